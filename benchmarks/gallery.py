@@ -12,17 +12,17 @@ from PIL import Image
 
 import ccfem
 from benchmarks.studies.confirmed_gain import LAYERS, posed
+from ccfem.base.errors import InputError
 from ccfem.cases import named_cases
 from ccfem.comparison.fibre_front import fibre_front
-from ccfem.errors import InputError
-from ccfem.layers.layer_stress import stress_on
-from ccfem.layers.slicing.planar import Planar
+from ccfem.comparison.plot.canvas import png
+from ccfem.comparison.plot.fields import tension_picture
+from ccfem.comparison.plot.part_picture import part_picture
+from ccfem.comparison.plot.paths import layer_picture
 from ccfem.machine.machine import Machine
-from ccfem.planning import plan
-from ccfem.plot.canvas import png
-from ccfem.plot.fields import tension_picture
-from ccfem.plot.part_picture import part_picture
-from ccfem.plot.paths import layer_picture
+from ccfem.paths.planning import plan
+from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create, named
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"

@@ -9,7 +9,7 @@ import importlib
 import numpy as np
 
 from ccfem.cases.designed import LAMINATE
-from ccfem.topopt import Compliance, Somp
+from ccfem.fem.topopt import Compliance, Somp
 
 PLATES = ("bridge", "suspension", "l_shape", "cantilever", "m_shape")
 

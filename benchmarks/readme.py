@@ -12,11 +12,11 @@ import tempfile
 from pathlib import Path
 
 from ccfem.cases import create_case
-from ccfem.elasticity import solve
-from ccfem.layers.layer_stress import stress_on
-from ccfem.layers.slicing.planar import Planar
-from ccfem.planning import plan
-from ccfem.plot.paths import layer_picture
+from ccfem.comparison.plot.paths import layer_picture
+from ccfem.fem.elasticity import solve
+from ccfem.paths.planning import plan
+from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -7,7 +7,7 @@ The data flow, in which each arrow is one function or one small callable object:
     TetMesh -> Problem -> StressField -> Layers -> Strategy -> Toolpaths -> Evaluation
 
 These functions are here, from ``ccfem.read`` to ``ccfem.compare``. The types of their arguments and
-results are in the subpackages: ``ccfem.strategies.Isocurve``, ``ccfem.elasticity.Force``.
+results are in the subpackages: ``ccfem.strategies.Isocurve``, ``ccfem.fem.elasticity.Force``.
 
 Examples
 --------
@@ -22,25 +22,26 @@ Examples
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from ccfem import display
+from ccfem.base import display
+from ccfem.base.moved import MOVED, find_moved
 
 if TYPE_CHECKING:
     from ccfem.cases.case import Case
+    from ccfem.cases.inspection.body_faces import faces
+    from ccfem.cases.inspection.part_check import check
     from ccfem.cases.reading import read
     from ccfem.comparison.engine import compare
     from ccfem.comparison.files import save
     from ccfem.comparison.result import Comparison
-    from ccfem.elasticity import Problem, solve
-    from ccfem.evaluation import evaluate
-    from ccfem.inspection.body_faces import faces
-    from ccfem.inspection.part_check import check
-    from ccfem.layers.slicing import slice
+    from ccfem.comparison.studies import Study, study
+    from ccfem.fem.elasticity import Problem, solve
+    from ccfem.judging.evaluation import evaluate
+    from ccfem.judging.virtual_testing import virtual_test
+    from ccfem.judging.virtual_testing.calibration import calibrate
     from ccfem.machine import Machine
     from ccfem.papers.reproduce import reproduce
-    from ccfem.planning import plan
-    from ccfem.studies import Study, study
-    from ccfem.virtual_testing import virtual_test
-    from ccfem.virtual_testing.calibration import calibrate
+    from ccfem.paths.planning import plan
+    from ccfem.slicing.slicers import slice
 
 __all__ = [
     "Case",
@@ -65,39 +66,38 @@ __all__ = [
 
 __version__: str
 
-display.drawn_by("ccfem.plot.values")
+find_moved()
+display.drawn_by("ccfem.comparison.plot.values")
 
 _HOMES = {
     "Case": "cases",
     "Comparison": "comparison",
     "Machine": "machine",
-    "Problem": "elasticity",
-    "Study": "studies",
-    "calibrate": "virtual_testing.calibration",
-    "check": "inspection",
+    "Problem": "fem.elasticity",
+    "Study": "comparison.studies",
+    "calibrate": "judging.virtual_testing.calibration",
+    "check": "cases.inspection",
     "compare": "comparison",
-    "evaluate": "evaluation",
-    "faces": "inspection",
-    "plan": "planning",
+    "evaluate": "judging.evaluation",
+    "faces": "cases.inspection",
+    "plan": "paths.planning",
     "read": "cases",
     "reproduce": "papers.reproduce",
     "save": "comparison",
-    "slice": "layers.slicing",
-    "solve": "elasticity",
-    "study": "studies",
-    "virtual_test": "virtual_testing",
+    "slice": "slicing.slicers",
+    "solve": "fem.elasticity",
+    "study": "comparison.studies",
+    "virtual_test": "judging.virtual_testing",
 }
 """Package of each name; it is imported when the name is first used."""
 
 _PACKAGES = frozenset(
     {
-        *("cases", "comparison", "elasticity", "errors", "evaluation", "export", "fields"),
-        *("geometry", "inspection", "io", "layers", "linking", "machine", "materials"),
-        *("mesh", "meshing", "planning", "plates", "plot", "progress", "raster", "strategies"),
-        *("studies", "tensor", "toolpaths", "topopt", "virtual_testing"),
+        *("base", "body", "cases", "comparison", "fem", "geometry", "judging", "machine"),
+        *("papers", "paths", "printing", "slicing", "strategies"),
     }
 )
-"""Packages and modules that are available without a separate import."""
+"""Wings, available without a separate import."""
 
 
 def __getattr__(name: str) -> Any:
@@ -105,7 +105,7 @@ def __getattr__(name: str) -> Any:
         return importlib.import_module("importlib.metadata").version("ccfem")
     if name in _HOMES:
         return getattr(importlib.import_module(f"ccfem.{_HOMES[name]}"), name)
-    if name in _PACKAGES:
+    if name in _PACKAGES or name in MOVED:
         return importlib.import_module(f"ccfem.{name}")
     raise AttributeError(f"module 'ccfem' has no attribute '{name}'")
 

@@ -22,13 +22,13 @@ from dataclasses import replace
 import numpy as np
 
 from ccfem.cases import create_case
-from ccfem.elasticity import solve
-from ccfem.evaluation import evaluate
-from ccfem.layers.slicing import Planar, Spatial
-from ccfem.planning import plan
+from ccfem.fem.elasticity import solve
+from ccfem.judging.evaluation import evaluate
+from ccfem.slicing.slicers import Planar, Spatial
+from ccfem.paths.planning import plan
 from ccfem.strategies import create
-from ccfem.virtual_testing import virtual_test
-from ccfem.winding.joint_loops import joint_loops
+from ccfem.judging.virtual_testing import virtual_test
+from ccfem.strategies.winding_curves.joint_loops import joint_loops
 
 case = create_case("lifting_eye", order=1)
 stress = solve(case.problem)["lift"]

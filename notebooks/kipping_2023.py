@@ -20,10 +20,10 @@ import numpy as np
 import shapely
 
 from ccfem.cases import create_case
-from ccfem.elasticity import solve
-from ccfem.planning import plan
+from ccfem.fem.elasticity import solve
+from ccfem.paths.planning import plan
 from ccfem.strategies import create
-from ccfem.support import support_columns
+from ccfem.printing.support import support_columns
 
 case = create_case("arm_bracket")
 stress = solve(case.problem)["lift"]

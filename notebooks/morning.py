@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import ClassVar
 
 import ccfem
-from ccfem.planning import Amount
+from ccfem.paths.planning import Amount
 
 folder = Path(tempfile.mkdtemp())
 (folder / "eye.toml").write_text("""

@@ -20,15 +20,15 @@
 import numpy as np
 
 from ccfem.papers.plocher_2022.plates import single_hole
-from ccfem.layers.layer_stress import stress_on
-from ccfem.evaluation import evaluate
+from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.judging.evaluation import evaluate
 from ccfem.papers.plocher_2022.fibre_map import fibre_map
-from ccfem.evaluation.plane_paths import plane_paths
+from ccfem.judging.evaluation.plane_paths import plane_paths
 from ccfem.papers.plocher_2022.plane_study import benchmark, laid_plate, print_seconds, reduced_stiffness
-from ccfem.evaluation.sensitivity import OffAxis
+from ccfem.judging.evaluation.sensitivity import OffAxis
 from ccfem.machine import Machine
-from ccfem.materials import named_material
-from ccfem.planning import plan
+from ccfem.fem.materials import named_material
+from ccfem.paths.planning import plan
 from ccfem.strategies import create
 
 plate = single_hole()

@@ -20,22 +20,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from ccfem.layers.layer_stress import stress_on
+from ccfem.slicing.layers.layer_stress import stress_on
 from ccfem.cases import create_case
 from ccfem.cases.bridge import bridge_plate
-from ccfem.elasticity import solve
-from ccfem.plates import solve_plane
-from ccfem.evaluation import evaluate
-from ccfem.evaluation.indices.matching import THRESHOLDS, matching_rate
-from ccfem.evaluation.plane_paths import plane_paths
-from ccfem.virtual_testing.equilibrium import BONDED
-from ccfem.virtual_testing.strand import RHO, Strand
-from ccfem.virtual_testing.virtual_test import virtual_test
-from ccfem.layers.slicing.planar import Planar
-from ccfem.planning import plan
+from ccfem.fem.elasticity import solve
+from ccfem.fem.plates import solve_plane
+from ccfem.judging.evaluation import evaluate
+from ccfem.judging.evaluation.indices.matching import THRESHOLDS, matching_rate
+from ccfem.judging.evaluation.plane_paths import plane_paths
+from ccfem.judging.virtual_testing.equilibrium import BONDED
+from ccfem.judging.virtual_testing.strand import RHO, Strand
+from ccfem.judging.virtual_testing.virtual_test import virtual_test
+from ccfem.slicing.slicers.planar import Planar
+from ccfem.paths.planning import plan
 from ccfem.strategies import create
-from ccfem.tensor import in_plane, largest_in_plane
-from ccfem.toolpaths import Toolpaths
+from ccfem.base.tensor import in_plane, largest_in_plane
+from ccfem.paths.toolpaths import Toolpaths
 
 plate = bridge_plate()
 full = solve_plane(plate.problem)["down"]

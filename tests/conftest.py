@@ -4,7 +4,7 @@ import os
 import numpy as np
 import pytest
 
-from ccfem.mesh import TetMesh
+from ccfem.body.mesh import TetMesh
 
 CUBE = np.array(
     [[0, 1, 3, 7], [0, 1, 7, 5], [0, 5, 7, 4], [0, 3, 2, 7], [0, 6, 4, 7], [0, 2, 6, 7]]

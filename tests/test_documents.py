@@ -17,9 +17,9 @@ import pandas as pd
 import pytest
 
 import ccfem
+from ccfem.base.errors import InputError
 from ccfem.cases.part_file import read_part
 from ccfem.comparison import engine, request
-from ccfem.errors import InputError
 from ccfem.strategies import named
 
 ROOT = Path(__file__).parents[1]
@@ -152,7 +152,7 @@ def test_a_slicer_of_a_notebook_works_as_printed(capsys):
 
 def test_adding_a_slicer_works_as_told(copy):
     folder, run = copy
-    (folder / "ccfem/layers/slicing/graded.py").write_text(blocks(CONTRIBUTING, "python")[2])
+    (folder / "ccfem/slicing/slicers/graded.py").write_text(blocks(CONTRIBUTING, "python")[2])
     listed, compared = re.findall(r"^ +(ccfem .*graded.*)$", CONTRIBUTING, flags=re.M)
     assert "Number of layers, at least 1." in run(listed)
     run(f"{compared} --natural --no-virtual-test --out results")
@@ -187,9 +187,9 @@ def test_adding_a_mesh_format_works_as_told(copy):
     (folder / name).write_text(block)
     program = folder / "both_ways.py"
     program.write_text(
-        "from ccfem.io import read_mesh, write_mesh\n"
-        "from ccfem.io.formats import suffixes\n"
-        "from ccfem.mesh import box_mesh\n"
+        "from ccfem.body.files import read_mesh, write_mesh\n"
+        "from ccfem.body.files.formats import suffixes\n"
+        "from ccfem.body.mesh import box_mesh\n"
         "mesh = box_mesh((2.0, 3.0, 4.0), (1, 1, 1))\n"
         "write_mesh(mesh, 'box.nodes')\n"
         "again = read_mesh('box.nodes')\n"

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 import ccfem
-from ccfem.errors import InputError
+from ccfem.base.errors import InputError
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +35,7 @@ def test_importing_loads_nothing_heavy():
 
 def test_strategies_and_slicers_by_their_class():
     assert ccfem.strategies.StreamFunction(coverage=0.3).coverage == 0.3
-    assert ccfem.layers.slicing.Planar(count=3).count == 3
+    assert ccfem.slicing.slicers.Planar(count=3).count == 3
     with pytest.raises(AttributeError):
         _ = ccfem.strategies.Isokurve
 

@@ -16,10 +16,10 @@ from ccfem.cases.part_keys import Part
 from ccfem.cases.part_loads import LOADS, SUPPORTS
 from ccfem.cases.part_tables import RULES
 from ccfem.cli.commands import app
-from ccfem.evaluation import COLUMNS
+from ccfem.judging.evaluation import COLUMNS
+from ccfem.judging.virtual_testing.force_displacement import read_curve
 from ccfem.machine import Machine, machine_from
 from ccfem.papers.reproduce import named_papers
-from ccfem.virtual_testing.force_displacement import read_curve
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted((ROOT / "docs").rglob("*.md"))

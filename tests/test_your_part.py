@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import ccfem
-from ccfem.isolated.process import ChildError, in_own_process
-from ccfem.meshing import mesh_body, read_cad
+from ccfem.body.isolated.process import ChildError, in_own_process
+from ccfem.body.meshing import mesh_body, read_cad
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "how_to" / "your_part.md").read_text()
@@ -90,7 +90,7 @@ def test_surfaces_are_meshed_the_same_every_time(parts, monkeypatch):
 
 
 def test_the_volume_of_the_hook_is_that_of_its_surface(parts):
-    from ccfem.io import read_surface
+    from ccfem.body.files import read_surface
 
     mesh, (about,) = mesh_body(parts / "crane_hook.stl", 4.0)
     surface = read_surface(parts / "crane_hook.stl")
@@ -118,13 +118,13 @@ def test_faces_of_a_cad_file_are_numbered_as_listed(parts):
 def test_a_file_that_is_no_cad_file_is_one_line(parts, tmp_path):
     path = tmp_path / "junk.step"
     path.write_text("ISO-10303-21;\nnothing\n")
-    with pytest.raises(ccfem.errors.InputError, match="export it again") as caught:
+    with pytest.raises(ccfem.base.errors.InputError, match="export it again") as caught:
         mesh_body(path, 2.0)
     assert "\n" not in str(caught.value)
 
 
 def test_a_surface_that_gmsh_cannot_fill_stops_in_its_own_process(parts):
-    with pytest.raises((ChildError, ccfem.errors.InputError)):
+    with pytest.raises((ChildError, ccfem.base.errors.InputError)):
         in_own_process(
             "gmsh_meshing:cad_volume", seconds=60.0, path="/none.step", size=1.0, scale=1.0
         )

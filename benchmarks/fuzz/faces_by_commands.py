@@ -16,12 +16,12 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray, IntArray
-from ccfem.elasticity import solve
-from ccfem.inspection import check, faces
-from ccfem.io import read_surface, write_mesh
-from ccfem.mesh.face_places import BodyFaces
-from ccfem.meshing import extrude, faces_of_body, mesh_body
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.body.files import read_surface, write_mesh
+from ccfem.body.mesh.face_places import BodyFaces
+from ccfem.body.meshing import extrude, faces_of_body, mesh_body
+from ccfem.cases.inspection import check, faces
+from ccfem.fem.elasticity import solve
 
 __all__ = ["bodies", "differences", "plate_of_holes"]
 

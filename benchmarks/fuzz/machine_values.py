@@ -17,16 +17,16 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.fuzz.__main__ import verdict
+from ccfem.base.errors import InputError
+from ccfem.body.mesh import box_mesh
 from ccfem.cases.case import Case
 from ccfem.comparison.engine import compare
-from ccfem.elasticity import Force, Problem, Support
-from ccfem.errors import InputError
-from ccfem.export.gcode import gcode
-from ccfem.layers.slicing.planar import Planar
+from ccfem.fem.elasticity import Force, Problem, Support
+from ccfem.fem.materials import isotropic
 from ccfem.machine import Machine, machine_from
 from ccfem.machine.ranges import RANGES
-from ccfem.materials import isotropic
-from ccfem.mesh import box_mesh
+from ccfem.printing.export.gcode import gcode
+from ccfem.slicing.slicers.planar import Planar
 
 __all__ = ["print_bar", "tables"]
 

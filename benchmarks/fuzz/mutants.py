@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ccfem.io import write_mesh
-from ccfem.mesh import box_mesh
+from ccfem.body.files import write_mesh
+from ccfem.body.mesh import box_mesh
 
 __all__ = ["MESH", "SIZES", "frd", "good_files", "mutants", "part_of_sizes"]
 

@@ -22,7 +22,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from benchmarks.fuzz.__main__ import verdict
-from ccfem.errors import InputError
+from ccfem.base.errors import InputError
 
 __all__ = ["COMMANDS", "MINE", "damage", "ended_process", "entries", "odd_folder", "prepare", "see"]
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from benchmarks.fuzz.__main__ import verdict
 from benchmarks.fuzz.odd_shapes import odd_grids, odd_shells
-from ccfem.errors import InputError
-from ccfem.inspection import check
+from ccfem.base.errors import InputError
+from ccfem.cases.inspection import check
 
 __all__ = ["odd_parts", "see"]
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, Delaunay
 
-from ccfem.mesh import box_mesh
+from ccfem.body.mesh import box_mesh
 
 __all__ = ["odd_grids", "odd_shells"]
 

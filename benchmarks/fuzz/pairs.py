@@ -19,24 +19,24 @@ import numpy as np
 import shapely
 
 from benchmarks.fuzz.__main__ import verdict
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.patches import Cylinder, patches_from_rules
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.meshing import extrude
 from ccfem.cases.case import Case
 from ccfem.comparison.engine import compare
 from ccfem.comparison.files import write_results
 from ccfem.comparison.request import DEFAULT_STRAND
 from ccfem.comparison.result import Comparison
-from ccfem.elasticity import Force, Problem, Support
-from ccfem.errors import InputError
-from ccfem.layers.level_surfaces import level_surfaces
-from ccfem.layers.slicer import Slicer
-from ccfem.layers.slicing import LoadOriented, Planar, Spatial, Surfaces, named
+from ccfem.fem.elasticity import Force, Problem, Support
+from ccfem.fem.materials import isotropic
+from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.machine import Machine
-from ccfem.materials import isotropic
-from ccfem.mesh.patches import Cylinder, patches_from_rules
-from ccfem.mesh.tet_mesh import TetMesh
-from ccfem.meshing import extrude
+from ccfem.slicing.layers.level_surfaces import level_surfaces
+from ccfem.slicing.layers.slicer import Slicer
+from ccfem.slicing.slicers import LoadOriented, Planar, Spatial, Surfaces, named
 from ccfem.strategies import named as strategies
-from ccfem.virtual_testing.strand import Strand
 
 __all__ = ["bent_link", "see", "slicings", "write_surfaces"]
 

@@ -15,7 +15,7 @@ from benchmarks.print_checks.all_checks import CHECKS
 from benchmarks.print_checks.filling import fullness
 from benchmarks.print_checks.motion import free_fibre
 from benchmarks.print_checks.parts import PARTS, Part, job_of
-from ccfem.errors import InputError
+from ccfem.base.errors import InputError
 from ccfem.machine import machine_names
 
 

@@ -8,20 +8,20 @@ import numpy as np
 
 from benchmarks.print_checks.job import Job
 from benchmarks.print_checks.sections import Sections
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases import Case, create_case
+from ccfem.cases.inspection.beginning import examples
 from ccfem.cases.part_file import read_part
-from ccfem.elasticity import solve
-from ccfem.elasticity.part_stress import PartStress
-from ccfem.export.gcode import gcode
-from ccfem.inspection.beginning import examples
-from ccfem.layers.layer import Layer
-from ccfem.layers.plane import plane_frame
+from ccfem.fem.elasticity import solve
+from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.machine import machine_table, updated
-from ccfem.mesh.tet_mesh import TetMesh
-from ccfem.planning import plan
+from ccfem.paths.planning import plan
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.printing.export.gcode import gcode
 from ccfem.printing.print_plan import plan_print
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.plane import plane_frame
 from ccfem.strategies import create
-from ccfem.toolpaths import Toolpaths
 
 __all__ = ["PARTS", "Part", "job_of", "on_bed"]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pyvista
 import shapely
 
-from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.body.mesh.tet_mesh import TetMesh
 
 __all__ = ["Sections"]
 

@@ -23,14 +23,14 @@ from time import perf_counter, process_time
 import numpy as np
 import typer
 
-from ccfem.elasticity.assembly import assemble, pattern
-from ccfem.elasticity.held import Held
-from ccfem.elasticity.problem import Problem
-from ccfem.elasticity.system import System
-from ccfem.io import read_mesh
-from ccfem.materials import isotropic
-from ccfem.mesh import TetMesh
-from ccfem.mesh.box import box_mesh
+from ccfem.body.files import read_mesh
+from ccfem.body.mesh import TetMesh
+from ccfem.body.mesh.box import box_mesh
+from ccfem.fem.elasticity.assembly import assemble, pattern
+from ccfem.fem.elasticity.held import Held
+from ccfem.fem.elasticity.problem import Problem
+from ccfem.fem.elasticity.system import System
+from ccfem.fem.materials import isotropic
 
 MATERIAL = (3500.0, 0.35)
 

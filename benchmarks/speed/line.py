@@ -47,9 +47,9 @@ def authors_loop() -> object:
 def timed(load: Callable[[], object]) -> dict[str, float]:
     """Seconds of each stage of one run, and of the whole."""
     from ccfem.cases.case import Case
-    from ccfem.elasticity import solve
-    from ccfem.layers.slicing.planar import Planar
-    from ccfem.planning import plan
+    from ccfem.fem.elasticity import solve
+    from ccfem.paths.planning import plan
+    from ccfem.slicing.slicers.planar import Planar
     from ccfem.strategies.isocurve import Isocurve
 
     marks = [time.perf_counter()]

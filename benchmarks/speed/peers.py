@@ -28,10 +28,10 @@ import numpy as np  # noqa: E402
 import typer  # noqa: E402
 from elasticity import BOXES, MATERIAL, Run, ends, forces_on, ours, part  # noqa: E402
 
-from ccfem.elasticity.assembly import assemble  # noqa: E402
-from ccfem.materials import isotropic  # noqa: E402
-from ccfem.mesh import TetMesh  # noqa: E402
-from ccfem.mesh.box import box_mesh  # noqa: E402
+from ccfem.body.mesh import TetMesh  # noqa: E402
+from ccfem.body.mesh.box import box_mesh  # noqa: E402
+from ccfem.fem.elasticity.assembly import assemble  # noqa: E402
+from ccfem.fem.materials import isotropic  # noqa: E402
 
 HERE = Path(__file__).parent
 SYSTEM = "/usr/bin/python3"

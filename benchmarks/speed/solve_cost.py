@@ -1,4 +1,4 @@
-"""Measure what `ccfem.inspection.cost` estimates: CPU seconds and memory of a solve by its size.
+"""Measure what `inspection.cost` estimates: CPU seconds and memory of a solve by its size.
 
 Run ``python benchmarks/speed/solve_cost.py``; one line a size, each in a process of its own.
 """
@@ -8,9 +8,9 @@ import subprocess
 import sys
 import time
 
-from ccfem.elasticity import Force, Problem, Support, solve
-from ccfem.materials import named_material
-from ccfem.mesh import box_mesh
+from ccfem.body.mesh import box_mesh
+from ccfem.fem.elasticity import Force, Problem, Support, solve
+from ccfem.fem.materials import named_material
 
 SIZES = ((1, 30, 12), (1, 60, 24), (2, 24, 10), (2, 45, 18))
 """Order of the cells, cells along the box, cells across."""

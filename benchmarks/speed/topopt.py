@@ -18,15 +18,15 @@ from typing import Any
 import numpy as np
 import typer
 
-from ccfem.arrays import IntArray
+from ccfem.base.arrays import IntArray
+from ccfem.body.mesh.box import box_mesh
+from ccfem.body.mesh.patches import Box, patches_from_rules
 from ccfem.cases.bracket import bracket_design
-from ccfem.elasticity import Force, PointForce, Problem, Support
-from ccfem.materials import isotropic, plane_stress
-from ccfem.mesh.box import box_mesh
-from ccfem.mesh.patches import Box, patches_from_rules
+from ccfem.fem.elasticity import Force, PointForce, Problem, Support
+from ccfem.fem.materials import isotropic, plane_stress
+from ccfem.fem.plates import PlaneProblem, raster_mesh
+from ccfem.fem.topopt import Simp, Somp, as_problem
 from ccfem.papers.plocher_2022.three_point_bending import three_point_bending
-from ccfem.plates import PlaneProblem, raster_mesh
-from ccfem.topopt import Simp, Somp, as_problem
 
 UNIT = plane_stress(1.0, 1.0, 0.3, 1.0 / 2.6)
 WANG = plane_stress(18300.0, 19800.0, 0.17, 5150.0)

@@ -18,21 +18,21 @@ import numpy as np
 import shapely
 
 from benchmarks.studies.table import print_table
+from ccfem.body.mesh.patches import Box, Cylinder, PatchRule, Plane, patches_from_rules
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.meshing import extrude
 from ccfem.cases.loop import loop_mesh
-from ccfem.elasticity.problem import Force, Problem, Support
-from ccfem.elasticity.solve import solve
-from ccfem.fibre_aware.upper_bound import upper_bound
-from ccfem.layers.slicing.planar import Planar
+from ccfem.fem.elasticity.problem import Force, Problem, Support
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.materials import printed_pla
+from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine.machine import Machine
-from ccfem.materials import printed_pla
-from ccfem.mesh.patches import Box, Cylinder, PatchRule, Plane, patches_from_rules
-from ccfem.mesh.tet_mesh import TetMesh
-from ccfem.meshing import extrude
-from ccfem.planning.equal_fibre import plan_to_length
-from ccfem.planning.whole_part import full_length
+from ccfem.paths.planning.equal_fibre import plan_to_length
+from ccfem.paths.planning.whole_part import full_length
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
-from ccfem.virtual_testing.specimen import Specimen
-from ccfem.virtual_testing.virtual_test import virtual_test
+from ccfem.strategies.fibre_aware.upper_bound import upper_bound
 
 __all__ = ["COVERAGE", "LAYERS", "PARTS", "compared", "posed"]
 

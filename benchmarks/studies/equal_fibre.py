@@ -19,17 +19,17 @@ from typing import Any
 
 import numpy as np
 
-from ccfem.arrays import BoolArray
+from ccfem.base.arrays import BoolArray
+from ccfem.base.errors import InputError
 from ccfem.cases import create_case
 from ccfem.cases.case import Case
-from ccfem.elasticity import solve
-from ccfem.elasticity.stress_field import StressField
-from ccfem.errors import InputError
-from ccfem.layers.layer import Layer
-from ccfem.layers.slicing.planar import Planar
-from ccfem.planning.equal_fibre import TOLERANCE, Planned, extremes, plan_to_length
-from ccfem.planning.mixing import layer_lengths
-from ccfem.planning.strategy import LengthStrategy
+from ccfem.fem.elasticity import solve
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.paths.planning.equal_fibre import TOLERANCE, Planned, extremes, plan_to_length
+from ccfem.paths.planning.mixing import layer_lengths
+from ccfem.paths.planning.strategy import LengthStrategy
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create, named
 
 __all__ = ["PARTS", "Reach", "Reached", "reach", "reached", "targets"]

@@ -10,12 +10,12 @@ import sys
 from dataclasses import replace
 
 from ccfem.cases import create_case
-from ccfem.elasticity.solve import solve
-from ccfem.layers.slicing import as_slicer
+from ccfem.fem.elasticity.solve import solve
 from ccfem.machine import Kinematics
+from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.curved_plan import curved_plan
-from ccfem.support import slice_with_support
-from ccfem.toolpaths import Toolpaths
+from ccfem.printing.support import slice_with_support
+from ccfem.slicing.slicers import as_slicer
 
 __all__ = ["row"]
 

@@ -15,15 +15,15 @@ from typing import Any
 import numpy as np
 
 from ccfem.cases import create_case
-from ccfem.elasticity import solve
-from ccfem.elasticity.stress_field import StressField
-from ccfem.layers import Layer
+from ccfem.fem.elasticity import solve
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.strength import first_failure
+from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine
-from ccfem.planning.equal_fibre import plan_to_length
+from ccfem.paths.planning.equal_fibre import plan_to_length
+from ccfem.slicing.layers import Layer
 from ccfem.strategies.isocurve import Isocurve
-from ccfem.virtual_testing.specimen import Specimen
-from ccfem.virtual_testing.strength import first_failure
-from ccfem.virtual_testing.virtual_test import virtual_test
 
 FIBRE_PER_LAYER = {"loop": 2600.0, "bar": 380.0, "open_hole": 4500.0}
 """Fibre, mm a layer: somewhat less than the natural length of the defaults."""

@@ -13,15 +13,15 @@ from pathlib import Path
 
 from benchmarks.studies.confirmed_gain import COVERAGE, LAYERS, PARTS, posed
 from benchmarks.studies.table import print_table
-from ccfem.elasticity.solve import solve
-from ccfem.fibre_aware.upper_bound import upper_bound
-from ccfem.layers.slicing.planar import Planar
+from ccfem.fem.elasticity.solve import solve
+from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine.machine import Machine
-from ccfem.planning.equal_fibre import plan_to_length
-from ccfem.planning.whole_part import full_length
+from ccfem.paths.planning.equal_fibre import plan_to_length
+from ccfem.paths.planning.whole_part import full_length
+from ccfem.slicing.slicers.planar import Planar
+from ccfem.strategies.fibre_aware.upper_bound import upper_bound
 from ccfem.strategies.stream_function import StreamFunction
-from ccfem.virtual_testing.strand import Strand
-from ccfem.virtual_testing.virtual_test import virtual_test
 
 __all__ = ["NARROWER", "shares"]
 

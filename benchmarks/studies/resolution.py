@@ -19,7 +19,10 @@ import numpy as np
 import shapely
 from shapely.affinity import rotate
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
+from ccfem.body.mesh.patches import Cylinder, PatchRule, Plane, patches_from_rules
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.meshing import extrude
 from ccfem.cases.bar import bar_outline
 from ccfem.cases.bracket import HOLE_RADIUS, HOLES, bracket_outline
 from ccfem.cases.case import Case, pulled
@@ -27,14 +30,11 @@ from ccfem.cases.loop import HOLE, loop_outline
 from ccfem.cases.loop import HOLE_RADIUS as EYE
 from ccfem.cases.open_hole import open_hole_outline
 from ccfem.comparison import compare
-from ccfem.elasticity import Bearing, Problem, Support, solve
-from ccfem.materials import printed_pla
-from ccfem.mesh.patches import Cylinder, PatchRule, Plane, patches_from_rules
-from ccfem.mesh.tet_mesh import TetMesh
-from ccfem.meshing import extrude
-from ccfem.virtual_testing.specimen import Specimen
-from ccfem.virtual_testing.strands import cut_strands
-from ccfem.virtual_testing.virtual_test import virtual_bracket
+from ccfem.fem.elasticity import Bearing, Problem, Support, solve
+from ccfem.fem.materials import printed_pla
+from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.strands import cut_strands
+from ccfem.judging.virtual_testing.virtual_test import virtual_bracket
 
 __all__ = ["PARTS", "Part", "changes", "meshed", "ratios"]
 

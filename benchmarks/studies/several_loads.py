@@ -18,15 +18,15 @@ import numpy as np
 
 from benchmarks.studies.table import print_table
 from ccfem.cases.named import create_case
-from ccfem.elasticity.solve import solve
-from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.fibre_aware.plan_cases import plan_cases
-from ccfem.fibre_aware.upper_bound import upper_bound
-from ccfem.planning.equal_fibre import plan_to_length
-from ccfem.planning.whole_part import full_length
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.judging.virtual_testing.several_cases import cases_failure, virtual_tests
+from ccfem.paths.planning.equal_fibre import plan_to_length
+from ccfem.paths.planning.whole_part import full_length
+from ccfem.strategies.fibre_aware.plan_cases import plan_cases
+from ccfem.strategies.fibre_aware.upper_bound import upper_bound
 from ccfem.strategies.isocurve import Isocurve
 from ccfem.strategies.stream_function import StreamFunction
-from ccfem.virtual_testing.several_cases import cases_failure, virtual_tests
 
 __all__ = ["PARTS", "compared"]
 

@@ -17,29 +17,29 @@ import shapely
 
 import ccfem
 from benchmarks.studies import confirmed_gain
-from ccfem.arrays import FloatArray
-from ccfem.elasticity.stress_field import StressField, solved
-from ccfem.fibre_aware.cut_and_move import prune_and_move
-from ccfem.fibre_aware.heights import nearest_layer
-from ccfem.fibre_aware.prune import prune
-from ccfem.fibre_aware.smeared import SmearedPart
-from ccfem.fibre_aware.stream_design import SLACK, StreamProblem, design
-from ccfem.fibre_aware.stream_paths import CLEARANCE, SHORTEST
-from ccfem.fibre_aware.stream_start import field_along, start_fields
-from ccfem.fibre_aware.upper_bound import UpperBound, upper_bound
-from ccfem.fields.tensile import Tension
-from ccfem.layers.layer import Layer
-from ccfem.layers.slicing.planar import Planar
-from ccfem.linking.clearance import trim_to_clearance
-from ccfem.linking.finishing import keep_off_border
+from ccfem.base.arrays import FloatArray
+from ccfem.base.tensor import largest_in_plane
+from ccfem.fem.elasticity.stress_field import StressField, solved
+from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine.machine import Machine
 from ccfem.papers.chen_2021.loop import authors_loop
-from ccfem.planning.whole_part import full_length
+from ccfem.paths.fields.tensile import Tension
+from ccfem.paths.linking.clearance import trim_to_clearance
+from ccfem.paths.linking.finishing import keep_off_border
+from ccfem.paths.planning.whole_part import full_length
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.slicers.planar import Planar
+from ccfem.strategies.fibre_aware.cut_and_move import prune_and_move
+from ccfem.strategies.fibre_aware.heights import nearest_layer
+from ccfem.strategies.fibre_aware.prune import prune
+from ccfem.strategies.fibre_aware.smeared import SmearedPart
+from ccfem.strategies.fibre_aware.stream_design import SLACK, StreamProblem, design
+from ccfem.strategies.fibre_aware.stream_paths import CLEARANCE, SHORTEST
+from ccfem.strategies.fibre_aware.stream_start import field_along, start_fields
+from ccfem.strategies.fibre_aware.upper_bound import UpperBound, upper_bound
 from ccfem.strategies.stream_function import StreamFunction
-from ccfem.tensor import largest_in_plane
-from ccfem.toolpaths import Toolpaths
-from ccfem.virtual_testing.strand import Strand
-from ccfem.virtual_testing.virtual_test import virtual_test
 
 __all__ = ["along_one_direction", "losses", "posed", "share_inside", "tension_of"]
 

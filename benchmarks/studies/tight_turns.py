@@ -13,16 +13,16 @@ from typing import get_args, get_type_hints
 
 from benchmarks.studies.confirmed_gain import LAYERS, PARTS, posed
 from benchmarks.studies.table import print_table
+from ccfem.base.errors import InputError
 from ccfem.cases.named import create_case
-from ccfem.elasticity.solve import solve
-from ccfem.elasticity.stress_field import StressField
-from ccfem.errors import InputError
-from ccfem.evaluation import evaluate
-from ccfem.layers.slicing.planar import Planar
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.judging.evaluation import evaluate
+from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine.machine import Machine
-from ccfem.planning import plan
+from ccfem.paths.planning import plan
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create, named
-from ccfem.virtual_testing.virtual_test import virtual_test
 
 __all__ = ["NAMES", "VALUES", "measured"]
 

@@ -3,15 +3,15 @@
 import numpy as np
 import shapely
 
+from ccfem.body.mesh.patches import Cylinder
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases.case import Case
 from ccfem.cases.crossed import arc, crossed_mesh
 from ccfem.cases.stored import mesh_of_case
-from ccfem.elasticity.problem import Bearing, Order, Problem, Support
-from ccfem.layers.slicing.load_oriented import LoadOriented
+from ccfem.fem.elasticity.problem import Bearing, Order, Problem, Support
+from ccfem.fem.materials import printed_pla
 from ccfem.machine.machine import Machine
-from ccfem.materials import printed_pla
-from ccfem.mesh.patches import Cylinder
-from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.slicing.slicers.load_oriented import LoadOriented
 
 __all__ = ["arm_bracket", "arm_bracket_mesh", "arm_bracket_outlines"]
 

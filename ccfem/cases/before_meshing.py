@@ -6,18 +6,18 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ccfem.elasticity.body import LoadedBody
-from ccfem.elasticity.load_kinds import Load, PointForce, SurfaceLoad, patches_in_use
-from ccfem.elasticity.loads import nodal_forces
-from ccfem.elasticity.support_kinds import AnySupport
-from ccfem.elasticity.supports import held
-from ccfem.errors import Mistakes
-from ccfem.io.surface import Surface
-from ccfem.mesh.cell_mesh import CellMesh
-from ccfem.mesh.face_names import face_name
-from ccfem.mesh.patches import PatchRule, patches_from_rules
-from ccfem.mesh.shell import Shell, refined
-from ccfem.mesh.smooth_faces import FEATURE_ANGLE, smooth_faces
+from ccfem.base.errors import Mistakes
+from ccfem.body.files.surface import Surface
+from ccfem.body.mesh.cell_mesh import CellMesh
+from ccfem.body.mesh.face_names import face_name
+from ccfem.body.mesh.patches import PatchRule, patches_from_rules
+from ccfem.body.mesh.shell import Shell, refined
+from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE, smooth_faces
+from ccfem.fem.elasticity.body import LoadedBody
+from ccfem.fem.elasticity.load_kinds import Load, PointForce, SurfaceLoad, patches_in_use
+from ccfem.fem.elasticity.loads import nodal_forces
+from ccfem.fem.elasticity.support_kinds import AnySupport
+from ccfem.fem.elasticity.supports import held
 
 __all__ = ["check_before_meshing"]
 

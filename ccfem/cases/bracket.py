@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from ccfem.arrays import BoolArray
+from ccfem.base.arrays import BoolArray
+from ccfem.base.progress import Progress, silent
+from ccfem.body.mesh.patches import Cylinder, patches_from_rules
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.meshing import extrude
 from ccfem.cases.case import Case
 from ccfem.cases.stored import mesh_of_case
-from ccfem.elasticity.problem import Bearing, Force, Order, Problem, Support
-from ccfem.materials import printed_pla
-from ccfem.mesh.patches import Cylinder, patches_from_rules
-from ccfem.mesh.tet_mesh import TetMesh
-from ccfem.meshing import extrude
-from ccfem.progress import Progress, silent
-from ccfem.topopt import Design, as_problem
-from ccfem.topopt.solid_design import solid_design
+from ccfem.fem.elasticity.problem import Bearing, Force, Order, Problem, Support
+from ccfem.fem.materials import printed_pla
+from ccfem.fem.topopt import Design, as_problem
+from ccfem.fem.topopt.solid_design import solid_design
 
 __all__ = ["bracket", "bracket_design", "bracket_domain", "bracket_mesh", "bracket_outline"]
 

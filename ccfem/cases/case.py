@@ -5,21 +5,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ccfem.arrays import freeze
-from ccfem.checks import check_known, check_number
-from ccfem.display import Shown
-from ccfem.elasticity.part_stress import PartStress
-from ccfem.elasticity.problem import Force, Order, Problem, Support
-from ccfem.elasticity.support_kinds import AnySupport
-from ccfem.errors import Mistakes, shown
-from ccfem.layers.layer import Layer
-from ccfem.layers.slicer import Slicer
-from ccfem.layers.slicing.planar import Planar
+from ccfem.base.arrays import freeze
+from ccfem.base.checks import check_known, check_number
+from ccfem.base.display import Shown
+from ccfem.base.errors import Mistakes, shown
+from ccfem.body.mesh.face_places import BodyFaces
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.fem.elasticity.problem import Force, Order, Problem, Support
+from ccfem.fem.elasticity.support_kinds import AnySupport
+from ccfem.fem.materials import printed_pla
 from ccfem.machine.machine import Machine
-from ccfem.materials import printed_pla
-from ccfem.mesh.face_places import BodyFaces
-from ccfem.mesh.tet_mesh import TetMesh
-from ccfem.placement.fibre_places import FibrePlaces
+from ccfem.paths.placement.fibre_places import FibrePlaces
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.slicer import Slicer
+from ccfem.slicing.slicers.planar import Planar
 
 __all__ = ["Case", "check_name", "pulled"]
 

@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from ccfem.arrays import BoolArray
+from ccfem.base.arrays import BoolArray
+from ccfem.base.progress import Progress, silent
+from ccfem.body.mesh.patches import Cylinder
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases.case import Case
 from ccfem.cases.crossed import crossed_mesh
 from ccfem.cases.stored import mesh_of_case
-from ccfem.elasticity.problem import Bearing, Order, Problem, Support
-from ccfem.layers.slicing.load_oriented import LoadOriented
+from ccfem.fem.elasticity.problem import Bearing, Order, Problem, Support
+from ccfem.fem.materials import printed_pla
+from ccfem.fem.topopt import Design, as_problem
+from ccfem.fem.topopt.solid_design import solid_design
 from ccfem.machine.machine import Machine
-from ccfem.materials import printed_pla
-from ccfem.mesh.patches import Cylinder
-from ccfem.mesh.tet_mesh import TetMesh
-from ccfem.progress import Progress, silent
-from ccfem.topopt import Design, as_problem
-from ccfem.topopt.solid_design import solid_design
+from ccfem.slicing.slicers.load_oriented import LoadOriented
 
 __all__ = [
     "corner_bracket",

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
-from ccfem.io.surface import write_stl
-from ccfem.mesh.check import check_mesh
-from ccfem.mesh.patches import PatchRule, patches_from_rules
-from ccfem.mesh.tet_mesh import TetMesh
-from ccfem.meshing import extrude
+from ccfem.base.arrays import FloatArray
+from ccfem.body.files.surface import write_stl
+from ccfem.body.mesh.check import check_mesh
+from ccfem.body.mesh.patches import PatchRule, patches_from_rules
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.meshing import extrude
 
 __all__ = ["arc", "crossed_mesh"]
 

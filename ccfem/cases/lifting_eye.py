@@ -3,14 +3,14 @@
 import numpy as np
 import shapely
 
+from ccfem.body.mesh.patches import Cylinder
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases.case import Case
 from ccfem.cases.crossed import arc, crossed_mesh
 from ccfem.cases.stored import mesh_of_case
-from ccfem.elasticity.problem import Bearing, Order, Problem, Support
-from ccfem.layers.slicing.spatial import Spatial
-from ccfem.materials import printed_pla
-from ccfem.mesh.patches import Cylinder
-from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.fem.elasticity.problem import Bearing, Order, Problem, Support
+from ccfem.fem.materials import printed_pla
+from ccfem.slicing.slicers.spatial import Spatial
 
 __all__ = ["lifting_eye", "lifting_eye_front", "lifting_eye_mesh", "lifting_eye_top"]
 

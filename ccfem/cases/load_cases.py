@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping
 
+from ccfem.base.errors import InputError
 from ccfem.cases.case import Case
-from ccfem.elasticity.stress_field import StressField
-from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.errors import InputError
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.elasticity.weighted_cases import WeightedCases
 
 __all__ = ["ALL_CASES", "asks_for_all", "weighted_cases"]
 

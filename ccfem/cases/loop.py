@@ -3,13 +3,13 @@
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
+from ccfem.body.mesh.patches import Cylinder, patches_from_rules
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.meshing import extrude
 from ccfem.cases.case import Case, pulled
 from ccfem.cases.stored import mesh_of_case
-from ccfem.elasticity.problem import Order
-from ccfem.mesh.patches import Cylinder, patches_from_rules
-from ccfem.mesh.tet_mesh import TetMesh
-from ccfem.meshing import extrude
+from ccfem.fem.elasticity.problem import Order
 
 __all__ = ["loop", "loop_mesh", "loop_outline"]
 

@@ -5,7 +5,7 @@ import pkgutil
 from collections.abc import Callable, Mapping
 from typing import Any, get_type_hints
 
-from ccfem import plugins
+from ccfem.base import plugins
 from ccfem.cases.case import Case
 
 __all__ = ["create_case", "named_cases"]

@@ -2,13 +2,13 @@
 
 import shapely
 
+from ccfem.body.mesh.patches import Cylinder, PatchRule, Plane, patches_from_rules
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.meshing import extrude
 from ccfem.cases.case import Case, pulled
 from ccfem.cases.stored import mesh_of_case
-from ccfem.elasticity.problem import Order
-from ccfem.layers.slicing.planar import Planar
-from ccfem.mesh.patches import Cylinder, PatchRule, Plane, patches_from_rules
-from ccfem.mesh.tet_mesh import TetMesh
-from ccfem.meshing import extrude
+from ccfem.fem.elasticity.problem import Order
+from ccfem.slicing.slicers.planar import Planar
 
 __all__ = ["open_hole", "open_hole_mesh", "open_hole_outline"]
 

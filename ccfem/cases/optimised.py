@@ -8,19 +8,19 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
-from ccfem.arrays import FloatArray, in_brief
+from ccfem.base.arrays import FloatArray, in_brief
+from ccfem.base.checks import check_known, check_number
+from ccfem.base.errors import InputError
+from ccfem.base.progress import Progress, silent
 from ccfem.cases.case import Case
 from ccfem.cases.designed import LAMINATE
 from ccfem.cases.passive import Place, area_of, cells_in, check_places
-from ccfem.checks import check_known, check_number
-from ccfem.elasticity.load_kinds import patches_in_use
-from ccfem.elasticity.problem import Problem
-from ccfem.errors import InputError
-from ccfem.materials import plane_stress
-from ccfem.progress import Progress, silent
-from ccfem.topopt import Design, Simp, Somp, as_problem
-from ccfem.topopt.flat_part import FlatPart, flat_part
-from ccfem.topopt.sheet_part import plane_stiffness, sheet_outline, sheet_part, sheet_problem
+from ccfem.fem.elasticity.load_kinds import patches_in_use
+from ccfem.fem.elasticity.problem import Problem
+from ccfem.fem.materials import plane_stress
+from ccfem.fem.topopt import Design, Simp, Somp, as_problem
+from ccfem.fem.topopt.flat_part import FlatPart, flat_part
+from ccfem.fem.topopt.sheet_part import plane_stiffness, sheet_outline, sheet_part, sheet_problem
 
 __all__ = ["Optimised", "optimise"]
 

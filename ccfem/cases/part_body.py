@@ -7,19 +7,19 @@ from typing import Any
 
 import shapely
 
-from ccfem.checks import check_number
-from ccfem.elasticity.problem import Order
-from ccfem.errors import InputError, Mistakes
-from ccfem.io import Surface, read_mesh
-from ccfem.io.toml import from_table
-from ccfem.io.whole import existing_file
-from ccfem.mesh.check import check_mesh
-from ccfem.mesh.face_places import BodyFaces
-from ccfem.mesh.face_rules import numbered_faces
-from ccfem.mesh.smooth_faces import FEATURE_ANGLE
-from ccfem.mesh.tet_mesh import TetMesh
-from ccfem.meshing import extrude, faces_of_body, mesh_body
-from ccfem.meshing.volume import Mesher
+from ccfem.base.checks import check_number
+from ccfem.base.errors import InputError, Mistakes
+from ccfem.base.toml import from_table
+from ccfem.base.whole import existing_file
+from ccfem.body.files import Surface, read_mesh
+from ccfem.body.mesh.check import check_mesh
+from ccfem.body.mesh.face_places import BodyFaces
+from ccfem.body.mesh.face_rules import numbered_faces
+from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.meshing import extrude, faces_of_body, mesh_body
+from ccfem.body.meshing.volume import Mesher
+from ccfem.fem.elasticity.problem import Order
 
 __all__ = ["Body"]
 

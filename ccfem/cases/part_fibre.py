@@ -5,13 +5,13 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from ccfem.base.errors import InputError, Mistakes, shown
+from ccfem.base.toml import from_table
+from ccfem.base.whole import existing_file
+from ccfem.body.files.surface import read_surface
 from ccfem.cases.part_tables import named_table
-from ccfem.errors import InputError, Mistakes, shown
-from ccfem.io.surface import read_surface
-from ccfem.io.toml import from_table
-from ccfem.io.whole import existing_file
-from ccfem.placement.fibre_places import FibrePlaces, FibreRegion
-from ccfem.placement.region_shapes import InBody, InBox, InCylinder, NearPatch, Shape
+from ccfem.paths.placement.fibre_places import FibrePlaces, FibreRegion
+from ccfem.paths.placement.region_shapes import InBody, InBox, InCylinder, NearPatch, Shape
 
 __all__ = ["FIBRE_REGIONS", "fibre_of", "fibre_table", "patches_of_fibre"]
 

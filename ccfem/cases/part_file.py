@@ -30,7 +30,7 @@ them with a minus ("-z"), or three numbers.
     build = "z"                       # build direction; default z
     layers = 12                       # flat layers of fibre, spread evenly over the height ...
     heights = [0.5, 1.0, 3.5]         # ... or their heights along the build direction; or [slicing]
-    material = "pla"                  # a name of the table (ccfem.materials), or a table:
+    material = "pla"                  # a name of the table (ccfem.fem.materials), or a table:
 
     [material]                        # isotropic ...
     modulus = 3500.0
@@ -64,7 +64,7 @@ them with a minus ("-z"), or three numbers.
     mode = "only"                     # fibre in such regions alone, or "exclude": none in it
     priority = 1                      # where regions overlap the lowest number counts
 
-    # Patches: boundary facets chosen by a rule (ccfem.mesh.patches). Groups of a mesh file
+    # Patches: boundary facets chosen by a rule (ccfem.body.mesh.patches). Groups of a mesh file
     # are patches already.
     [patches.foot]
     rule = "plane"                    # facets on a plane
@@ -237,7 +237,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
+from ccfem.base.errors import InputError, Mistakes
+from ccfem.base.toml import from_table, read_toml
+from ccfem.body.files.surface import Surface
+from ccfem.body.mesh.face_places import BodyFaces
+from ccfem.body.mesh.face_rules import Faces, Holes, OnBody, numbered_faces, without_faces
+from ccfem.body.mesh.patch_findings import about_patches
+from ccfem.body.mesh.patches import PatchRule, patches_from_rules, unit_vector
+from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE
+from ccfem.body.meshing.cad import is_cad
+from ccfem.body.meshing.volume import check_edge_length
 from ccfem.cases.before_meshing import check_before_meshing
 from ccfem.cases.case import Case, check_name
 from ccfem.cases.part_fibre import fibre_of, patches_of_fibre
@@ -252,23 +262,13 @@ from ccfem.cases.part_loads import (
 from ccfem.cases.part_regions import region_rules_of, regions_of
 from ccfem.cases.part_slicing import slicing_of
 from ccfem.cases.part_tables import check_strategies, material_of, rules_of
-from ccfem.elasticity.load_kinds import patches_in_use
-from ccfem.elasticity.problem import Problem
-from ccfem.errors import InputError, Mistakes
-from ccfem.io.surface import Surface
-from ccfem.io.toml import from_table, read_toml
-from ccfem.layers.slicer import Slicer
+from ccfem.fem.elasticity.load_kinds import patches_in_use
+from ccfem.fem.elasticity.problem import Problem
+from ccfem.fem.materials import Material
 from ccfem.machine.machine import Machine
 from ccfem.machine.named_machines import machine_from
-from ccfem.materials import Material
-from ccfem.mesh.face_places import BodyFaces
-from ccfem.mesh.face_rules import Faces, Holes, OnBody, numbered_faces, without_faces
-from ccfem.mesh.patch_findings import about_patches
-from ccfem.mesh.patches import PatchRule, patches_from_rules, unit_vector
-from ccfem.mesh.smooth_faces import FEATURE_ANGLE
-from ccfem.meshing.cad import is_cad
-from ccfem.meshing.volume import check_edge_length
-from ccfem.placement.fibre_places import FibrePlaces
+from ccfem.paths.placement.fibre_places import FibrePlaces
+from ccfem.slicing.layers.slicer import Slicer
 
 __all__ = ["faces_of_part", "read_part"]
 

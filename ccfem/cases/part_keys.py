@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 from typing import Any
 
+from ccfem.body.mesh.patches import Vector
 from ccfem.cases.part_body import Body
-from ccfem.mesh.patches import Vector
 
 __all__ = ["Part"]
 

@@ -3,9 +3,11 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from ccfem.base.checks import check_number
+from ccfem.base.errors import InputError, Mistakes, known_names, shown
+from ccfem.base.toml import cure_of, from_table
 from ccfem.cases.part_tables import named_table
-from ccfem.checks import check_number
-from ccfem.elasticity.load_kinds import (
+from ccfem.fem.elasticity.load_kinds import (
     Bearing,
     BodyForce,
     Displacement,
@@ -17,7 +19,7 @@ from ccfem.elasticity.load_kinds import (
     Temperature,
     Traction,
 )
-from ccfem.elasticity.support_kinds import (
+from ccfem.fem.elasticity.support_kinds import (
     AnySupport,
     EdgeSupport,
     Foundation,
@@ -30,8 +32,6 @@ from ccfem.elasticity.support_kinds import (
     Spring,
     Support,
 )
-from ccfem.errors import InputError, Mistakes, known_names, shown
-from ccfem.io.toml import cure_of, from_table
 
 __all__ = [
     "LOADS",

@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
+from ccfem.base.errors import InputError, Mistakes, shown
+from ccfem.base.toml import from_table
+from ccfem.body.mesh.cell_rules import CellBox, CellCylinder, CellRule
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases.part_tables import material_of, named_table
-from ccfem.elasticity.problem import Region
-from ccfem.errors import InputError, Mistakes, shown
-from ccfem.io.toml import from_table
-from ccfem.materials import Material
-from ccfem.mesh.cell_rules import CellBox, CellCylinder, CellRule
-from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.fem.elasticity.problem import Region
+from ccfem.fem.materials import Material
 
 __all__ = ["REGIONS", "region_rules_of", "regions_of"]
 

@@ -1,11 +1,11 @@
 """The slicer of a part file."""
 
+from ccfem.base.errors import InputError
 from ccfem.cases.part_keys import Part
 from ccfem.cases.part_tables import named_table
-from ccfem.errors import InputError
-from ccfem.layers import slicing as slicers
-from ccfem.layers.slicer import Slicer
-from ccfem.layers.slicing.planar import Planar
+from ccfem.slicing import slicers as slicers
+from ccfem.slicing.layers.slicer import Slicer
+from ccfem.slicing.slicers.planar import Planar
 
 __all__ = ["slicing_of"]
 

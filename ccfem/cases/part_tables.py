@@ -3,17 +3,17 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ccfem.errors import InputError, Mistakes, shown
-from ccfem.io.toml import from_table
-from ccfem.materials import (
+from ccfem.base.errors import InputError, Mistakes, shown
+from ccfem.base.toml import from_table
+from ccfem.body.mesh.face_rules import Faces, Holes
+from ccfem.body.mesh.patches import Box, Cylinder, Group, Nearest, PatchRule, Plane
+from ccfem.fem.materials import (
     Material,
     isotropic,
     material_names,
     named_material,
     transversely_isotropic,
 )
-from ccfem.mesh.face_rules import Faces, Holes
-from ccfem.mesh.patches import Box, Cylinder, Group, Nearest, PatchRule, Plane
 
 __all__ = [
     "RULES",

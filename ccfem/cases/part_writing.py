@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from ccfem.base.checks import member_name
+from ccfem.base.errors import InputError
 from ccfem.cases.case import Case
 from ccfem.cases.part_fibre import fibre_table
 from ccfem.cases.part_loads import LOADS, SUPPORTS
-from ccfem.checks import member_name
-from ccfem.elasticity.problem import Problem
-from ccfem.errors import InputError
-from ccfem.layers.slicing.planar import Planar
+from ccfem.fem.elasticity.problem import Problem
+from ccfem.fem.materials import Material
 from ccfem.machine.machine import Machine
-from ccfem.materials import Material
+from ccfem.slicing.slicers.planar import Planar
 
 __all__ = ["part_text"]
 

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ccfem.arrays import BoolArray, FloatArray
-from ccfem.errors import InputError
+from ccfem.base.arrays import BoolArray, FloatArray
+from ccfem.base.errors import InputError
 
 __all__ = ["area_of", "cells_in", "check_places"]
 

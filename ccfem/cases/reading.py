@@ -4,10 +4,10 @@ import os
 from pathlib import Path
 from typing import Any
 
+from ccfem.base.errors import InputError
 from ccfem.cases.case import Case
 from ccfem.cases.named import create_case
 from ccfem.cases.part_file import read_part
-from ccfem.errors import InputError
 
 __all__ = ["read"]
 

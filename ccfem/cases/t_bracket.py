@@ -3,16 +3,16 @@
 import numpy as np
 import shapely
 
-from ccfem.arrays import IntArray
+from ccfem.base.arrays import IntArray
+from ccfem.body.mesh.patches import Cylinder
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases.case import Case
 from ccfem.cases.crossed import arc, crossed_mesh
 from ccfem.cases.stored import mesh_of_case
-from ccfem.elasticity.problem import Bearing, Force, Order, Problem, Support
-from ccfem.elasticity.support_kinds import PressingSupport
-from ccfem.layers.slicing.spatial import Spatial
-from ccfem.materials import printed_pla
-from ccfem.mesh.patches import Cylinder
-from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.fem.elasticity.problem import Bearing, Force, Order, Problem, Support
+from ccfem.fem.elasticity.support_kinds import PressingSupport
+from ccfem.fem.materials import printed_pla
+from ccfem.slicing.slicers.spatial import Spatial
 
 __all__ = ["bolt_heads", "t_bracket", "t_bracket_front", "t_bracket_mesh", "t_bracket_top"]
 

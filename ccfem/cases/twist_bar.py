@@ -3,16 +3,16 @@
 import numpy as np
 import shapely
 
+from ccfem.body.mesh.patches import Cylinder
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases.case import Case
 from ccfem.cases.crossed import arc, crossed_mesh
 from ccfem.cases.stored import mesh_of_case
-from ccfem.elasticity.load_kinds import Load
-from ccfem.elasticity.problem import Bearing, Force, Order, Problem, Support
-from ccfem.layers.slicing.spatial import Spatial
+from ccfem.fem.elasticity.load_kinds import Load
+from ccfem.fem.elasticity.problem import Bearing, Force, Order, Problem, Support
+from ccfem.fem.materials import printed_pla
 from ccfem.machine.machine import Machine
-from ccfem.materials import printed_pla
-from ccfem.mesh.patches import Cylinder
-from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.slicing.slicers.spatial import Spatial
 
 __all__ = ["twist_bar", "twist_bar_front", "twist_bar_mesh", "twist_bar_top"]
 

@@ -3,13 +3,13 @@
 import numpy as np
 import shapely
 
+from ccfem.body.mesh.patches import Cylinder, PatchRule, patches_from_rules
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.meshing import extrude
 from ccfem.cases.case import Case
-from ccfem.elasticity.problem import Bearing, Order, Problem, Support
-from ccfem.layers.slicing.planar import Planar
-from ccfem.materials import printed_pla
-from ccfem.mesh.patches import Cylinder, PatchRule, patches_from_rules
-from ccfem.mesh.tet_mesh import TetMesh
-from ccfem.meshing import extrude
+from ccfem.fem.elasticity.problem import Bearing, Order, Problem, Support
+from ccfem.fem.materials import printed_pla
+from ccfem.slicing.slicers.planar import Planar
 
 __all__ = ["two_angle_bracket", "two_angle_bracket_mesh"]
 

@@ -3,11 +3,11 @@
 from dataclasses import replace
 from math import inf
 
+from ccfem.body.mesh.patches import Box, PatchRule, patches_from_rules
 from ccfem.cases.case import Case
 from ccfem.cases.loop import ELEMENT_SIZE, RING_RADIUS, loop
-from ccfem.elasticity.problem import Force, Order
-from ccfem.layers.slicing.planar import Planar
-from ccfem.mesh.patches import Box, PatchRule, patches_from_rules
+from ccfem.fem.elasticity.problem import Force, Order
+from ccfem.slicing.slicers.planar import Planar
 
 __all__ = ["two_pull_loop"]
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import typer
 
-from ccfem.checks import check_known
-from ccfem.errors import InputError
-from ccfem.io.toml import assignment
+from ccfem.base.checks import check_known
+from ccfem.base.errors import InputError
+from ccfem.base.toml import assignment
 
 __all__ = [
     "drawings_of",

@@ -3,13 +3,13 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from ccfem.base.whole import check_writable, whole_file
+from ccfem.cases.inspection import check
 from ccfem.cli.run import complain, load
-from ccfem.inspection import check
-from ccfem.io.whole import check_writable, whole_file
+from ccfem.comparison.plot.canvas import check_picture, save
+from ccfem.comparison.plot.part_picture import part_page, part_picture
 from ccfem.machine.machine import Machine
-from ccfem.placement.fibre_places import FibrePlaces
-from ccfem.plot.canvas import check_picture, save
-from ccfem.plot.part_picture import part_page, part_picture
+from ccfem.paths.placement.fibre_places import FibrePlaces
 
 __all__ = ["check_part"]
 

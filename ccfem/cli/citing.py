@@ -4,9 +4,9 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from ccfem.checks import check_known
+from ccfem.base.checks import check_known
+from ccfem.base.errors import InputError
 from ccfem.comparison.citations import METHODS, bibtex, cited, methods_of
-from ccfem.errors import InputError
 
 __all__ = ["cite"]
 

@@ -6,12 +6,12 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from ccfem.arrays import FloatArray, IntArray
-from ccfem.inspection.body_faces import faces as faces_of
-from ccfem.mesh.smooth_faces import Face, place_text
-from ccfem.meshing.cad import is_cad
-from ccfem.plot.canvas import check_picture
-from ccfem.plot.part_views import Label, draw_part
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.body.mesh.smooth_faces import Face, place_text
+from ccfem.body.meshing.cad import is_cad
+from ccfem.cases.inspection.body_faces import faces as faces_of
+from ccfem.comparison.plot.canvas import check_picture
+from ccfem.comparison.plot.part_views import Label, draw_part
 
 __all__ = ["list_faces"]
 

@@ -59,13 +59,13 @@ def front(
     force: Force = False,
 ) -> None:
     """Show how stiff and strong a part gets with how much fibre, beside what no paths exceed."""
+    from ccfem.base.csv_table import write_csv
+    from ccfem.base.errors import InputError, spared
+    from ccfem.base.progress import progress_bar
+    from ccfem.base.result_folder import whole_folder
     from ccfem.cli.run import load
     from ccfem.comparison.fibre_front import front_of
     from ccfem.comparison.request import Request, named_strategies
-    from ccfem.errors import InputError, spared
-    from ccfem.io.csv_table import write_csv
-    from ccfem.io.result_folder import whole_folder
-    from ccfem.progress import progress_bar
 
     parameters = parameters_by_strategy(set_ or (), strategy)
     counts = None if layers is None else numbers_of(layers)
@@ -101,7 +101,7 @@ def front(
 def _say(found: "FibreFront") -> None:
     """Print a table: the part without fibre, then the plans; marked are those of the fronts."""
     from ccfem.cli.front_table import front_table
-    from ccfem.planning.equal_fibre import TOLERANCE
+    from ccfem.paths.planning.equal_fibre import TOLERANCE
 
     print("\n".join(front_table(found)))
     for count, reason in found.refused.items():

@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ccfem.errors import InputError
-from ccfem.io.toml import assignment
+from ccfem.base.errors import InputError
+from ccfem.base.toml import assignment
 
 if TYPE_CHECKING:
-    from ccfem.placement.fibre_places import FibrePlaces
+    from ccfem.paths.placement.fibre_places import FibrePlaces
 
 __all__ = ["SetFibre", "fibre_choice"]
 

@@ -4,14 +4,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from ccfem.base.errors import InputError
+from ccfem.base.whole import check_writable
 from ccfem.cases.case import Case
 from ccfem.comparison.engine import compare
 from ccfem.comparison.request import named_strategies
-from ccfem.elasticity.plausibility import about_problem
-from ccfem.errors import InputError
-from ccfem.io.whole import check_writable
-from ccfem.virtual_testing.calibration import calibrate
-from ccfem.virtual_testing.force_displacement import read_curve
+from ccfem.fem.elasticity.plausibility import about_problem
+from ccfem.judging.virtual_testing.calibration import calibrate
+from ccfem.judging.virtual_testing.force_displacement import read_curve
 
 __all__ = ["fit_material"]
 

@@ -7,23 +7,23 @@ __all__ = ["CALLS", "say_in_python"]
 CALLS = {
     "cases": "ccfem.cases.named_cases()",
     "strategies": "ccfem.strategies.named()",
-    "slicers": "ccfem.layers.slicing.named()",
+    "slicers": "ccfem.slicing.slicers.named()",
     "machines": "ccfem.machine.machine_names()",
     "faces": "ccfem.faces(BODY)",
     "check": "ccfem.check(CASE)",
-    "mesh": "ccfem.meshing.mesh_body(BODY, SIZE)",
+    "mesh": "ccfem.body.meshing.mesh_body(BODY, SIZE)",
     "optimise": "ccfem.cases.optimise(CASE, VOLUME_FRACTION)",
     "compare": "ccfem.compare(CASE, [A, B]), and ccfem.save(comparison, DIR)",
     "plan": "ccfem.compare(CASE, [S], natural=True), or ccfem.plan(STRATEGY, LAYERS, STRESS)",
     "solve": "ccfem.solve(CASE.problem)",
     "calibrate": "ccfem.calibrate(PROBLEM, CURVE)",
     "reproduce": "ccfem.reproduce(PAPER, PART)",
-    "new": "ccfem.inspection.new_part(BODY)",
-    "example": "ccfem.inspection.write_example(NAME)",
+    "new": "ccfem.cases.inspection.new_part(BODY)",
+    "example": "ccfem.cases.inspection.write_example(NAME)",
     "cite": "ccfem.comparison.bibtex(ccfem.comparison.cited([METHOD]))",
     "front": "ccfem.comparison.fibre_front(CASE, STRESS, NAME, STRATEGY, COUNTS)",
     "study": "ccfem.study(FILE, workers=N)",
-    "support": "ccfem.support.slice_with_support(SLICER, STRESS, BUILD)",
+    "support": "ccfem.printing.support.slice_with_support(SLICER, STRESS, BUILD)",
 }
 """Call of each command, as its help prints it."""
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ccfem.base.errors import InputError
+from ccfem.base.toml import assignment
 from ccfem.cli.docstring import attributes
-from ccfem.errors import InputError
-from ccfem.io.toml import assignment
 
 if TYPE_CHECKING:
     from ccfem.machine.machine import Machine

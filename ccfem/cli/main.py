@@ -9,10 +9,10 @@ from typing import Any
 
 import typer
 
+from ccfem.base.errors import InputError, SolveError
 from ccfem.cli.commands import app
 from ccfem.cli.run import complain
 from ccfem.cli.stopping import Stopped, asked, say
-from ccfem.errors import InputError, SolveError
 
 __all__ = ["main"]
 

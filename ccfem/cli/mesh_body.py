@@ -3,13 +3,13 @@
 from pathlib import Path
 from typing import Any
 
-from ccfem.errors import InputError
-from ccfem.io.mesh_file import check_mesh_name, write_mesh
-from ccfem.io.surface import is_surface
-from ccfem.io.whole import check_writable
-from ccfem.mesh.in_metres import in_metres
-from ccfem.meshing.cad import is_cad
-from ccfem.meshing.meshed_body import mesh_body
+from ccfem.base.errors import InputError
+from ccfem.base.whole import check_writable
+from ccfem.body.files.mesh_file import check_mesh_name, write_mesh
+from ccfem.body.files.surface import is_surface
+from ccfem.body.mesh.in_metres import in_metres
+from ccfem.body.meshing.cad import is_cad
+from ccfem.body.meshing.meshed_body import mesh_body
 
 __all__ = ["mesh_file"]
 

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ccfem.checks import check_number
+from ccfem.base.checks import check_number
+from ccfem.base.errors import InputError
+from ccfem.base.toml import assignment
 from ccfem.cli.arguments import names_of, numbers_of, path_of
 from ccfem.cli.options import CasePath, SetCase
-from ccfem.errors import InputError
-from ccfem.io.toml import assignment
 
 if TYPE_CHECKING:
+    from ccfem.base.progress import Progress
     from ccfem.cases.optimised import Optimised
-    from ccfem.progress import Progress
 
 __all__ = ["optimise"]
 
@@ -107,9 +107,9 @@ def optimise(
     Supports, loads and their patches are carried over. Beside PART.toml lie its mesh (.npz), a
     picture of densities and outline (.png) and the compliance of every iteration (.csv).
     """
+    from ccfem.base.progress import progress_bar
     from ccfem.cases.optimised import optimise as find
     from ccfem.cli.run import load
-    from ccfem.progress import progress_bar
 
     check_number("--iterations", iterations, at_least=1)
     if radius is not None:
@@ -155,7 +155,7 @@ def _now_and_then(progress: "Progress") -> "Progress":
 
 def _files(part: Path, force: bool) -> tuple[Path, Path, Path, Path]:
     """Part file, mesh, picture and history, none of which is there already."""
-    from ccfem.io.whole import check_writable
+    from ccfem.base.whole import check_writable
 
     if part.suffix != ".toml":
         raise InputError(f"a part file ends in .toml; got --out {part}: name it so")
@@ -172,11 +172,11 @@ def _write(found: "Optimised", files: Sequence[Path], case: str) -> None:
     import shlex
     import sys
 
+    from ccfem.base.whole import whole_file
+    from ccfem.body.files.formats import npz
     from ccfem.cases.part_writing import part_text
-    from ccfem.io.formats import npz
-    from ccfem.io.whole import whole_file
-    from ccfem.plot.canvas import png
-    from ccfem.plot.design_picture import design_picture
+    from ccfem.comparison.plot.canvas import png
+    from ccfem.comparison.plot.design_picture import design_picture
 
     _, mesh, picture, history = files
     design, new = found.design, found.case

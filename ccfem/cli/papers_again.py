@@ -22,9 +22,9 @@ def reproduce(
     ] = None,
 ) -> None:
     """Make the figures, tables and claims of a paper again, ours beside theirs."""
+    from ccfem.base.progress import progress_bar
     from ccfem.papers.reproduce import KEPT, named_papers
     from ccfem.papers.reproduce import reproduce as make
-    from ccfem.progress import progress_bar
 
     if paper is None:
         for name, contents in named_papers().items():

@@ -26,7 +26,7 @@ def _new(
     force: _Force = False,
 ) -> None:
     """Write a part file for a body: its faces listed, a support and a load to be changed."""
-    from ccfem.inspection.beginning import new_part
+    from ccfem.cases.inspection.beginning import new_part
 
     written = new_part(body, out, force)
     if "\nscale = " in written.read_text(encoding="utf-8"):
@@ -44,7 +44,7 @@ def _example(
     """List the part files that come with ccfem, or write one of them here."""
     import tomllib
 
-    from ccfem.inspection.beginning import examples, write_example
+    from ccfem.cases.inspection.beginning import examples, write_example
 
     if name is None:
         for known, text in examples().items():

@@ -11,19 +11,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ccfem.base.errors import InputError
+from ccfem.base.progress import Progress, progress_bar
+from ccfem.base.toml import assignment
 from ccfem.cli.arguments import numbers_of
-from ccfem.errors import InputError
-from ccfem.io.toml import assignment
-from ccfem.progress import Progress, progress_bar
 
 if TYPE_CHECKING:
     from ccfem.cases.case import Case
     from ccfem.comparison.request import Request
     from ccfem.comparison.result import Comparison
+    from ccfem.judging.virtual_testing.strand import Strand
     from ccfem.machine.machine import Machine
-    from ccfem.placement.fibre_places import FibrePlaces
-    from ccfem.planning.strategy import Strategy
-    from ccfem.virtual_testing.strand import Strand
+    from ccfem.paths.placement.fibre_places import FibrePlaces
+    from ccfem.paths.planning.strategy import Strategy
 
 __all__ = [
     "Output",
@@ -79,9 +79,9 @@ def load(
 
 def _refuse_body(name: str) -> None:
     """Say what a part file is to who gives the body instead."""
-    from ccfem.io.formats import suffixes
-    from ccfem.io.surface import is_surface
-    from ccfem.meshing.cad import is_cad
+    from ccfem.body.files.formats import suffixes
+    from ccfem.body.files.surface import is_surface
+    from ccfem.body.meshing.cad import is_cad
 
     body = Path(name)
     if is_surface(body) or is_cad(body) or body.suffix.lower() in suffixes():
@@ -93,7 +93,7 @@ def _refuse_body(name: str) -> None:
 
 def _refined(case: "Case") -> "Case":
     """Case on cells that are fine enough by the estimated error; a finding says how many."""
-    from ccfem.elasticity.refinement import refine
+    from ccfem.fem.elasticity.refinement import refine
 
     problem = refine(case.problem)
     before, after = (len(each.mesh.cells) for each in (case.problem, problem))
@@ -112,14 +112,14 @@ def layers_of(layers: int | None, heights: str | None, slicing: str | None) -> A
         return numbers_of(heights)
     if slicing is None:
         return layers
-    from ccfem.layers.slicing import from_text
+    from ccfem.slicing.slicers import from_text
 
     return from_text(slicing)
 
 
 def slicings_of(text: str) -> tuple[str, ...]:
     """Read the slicings of a comparison over several."""
-    from ccfem.layers.slicing import split
+    from ccfem.slicing.slicers import split
 
     return split(text)
 
@@ -181,10 +181,10 @@ def run(name: str, ask: "Callable[[], Request]", output: Output) -> None:
         Reads the part, and returns what is asked of it.
     output : Output
     """
+    from ccfem.base.result_folder import whole_folder
     from ccfem.cli.screen import print_comparison
     from ccfem.comparison.engine import answer
     from ccfem.comparison.files import RESULT_FILES, write_results
-    from ccfem.io.result_folder import whole_folder
 
     imported = time.perf_counter()
     request = ask()
@@ -228,9 +228,9 @@ def with_given_paths(
                 "--paths-frame gives the frame of the --paths files; got no --paths: name them"
             )
         return strategies
-    from ccfem.export.path_table import read_paths
-    from ccfem.layers.plane import plane_frame
-    from ccfem.planning.given_paths import GivenPaths
+    from ccfem.paths.planning.given_paths import GivenPaths
+    from ccfem.printing.export.path_table import read_paths
+    from ccfem.slicing.layers.plane import plane_frame
 
     named = dict(strategies)
     for file in files:
@@ -253,7 +253,7 @@ def calibrated(
     strand = DEFAULT_STRAND if virtual_test else None
     if calibration is None:
         return case, strand
-    from ccfem.virtual_testing.calibration import read_calibration
+    from ccfem.judging.virtual_testing.calibration import read_calibration
 
     fitted = read_calibration(calibration)
     if strand is not None:

@@ -15,7 +15,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from ccfem.checks import check_known
+from ccfem.base.checks import check_known
+from ccfem.base.tensor import von_mises
 from ccfem.cli.docstring import about, attributes
 from ccfem.comparison.headline import (
     HEADLINE,
@@ -30,9 +31,8 @@ from ccfem.comparison.remarks import by_importance
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.said_of_cases import cases_rows
-from ccfem.elasticity.stress_field import StressField, about_cells
-from ccfem.tensor import von_mises
-from ccfem.virtual_testing.stiffer import HONEST_PROMISE, IN_SHORT
+from ccfem.fem.elasticity.stress_field import StressField, about_cells
+from ccfem.judging.virtual_testing.stiffer import HONEST_PROMISE, IN_SHORT
 
 __all__ = [
     "print_cases",
@@ -123,7 +123,7 @@ def print_member(kind: str, name: str) -> None:
 
 def _members(kind: str) -> Mapping[str, typing.Any]:
     if kind == "slicer":
-        from ccfem.layers import slicing
+        from ccfem.slicing import slicers as slicing
 
         return slicing.named()
     from ccfem import strategies

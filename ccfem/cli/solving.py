@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
+from ccfem.base.checks import check_known
+from ccfem.base.whole import check_writable
 from ccfem.cases.case import Case
-from ccfem.checks import check_known
 from ccfem.cli.screen import print_solution
-from ccfem.elasticity.solve import solve
-from ccfem.export.vtu_result import result_path, write_result
-from ccfem.io.whole import check_writable
+from ccfem.fem.elasticity.solve import solve
+from ccfem.printing.export.vtu_result import result_path, write_result
 
 __all__ = ["solve_part"]
 

@@ -54,7 +54,7 @@ def unwind() -> None:
 
 
 def _end(number: int, frame: FrameType | None) -> None:
-    folder = sys.modules.get("ccfem.io.folder")
+    folder = sys.modules.get("ccfem.base.folder")
     if folder is not None:
         folder.remove_private_folders()
     os._exit(say(number))

@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
+from ccfem.base.progress import progress_bar
 from ccfem.cli.options import Force, Out
-from ccfem.progress import progress_bar
 
 __all__ = ["study"]
 
@@ -33,7 +33,9 @@ def study(
 ) -> None:
     """Run parts x slicings x strategies x parameters; one that was stopped goes on where it was."""
     if example:
-        text = files("ccfem.studies").joinpath("example.toml").read_text(encoding="utf-8")
+        text = (
+            files("ccfem.comparison.studies").joinpath("example.toml").read_text(encoding="utf-8")
+        )
         print(text, end="")
     elif file is None:
         raise typer.BadParameter("name a study file; ccfem study --example prints one")
@@ -45,8 +47,8 @@ def _run(
     file: Path, out: Path | None, workers: int | None, scheduler: str | None, force: bool
 ) -> None:
     """Run a study file and print what came out."""
-    from ccfem.studies import study
-    from ccfem.studies.study_fronts import COST
+    from ccfem.comparison.studies import study
+    from ccfem.comparison.studies.study_fronts import COST
 
     with progress_bar() as progress:
         result = study(file, out, workers, scheduler, force, progress)

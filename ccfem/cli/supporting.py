@@ -44,14 +44,14 @@ def support(
     """Lay support below a part, in layers that continue its own down to the bed."""
     import numpy as np
 
-    from ccfem.checks import check_known
+    from ccfem.base.checks import check_known
+    from ccfem.base.whole import check_writable
     from ccfem.cli.run import layers_of, load
-    from ccfem.elasticity.solve import solve
-    from ccfem.export.vtk import write_paths
-    from ccfem.io.whole import check_writable
-    from ccfem.layers.plane import plane_frame
-    from ccfem.layers.slicing import as_slicer
-    from ccfem.support import slice_with_support, support_paths
+    from ccfem.fem.elasticity.solve import solve
+    from ccfem.printing.export.vtk import write_paths
+    from ccfem.printing.support import slice_with_support, support_paths
+    from ccfem.slicing.layers.plane import plane_frame
+    from ccfem.slicing.slicers import as_slicer
 
     if out is not None:
         check_writable(out)

@@ -1,5 +1,6 @@
 """Comparison of strategies on one part: runs, ranking, pictures, report and files."""
 
+from ccfem.base.submodules import submodules
 from ccfem.comparison.citations import bibtex, cited
 from ccfem.comparison.engine import answer, compare
 from ccfem.comparison.fibre_front import fibre_front
@@ -21,3 +22,5 @@ __all__ = [
     "fibre_front",
     "save",
 ]
+
+__getattr__ = submodules(__name__)

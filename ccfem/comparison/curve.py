@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ccfem.arrays import freeze
+from ccfem.base.arrays import freeze
 from ccfem.comparison.headline import headline_values
 from ccfem.comparison.ranking import off_length
 from ccfem.comparison.runs import Run

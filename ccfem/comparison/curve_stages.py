@@ -10,9 +10,9 @@ import numpy as np
 from ccfem.comparison.curve import Curve
 from ccfem.comparison.runs import Run
 from ccfem.comparison.stages import Part, Tell, attempted, evaluated, planned_to_lengths
-from ccfem.planning.equal_fibre import Planned, extremes
-from ccfem.planning.given_paths import GivenPaths
-from ccfem.planning.strategy import LengthStrategy
+from ccfem.paths.planning.equal_fibre import Planned, extremes
+from ccfem.paths.planning.given_paths import GivenPaths
+from ccfem.paths.planning.strategy import LengthStrategy
 
 __all__ = ["along_curve"]
 

@@ -14,9 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from ccfem.base.checks import refuse_keywords
+from ccfem.base.errors import InputError
+from ccfem.base.progress import Progress, silent
 from ccfem.cases.case import Case
 from ccfem.cases.load_cases import weighted_cases
-from ccfem.checks import refuse_keywords
 from ccfem.comparison.curve import Curve
 from ccfem.comparison.curve_stages import along_curve
 from ccfem.comparison.plan_to_stiffness import plan_to_stiffness
@@ -50,25 +52,23 @@ from ccfem.comparison.stages import (
     to_length,
     with_print,
 )
-from ccfem.elasticity.part_stress import GivenStress, PartStress
-from ccfem.elasticity.solve import solve
-from ccfem.elasticity.stress_field import StressField
-from ccfem.elasticity.support_kinds import PressingSupport
-from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.errors import InputError
-from ccfem.fibre_aware.upper_bound import UpperBound, upper_bound
-from ccfem.io.stress_file import read_stress
-from ccfem.layers.slicer import Slicer, slicer_remarks
-from ccfem.layers.slicing.planar import Planar
-from ccfem.planning.given_paths import GivenPaths
-from ccfem.planning.strategy import Strategy
-from ccfem.planning.whole_part import full_length
+from ccfem.fem.elasticity.part_stress import GivenStress, PartStress
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.elasticity.support_kinds import PressingSupport
+from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.fem.stress_files.stress_file import read_stress
+from ccfem.judging.virtual_testing.several_cases import specimens
+from ccfem.judging.virtual_testing.strand import RHO_SPAN, Strand
+from ccfem.paths.planning.given_paths import GivenPaths
+from ccfem.paths.planning.strategy import Strategy
+from ccfem.paths.planning.whole_part import full_length
+from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.line_counts import check_strands
-from ccfem.progress import Progress, silent
-from ccfem.support import SupportLayers, slice_with_support
-from ccfem.toolpaths import Toolpaths
-from ccfem.virtual_testing.several_cases import specimens
-from ccfem.virtual_testing.strand import RHO_SPAN, Strand
+from ccfem.printing.support import SupportLayers, slice_with_support
+from ccfem.slicing.layers.slicer import Slicer, slicer_remarks
+from ccfem.slicing.slicers.planar import Planar
+from ccfem.strategies.fibre_aware.upper_bound import UpperBound, upper_bound
 
 __all__ = ["Solved", "answer", "compare", "otherwise_held", "solved"]
 
@@ -552,7 +552,7 @@ def compare(
     print_plans : bool, default False
         Also plan the print of the whole part, matrix and fibre, for every strategy.
     support : bool, default False
-        Also print support below a part of curved layers (`ccfem.support`).
+        Also print support below a part of curved layers (`ccfem.printing.support`).
     stress : ForeignStress, optional
         Stress file of another program, on the same mesh, to plan and evaluate on. Virtual tests and
         the bound still solve the part themselves.

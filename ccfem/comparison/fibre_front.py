@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from ccfem.base.checks import check_number
+from ccfem.base.errors import InputError
+from ccfem.base.progress import Progress, silent
 from ccfem.cases.case import Case
-from ccfem.checks import check_number
 from ccfem.comparison.engine import Solved, answer, solved
 from ccfem.comparison.front_cases import PointCases
 from ccfem.comparison.front_points import FibreFront, FrontPoint
@@ -16,16 +18,14 @@ from ccfem.comparison.request import Request, Slicing, Spread
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.stages import Tests
-from ccfem.elasticity.stress_field import StressField
-from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.errors import InputError
-from ccfem.layers.slicing.planar import Planar
-from ccfem.planning.strategy import Strategy
-from ccfem.progress import Progress, silent
-from ccfem.virtual_testing.several_cases import specimens
-from ccfem.virtual_testing.specimen import Specimen
-from ccfem.virtual_testing.strand import Strand
-from ccfem.virtual_testing.strength import matrix_peak
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.judging.virtual_testing.several_cases import specimens
+from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.judging.virtual_testing.strength import matrix_peak
+from ccfem.paths.planning.strategy import Strategy
+from ccfem.slicing.slicers.planar import Planar
 
 __all__ = ["fibre_front", "front_of"]
 

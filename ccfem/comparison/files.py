@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ccfem.base.csv_table import write_csv
+from ccfem.base.errors import spared
+from ccfem.base.progress import Progress, silent
+from ccfem.base.result_folder import whole_folder
 from ccfem.comparison.record import record, results_rows, write_table
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.shown import file_stem
-from ccfem.errors import spared
-from ccfem.io.csv_table import write_csv
-from ccfem.io.result_folder import whole_folder
+from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.print_plan import PrintPlan
-from ccfem.progress import Progress, silent
-from ccfem.toolpaths import Toolpaths
 
 if TYPE_CHECKING:
     from ccfem.comparison.pictures import Pictures
@@ -93,7 +93,7 @@ def write_results(
     ----------
     comparison : Comparison
     folder : Path
-        An existing folder; use `ccfem.io.result_folder.whole_folder` to have all files or none.
+        An existing folder; use `ccfem.base.result_folder.whole_folder` to have all files or none.
     command : str
         What was typed; the report tells how to repeat it.
     seconds : mapping of stage to float, optional
@@ -134,7 +134,7 @@ def _write_report(
     comparison: Comparison, about: dict[str, Any], folder: Path, part_file: str
 ) -> None:
     """Write ``report.html``, and ``results.json`` whatever becomes of the report."""
-    from ccfem.comparison.report import report_html
+    from ccfem.comparison.report.html_report import report_html
 
     start = time.perf_counter()
     with spared("report.html", about["left_out"]):
@@ -148,7 +148,7 @@ def _write_report(
 
 def _write_drawings(comparison: Comparison, folder: Path, suffix: str) -> None:
     """Draw every layer of every run to scale; raise `InputError` where layers are curved."""
-    from ccfem.export.layer_drawings import draw_layer
+    from ccfem.printing.export.layer_drawings import draw_layer
 
     width = comparison.case.machine.fibre_width
     for run in comparison.succeeded:
@@ -160,7 +160,7 @@ def _write_drawings(comparison: Comparison, folder: Path, suffix: str) -> None:
 def _draw(comparison: Comparison, folder: Path, progress: Progress, left_out: list[str]) -> None:
     """Draw and write the pictures that are files of their own."""
     from ccfem.comparison.pictures import draw_pictures, overview_picture
-    from ccfem.plot.canvas import png
+    from ccfem.comparison.plot.canvas import png
 
     if not comparison.over_slicings:
         with spared("pictures", left_out):
@@ -192,8 +192,8 @@ def _write_pictures(pictures: "Pictures", folder: Path) -> None:
 
 def _write_in_space(comparison: Comparison, folder: Path, slicing: str) -> None:
     """Write a picture of the strands of every strategy in space, and a page on which they turn."""
-    from ccfem.plot.canvas import png
-    from ccfem.plot.stack_page import space_picture, turning_page
+    from ccfem.comparison.plot.canvas import png
+    from ccfem.comparison.plot.stack_page import space_picture, turning_page
 
     layers, build = comparison.layers, comparison.case.build
     for run in comparison.succeeded:
@@ -212,9 +212,9 @@ def _stem(slicing: str, run: Run) -> str:
 
 def _write_matrix(comparison: Comparison, folder: Path) -> None:
     """Write the matrix of curved layers for robots, once for all strategies."""
-    from ccfem.export.robot_waypoints import write_robot_waypoints
+    from ccfem.paths.toolpaths import MATRIX
+    from ccfem.printing.export.robot_waypoints import write_robot_waypoints
     from ccfem.printing.layer_matrix import layer_matrix
-    from ccfem.toolpaths import MATRIX
 
     file = folder / "matrix_waypoints.csv"
     if not file.exists():
@@ -224,9 +224,9 @@ def _write_matrix(comparison: Comparison, folder: Path) -> None:
 
 def _write_print(folder: Path, name: str, plan: PrintPlan, comparison: Comparison) -> None:
     """Write what a printer and a cell of robots do to print a part: one chain of moves."""
-    from ccfem.export.gcode import gcode_of_moves
-    from ccfem.export.robot_cell import write_robot_cell
-    from ccfem.export.trim_table import write_trims
+    from ccfem.printing.export.gcode import gcode_of_moves
+    from ccfem.printing.export.robot_cell import write_robot_cell
+    from ccfem.printing.export.trim_table import write_trims
     from ccfem.printing.part_moves import part_moves
 
     case = comparison.case
@@ -240,9 +240,9 @@ def _write_print(folder: Path, name: str, plan: PrintPlan, comparison: Compariso
 
 def _write_paths(comparison: Comparison, folder: Path) -> None:
     """Write the paths of every strategy in the formats of other programs."""
-    from ccfem.export.robot_waypoints import write_robot_waypoints
-    from ccfem.export.vtk import write_paths
-    from ccfem.export.waypoints import write_waypoints
+    from ccfem.printing.export.robot_waypoints import write_robot_waypoints
+    from ccfem.printing.export.vtk import write_paths
+    from ccfem.printing.export.waypoints import write_waypoints
 
     runs, machine = comparison.succeeded, comparison.case.machine
     for run in runs:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ccfem.arrays import BoolArray, FloatArray
+from ccfem.base.arrays import BoolArray, FloatArray
 
 __all__ = ["on_front"]
 

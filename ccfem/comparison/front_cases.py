@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ccfem.arrays import FloatArray, freeze
+from ccfem.base.arrays import FloatArray, freeze
 from ccfem.comparison.tested_cases import TestedCases
-from ccfem.fibre_aware.upper_bound import UpperBound
+from ccfem.strategies.fibre_aware.upper_bound import UpperBound
 
 __all__ = ["WORST", "PointCases", "stiffness_panels"]
 

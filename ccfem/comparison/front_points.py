@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ccfem.arrays import BoolArray, freeze
+from ccfem.base.arrays import BoolArray, freeze
+from ccfem.base.errors import InputError
 from ccfem.comparison.front import on_front
 from ccfem.comparison.front_cases import WORST, PointCases, stiffness_panels
-from ccfem.errors import InputError
-from ccfem.fibre_aware.upper_bound import UpperBound
-from ccfem.planning.equal_fibre import TOLERANCE
-from ccfem.plot.amount_curves import AmountPoint, TradePoint, amount_curves, trade_curves
-from ccfem.toolpaths import Toolpaths
+from ccfem.comparison.plot.amount_curves import AmountPoint, TradePoint, amount_curves, trade_curves
+from ccfem.paths.planning.equal_fibre import TOLERANCE
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.strategies.fibre_aware.upper_bound import UpperBound
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ccfem.comparison.runs import Run, Tested
-from ccfem.evaluation.column import Column
-from ccfem.virtual_testing.strength import FirstFailure
+from ccfem.judging.evaluation.column import Column
+from ccfem.judging.virtual_testing.strength import FirstFailure
 
 __all__ = [
     "HEADLINE",

@@ -6,24 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
-from ccfem.comparison.ranking import stiffness_ratio
-from ccfem.comparison.result import Comparison
-from ccfem.comparison.runs import Run
-from ccfem.comparison.shown import caption, drawn_layers, middle_layer
-from ccfem.elasticity.stress_field import StressField
-from ccfem.evaluation.indices.matching import THRESHOLDS, along_fibre, matching_curve
-from ccfem.evaluation.plane_paths import pool
-from ccfem.fields.chart import chart_of, flat_view, in_charts
-from ccfem.inspection.part_check import check
-from ccfem.layers import Layer
-from ccfem.layers.layer_stress import LayerStress, stress_on
-from ccfem.plot.canvas import png
-from ccfem.plot.colours import palette
-from ccfem.plot.curves import curvature_curves, matching_curves
-from ccfem.plot.fields import error_picture, tension_picture
-from ccfem.plot.part_picture import part_page, part_picture
-from ccfem.plot.paths import (
+from ccfem.base.arrays import FloatArray
+from ccfem.base.progress import Progress, silent
+from ccfem.cases.inspection.part_check import check
+from ccfem.comparison.plot.canvas import png
+from ccfem.comparison.plot.colours import palette
+from ccfem.comparison.plot.curves import curvature_curves, matching_curves
+from ccfem.comparison.plot.fields import error_picture, tension_picture
+from ccfem.comparison.plot.part_picture import part_page, part_picture
+from ccfem.comparison.plot.paths import (
     Coloured,
     compare_layer,
     force_on_paths,
@@ -32,8 +23,17 @@ from ccfem.plot.paths import (
     mark_failure,
     tension_limit,
 )
-from ccfem.plot.stiffness_curves import StiffnessPoint, stiffness_curves
-from ccfem.progress import Progress, silent
+from ccfem.comparison.plot.stiffness_curves import StiffnessPoint, stiffness_curves
+from ccfem.comparison.ranking import stiffness_ratio
+from ccfem.comparison.result import Comparison
+from ccfem.comparison.runs import Run
+from ccfem.comparison.shown import caption, drawn_layers, middle_layer
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.judging.evaluation.indices.matching import THRESHOLDS, along_fibre, matching_curve
+from ccfem.judging.evaluation.plane_paths import pool
+from ccfem.paths.fields.chart import chart_of, flat_view, in_charts
+from ccfem.slicing.layers import Layer
+from ccfem.slicing.layers.layer_stress import LayerStress, stress_on
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

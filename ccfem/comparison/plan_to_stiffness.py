@@ -3,20 +3,20 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from ccfem.checks import check_number
+from ccfem.base.checks import check_number
+from ccfem.base.errors import InputError
 from ccfem.comparison.request import Request, Stiffness
 from ccfem.comparison.runs import Run
 from ccfem.comparison.stages import Part, Tell, with_plan
-from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.errors import InputError
-from ccfem.fibre_aware.least_fibre import LeastFibre, for_every_case, least_fibre
-from ccfem.fibre_aware.upper_bound import LEAST, upper_bound
-from ccfem.layers.slicer import Slicer
-from ccfem.layers.slicing.planar import Planar
-from ccfem.planning.strategy import Strategy
-from ccfem.planning.whole_part import full_length
-from ccfem.toolpaths import Toolpaths
-from ccfem.virtual_testing.specimen import Specimen
+from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.paths.planning.strategy import Strategy
+from ccfem.paths.planning.whole_part import full_length
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.slicer import Slicer
+from ccfem.slicing.slicers.planar import Planar
+from ccfem.strategies.fibre_aware.least_fibre import LeastFibre, for_every_case, least_fibre
+from ccfem.strategies.fibre_aware.upper_bound import LEAST, upper_bound
 
 __all__ = ["counts_to_try", "plan_to_stiffness"]
 

@@ -7,8 +7,8 @@ import numpy as np
 from ccfem.comparison.headline import HEADLINE, cell_text, headline_values
 from ccfem.comparison.request import InAll, Wanted
 from ccfem.comparison.runs import Run
-from ccfem.planning.equal_fibre import TOLERANCE
-from ccfem.virtual_testing.stiffer import FIRST, RESOLUTION, SAME, SECOND, UNDECIDED
+from ccfem.judging.virtual_testing.stiffer import FIRST, RESOLUTION, SAME, SECOND, UNDECIDED
+from ccfem.paths.planning.equal_fibre import TOLERANCE
 
 __all__ = [
     "best_values",

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ccfem.checks import member_name
+from ccfem.base.checks import member_name
+from ccfem.base.csv_table import write_csv
 from ccfem.comparison.headline import TEST_COLUMNS, headline_values
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
-from ccfem.elasticity.stress_field import StressField
-from ccfem.io.csv_table import write_csv
+from ccfem.fem.elasticity.stress_field import StressField
 
 if TYPE_CHECKING:
     import pandas as pd

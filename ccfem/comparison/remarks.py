@@ -7,12 +7,12 @@ import numpy as np
 from ccfem.comparison.ranking import is_tested, off_length, order_of, ranking, stiffness_ratio
 from ccfem.comparison.request import Wanted
 from ccfem.comparison.runs import Run
-from ccfem.evaluation.evaluation import Evaluation
-from ccfem.evaluation.open_places import open_places
-from ccfem.evaluation.plane_paths import plane_paths
-from ccfem.fibre_aware.upper_bound import LOOSE, UpperBound
-from ccfem.layers.layer import Layer
-from ccfem.virtual_testing.stiffer import RESOLUTION, SAME, UNDECIDED
+from ccfem.judging.evaluation.evaluation import Evaluation
+from ccfem.judging.evaluation.open_places import open_places
+from ccfem.judging.evaluation.plane_paths import plane_paths
+from ccfem.judging.virtual_testing.stiffer import RESOLUTION, SAME, UNDECIDED
+from ccfem.slicing.layers.layer import Layer
+from ccfem.strategies.fibre_aware.upper_bound import LOOSE, UpperBound
 
 __all__ = ["bound_remark", "by_importance", "open_remarks", "remarks", "why_above"]
 

@@ -10,23 +10,23 @@ from dataclasses import dataclass, field
 from itertools import count
 from typing import Any
 
-from ccfem.arrays import freeze
+from ccfem.base.arrays import freeze
+from ccfem.base.checks import check_instance, check_known, check_number, member_name
+from ccfem.base.errors import InputError, known_names, shown
 from ccfem.cases.case import Case
 from ccfem.cases.load_cases import asks_for_all
 from ccfem.cases.reading import read
-from ccfem.checks import check_instance, check_known, check_number, member_name
-from ccfem.errors import InputError, known_names, shown
-from ccfem.layers.plane import plane_frame
-from ccfem.layers.slicer import Slicer
-from ccfem.layers.slicing import as_slicer, from_text
-from ccfem.layers.slicing.planar import Planar
-from ccfem.planning.equal_fibre import check_wanted
-from ccfem.planning.given_paths import GivenPaths
-from ccfem.planning.strategy import Strategy
+from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.paths.planning.equal_fibre import check_wanted
+from ccfem.paths.planning.given_paths import GivenPaths
+from ccfem.paths.planning.strategy import Strategy
 from ccfem.printing.line_counts import check_matrix_lines
 from ccfem.printing.print_plan import check_machine
+from ccfem.slicing.layers.plane import plane_frame
+from ccfem.slicing.layers.slicer import Slicer
+from ccfem.slicing.slicers import as_slicer, from_text
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
-from ccfem.virtual_testing.strand import Strand
 
 __all__ = [
     "DEFAULT_STRAND",
@@ -67,7 +67,7 @@ _FLAT = (
 
 @dataclass(frozen=True)
 class ForeignStress:
-    """Stress of another program in a file: see `ccfem.io.read_stress`.
+    """Stress of another program in a file: see `ccfem.body.files.read_stress`.
 
     Attributes
     ----------

@@ -6,11 +6,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ccfem.arrays import freeze
+from ccfem.base.arrays import freeze
+from ccfem.base.checks import check_known
+from ccfem.base.errors import InputError
 from ccfem.cases.case import Case
-from ccfem.checks import check_known
 from ccfem.comparison.curve import Curve
 from ccfem.comparison.headline import Headline
+from ccfem.comparison.plot.scenes import View, show
+from ccfem.comparison.plot.values import image
 from ccfem.comparison.ranking import ranking
 from ccfem.comparison.remarks import open_remarks, remarks
 from ccfem.comparison.request import InAll, Request, Wanted
@@ -20,14 +23,11 @@ from ccfem.comparison.summary import SUMMARY, SUMMARY_OF_SLICINGS, summary_html,
 from ccfem.comparison.table import frame
 from ccfem.comparison.verdict import verdict
 from ccfem.comparison.views import front_picture, layer_view, shown_layer, told
-from ccfem.elasticity.part_stress import GivenStress, PartStress
-from ccfem.elasticity.stress_field import StressField
-from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.errors import InputError
-from ccfem.fibre_aware.upper_bound import UpperBound
-from ccfem.layers import Layer
-from ccfem.plot.scenes import View, show
-from ccfem.plot.values import image
+from ccfem.fem.elasticity.part_stress import GivenStress, PartStress
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.slicing.layers import Layer
+from ccfem.strategies.fibre_aware.upper_bound import UpperBound
 
 if TYPE_CHECKING:
     import pandas as pd

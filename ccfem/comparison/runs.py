@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 from html import escape
 from typing import Any
 
-from ccfem.arrays import freeze, in_brief
+from ccfem.base.arrays import freeze, in_brief
 from ccfem.comparison.tested_cases import TestedCases
-from ccfem.evaluation import Evaluation
-from ccfem.planning.strategy import Strategy
+from ccfem.judging.evaluation import Evaluation
+from ccfem.judging.virtual_testing.strength import FirstFailure
+from ccfem.judging.virtual_testing.virtual_test import Bracket
+from ccfem.paths.planning.strategy import Strategy
+from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.print_plan import PrintPlan
-from ccfem.toolpaths import Toolpaths
-from ccfem.virtual_testing.strength import FirstFailure
-from ccfem.virtual_testing.virtual_test import Bracket
 
 __all__ = ["Run", "Tested"]
 

@@ -9,9 +9,9 @@ from ccfem.comparison.remarks import why_above
 from ccfem.comparison.request import Wanted
 from ccfem.comparison.runs import Run
 from ccfem.comparison.verdict import all_same, comparable, left_out
-from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.fibre_aware.upper_bound import LEAST, LOOSE, UpperBound
-from ccfem.virtual_testing.stiffer import FIRST, RESOLUTION
+from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.judging.virtual_testing.stiffer import FIRST, RESOLUTION
+from ccfem.strategies.fibre_aware.upper_bound import LEAST, LOOSE, UpperBound
 
 __all__ = ["cases_remarks", "cases_rows", "cases_verdict"]
 

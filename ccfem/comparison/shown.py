@@ -6,7 +6,7 @@ import numpy as np
 
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
-from ccfem.layers.layer import Layer
+from ccfem.slicing.layers.layer import Layer
 
 __all__ = ["caption", "drawn_layers", "file_stem", "middle_layer"]
 

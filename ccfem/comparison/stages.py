@@ -7,18 +7,23 @@ from dataclasses import dataclass, replace
 from itertools import count
 from typing import Any
 
+from ccfem.base.errors import InputError, SolveError
+from ccfem.base.progress import Progress
 from ccfem.comparison.runs import Run, Tested
 from ccfem.comparison.tested_cases import in_all_cases
-from ccfem.elasticity.part_stress import PartStress
-from ccfem.elasticity.stress_field import StressField
-from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.errors import InputError, SolveError
-from ccfem.evaluation import evaluate
-from ccfem.evaluation.printable import why_not
-from ccfem.fibre_aware.plan_cases import plan_cases, plan_cases_to_lengths
-from ccfem.layers import Layer
+from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.judging.evaluation import evaluate
+from ccfem.judging.evaluation.printable import why_not
+from ccfem.judging.virtual_testing.equilibrium import BONDED, TENSION
+from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.strand import RHO_SPAN, Strand
+from ccfem.judging.virtual_testing.strands import Strands, cut_strands
+from ccfem.judging.virtual_testing.strength import first_failure, matrix_peak
+from ccfem.judging.virtual_testing.virtual_test import Bracket, virtual_test
 from ccfem.machine.machine import Machine
-from ccfem.planning.equal_fibre import (
+from ccfem.paths.planning.equal_fibre import (
     TOLERANCE,
     Planned,
     length_per_layer,
@@ -26,20 +31,15 @@ from ccfem.planning.equal_fibre import (
     plan_to_lengths,
     sampled_length,
 )
-from ccfem.planning.given_paths import GivenPaths
-from ccfem.planning.plan import plan
-from ccfem.planning.strategy import LengthStrategy
+from ccfem.paths.planning.given_paths import GivenPaths
+from ccfem.paths.planning.plan import plan
+from ccfem.paths.planning.strategy import LengthStrategy
+from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.curved_plan import curved_plan
 from ccfem.printing.print_plan import plan_print
-from ccfem.progress import Progress
-from ccfem.support import SupportLayers
-from ccfem.toolpaths import Toolpaths
-from ccfem.virtual_testing.equilibrium import BONDED, TENSION
-from ccfem.virtual_testing.specimen import Specimen
-from ccfem.virtual_testing.strand import RHO_SPAN, Strand
-from ccfem.virtual_testing.strands import Strands, cut_strands
-from ccfem.virtual_testing.strength import first_failure, matrix_peak
-from ccfem.virtual_testing.virtual_test import Bracket, virtual_test
+from ccfem.printing.support import SupportLayers
+from ccfem.slicing.layers import Layer
+from ccfem.strategies.fibre_aware.plan_cases import plan_cases, plan_cases_to_lengths
 
 __all__ = [
     "Part",

@@ -3,21 +3,21 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ccfem.arrays import FloatArray, in_brief
-from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.errors import InputError
-from ccfem.fibre_aware.upper_bound import UpperBound
-from ccfem.layers import Layer
-from ccfem.virtual_testing.equilibrium import BONDED
-from ccfem.virtual_testing.several_cases import (
+from ccfem.base.arrays import FloatArray, in_brief
+from ccfem.base.errors import InputError
+from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.judging.virtual_testing.equilibrium import BONDED
+from ccfem.judging.virtual_testing.several_cases import (
     CasesFailure,
     CasesTest,
     cases_failure,
     specimens,
     virtual_tests,
 )
-from ccfem.virtual_testing.strand import Strand
-from ccfem.virtual_testing.strands import Strands
+from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.judging.virtual_testing.strands import Strands
+from ccfem.slicing.layers import Layer
+from ccfem.strategies.fibre_aware.upper_bound import UpperBound
 
 __all__ = ["TestedCases", "in_all_cases"]
 

@@ -16,7 +16,7 @@ from ccfem.comparison.ranking import (
 )
 from ccfem.comparison.request import InAll, Wanted
 from ccfem.comparison.runs import Run
-from ccfem.virtual_testing.stiffer import FIRST, RESOLUTION, SAME
+from ccfem.judging.virtual_testing.stiffer import FIRST, RESOLUTION, SAME
 
 __all__ = ["all_same", "comparable", "left_out", "verdict"]
 

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ccfem.base.errors import InputError
 from ccfem.comparison.front import on_front
 from ccfem.comparison.headline import headline_values
 from ccfem.comparison.runs import Run
-from ccfem.elasticity.part_stress import PartStress
-from ccfem.errors import InputError
-from ccfem.fields.chart import flat_view, in_charts
-from ccfem.layers import Layer
-from ccfem.layers.layer_stress import stress_on
+from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.machine.machine import Machine
+from ccfem.paths.fields.chart import flat_view, in_charts
+from ccfem.slicing.layers import Layer
+from ccfem.slicing.layers.layer_stress import stress_on
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,7 +54,7 @@ def layer_view(
     InputError
         Where there is no such layer, and where no run has paths.
     """
-    from ccfem.plot.paths import compare_layer
+    from ccfem.comparison.plot.paths import compare_layer
 
     by_index = {layer.index: layer for layer in layers}
     if index not in by_index:
@@ -81,7 +81,7 @@ def front_picture(runs: Sequence[Run], over: str) -> "Figure":
     InputError
         For an unknown index, and runs without a virtual test.
     """
-    from ccfem.plot.fronts import FrontPoint, front_figure
+    from ccfem.comparison.plot.fronts import FrontPoint, front_figure
 
     if over not in FRONTS:
         raise InputError(f"fronts are drawn over {', '.join(FRONTS)}; got {over!r}: choose one")

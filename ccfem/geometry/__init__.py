@@ -1,1 +1,7 @@
 """Geometry of polylines, isocontours, offsets and hatches in the plane."""
+
+from ccfem.base.submodules import submodules
+
+__all__: list[str] = []
+
+__getattr__ = submodules(__name__)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
 from ccfem.geometry.polylines import (
     along_line,
     is_closed,

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.geometry.buckets import Buckets
 
 __all__ = ["share_room"]

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.band_overlap import share_room
 from ccfem.geometry.buckets import bucket
 from ccfem.geometry.polylines import lengths, resample, starts_segment

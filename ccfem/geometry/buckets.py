@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.base.arrays import FloatArray, IntArray
 
 __all__ = ["Buckets", "bucket"]
 

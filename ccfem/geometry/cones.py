@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray, seen_only
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, seen_only
 
 __all__ = ["earlier_in_cones", "groups_in_cones"]
 

@@ -14,7 +14,7 @@ import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
-from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.base.arrays import FloatArray, IntArray, read_only
 from ccfem.geometry.offsets import ring_from, rings
 from ccfem.geometry.polylines import line_length, resample
 from ccfem.geometry.shapes import Region

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.polylines import inner_points, lengths, resample, turning_angles
 
 __all__ = ["curvature_samples"]

@@ -11,7 +11,7 @@ A pose is (x, y, heading), mm and radians.
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.base.arrays import FloatArray, IntArray
 
 __all__ = ["WORDS", "advance", "curve_points", "shortest_curve", "word_sizes"]
 

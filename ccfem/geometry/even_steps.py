@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.polylines import merge_repeated, subdivide
 
 __all__ = ["OFF", "even_steps"]

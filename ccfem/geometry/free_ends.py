@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.geometry.offsets import rings
 from ccfem.geometry.polylines import is_closed, line_length, straight_pieces
 from ccfem.geometry.shapes import Region

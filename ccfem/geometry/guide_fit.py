@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from ccfem.arrays import BoolArray, FloatArray
+from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.geometry.offsets import rings
 from ccfem.geometry.own_way import until_itself
 from ccfem.geometry.polylines import line_length, pack, sample_midpoints, straight_pieces

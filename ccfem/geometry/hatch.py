@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray, IntArray, repeated
+from ccfem.base.arrays import FloatArray, IntArray, repeated
 from ccfem.geometry.offsets import inset, rings
 from ccfem.geometry.shapes import Region
 

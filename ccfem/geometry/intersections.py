@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.buckets import bucket
 from ccfem.geometry.polylines import lengths, starts_segment, subdivide
 

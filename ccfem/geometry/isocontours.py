@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import FloatArray, IntArray, repeated
+from ccfem.base.arrays import FloatArray, IntArray, repeated
 from ccfem.geometry.buckets import bucket
+from ccfem.geometry.facets import unique_edges
 from ccfem.geometry.polylines import starts_segment
-from ccfem.mesh.facets import unique_edges
 
 __all__ = ["Isocontours", "isocontours", "least_distance", "triangle_edges"]
 

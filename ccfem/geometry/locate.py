@@ -5,7 +5,7 @@ from functools import reduce
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.geometry.buckets import bucket
 
 __all__ = ["locate"]

@@ -14,13 +14,13 @@ import numpy as np
 import shapely
 from scipy.spatial import QhullError, Voronoi, cKDTree
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze, repeated
-from ccfem.checks import check_number
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, repeated
+from ccfem.base.checks import check_number
+from ccfem.geometry.facets import facet_keys
+from ccfem.geometry.measures import connected
 from ccfem.geometry.offsets import rings
 from ccfem.geometry.polylines import is_closed, line_length
 from ccfem.geometry.shapes import Region
-from ccfem.mesh.facets import facet_keys
-from ccfem.mesh.measures import connected
 
 __all__ = ["MedialAxis", "MedialSegment", "medial_axis"]
 

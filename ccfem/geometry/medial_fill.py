@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
 from ccfem.geometry.medial_axis import MedialSegment, medial_axis
 from ccfem.geometry.parallel_strands import grow
 from ccfem.geometry.shapes import Region

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from scipy.spatial import cKDTree
 
-from ccfem.arrays import FloatArray, IntArray, seen_only
+from ccfem.base.arrays import FloatArray, IntArray, seen_only
 
 __all__ = ["Nearest", "nearest_on_triangles"]
 

@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 from shapely.geometry.polygon import orient
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
 from ccfem.geometry.polylines import along_line, line_length
 from ccfem.geometry.shapes import Region
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
 from ccfem.geometry.polylines import is_closed
 
 __all__ = ["until_itself"]

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.geometry.free_ends import extend_free_ends
 from ccfem.geometry.polylines import is_closed, line_length, straight_pieces
 from ccfem.geometry.shapes import Region, open_lines, strings

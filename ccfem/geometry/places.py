@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.geometry.shapes import Region
 
 __all__ = ["INSIDE", "OUTSIDE", "TOLERANCE", "VOID", "Pieces", "cut_at_section", "section_places"]

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray, repeated
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, repeated
 
 __all__ = [
     "along_line",

@@ -7,7 +7,7 @@ import shapely
 from numba import njit
 from scipy.ndimage import distance_transform_edt
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray, repeated
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, repeated
 from ccfem.geometry.places import INSIDE, OUTSIDE, VOID
 from ccfem.geometry.shapes import Region
 

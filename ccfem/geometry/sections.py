@@ -3,7 +3,7 @@
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
 from ccfem.geometry.shapes import Region
 
 __all__ = ["corners_only"]

@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
 from ccfem.geometry.polylines import pack
 
 __all__ = ["Region", "Shapes", "open_lines", "strings"]

@@ -3,7 +3,7 @@
 import numpy as np
 import shapely
 
-from ccfem.arrays import BoolArray, FloatArray
+from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.geometry.medial_axis import MedialAxis, medial_axis
 from ccfem.geometry.offsets import inset, rings
 from ccfem.geometry.polylines import is_closed, line_length, runs, straight_pieces

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
 from ccfem.geometry.shapes import Region
 
 __all__ = ["Mirror", "mirror_image", "mirror_lines", "mirrors_of", "reflected"]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.geometry.polylines import (
     angles_between,
     inner_points,

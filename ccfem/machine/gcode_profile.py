@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from ccfem.checks import check_choices
-from ccfem.errors import InputError
+from ccfem.base.checks import check_choices
+from ccfem.base.errors import InputError
 from ccfem.machine.ranges import check_ranges
 
 __all__ = ["FeedAxes", "GcodeProfile"]

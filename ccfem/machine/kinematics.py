@@ -5,8 +5,8 @@ from typing import Literal
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
-from ccfem.checks import check_choices
+from ccfem.base.arrays import FloatArray
+from ccfem.base.checks import check_choices
 from ccfem.machine.ranges import check_ranges
 
 __all__ = ["Kinematics", "axis_values", "head_pose"]

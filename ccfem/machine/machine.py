@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from ccfem.arrays import in_brief
+from ccfem.base.arrays import in_brief
 from ccfem.machine.gcode_profile import GcodeProfile
 from ccfem.machine.kinematics import Kinematics
 from ccfem.machine.limits import Limits

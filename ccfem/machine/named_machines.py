@@ -12,9 +12,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ccfem.checks import check_known
-from ccfem.errors import InputError, shown
-from ccfem.io.toml import from_table, read_toml
+from ccfem.base.checks import check_known
+from ccfem.base.errors import InputError, shown
+from ccfem.base.toml import from_table, read_toml
 from ccfem.machine.machine import Machine
 
 __all__ = ["machine_about", "machine_from", "machine_names", "machine_table", "updated"]
@@ -91,7 +91,7 @@ def machine_from(table: object, where: str = "machine") -> Machine:
     Raises
     ------
     InputError
-        For an unknown key or a value of a wrong type, as `ccfem.io.toml.from_table`.
+        For an unknown key or a value of a wrong type, as `ccfem.base.toml.from_table`.
     """
     whole = _whole_table(table) if isinstance(table, Mapping) else table
     return from_table(Machine, whole, where)

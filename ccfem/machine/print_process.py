@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from ccfem.checks import check_choices
+from ccfem.base.checks import check_choices
 from ccfem.machine.ranges import check_ranges
 
 __all__ = ["Process"]

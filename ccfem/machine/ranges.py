@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Any, get_args, get_type_hints
 
-from ccfem.checks import check_number, member_name
-from ccfem.errors import InputError
+from ccfem.base.checks import check_number, member_name
+from ccfem.base.errors import InputError
 
 __all__ = ["RANGES", "Range", "check_ranges"]
 

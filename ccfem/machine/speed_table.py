@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ccfem.arrays import FloatArray, IntArray
-from ccfem.errors import InputError
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.errors import InputError
 from ccfem.machine.ranges import check_ranges
 
 __all__ = ["SpeedTable"]

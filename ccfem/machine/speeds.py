@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.polylines import (
     arc_lengths,
     inner_points,

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ccfem.progress import Progress, silent
+from ccfem.base.progress import Progress, silent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,12 +12,12 @@ from importlib import metadata, resources
 from pathlib import Path
 from typing import Any
 
-from ccfem.checks import check_known
-from ccfem.errors import InputError
-from ccfem.io.result_folder import whole_folder
-from ccfem.io.whole import whole_file
+from ccfem.base.checks import check_known
+from ccfem.base.errors import InputError
+from ccfem.base.progress import Progress, silent
+from ccfem.base.result_folder import whole_folder
+from ccfem.base.whole import whole_file
 from ccfem.papers.contents import Contents
-from ccfem.progress import Progress, silent
 
 __all__ = ["KEPT", "named_papers", "reproduce"]
 
@@ -104,7 +104,7 @@ def _written(
         with whole_file(path) as temporary:
             temporary.write_text(text, encoding="utf-8")
         return [path]
-    from ccfem.plot.canvas import save
+    from ccfem.comparison.plot.canvas import save
 
     drawn = contents.figures(study(), int(part.removeprefix("figure")))
     written = []

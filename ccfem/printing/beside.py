@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
 from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
+from ccfem.paths.toolpaths import FIBRE
 from ccfem.printing.poses import poses
 from ccfem.printing.print_plan import COORDINATE_DIGITS, PrintPlan
-from ccfem.toolpaths import FIBRE
 
 __all__ = ["Beside", "beside"]
 

@@ -5,15 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
 from ccfem.geometry.polylines import is_closed, pack, starts_segment
-from ccfem.layers.layer import Layer
-from ccfem.linking.print_order import nearest_end_order
 from ccfem.machine.machine import Machine
+from ccfem.paths.linking.print_order import nearest_end_order
+from ccfem.paths.toolpaths import FIBRE, SUPPORT, Toolpaths
 from ccfem.printing.layer_matrix import layer_matrix
-from ccfem.support import SupportLayers, support_paths
-from ccfem.toolpaths import FIBRE, SUPPORT, Toolpaths
+from ccfem.printing.support import SupportLayers, support_paths
+from ccfem.slicing.layers.layer import Layer
 
 __all__ = ["FilledLayer", "filled_layers", "in_order"]
 

@@ -5,21 +5,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, IntArray
-from ccfem.errors import InputError
-from ccfem.layers.layer import Layer
-from ccfem.layers.plane import plane_frame
-from ccfem.layers.slicer import Vector
-from ccfem.layers.standing import standing
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.machine.machine import Machine
-from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.printing.curved_layers import FilledLayer, filled_layers, in_order
 from ccfem.printing.head_lean import Matter, cleared, touched_length
 from ccfem.printing.islands import Islands, clashes, island_order, islands_of, rests_on, steps_of
 from ccfem.printing.poses import poses
 from ccfem.printing.print_plan import COORDINATE_DIGITS, PrintPlan
-from ccfem.support import SupportLayers
-from ccfem.toolpaths import FIBRE, Toolpaths
+from ccfem.printing.support import SupportLayers
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.plane import plane_frame
+from ccfem.slicing.layers.slicer import Vector
+from ccfem.slicing.layers.standing import standing
 
 __all__ = ["curved_plan"]
 

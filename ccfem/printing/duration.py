@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.machine.machine import Machine
 from ccfem.printing.moves import CUT, FEED, LAY, PREHEAT, STANDBY, TRAVEL, WAIT, WORK, Moves
 

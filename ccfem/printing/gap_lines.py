@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 from scipy.spatial import Voronoi
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
 from ccfem.geometry.shapes import Region, open_lines, strings
 
 __all__ = ["gap_lines"]

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.geometry.cones import earlier_in_cones
 from ccfem.geometry.polylines import along_line
 from ccfem.machine.machine import Machine
+from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.poses import under_bed
-from ccfem.toolpaths import Toolpaths
 
 __all__ = ["Cleared", "Matter", "cleared", "touched_length"]
 

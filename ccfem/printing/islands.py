@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.geometry.cones import groups_in_cones
-from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.printing.poses import poses
+from ccfem.slicing.layers.layer import Layer
 
 __all__ = ["Islands", "clashes", "island_order", "islands_of", "rests_on", "steps_of"]
 

@@ -6,16 +6,16 @@ from dataclasses import dataclass, field
 import numpy as np
 import shapely
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray
-from ccfem.errors import InputError
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.errors import InputError
 from ccfem.geometry.polylines import is_closed, line_length, merge_repeated, pack
 from ccfem.geometry.shapes import Region, strings
-from ccfem.linking.print_order import nearest_end_order
 from ccfem.machine.machine import Machine
+from ccfem.paths.linking.print_order import nearest_end_order
+from ccfem.paths.toolpaths import FIBRE, MATRIX, SUPPORT, Toolpaths
 from ccfem.printing.matrix_flow import pad_flow, with_flow
 from ccfem.printing.matrix_lines import MatrixFill
 from ccfem.printing.slabs import LOW
-from ccfem.toolpaths import FIBRE, MATRIX, SUPPORT, Toolpaths
 
 __all__ = ["COORDINATE_DIGITS", "SHORT", "Below", "LaidLayer", "fibre_layer", "matrix_layer"]
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ccfem.fields.chart import chart_of, flat_view
+from ccfem.base.threads import in_threads
 from ccfem.geometry.offsets import offset_rings
-from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
-from ccfem.threads import in_threads
-from ccfem.toolpaths import MATRIX, Toolpaths
+from ccfem.paths.fields.chart import chart_of, flat_view
+from ccfem.paths.toolpaths import MATRIX, Toolpaths
+from ccfem.slicing.layers.layer import Layer
 
 __all__ = ["layer_matrix"]
 
@@ -22,7 +22,7 @@ def layer_matrix(layers: Sequence[Layer], machine: Machine) -> Toolpaths:
     """Fill layers with matrix: rings a line's width apart, measured in the chart of curved layers.
 
     A line has the width of the machine and the height that the layer has where it lies, so that
-    its cross-section changes along it: `ccfem.export.robot_waypoints` writes that height.
+    its cross-section changes along it: `ccfem.printing.export.robot_waypoints` writes that height.
 
     Parameters
     ----------

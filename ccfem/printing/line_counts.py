@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
-from ccfem.errors import InputError
-from ccfem.layers.layer import Layer
+from ccfem.base.arrays import FloatArray
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.machine.machine import Machine
-from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.slicing.layers.layer import Layer
 
 __all__ = ["MOST_LINES", "MOST_STRANDS", "check_matrix_lines", "check_strands"]
 

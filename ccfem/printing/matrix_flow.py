@@ -16,13 +16,13 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
-from ccfem.errors import InputError
+from ccfem.base.arrays import FloatArray
+from ccfem.base.errors import InputError
 from ccfem.geometry.polylines import starts_segment, subdivide
 from ccfem.geometry.shapes import Region, strings
 from ccfem.machine.machine import Machine
+from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.strand_density import StrandDensity
-from ccfem.toolpaths import Toolpaths
 
 __all__ = ["THIN", "pad_flow", "with_flow"]
 

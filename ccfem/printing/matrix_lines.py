@@ -6,17 +6,17 @@ from dataclasses import dataclass, field
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
+from ccfem.base.threads import in_threads
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.offsets import offset_rings
 from ccfem.geometry.shapes import Region
-from ccfem.layers.layer import Layer
-from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
-from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.printing.gap_lines import gap_lines
 from ccfem.printing.slabs import Slab
-from ccfem.threads import in_threads
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.slicers.planar import Planar
 
 __all__ = ["MatrixFill", "matrix_fills"]
 

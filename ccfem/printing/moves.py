@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze, in_brief
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, in_brief
 
 __all__ = [
     *("CUT", "EVENTS", "FAN", "FEED", "HEAT", "HEAT_BED", "LAY", "LAYER", "PATH_END"),

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
 from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.offsets import offset_rings
 from ccfem.geometry.polylines import line_length

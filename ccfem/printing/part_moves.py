@@ -4,16 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
-from ccfem.errors import InputError
+from ccfem.base.arrays import FloatArray
+from ccfem.base.errors import InputError
 from ccfem.machine.machine import Machine
+from ccfem.paths.toolpaths import FIBRE, SUPPORT
 from ccfem.printing.beside import Beside, beside
 from ccfem.printing.moves import FEED, LAY, TRAVEL, Moves
 from ccfem.printing.preheating import preheated
 from ccfem.printing.print_plan import COORDINATE_DIGITS, PrintPlan
 from ccfem.printing.recorder import Recorder
 from ccfem.printing.tools import begin_layer, change_tool, lay_matrix, lay_strand
-from ccfem.toolpaths import FIBRE, SUPPORT
 
 __all__ = ["part_moves"]
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ccfem.arrays import BoolArray, FloatArray
+from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.machine.machine import Machine
 
 __all__ = ["limited_tilt", "poses", "under_bed"]

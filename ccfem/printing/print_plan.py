@@ -6,15 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 
-from ccfem.arrays import BoolArray, FloatArray, freeze, in_brief
-from ccfem.errors import InputError
+from ccfem.base.arrays import BoolArray, FloatArray, freeze, in_brief
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.polylines import line_length, starts_segment
 from ccfem.geometry.shapes import Region
-from ccfem.layers import Layer
-from ccfem.layers.plane import Plane
-from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
-from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.paths.toolpaths import FIBRE, MATRIX, Toolpaths
 from ccfem.printing.laid_layer import (
     COORDINATE_DIGITS,
     SHORT,
@@ -29,7 +27,9 @@ from ccfem.printing.pads import pad_lines, pad_regions
 from ccfem.printing.slabs import Slab, check_cover, slabs_of
 from ccfem.printing.stacks import ended_in_stacks, height_over
 from ccfem.printing.turns import turned
-from ccfem.toolpaths import FIBRE, MATRIX, Toolpaths
+from ccfem.slicing.layers import Layer
+from ccfem.slicing.layers.plane import Plane
+from ccfem.slicing.slicers.planar import Planar
 
 __all__ = ["COORDINATE_DIGITS", "PrintPlan", "check_machine", "plan_print"]
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
 from ccfem.geometry.polylines import subdivide
 from ccfem.machine.machine import Machine
 from ccfem.printing.moves import FEED, LAY, TRAVEL, Moves, role

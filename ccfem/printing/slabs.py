@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from ccfem.errors import InputError
-from ccfem.layers import Layer
+from ccfem.base.errors import InputError
 from ccfem.machine.machine import Machine
+from ccfem.slicing.layers import Layer
 
 __all__ = ["LOW", "Slab", "check_cover", "slabs_of"]
 

@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 from scipy.ndimage import label
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
 from ccfem.geometry.polylines import along_line, line_length, points_along
 from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ccfem.arrays import BoolArray, FloatArray
+from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.geometry.polylines import along_line, points_along, turning_angles
 from ccfem.machine.machine import Machine
 from ccfem.machine.speeds import step_curvatures, table_speeds
@@ -10,7 +10,7 @@ from ccfem.machine.speeds import step_curvatures, table_speeds
 __all__ = ["strand_speeds"]
 
 _REACH = 2.0
-"""Least length over which curvature is taken, in fibre widths; that of `ccfem.linking`."""
+"""Least length over which curvature is taken, in fibre widths; that of `ccfem.paths.linking`."""
 _PIECES = 5
 """Pieces of the ramp from the start speed to the normal one."""
 _SAME = 1e-3

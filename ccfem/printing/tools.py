@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
 from ccfem.geometry.polylines import along_line, line_length, points_along
 from ccfem.machine.machine import Machine
 from ccfem.printing.moves import (

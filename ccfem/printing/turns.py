@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
-from ccfem.errors import InputError
+from ccfem.base.arrays import FloatArray
+from ccfem.base.errors import InputError
 from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
 from ccfem.printing.pads import border_crossings, cut_at_border

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from ccfem import plugins
-from ccfem.planning.strategy import Strategy
+from ccfem.base import plugins
+from ccfem.paths.planning.strategy import Strategy
 
 __all__ = ["create", "named"]
 

@@ -6,17 +6,17 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
-from ccfem.checks import check_fields
-from ccfem.errors import InputError
+from ccfem.base.arrays import FloatArray
+from ccfem.base.checks import check_fields
+from ccfem.base.errors import InputError
 from ccfem.geometry.offsets import join_rings, offset_rings
 from ccfem.geometry.shells import concentric
-from ccfem.layers.layer import Layer
-from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import Infill, Turns
-from ccfem.raster.bitmap import Bitmap
-from ccfem.raster.patterns import Regions, concentric_regions
+from ccfem.paths.planning.infill import Infill, Turns
+from ccfem.paths.raster.bitmap import Bitmap
+from ccfem.paths.raster.patterns import Regions, concentric_regions
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer_stress import LayerStress
 
 __all__ = ["Concentric"]
 
@@ -51,7 +51,7 @@ class Concentric(Infill):
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut.
     mode : {"polyline", "raster"}, default "polyline"
-        Polylines; or paths of pixels one spacing wide, as in the paper: see `ccfem.raster`.
+        Polylines; or paths of pixels one spacing wide, as in the paper: see `ccfem.paths.raster`.
     turns : {"tight", "printable", "cut"}, default "tight"
         As in `Zigzag`.
     """

@@ -12,20 +12,20 @@ from typing import Any, ClassVar
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
-from ccfem.errors import InputError
-from ccfem.fields.streamlines import streamlines
+from ccfem.base.arrays import FloatArray
+from ccfem.base.errors import InputError
+from ccfem.base.tensor import in_plane, strongest_in_plane
 from ccfem.geometry.own_way import until_itself
 from ccfem.geometry.polylines import along_line, between, line_length, points_along
 from ccfem.geometry.shapes import Region, open_lines
-from ccfem.layers.layer import Layer
-from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import SPACING, check_fill, long_enough
-from ccfem.planning.strategy import Amount
-from ccfem.stress_tracing.stress_lines import misalignment, plane_stress_at, stress_lines
-from ccfem.tensor import in_plane, strongest_in_plane
-from ccfem.toolpaths import Toolpaths
+from ccfem.paths.fields.streamlines import streamlines
+from ccfem.paths.planning.infill import SPACING, check_fill, long_enough
+from ccfem.paths.planning.strategy import Amount
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.strategies.stress_tracing.stress_lines import misalignment, plane_stress_at, stress_lines
 
 __all__ = ["Eqs"]
 

@@ -10,17 +10,17 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
-from ccfem.checks import check_fields
-from ccfem.errors import InputError
+from ccfem.base.arrays import FloatArray
+from ccfem.base.checks import check_fields
+from ccfem.base.errors import InputError
 from ccfem.geometry.contour_tree import contour_trees
-from ccfem.layers.layer import Layer
-from ccfem.layers.layer_stress import LayerStress
-from ccfem.linking.first_in import first_in_spiral_out
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import SPACING, Turns, check_fill, long_enough, with_turns
-from ccfem.planning.strategy import Amount
-from ccfem.toolpaths import Toolpaths
+from ccfem.paths.linking.first_in import first_in_spiral_out
+from ccfem.paths.planning.infill import SPACING, Turns, check_fill, long_enough, with_turns
+from ccfem.paths.planning.strategy import Amount
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer_stress import LayerStress
 
 __all__ = ["Fiso"]
 

@@ -12,19 +12,19 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
-from ccfem.checks import check_fields
-from ccfem.errors import InputError
+from ccfem.base.arrays import FloatArray
+from ccfem.base.checks import check_fields
+from ccfem.base.errors import InputError
 from ccfem.geometry.hatch import hatch
 from ccfem.geometry.shapes import Region
 from ccfem.geometry.shells import shells
-from ccfem.layers.layer import Layer
-from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import SPACING, Infill, Turns, check_shells
-from ccfem.planning.strategy import Amount
-from ccfem.raster.bitmap import Bitmap
-from ccfem.raster.patterns import Regions, grid_regions
+from ccfem.paths.planning.infill import SPACING, Infill, Turns, check_shells
+from ccfem.paths.planning.strategy import Amount
+from ccfem.paths.raster.bitmap import Bitmap
+from ccfem.paths.raster.patterns import Regions, grid_regions
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer_stress import LayerStress
 
 __all__ = ["Grid"]
 
@@ -54,7 +54,7 @@ class Grid(Infill):
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut.
     mode : {"polyline", "raster"}, default "polyline"
-        Polylines; or paths of pixels one spacing wide, as in the paper: see `ccfem.raster`.
+        Polylines; or paths of pixels one spacing wide, as in the paper: see `ccfem.paths.raster`.
     turns : {"tight", "printable", "cut"}, default "tight"
         As in `Zigzag`.
     """

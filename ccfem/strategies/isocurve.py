@@ -14,31 +14,31 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ccfem.arrays import FloatArray
-from ccfem.checks import check_choices, check_fields
-from ccfem.elasticity.part_stress import PartStress
-from ccfem.errors import InputError
-from ccfem.fields.compatibility import Incompatible
-from ccfem.fields.directed import Directed, directed
-from ccfem.fields.layer_elements import Surface
-from ccfem.fields.layer_tension import layer_tension, mesh_tension
-from ccfem.fields.levels import extract_levels, unit_levels
-from ccfem.fields.scalar import fit_cone, fit_constrained, fit_literal, fit_weighted
-from ccfem.fields.tensile import Tension
+from ccfem.base.arrays import FloatArray
+from ccfem.base.checks import check_choices, check_fields
+from ccfem.base.errors import InputError
+from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.geometry.isocontours import Isocontours
 from ccfem.geometry.polylines import is_closed, middle_of_longest_run
-from ccfem.layers.holes import holes_on
-from ccfem.layers.layer import Layer
-from ccfem.layers.layer_stress import LayerStress, stress_on
-from ccfem.linking.clearance import trim_to_clearance
-from ccfem.linking.conformal import lead_into, parallel_curve
-from ccfem.linking.finishing import keep_off_border, linked_paths
-from ccfem.linking.joining import Joined
-from ccfem.linking.spiral import spiral
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import Turns, with_turns
-from ccfem.planning.strategy import Amount, LayerPlanner
-from ccfem.toolpaths import Toolpaths
+from ccfem.paths.fields.compatibility import Incompatible
+from ccfem.paths.fields.directed import Directed, directed
+from ccfem.paths.fields.layer_elements import Surface
+from ccfem.paths.fields.layer_tension import layer_tension, mesh_tension
+from ccfem.paths.fields.levels import extract_levels, unit_levels
+from ccfem.paths.fields.scalar import fit_cone, fit_constrained, fit_literal, fit_weighted
+from ccfem.paths.fields.tensile import Tension
+from ccfem.paths.linking.clearance import trim_to_clearance
+from ccfem.paths.linking.conformal import lead_into, parallel_curve
+from ccfem.paths.linking.finishing import keep_off_border, linked_paths
+from ccfem.paths.linking.joining import Joined
+from ccfem.paths.linking.spiral import spiral
+from ccfem.paths.planning.infill import Turns, with_turns
+from ccfem.paths.planning.strategy import Amount, LayerPlanner
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.holes import holes_on
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer_stress import LayerStress, stress_on
 
 __all__ = ["Isocurve"]
 

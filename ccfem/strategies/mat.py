@@ -9,16 +9,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
 from ccfem.geometry.medial_fill import medial_fill
 from ccfem.geometry.shapes import Region
 from ccfem.geometry.shells import shells
-from ccfem.layers.layer import Layer
-from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import Infill, Turns, check_shells
-from ccfem.raster.bitmap import Bitmap
-from ccfem.raster.patterns import Regions, medial_regions
+from ccfem.paths.planning.infill import Infill, Turns, check_shells
+from ccfem.paths.raster.bitmap import Bitmap
+from ccfem.paths.raster.patterns import Regions, medial_regions
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer_stress import LayerStress
 
 __all__ = ["Mat"]
 
@@ -42,7 +42,7 @@ class Mat(Infill):
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut.
     mode : {"polyline", "raster"}, default "polyline"
-        Polylines; or paths of pixels one spacing wide, as in the paper: see `ccfem.raster`.
+        Polylines; or paths of pixels one spacing wide, as in the paper: see `ccfem.paths.raster`.
     turns : {"tight", "printable", "cut"}, default "tight"
         As in `Zigzag`.
     """

@@ -12,9 +12,9 @@ from typing import Any, ClassVar, Literal, NamedTuple
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
-from ccfem.errors import InputError
-from ccfem.fields.streamlines import streamlines
+from ccfem.base.arrays import FloatArray
+from ccfem.base.errors import InputError
+from ccfem.base.tensor import in_plane
 from ccfem.geometry.abutting import clear_ends
 from ccfem.geometry.guide_fit import fitted_guides, spaced_guides
 from ccfem.geometry.medial_axis import medial_axis
@@ -22,15 +22,15 @@ from ccfem.geometry.parallel_strands import grow, lengthened
 from ccfem.geometry.polylines import along_line, line_length, points_along
 from ccfem.geometry.shapes import Region
 from ccfem.geometry.shells import shells
-from ccfem.layers.layer import Layer
-from ccfem.layers.layer_stress import LayerStress
-from ccfem.linking.joining import Joined, link_ends
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import Infill, Turns, check_shells, with_turns
-from ccfem.raster.bitmap import Bitmap
-from ccfem.raster.guides import stress_guides
-from ccfem.raster.patterns import Regions, inside_shells, stress_regions
-from ccfem.tensor import in_plane
+from ccfem.paths.fields.streamlines import streamlines
+from ccfem.paths.linking.joining import Joined, link_ends
+from ccfem.paths.planning.infill import Infill, Turns, check_shells, with_turns
+from ccfem.paths.raster.bitmap import Bitmap
+from ccfem.paths.raster.guides import stress_guides
+from ccfem.paths.raster.patterns import Regions, inside_shells, stress_regions
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer_stress import LayerStress
 
 __all__ = ["Mps"]
 
@@ -84,7 +84,7 @@ class Mps(Infill):
         are too short are first joined to their neighbours by marked links; ends then stop a fibre
         width before the sides of other strands.
     mode : {"polyline", "raster"}, default "polyline"
-        Polylines; or paths of pixels one spacing wide, as in the paper: see `ccfem.raster`.
+        Polylines; or paths of pixels one spacing wide, as in the paper: see `ccfem.paths.raster`.
     turns : {"tight", "printable", "cut"}, default "tight"
         As in `Zigzag`.
     """

@@ -1,31 +1,31 @@
 """Any strategy, planned with too much fibre and then cut back to the most useful fibre.
 
 Not from a paper: the part is tested virtually with its fibre, and the stretches that do the least
-work are removed until the wanted length is left (`ccfem.fibre_aware.prune`).
+work are removed until the wanted length is left (`ccfem.strategies.fibre_aware.prune`).
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal
 
-from ccfem.arrays import freeze
-from ccfem.checks import check_choices, check_fields
-from ccfem.elasticity.part_stress import PartStress
-from ccfem.elasticity.stress_field import solved
-from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.errors import InputError
-from ccfem.fibre_aware.cut_and_move import prune_and_move
-from ccfem.fibre_aware.judges import Goal
-from ccfem.fibre_aware.plan_cases import plan_by_layers
-from ccfem.fibre_aware.shortening import TIGHT_SHARES
-from ccfem.fibre_aware.upper_bound import measures
-from ccfem.layers.layer import Layer
+from ccfem.base.arrays import freeze
+from ccfem.base.checks import check_choices, check_fields
+from ccfem.base.errors import InputError
+from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.fem.elasticity.stress_field import solved
+from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.judging.virtual_testing.several_cases import specimens
+from ccfem.judging.virtual_testing.strand import RHO, Strand
 from ccfem.machine.machine import Machine
-from ccfem.planning.strategy import Amount, LayerPlanner, Strategy
-from ccfem.planning.whole_part import WholePart, full_length
+from ccfem.paths.planning.strategy import Amount, LayerPlanner, Strategy
+from ccfem.paths.planning.whole_part import WholePart, full_length
+from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies import create
-from ccfem.virtual_testing.several_cases import specimens
-from ccfem.virtual_testing.strand import RHO, Strand
+from ccfem.strategies.fibre_aware.cut_and_move import prune_and_move
+from ccfem.strategies.fibre_aware.judges import Goal
+from ccfem.strategies.fibre_aware.plan_cases import plan_by_layers
+from ccfem.strategies.fibre_aware.shortening import TIGHT_SHARES
+from ccfem.strategies.fibre_aware.upper_bound import measures
 
 __all__ = ["Pruned"]
 
@@ -64,8 +64,8 @@ class Pruned:
         case that fails first, at the least multiple of its load.
     moves : int, default 0
         Number of steps in which the remaining strands are moved sideways, each step tested
-        (`ccfem.fibre_aware.strand_moves`). 6 steps make a part 1 to 2 % stiffer, and planning takes
-        two to three times as long.
+        (`ccfem.strategies.fibre_aware.strand_moves`). 6 steps make a part 1 to 2 % stiffer, and
+        planning takes two to three times as long.
     turns : {"tight", "cut"}
         Whether more than 1 % of the fibre may turn more tightly than the machine's minimum radius.
     objective : {"worst", "sum", "least"}

@@ -11,15 +11,23 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, IntArray
-from ccfem.checks import check_choices, check_fields
-from ccfem.elasticity.part_stress import PartStress
-from ccfem.elasticity.stress_field import StressField, solved
-from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.errors import InputError
-from ccfem.fibre_aware.cut_and_move import prune_and_move
-from ccfem.fibre_aware.design_lengths import designed_to_lengths
-from ccfem.fibre_aware.heights import (
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.checks import check_choices, check_fields
+from ccfem.base.errors import InputError
+from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.fem.elasticity.stress_field import StressField, solved
+from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.judging.virtual_testing.strand import RHO, Strand
+from ccfem.machine.machine import Machine
+from ccfem.paths.fields.layer_tension import layer_tension
+from ccfem.paths.planning.strategy import Amount, LayerPlanner
+from ccfem.paths.planning.whole_part import WholePart, full_length
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.strategies.fibre_aware.cut_and_move import prune_and_move
+from ccfem.strategies.fibre_aware.design_lengths import designed_to_lengths
+from ccfem.strategies.fibre_aware.heights import (
     alike_share,
     fibre_capacity,
     group_layers,
@@ -28,30 +36,22 @@ from ccfem.fibre_aware.heights import (
     middle_layers,
     nearest_layer,
 )
-from ccfem.fibre_aware.judges import Goal
-from ccfem.fibre_aware.shortening import TIGHT_SHARES
-from ccfem.fibre_aware.smeared import SmearedPart, smeared_cases
-from ccfem.fibre_aware.spline_grid import SplineGrid
-from ccfem.fibre_aware.strand_moves import kept_radius
-from ccfem.fibre_aware.stream_design import (
+from ccfem.strategies.fibre_aware.judges import Goal
+from ccfem.strategies.fibre_aware.shortening import TIGHT_SHARES
+from ccfem.strategies.fibre_aware.smeared import SmearedPart, smeared_cases
+from ccfem.strategies.fibre_aware.spline_grid import SplineGrid
+from ccfem.strategies.fibre_aware.strand_moves import kept_radius
+from ccfem.strategies.fibre_aware.stream_design import (
     DESIGN_POWERS,
     StreamDesign,
     StreamModel,
     StreamProblem,
     designed_in_steps,
 )
-from ccfem.fibre_aware.stream_paths import Extraction, refined
-from ccfem.fibre_aware.stream_start import plane_axes, start_fields
-from ccfem.fibre_aware.strength_design import design_for_strength
-from ccfem.fibre_aware.upper_bound import measures
-from ccfem.fields.layer_tension import layer_tension
-from ccfem.layers.layer import Layer
-from ccfem.layers.layer_stress import stress_on
-from ccfem.machine.machine import Machine
-from ccfem.planning.strategy import Amount, LayerPlanner
-from ccfem.planning.whole_part import WholePart, full_length
-from ccfem.toolpaths import Toolpaths
-from ccfem.virtual_testing.strand import RHO, Strand
+from ccfem.strategies.fibre_aware.stream_paths import Extraction, refined
+from ccfem.strategies.fibre_aware.stream_start import plane_axes, start_fields
+from ccfem.strategies.fibre_aware.strength_design import design_for_strength
+from ccfem.strategies.fibre_aware.upper_bound import measures
 
 __all__ = ["StreamFunction"]
 
@@ -90,7 +90,7 @@ class StreamFunction:
         Axial stiffness of a strand over Young's modulus of the matrix.
     evaluations : int, default 80
         Evaluations of the stiffness in the design. If the coverage is above 0.45, 0.6 times as many
-        follow for one load case (`ccfem.fibre_aware.stream_design.designed_in_steps`).
+        follow for one load case (`ccfem.strategies.fibre_aware.stream_design.designed_in_steps`).
     groups : int, default 0
         Number of fields over the height of the part; 0 for one field, or for at most six where the
         stress differs over the height.
@@ -293,7 +293,7 @@ class StreamFunction:
         """Design for stiffness; return the problem, the group of each layer, and the design.
 
         `bounds` (n,) are the stiffness ratios that the cases are measured by
-        (`ccfem.fibre_aware.upper_bound.measures`), by default 1.
+        (`ccfem.strategies.fibre_aware.upper_bound.measures`), by default 1.
         """
         cases = WeightedCases.of(stress)
         parts = smeared_cases(cases.fields, layers[0].plane.frame)

@@ -12,15 +12,15 @@ from typing import ClassVar
 
 import shapely
 
-from ccfem.checks import check_fields
-from ccfem.fields.evenly_spaced import evenly_spaced_streamlines
-from ccfem.layers.layer import Layer
-from ccfem.layers.layer_stress import LayerStress
+from ccfem.base.checks import check_fields
+from ccfem.base.tensor import in_plane
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import SPACING, check_fill, long_enough
-from ccfem.planning.strategy import Amount
-from ccfem.tensor import in_plane
-from ccfem.toolpaths import Toolpaths
+from ccfem.paths.fields.evenly_spaced import evenly_spaced_streamlines
+from ccfem.paths.planning.infill import SPACING, check_fill, long_enough
+from ccfem.paths.planning.strategy import Amount
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer_stress import LayerStress
 
 __all__ = ["Streamline"]
 

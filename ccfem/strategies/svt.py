@@ -14,29 +14,29 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 import shapely
 
-from ccfem.arrays import BoolArray, FloatArray
-from ccfem.checks import check_fields
-from ccfem.elasticity.part_stress import PartStress
+from ccfem.base.arrays import BoolArray, FloatArray
+from ccfem.base.checks import check_fields
+from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.geometry.offsets import join_rings, offset_rings, rings
 from ccfem.geometry.shapes import Region
-from ccfem.layers.layer import Layer
-from ccfem.layers.layer_stress import LayerStress, stress_on
-from ccfem.linking.single_path import link_tracks
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import SPACING, Turns, check_fill, long_enough, with_turns
-from ccfem.planning.strategy import Amount, LayerPlanner
-from ccfem.stress_tracing.alike import alike
-from ccfem.stress_tracing.band import band
-from ccfem.stress_tracing.blobs import blobs
-from ccfem.stress_tracing.criterion import Criterion
-from ccfem.stress_tracing.frame import frame
-from ccfem.stress_tracing.main_paths import main_paths
-from ccfem.stress_tracing.stems import with_shared_stems
-from ccfem.stress_tracing.symmetric import made_symmetric
-from ccfem.stress_tracing.tails import tail_turns
-from ccfem.stress_tracing.tracks import tracks
-from ccfem.stress_tracing.walk import walk
-from ccfem.toolpaths import Toolpaths
+from ccfem.paths.linking.single_path import link_tracks
+from ccfem.paths.planning.infill import SPACING, Turns, check_fill, long_enough, with_turns
+from ccfem.paths.planning.strategy import Amount, LayerPlanner
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer_stress import LayerStress, stress_on
+from ccfem.strategies.stress_tracing.alike import alike
+from ccfem.strategies.stress_tracing.band import band
+from ccfem.strategies.stress_tracing.blobs import blobs
+from ccfem.strategies.stress_tracing.criterion import Criterion
+from ccfem.strategies.stress_tracing.frame import frame
+from ccfem.strategies.stress_tracing.main_paths import main_paths
+from ccfem.strategies.stress_tracing.stems import with_shared_stems
+from ccfem.strategies.stress_tracing.symmetric import made_symmetric
+from ccfem.strategies.stress_tracing.tails import tail_turns
+from ccfem.strategies.stress_tracing.tracks import tracks
+from ccfem.strategies.stress_tracing.walk import walk
 
 __all__ = ["Svt"]
 

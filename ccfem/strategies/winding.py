@@ -14,30 +14,30 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
-from ccfem.checks import check_choices, check_fields
-from ccfem.elasticity.part_stress import PartStress
-from ccfem.errors import InputError
-from ccfem.fields.layer_elements import Surface
+from ccfem.base.arrays import FloatArray
+from ccfem.base.checks import check_choices, check_fields
+from ccfem.base.errors import InputError
+from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.geometry.isocontours import isocontours
 from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
-from ccfem.guidance.joint_lines import joint_lines
-from ccfem.guidance.joints import joints_of
-from ccfem.layers.layer import Layer
-from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import SPACING, Turns, check_fill, long_enough, with_turns
-from ccfem.planning.strategy import Amount, LayerPlanner
-from ccfem.principal_lines.critical import Keep
-from ccfem.principal_lines.strongest import strongest_stress
-from ccfem.toolpaths import Toolpaths
-from ccfem.winding.annulus import annulus_field
-from ccfem.winding.bends import limit_bends
-from ccfem.winding.even_levels import evened, steep
-from ccfem.winding.joining_curves import border_tree
-from ccfem.winding.paper_field import PaperWeights, paper_field
-from ccfem.winding.piece import Piece, pieces_with_joints
-from ccfem.winding.spaced import CLOSEST, kept_apart
+from ccfem.paths.fields.layer_elements import Surface
+from ccfem.paths.planning.infill import SPACING, Turns, check_fill, long_enough, with_turns
+from ccfem.paths.planning.strategy import Amount, LayerPlanner
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.guidance.joint_lines import joint_lines
+from ccfem.slicing.guidance.joints import joints_of
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.principal_lines.critical import Keep
+from ccfem.slicing.principal_lines.strongest import strongest_stress
+from ccfem.strategies.winding_curves.annulus import annulus_field
+from ccfem.strategies.winding_curves.bends import limit_bends
+from ccfem.strategies.winding_curves.even_levels import evened, steep
+from ccfem.strategies.winding_curves.joining_curves import border_tree
+from ccfem.strategies.winding_curves.paper_field import PaperWeights, paper_field
+from ccfem.strategies.winding_curves.piece import Piece, pieces_with_joints
+from ccfem.strategies.winding_curves.spaced import CLOSEST, kept_apart
 
 __all__ = ["Winding"]
 

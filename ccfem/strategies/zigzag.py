@@ -6,14 +6,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ccfem.checks import check_fields
+from ccfem.base.checks import check_fields
 from ccfem.geometry.hatch import zigzag
-from ccfem.layers.layer import Layer
-from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import SPACING, Turns, check_fill, long_enough, with_turns
-from ccfem.planning.strategy import Amount
-from ccfem.toolpaths import Toolpaths
+from ccfem.paths.planning.infill import SPACING, Turns, check_fill, long_enough, with_turns
+from ccfem.paths.planning.strategy import Amount
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer_stress import LayerStress
 
 __all__ = ["Zigzag"]
 

@@ -3,7 +3,7 @@
 from table import table
 
 from ccfem.comparison.headline import TEST_COLUMNS
-from ccfem.evaluation import COLUMNS
+from ccfem.judging.evaluation import COLUMNS
 
 __all__ = ["indices_page"]
 

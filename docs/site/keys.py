@@ -7,8 +7,8 @@ from typing import Any
 
 from table import table
 
+from ccfem.base.toml import described
 from ccfem.cli.docstring import Attribute, about, attributes
-from ccfem.io.toml import described
 
 __all__ = ["keys", "kinds"]
 

@@ -8,7 +8,7 @@ from keys import keys
 
 from ccfem import strategies
 from ccfem.cli.docstring import about
-from ccfem.layers import slicing
+from ccfem.slicing import slicers as slicing
 
 __all__ = ["slicers_page", "strategies_page"]
 
@@ -25,7 +25,7 @@ _SLICERS = """# Slicers
 
 A slicer cuts a part into layers, flat or curved. On the command line it is given as
 `--slicing NAME:PARAMETER=VALUE,...`, in a part file as `[slicing] method = "NAME"`, in Python as a
-value of `ccfem.layers.slicing`.
+value of `ccfem.slicing.slicers`.
 
 """
 

@@ -10,9 +10,9 @@ from ccfem.cases.part_keys import Part
 from ccfem.cases.part_loads import LOADS, SUPPORTS
 from ccfem.cases.part_regions import REGIONS
 from ccfem.cases.part_tables import RULES
+from ccfem.fem.materials import isotropic, material_names, transversely_isotropic
 from ccfem.machine import GcodeProfile, Kinematics, Limits, Machine, Process, SpeedTable
-from ccfem.materials import isotropic, material_names, transversely_isotropic
-from ccfem.placement import FibrePlaces, FibreRegion
+from ccfem.paths.placement import FibrePlaces, FibreRegion
 
 __all__ = ["part_file_page"]
 

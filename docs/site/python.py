@@ -9,8 +9,8 @@ __all__ = ["python_page"]
 _HEAD = """# Python
 
 `import ccfem` offers the functions of the flow; what they take and give lives in packages by name,
-which need no import of their own: `ccfem.elasticity.Force`, `ccfem.strategies.Isocurve`. Units are
-mm, N and MPa; angles are degrees.
+which need no import of their own: `ccfem.fem.elasticity.Force`, `ccfem.strategies.Isocurve`. Units
+are mm, N and MPa; angles are degrees.
 
 """
 

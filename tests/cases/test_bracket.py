@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ccfem.body.files.surface import Surface
+from ccfem.body.mesh.check import check_mesh
 from ccfem.cases.bracket import HOLES, bracket, bracket_design, bracket_domain, bracket_outline
-from ccfem.elasticity import solve
-from ccfem.io.surface import Surface
-from ccfem.mesh.check import check_mesh
+from ccfem.fem.elasticity import solve
 
 
 @pytest.fixture(scope="module")

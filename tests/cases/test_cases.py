@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 import shapely
 
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.check import check_mesh
 from ccfem.cases import Case, create_case, named_cases
 from ccfem.cases.bar import bar_outline
 from ccfem.cases.loop import loop_outline
 from ccfem.cases.open_hole import open_hole_outline
 from ccfem.cases.stored.build import build
 from ccfem.cases.stored.stored_files import data_folder, manifest, stored_mesh
-from ccfem.elasticity.solve import solve
-from ccfem.errors import InputError
-from ccfem.mesh.check import check_mesh
+from ccfem.fem.elasticity.solve import solve
 
 NAMES = ("bar", "loop", "open_hole")
 SIZES = {

@@ -8,7 +8,7 @@ import shapely
 
 from ccfem.cases import create_case
 from ccfem.cases.twist_bar import twist_bar_front, twist_bar_top
-from ccfem.layers.slicing import Spatial
+from ccfem.slicing.slicers import Spatial
 
 SIZES = {
     "twist_bar": ((330.0, 157.4, 60.0), {"base": (9.75, 60.0), "head": (9.75, 60.0)}),

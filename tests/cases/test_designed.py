@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 import shapely
 
+from ccfem.base.errors import InputError
+from ccfem.base.tensor import largest_in_plane
+from ccfem.body.mesh.check import check_mesh
 from ccfem.cases import create_case
 from ccfem.cases.designed import LAMINATE, DesignPlate, Stretch
 from ccfem.cases.stored.build import DESIGNED
 from ccfem.cases.stored.stored_files import manifest
-from ccfem.elasticity import solve
-from ccfem.errors import InputError
-from ccfem.materials import plane_stress
-from ccfem.mesh.check import check_mesh
-from ccfem.plates import rotate_plane, solve_plane
-from ccfem.tensor import largest_in_plane
+from ccfem.fem.elasticity import solve
+from ccfem.fem.materials import plane_stress
+from ccfem.fem.plates import rotate_plane, solve_plane
 
 
 def plate_of(name, **parameters):

@@ -7,7 +7,7 @@ import shapely
 from ccfem.cases import create_case
 from ccfem.cases.arm_bracket import arm_bracket_outlines
 from ccfem.cases.corner_bracket import corner_bracket_outlines
-from ccfem.layers.slicing import LoadOriented
+from ccfem.slicing.slicers import LoadOriented
 
 
 def volume_in_common(outlines, parts=400):

@@ -6,16 +6,16 @@ import pytest
 
 import ccfem.cases.part_file
 import ccfem.cases.part_tables
+from ccfem.base.errors import InputError
+from ccfem.body.files import write_mesh
+from ccfem.body.mesh import TetMesh
+from ccfem.body.meshing import extrude
+from ccfem.cases.inspection import check
 from ccfem.cases.part_file import read_part
-from ccfem.elasticity.problem import Bearing, Force, PointForce, Pressure, Support, Traction
-from ccfem.elasticity.solve import solve
-from ccfem.elasticity.support_kinds import PressingSupport
-from ccfem.errors import InputError
-from ccfem.inspection import check
-from ccfem.io import write_mesh
-from ccfem.layers.slicing.planar import Planar
-from ccfem.mesh import TetMesh
-from ccfem.meshing import extrude
+from ccfem.fem.elasticity.problem import Bearing, Force, PointForce, Pressure, Support, Traction
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.support_kinds import PressingSupport
+from ccfem.slicing.slicers.planar import Planar
 
 EXAMPLE = Path(ccfem.__file__).parent / "cases" / "examples" / "bracket_plate.toml"
 

@@ -7,12 +7,19 @@ import numpy as np
 import pytest
 
 import ccfem.cases.part_file
+from ccfem.base.errors import InputError
+from ccfem.body.files import write_mesh
+from ccfem.body.files.surface import Surface
+from ccfem.body.mesh import box_mesh
+from ccfem.body.mesh.patches import Plane
 from ccfem.cases.before_meshing import check_before_meshing
+from ccfem.cases.inspection import check
 from ccfem.cases.part_file import read_part
 from ccfem.cases.part_loads import LOADS, SUPPORTS
 from ccfem.cases.part_regions import REGIONS
 from ccfem.cases.part_writing import part_text
-from ccfem.elasticity import (
+from ccfem.comparison.plot.part_picture import support_marks
+from ccfem.fem.elasticity import (
     Bearing,
     BodyForce,
     Displacement,
@@ -35,14 +42,7 @@ from ccfem.elasticity import (
     prepare,
     solve,
 )
-from ccfem.elasticity.support_sets import support_sets
-from ccfem.errors import InputError
-from ccfem.inspection import check
-from ccfem.io import write_mesh
-from ccfem.io.surface import Surface
-from ccfem.mesh import box_mesh
-from ccfem.mesh.patches import Plane
-from ccfem.plot.part_picture import support_marks
+from ccfem.fem.elasticity.support_sets import support_sets
 
 EXAMPLE = Path(ccfem.__file__).parent / "cases" / "examples" / "loads_and_supports.toml"
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ccfem.cases.t_bracket import HOLES, t_bracket, t_bracket_front, t_bracket_top
-from ccfem.elasticity import solve
-from ccfem.layers.slicing import Planar, Spatial
+from ccfem.fem.elasticity import solve
+from ccfem.slicing.slicers import Planar, Spatial
 
 
 @pytest.fixture(scope="module")

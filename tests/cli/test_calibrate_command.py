@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ccfem.cli.main import main
-from ccfem.virtual_testing.calibration import read_calibration
+from ccfem.judging.virtual_testing.calibration import read_calibration
 
 QUICK = ["--set-case", "element_size=4.0", "--layers", "2"]
 
@@ -109,7 +109,9 @@ def test_a_file_that_cannot_be_written_is_refused_before_the_solve(
     calibrated: Path, out: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     solved = []
-    monkeypatch.setattr("ccfem.virtual_testing.calibration.calibrate", lambda *_: solved.append(1))
+    monkeypatch.setattr(
+        "ccfem.judging.virtual_testing.calibration.calibrate", lambda *_: solved.append(1)
+    )
     monkeypatch.chdir(calibrated)
     command = ["ccfem", "calibrate", "bar", "--unreinforced", "none.csv", "--out", out]
     monkeypatch.setattr(sys, "argv", command)

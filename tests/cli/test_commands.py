@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from ccfem import __version__
+from ccfem.base.errors import InputError
+from ccfem.body.files import write_mesh
+from ccfem.body.mesh import TetMesh
+from ccfem.body.mesh.box import box_mesh
 from ccfem.cli.arguments import parameters_by_strategy
 from ccfem.cli.main import main
-from ccfem.errors import InputError
-from ccfem.export.waypoints import read_waypoints
-from ccfem.io import write_mesh
-from ccfem.mesh import TetMesh
-from ccfem.mesh.box import box_mesh
+from ccfem.printing.export.waypoints import read_waypoints
 from ccfem.strategies import named
 
 PART = """

@@ -5,8 +5,8 @@ import pytest
 from ccfem.cli import fibre_amounts
 from ccfem.comparison.front_cases import PointCases
 from ccfem.comparison.front_points import FibreFront, FrontPoint
-from ccfem.fibre_aware.upper_bound import UpperBound
-from ccfem.toolpaths import Toolpaths
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.strategies.fibre_aware.upper_bound import UpperBound
 
 QUICK = ["bar", "--set-case", "element_size=4.0", "--strategy", "zigzag", "--layers", "2"]
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import shapely
 
+from ccfem.body.files import write_mesh
+from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.part_file import read_part
 from ccfem.cli.main import main
-from ccfem.io import write_mesh
-from ccfem.mesh.box import box_mesh
-from ccfem.topopt.flat_part import flat_part
+from ccfem.fem.topopt.flat_part import flat_part
 
 _PART = """
 mesh = "plate.npz"

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 import shapely
 
+from ccfem.body.files import write_mesh
+from ccfem.body.mesh import TetMesh
+from ccfem.body.mesh.box import box_mesh
+from ccfem.body.meshing import extrude
+from ccfem.cases.inspection import check
 from ccfem.cases.part_file import read_part
-from ccfem.inspection import check
-from ccfem.io import write_mesh
-from ccfem.mesh import TetMesh
-from ccfem.mesh.box import box_mesh
-from ccfem.meshing import extrude
 
 
 def test_a_body_is_no_part_and_a_new_part_file_is_one(ccfem, tmp_path):

@@ -8,11 +8,11 @@ import numpy as np
 import pyvista
 
 from benchmarks.fuzz.mutants import frd
+from ccfem.base.tensor import to_voigt
+from ccfem.body.files import read_stress
+from ccfem.body.mesh import TetMesh, box_mesh
 from ccfem.cases.part_file import read_part
-from ccfem.elasticity import solve
-from ccfem.io import read_stress
-from ccfem.mesh import TetMesh, box_mesh
-from ccfem.tensor import to_voigt
+from ccfem.fem.elasticity import solve
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "how_to" / "foreign_stress.md").read_text()

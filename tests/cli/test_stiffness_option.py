@@ -2,19 +2,19 @@
 
 import pytest
 
+from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
 from ccfem.cases.reading import read
 from ccfem.comparison.engine import compare
-from ccfem.elasticity.problem import Force, Problem, Support
-from ccfem.elasticity.solve import solve
-from ccfem.layers.slicing.planar import Planar
+from ccfem.fem.elasticity.problem import Force, Problem, Support
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.materials import isotropic
+from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine.machine import Machine
-from ccfem.materials import isotropic
-from ccfem.mesh.box import box_mesh
-from ccfem.planning.equal_fibre import plan_to_length
+from ccfem.paths.planning.equal_fibre import plan_to_length
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
-from ccfem.virtual_testing.specimen import Specimen
-from ccfem.virtual_testing.virtual_test import virtual_test
 
 QUICK = ["--set-case", "element_size=4.0", "--layers", "2", "--strategy", "zigzag"]
 

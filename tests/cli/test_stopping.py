@@ -23,8 +23,8 @@ import os, signal, time
 from pathlib import Path
 import typer
 from ccfem.cli.start import start
-from ccfem.io.folder import private_folder
-from ccfem.io.result_folder import whole_folder
+from ccfem.base.folder import private_folder
+from ccfem.base.result_folder import whole_folder
 
 def stop():
     os.kill(os.getpid(), signal.{name})

@@ -2,8 +2,9 @@
 
 import pytest
 
-from ccfem.comparison import charts, ranking
-from ccfem.comparison.charts import fronts, wide_enough
+from ccfem.comparison import ranking
+from ccfem.comparison.report.charts import fronts, wide_enough
+from ccfem.comparison.report.html_report import charts
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
 from ccfem.cli import commands
 from ccfem.comparison.engine import compare
@@ -19,19 +21,17 @@ from ccfem.comparison.pictures import caption
 from ccfem.comparison.ranking import best_values
 from ccfem.comparison.remarks import bound_remark
 from ccfem.comparison.request import STRATEGIES, named_strategies
-from ccfem.elasticity.problem import Force, Problem, Support
-from ccfem.elasticity.support_kinds import PressingSupport
-from ccfem.elasticity.system import System
-from ccfem.errors import InputError
-from ccfem.evaluation import evaluate
-from ccfem.layers.slicing import Planar
+from ccfem.fem.elasticity.problem import Force, Problem, Support
+from ccfem.fem.elasticity.support_kinds import PressingSupport
+from ccfem.fem.elasticity.system import System
+from ccfem.fem.materials import isotropic
+from ccfem.judging.evaluation import evaluate
 from ccfem.machine import GcodeProfile, Machine
-from ccfem.materials import isotropic
-from ccfem.mesh.box import box_mesh
-from ccfem.planning import GivenPaths, plan
-from ccfem.planning.equal_fibre import length_per_layer
+from ccfem.paths.planning import GivenPaths, plan
+from ccfem.paths.planning.equal_fibre import length_per_layer
+from ccfem.paths.toolpaths import FIBRE, Toolpaths
+from ccfem.slicing.slicers import Planar
 from ccfem.strategies import create
-from ccfem.toolpaths import FIBRE, Toolpaths
 
 SIZE = (60.0, 24.0, 4.0)
 

@@ -12,18 +12,19 @@ import pandas as pd
 import pytest
 
 import ccfem
+from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
-from ccfem.comparison import pictures, report
+from ccfem.comparison import pictures
 from ccfem.comparison.engine import compare
 from ccfem.comparison.files import write_results
-from ccfem.elasticity.problem import Force, Problem, Support
-from ccfem.evaluation import FibreSamples
-from ccfem.evaluation.indices.matching import THRESHOLDS
-from ccfem.export import layer_drawings
-from ccfem.layers.slicing import Planar
+from ccfem.comparison.report.html_report import html_report as report
+from ccfem.fem.elasticity.problem import Force, Problem, Support
+from ccfem.fem.materials import isotropic
+from ccfem.judging.evaluation import FibreSamples
+from ccfem.judging.evaluation.indices.matching import THRESHOLDS
 from ccfem.machine import Machine
-from ccfem.materials import isotropic
-from ccfem.mesh.box import box_mesh
+from ccfem.printing.export import layer_drawings
+from ccfem.slicing.slicers import Planar
 
 ROOT = Path(ccfem.__file__).parent
 DRAWN = [

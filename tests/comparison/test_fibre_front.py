@@ -6,21 +6,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
 from ccfem.comparison.engine import Solved
 from ccfem.comparison.fibre_front import fibre_front
 from ccfem.comparison.front_points import FibreFront, FrontPoint
 from ccfem.comparison.plan_to_stiffness import counts_to_try
-from ccfem.elasticity import Force, Problem, Support, solve
-from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.errors import InputError
-from ccfem.layers.slicing.planar import Planar
+from ccfem.fem.elasticity import Force, Problem, Support, solve
+from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.fem.materials import isotropic
+from ccfem.judging.virtual_testing.strand import RHO
 from ccfem.machine import Machine
-from ccfem.materials import isotropic
-from ccfem.mesh.box import box_mesh
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
-from ccfem.toolpaths import Toolpaths
-from ccfem.virtual_testing.strand import RHO
 
 ALONG = {"angle": 0.0, "turn": 0.0}
 

@@ -6,22 +6,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
 from ccfem.comparison.fibre_front import fibre_front
 from ccfem.comparison.front_cases import PointCases
 from ccfem.comparison.front_points import FibreFront, FrontPoint
-from ccfem.elasticity import Force, Problem, Support, solve
-from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.fibre_aware.plan_cases import plan_cases
-from ccfem.fibre_aware.upper_bound import UpperBound, upper_bound
-from ccfem.layers.slicing.planar import Planar
+from ccfem.fem.elasticity import Force, Problem, Support, solve
+from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.fem.materials import printed_pla
+from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine
-from ccfem.materials import printed_pla
-from ccfem.mesh.box import box_mesh
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.slicers.planar import Planar
+from ccfem.strategies.fibre_aware.plan_cases import plan_cases
+from ccfem.strategies.fibre_aware.upper_bound import UpperBound, upper_bound
 from ccfem.strategies.pruned import Pruned
 from ccfem.strategies.stream_function import StreamFunction
-from ccfem.toolpaths import Toolpaths
-from ccfem.virtual_testing.virtual_test import virtual_test
 
 STREAM = StreamFunction(evaluations=5, phases=1)
 

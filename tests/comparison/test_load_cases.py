@@ -3,20 +3,20 @@ import json
 import numpy as np
 import pytest
 
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
 from ccfem.cases.load_cases import weighted_cases
 from ccfem.comparison.engine import compare
 from ccfem.comparison.files import write_results
-from ccfem.elasticity.problem import Force, Problem, Support
-from ccfem.elasticity.solve import solve
-from ccfem.errors import InputError
-from ccfem.layers.slicing.planar import Planar
+from ccfem.fem.elasticity.problem import Force, Problem, Support
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.materials import printed_pla
+from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine
-from ccfem.materials import printed_pla
-from ccfem.mesh.box import box_mesh
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies.stream_function import StreamFunction
 from ccfem.strategies.zigzag import Zigzag
-from ccfem.virtual_testing.virtual_test import virtual_test
 
 
 def case_of(loads=None, **options):

@@ -5,11 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import shapely
 
+from ccfem.body.meshing import extrude
 from ccfem.comparison.remarks import _about_open, open_remarks
-from ccfem.layers.slicing.planar import Planar
-from ccfem.meshing import extrude
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
-from ccfem.toolpaths import Toolpaths
 
 
 def test_layers_that_stay_open_are_named():

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
 from ccfem.comparison.engine import compare
 from ccfem.comparison.files import write_results
-from ccfem.elasticity.problem import Force, Problem, Support
-from ccfem.layers.slicing import Planar
+from ccfem.fem.elasticity.problem import Force, Problem, Support
+from ccfem.fem.materials import isotropic
 from ccfem.machine import Machine
-from ccfem.materials import isotropic
-from ccfem.mesh.box import box_mesh
+from ccfem.slicing.slicers import Planar
 from ccfem.strategies import Concentric, Zigzag
 
 EVIL = "<script>window.broken = 1</script>"

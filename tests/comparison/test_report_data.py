@@ -6,17 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ccfem.comparison import charts
+from ccfem.body.mesh.box import box_mesh
 from ccfem.comparison.citations import METHODS, bibtex, cited, methods_of, sentence
-from ccfem.comparison.part_view import _coarser
-from ccfem.comparison.path_view import _nearest, angle_on_layer, drawn_paths, in_layer
+from ccfem.comparison.report.html_report import charts
+from ccfem.comparison.report.part_view import _coarser
+from ccfem.comparison.report.path_view import _nearest, angle_on_layer, drawn_paths, in_layer
 from ccfem.comparison.runs import Run
-from ccfem.layers.layer_stress import LayerStress
-from ccfem.layers.slicing import Planar
-from ccfem.layers.slicing import named as slicers
-from ccfem.mesh.box import box_mesh
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.slicers import Planar
+from ccfem.slicing.slicers import named as slicers
 from ccfem.strategies import Zigzag, named
-from ccfem.toolpaths import Toolpaths
 
 (LAYER,) = Planar(count=1).cut(box_mesh((80.0, 60.0, 4.0), (8, 6, 1)))
 

@@ -9,18 +9,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
 from ccfem.cli.screen import print_comparison
 from ccfem.comparison.engine import compare
 from ccfem.comparison.files import write_results
 from ccfem.comparison.ranking import best_values, off_length
 from ccfem.comparison.request import InAll
-from ccfem.elasticity.problem import Force, Problem, Support
-from ccfem.errors import InputError
-from ccfem.layers.slicing import Planar, Spatial, as_slicer, from_text, split
+from ccfem.fem.elasticity.problem import Force, Problem, Support
+from ccfem.fem.materials import isotropic
 from ccfem.machine import Machine
-from ccfem.materials import isotropic
-from ccfem.mesh.box import box_mesh
+from ccfem.slicing.slicers import Planar, Spatial, as_slicer, from_text, split
 
 PULL = 400.0
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.fuzz.faces_by_commands import TURNS, differences, moved
-from ccfem.inspection import faces
+from ccfem.cases.inspection import faces
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,9 @@ import pytest
 
 from benchmarks.fuzz.__main__ import read, solve_sizes
 from benchmarks.fuzz.mutants import good_files, mutants, part_of_sizes
-from ccfem.errors import InputError
-from ccfem.io import read_mesh
-from ccfem.mesh import box_mesh
+from ccfem.base.errors import InputError
+from ccfem.body.files import read_mesh
+from ccfem.body.mesh import box_mesh
 
 COUNTS = {
     **dict.fromkeys(("part.toml", "box.inp", "box.tet", "box.npz"), 40),

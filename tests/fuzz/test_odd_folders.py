@@ -13,7 +13,7 @@ from benchmarks.fuzz.odd_folders import (
     prepare,
     see,
 )
-from ccfem.errors import InputError
+from ccfem.base.errors import InputError
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.fuzz.odd_meshes import PART, see
 from benchmarks.fuzz.odd_shapes import odd_grids, odd_shells
-from ccfem.errors import InputError
+from ccfem.base.errors import InputError
 
 EXPECTED = {
     "one tet of size 1e+300": "within 1e.09 mm",

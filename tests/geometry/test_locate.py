@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from ccfem.elasticity.problem import Problem, Support
-from ccfem.elasticity.stress_field import SolveRecord, StressField
-from ccfem.errors import InputError
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.box import box_mesh
+from ccfem.fem.elasticity.problem import Problem, Support
+from ccfem.fem.elasticity.stress_field import SolveRecord, StressField
+from ccfem.fem.materials import isotropic
 from ccfem.geometry.buckets import bucket
 from ccfem.geometry.locate import locate
-from ccfem.materials import isotropic
-from ccfem.mesh.box import box_mesh
 
 RNG = np.random.default_rng(3)
 

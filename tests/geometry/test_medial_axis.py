@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import affinity
 
-from ccfem.errors import InputError
+from ccfem.base.errors import InputError
 from ccfem.geometry.medial_axis import _equidistant, medial_axis
 
 PLATE = shapely.box(-60, -18, 60, 18).difference(shapely.Point(0, 0).buffer(6, quad_segs=32))

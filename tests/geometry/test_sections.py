@@ -6,7 +6,7 @@ from shapely import affinity
 
 from ccfem.cases.named import create_case
 from ccfem.geometry.sections import corners_only
-from ccfem.layers.slicing.planar import Planar
+from ccfem.slicing.slicers.planar import Planar
 
 L_SHAPE = shapely.Polygon([(0, 0), (30, 0), (30, 10), (10, 10), (10, 30), (0, 30)])
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import ccfem
-from ccfem.errors import InputError
+from ccfem.base.errors import InputError
 from ccfem.geometry.polylines import lengths, sample_at
-from ccfem.layers import Layer
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers import Layer
 from ccfem.strategies import create
-from ccfem.toolpaths import Toolpaths
 
 HONEST = ("isocurve", "concentric", "zigzag")
 

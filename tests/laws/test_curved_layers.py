@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.elasticity import Force, Problem, Support, solve
-from ccfem.evaluation import evaluate
-from ccfem.fields.chart import chart_of
+from ccfem.body.mesh.patches import Cylinder, patches_from_rules
+from ccfem.body.meshing import extrude
+from ccfem.fem.elasticity import Force, Problem, Support, solve
+from ccfem.fem.materials import isotropic
 from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
-from ccfem.layers.level_surfaces import level_surfaces
-from ccfem.layers.slicing import Spatial
+from ccfem.judging.evaluation import evaluate
 from ccfem.machine import Machine
-from ccfem.materials import isotropic
-from ccfem.mesh.patches import Cylinder, patches_from_rules
-from ccfem.meshing import extrude
-from ccfem.planning import plan
+from ccfem.paths.fields.chart import chart_of
+from ccfem.paths.planning import plan
+from ccfem.slicing.layers.level_surfaces import level_surfaces
+from ccfem.slicing.slicers import Spatial
 from ccfem.strategies import create, named
 
 MACHINE = Machine()

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.elasticity import GivenStress
-from ccfem.errors import InputError, SolveError
-from ccfem.evaluation import evaluate
-from ccfem.layers.level_surfaces import level_surfaces
-from ccfem.layers.slicing import Spatial
+from ccfem.base.errors import InputError, SolveError
+from ccfem.body.mesh import TetMesh, box_mesh
+from ccfem.body.mesh.patches import Cylinder, patches_from_rules
+from ccfem.body.meshing import extrude
+from ccfem.fem.elasticity import GivenStress
+from ccfem.judging.evaluation import evaluate
 from ccfem.machine import Machine
-from ccfem.mesh import TetMesh, box_mesh
-from ccfem.mesh.patches import Cylinder, patches_from_rules
-from ccfem.meshing import extrude
-from ccfem.planning import plan
+from ccfem.paths.planning import plan
 from ccfem.printing.layer_matrix import layer_matrix
+from ccfem.slicing.layers.level_surfaces import level_surfaces
+from ccfem.slicing.slicers import Spatial
 from ccfem.strategies import create
 
 MACHINE = Machine()

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ccfem.elasticity import (
+from ccfem.body.mesh.box import box_mesh
+from ccfem.fem.elasticity import (
     Bearing,
     EdgeSupport,
     Force,
@@ -22,12 +23,11 @@ from ccfem.elasticity import (
     Traction,
     solve,
 )
-from ccfem.elasticity.held import Held
-from ccfem.elasticity.loads import nodal_forces
-from ccfem.elasticity.stress_field import SolveRecord
-from ccfem.elasticity.system import System
-from ccfem.materials import isotropic
-from ccfem.mesh.box import box_mesh
+from ccfem.fem.elasticity.held import Held
+from ccfem.fem.elasticity.loads import nodal_forces
+from ccfem.fem.elasticity.stress_field import SolveRecord
+from ccfem.fem.elasticity.system import System
+from ccfem.fem.materials import isotropic
 
 
 def mapped(divisions, place, order=2):
@@ -232,7 +232,7 @@ def test_cantilever(poisson, band):
 @pytest.mark.parametrize(("order", "largest"), [(1, 0.75734475524), (2, 0.78333604931)])
 def test_loop_of_chen_2021(order, largest):
     # Regression of the specification; benchmarks/speed/elasticity.py solves it with scikit-fem too.
-    from ccfem.io import read_mesh
+    from ccfem.body.files import read_mesh
 
     mesh = read_mesh(Path(os.environ["CCFEM_CHEN2021"]) / "Loop" / "Loop.tet")
     mesh = mesh if order == 1 else mesh.quadratic()

@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import roots_jacobi
 
-from ccfem import tensor
-from ccfem.elasticity import Force, Problem, Support, solve
-from ccfem.elasticity.held import Held
-from ccfem.elasticity.system import System
-from ccfem.materials import transversely_isotropic
-from ccfem.mesh import TetMesh
-from ccfem.mesh.box import box_mesh
+from ccfem.base import tensor
+from ccfem.body.mesh import TetMesh
+from ccfem.body.mesh.box import box_mesh
+from ccfem.fem.elasticity import Force, Problem, Support, solve
+from ccfem.fem.elasticity.held import Held
+from ccfem.fem.elasticity.system import System
+from ccfem.fem.materials import transversely_isotropic
 
 MATERIAL = transversely_isotropic(20.0, 6.0, 0.3, 3.0)
 TURN = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]

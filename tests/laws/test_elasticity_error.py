@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from scipy.special import roots_jacobi
 
-from ccfem.elasticity import Force, Problem, Support, solve
-from ccfem.elasticity.assembly import cell_gradients
-from ccfem.elasticity.error_estimate import estimate_error
-from ccfem.elasticity.held import Held
-from ccfem.elasticity.order import LARGEST_ERROR
-from ccfem.elasticity.system import System
-from ccfem.materials import isotropic
-from ccfem.mesh import TetMesh
-from ccfem.mesh.box import box_mesh
+from ccfem.body.mesh import TetMesh
+from ccfem.body.mesh.box import box_mesh
+from ccfem.fem.elasticity import Force, Problem, Support, solve
+from ccfem.fem.elasticity.assembly import cell_gradients
+from ccfem.fem.elasticity.error_estimate import estimate_error
+from ccfem.fem.elasticity.held import Held
+from ccfem.fem.elasticity.order import LARGEST_ERROR
+from ccfem.fem.elasticity.system import System
+from ccfem.fem.materials import isotropic
 
 YOUNG, NU = 1000.0, 0.3
 SHEAR = YOUNG / (2.0 + 2.0 * NU)

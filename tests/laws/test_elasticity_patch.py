@@ -5,16 +5,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ccfem.elasticity import Problem, SolveRecord, Traction
-from ccfem.elasticity.assembly import assemble
-from ccfem.elasticity.held import Held
-from ccfem.elasticity.loads import nodal_forces
-from ccfem.elasticity.recovery import cell_stress
-from ccfem.elasticity.system import System
-from ccfem.materials import isotropic, transversely_isotropic
-from ccfem.mesh import TetMesh
-from ccfem.mesh.box import box_mesh
-from ccfem.tensor import from_voigt, rotate_stiffness, strain_to_voigt
+from ccfem.base.tensor import from_voigt, rotate_stiffness, strain_to_voigt
+from ccfem.body.mesh import TetMesh
+from ccfem.body.mesh.box import box_mesh
+from ccfem.fem.elasticity import Problem, SolveRecord, Traction
+from ccfem.fem.elasticity.assembly import assemble
+from ccfem.fem.elasticity.held import Held
+from ccfem.fem.elasticity.loads import nodal_forces
+from ccfem.fem.elasticity.recovery import cell_stress
+from ccfem.fem.elasticity.system import System
+from ccfem.fem.materials import isotropic, transversely_isotropic
 
 
 def shaken(order, seed):

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from ccfem.elasticity.problem import Force, Problem, Support
-from ccfem.elasticity.solve import solve
-from ccfem.layers.slicing.planar import Planar
+from ccfem.body.mesh.box import box_mesh
+from ccfem.fem.elasticity.problem import Force, Problem, Support
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.materials import isotropic
 from ccfem.machine import Machine
-from ccfem.materials import isotropic
-from ccfem.mesh.box import box_mesh
-from ccfem.planning import plan
-from ccfem.planning.equal_fibre import extremes, plan_to_lengths
-from ccfem.planning.mixing import layer_lengths
-from ccfem.planning.strategy import LengthStrategy
+from ccfem.paths.planning import plan
+from ccfem.paths.planning.equal_fibre import extremes, plan_to_lengths
+from ccfem.paths.planning.mixing import layer_lengths
+from ccfem.paths.planning.strategy import LengthStrategy
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create, named
 
 MACHINE = Machine(minimum_length=25.0)

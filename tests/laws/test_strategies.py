@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.elasticity.problem import Force, Problem, Support
-from ccfem.elasticity.solve import solve
-from ccfem.evaluation import evaluate
-from ccfem.layers.slicing.planar import Planar
+from ccfem.body.mesh import TetMesh
+from ccfem.body.mesh.box import box_mesh
+from ccfem.fem.elasticity.problem import Force, Problem, Support
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.materials import isotropic
+from ccfem.judging.evaluation import evaluate
 from ccfem.machine import Machine
-from ccfem.materials import isotropic
-from ccfem.mesh import TetMesh
-from ccfem.mesh.box import box_mesh
-from ccfem.planning import plan
-from ccfem.planning.strategy import PartStrategy
+from ccfem.paths.planning import plan
+from ccfem.paths.planning.strategy import PartStrategy
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create, named
 
 MACHINE = Machine()

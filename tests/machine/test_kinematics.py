@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ccfem.errors import InputError
+from ccfem.base.errors import InputError
 from ccfem.machine.kinematics import Kinematics, axis_values, head_pose
 
 CENTRE = (140.0, 160.0, -20.0)

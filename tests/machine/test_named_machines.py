@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import pytest
 
+from ccfem.base.errors import InputError
+from ccfem.base.toml import from_table
 from ccfem.cases.reading import read
 from ccfem.cli.machines import machine_choice, machine_file, machines
-from ccfem.errors import InputError
-from ccfem.io.toml import from_table
 from ccfem.machine import (
     Machine,
     SpeedTable,

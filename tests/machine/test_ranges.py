@@ -4,8 +4,8 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from ccfem.errors import InputError
-from ccfem.io.toml import from_table
+from ccfem.base.errors import InputError
+from ccfem.base.toml import from_table
 from ccfem.machine import Machine, machine_from, machine_names
 from ccfem.machine.gcode_profile import GcodeProfile
 from ccfem.machine.kinematics import Kinematics

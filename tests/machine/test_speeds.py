@@ -6,19 +6,19 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from ccfem.base.errors import InputError
+from ccfem.base.toml import from_table
+from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.part_file import read_part
-from ccfem.errors import InputError
-from ccfem.evaluation.indices.manufacture import manufacture_indices, sample_manufacture
-from ccfem.evaluation.plane_paths import plane_paths
 from ccfem.geometry.polylines import pack
-from ccfem.io.toml import from_table
-from ccfem.layers.slicing.planar import Planar
-from ccfem.linking.print_speed import step_speeds
+from ccfem.judging.evaluation.indices.manufacture import manufacture_indices, sample_manufacture
+from ccfem.judging.evaluation.plane_paths import plane_paths
 from ccfem.machine import Machine, SpeedTable
 from ccfem.machine.gcode_profile import GcodeProfile
 from ccfem.machine.speeds import table_speeds
-from ccfem.mesh.box import box_mesh
-from ccfem.toolpaths import MATRIX, TRAVEL, Toolpaths
+from ccfem.paths.linking.print_speed import step_speeds
+from ccfem.paths.toolpaths import MATRIX, TRAVEL, Toolpaths
+from ccfem.slicing.slicers.planar import Planar
 
 TABLE = SpeedTable()
 EASY = {"curvature": 0.0, "length": 100.0, "angle": 180.0}

@@ -5,14 +5,14 @@ import tomllib
 import numpy as np
 import pytest
 
-from ccfem.elasticity import Force, Problem, Support
-from ccfem.layers.layer_stress import stress_on
-from ccfem.materials import isotropic
-from ccfem.mesh import box_mesh
+from ccfem.body.mesh import box_mesh
+from ccfem.fem.elasticity import Force, Problem, Support
+from ccfem.fem.materials import isotropic
 from ccfem.papers.chen_2021.claims import EXPECTED, quantities
 from ccfem.papers.chen_2021.large_displacement import turned_by, turns_at
 from ccfem.papers.chen_2021.study import run_study
 from ccfem.papers.chen_2021.whole import write
+from ccfem.slicing.layers.layer_stress import stress_on
 from ccfem.strategies.isocurve import Isocurve
 
 

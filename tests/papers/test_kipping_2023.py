@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ccfem.layers.slicing import Planar
-from ccfem.mesh import box_mesh
+from ccfem.body.mesh import box_mesh
 from ccfem.papers.kipping_2023.claims import verdicts
 from ccfem.papers.kipping_2023.fiso_shapes import measured
 from ccfem.papers.kipping_2023.thickness import distances_below
 from ccfem.papers.verdicts import claim_table
+from ccfem.slicing.slicers import Planar
 
 
 def test_distances_are_those_of_the_planes():

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
-from ccfem.elasticity.problem import Force, Problem, Support
-from ccfem.elasticity.solve import solve
-from ccfem.errors import InputError
-from ccfem.materials import Material, isotropic, transversely_isotropic
-from ccfem.mesh.box import box_mesh
+from ccfem.base.errors import InputError
+from ccfem.base.tensor import rotate_stiffness, to_voigt
+from ccfem.body.mesh.box import box_mesh
+from ccfem.fem.elasticity.problem import Force, Problem, Support
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.materials import Material, isotropic, transversely_isotropic
+from ccfem.judging.virtual_testing.strands import cut_strands
 from ccfem.papers.chen_2021.oriented import (
     fibre_share,
     mix,
@@ -16,9 +18,7 @@ from ccfem.papers.chen_2021.oriented import (
     oriented_stiffness,
     to_plane_stress,
 )
-from ccfem.tensor import rotate_stiffness, to_voigt
-from ccfem.toolpaths import Toolpaths
-from ccfem.virtual_testing.strands import cut_strands
+from ccfem.paths.toolpaths import Toolpaths
 
 CARBON = transversely_isotropic(73200.0, 4100.0, 0.33, 2200.0)
 PLA = isotropic(3000.0, 0.35)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.elasticity.problem import Force, Support
-from ccfem.evaluation.plane_paths import PlanePaths
-from ccfem.evaluation.sensitivity import OffAxis
+from ccfem.fem.elasticity.problem import Force, Support
+from ccfem.fem.materials import isotropic, named_material, plane_stress
+from ccfem.fem.plates import PlaneProblem, raster_mesh, solve_plane
 from ccfem.geometry.polylines import pack
-from ccfem.linking.print_order import nearest_end_order
-from ccfem.materials import isotropic, named_material, plane_stress
+from ccfem.judging.evaluation.plane_paths import PlanePaths
+from ccfem.judging.evaluation.sensitivity import OffAxis
 from ccfem.papers.plocher_2022.fibre_map import FibreMap, fibre_map
 from ccfem.papers.plocher_2022.plane_study import (
     bead_area,
@@ -23,7 +23,7 @@ from ccfem.papers.plocher_2022.plane_study import (
     turned_energies,
 )
 from ccfem.papers.plocher_2022.sensitivity import ANGLES
-from ccfem.plates import PlaneProblem, raster_mesh, solve_plane
+from ccfem.paths.linking.print_order import nearest_end_order
 
 TABLE_5 = {
     "c_fram": (73200.0, 4100.0, 0.33, 2200.0),

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from ccfem.errors import InputError
-from ccfem.layers.layer_stress import stress_on
+from ccfem.base.errors import InputError
+from ccfem.base.tensor import in_plane
 from ccfem.papers.plocher_2022.plates import five_holes, optimised_beam, plates, single_hole
-from ccfem.tensor import in_plane
+from ccfem.slicing.layers.layer_stress import stress_on
 
 
 @pytest.fixture(scope="module", params=["I", "II", "III"])

@@ -19,7 +19,7 @@ from ccfem.papers.plocher_2022.tables import (
 )
 from ccfem.papers.plocher_2022.variants import metric_table
 from ccfem.papers.verdicts import claim_table
-from ccfem.raster.patterns import INFILL
+from ccfem.paths.raster.patterns import INFILL
 
 
 @pytest.fixture(scope="module")

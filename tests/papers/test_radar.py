@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from ccfem.errors import InputError
+from ccfem.base.errors import InputError
+from ccfem.comparison.plot.canvas import save
 from ccfem.papers.plocher_2022.radar import normalised, radar_picture
-from ccfem.plot.canvas import save
 
 
 def test_the_best_of_every_index_has_one():

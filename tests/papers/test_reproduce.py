@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import ccfem.papers
-from ccfem.errors import InputError
+from ccfem.base.errors import InputError
 from ccfem.papers.contents import Contents, WhenAsked
 from ccfem.papers.reproduce import KEPT, named_papers, reproduce
 

@@ -3,11 +3,11 @@ import pytest
 import shapely
 from scipy import ndimage
 
+from ccfem.fem.plates import solve_plane
 from ccfem.papers.plocher_2022.three_point_bending import (
     three_point_bending,
     three_point_bending_problem,
 )
-from ccfem.plates import solve_plane
 
 
 @pytest.fixture(scope="module")

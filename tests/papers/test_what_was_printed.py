@@ -3,9 +3,9 @@ from pathlib import Path
 
 import pytest
 
+from ccfem.judging.virtual_testing.stiffer import HONEST_PROMISE
 from ccfem.papers.chen_2021.study import PARTS_AT_HAND
 from ccfem.papers.chen_2021.virtual_test import PHYSICAL
-from ccfem.virtual_testing.stiffer import HONEST_PROMISE
 
 ROOT = Path(__file__).parents[2]
 

@@ -5,12 +5,12 @@ import pytest
 import shapely
 
 from benchmarks.print_checks.job import Job
-from ccfem.export.gcode import gcode
-from ccfem.layers.slicing.planar import Planar
+from ccfem.body.mesh.box import box_mesh
 from ccfem.machine import Machine, machine_table, updated
-from ccfem.mesh.box import box_mesh
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.printing.export.gcode import gcode
 from ccfem.printing.print_plan import plan_print
-from ccfem.toolpaths import Toolpaths
+from ccfem.slicing.slicers.planar import Planar
 
 SIZE = (85.0, 26.0, 1.8)
 HEIGHTS = (0.7, 1.3)

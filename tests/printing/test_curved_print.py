@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ccfem.errors import InputError
-from ccfem.export.gcode import gcode
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.box import box_mesh
 from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
-from ccfem.layers.level_surfaces import level_surfaces
 from ccfem.machine import Kinematics, Machine
-from ccfem.mesh.box import box_mesh
+from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.printing.curved_plan import curved_plan
+from ccfem.printing.export.gcode import gcode
 from ccfem.printing.poses import limited_tilt
-from ccfem.toolpaths import FIBRE, Toolpaths
+from ccfem.slicing.layers.level_surfaces import level_surfaces
 
 MACHINE = Machine(filament_area=0.05, minimum_length=30.0, cutter_distance=30.0)
 CENTRE = (150.0, 150.0, -30.0)

@@ -7,20 +7,20 @@ import pytest
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
 from ccfem.comparison.engine import Solved, compare
-from ccfem.elasticity import Problem
-from ccfem.errors import InputError
-from ccfem.export.gcode import gcode
-from ccfem.layers.level_surfaces import level_surfaces
-from ccfem.layers.slicing import Planar
-from ccfem.layers.standing import standing
+from ccfem.fem.elasticity import Problem
+from ccfem.fem.materials import isotropic
 from ccfem.machine import Kinematics, Machine, Process
-from ccfem.materials import isotropic
-from ccfem.mesh.box import box_mesh
+from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.curved_plan import curved_plan
-from ccfem.support import support_layers
-from ccfem.toolpaths import Toolpaths
+from ccfem.printing.export.gcode import gcode
+from ccfem.printing.support import support_layers
+from ccfem.slicing.layers.level_surfaces import level_surfaces
+from ccfem.slicing.layers.standing import standing
+from ccfem.slicing.slicers import Planar
 
 CENTRE = (150.0, 150.0, -30.0)
 STEP = 1.0

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from ccfem.export.robot_waypoints import write_robot_waypoints
+from ccfem.body.mesh.box import box_mesh
 from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
-from ccfem.layers.level_surfaces import level_surfaces
 from ccfem.machine import Machine
-from ccfem.mesh.box import box_mesh
+from ccfem.paths.toolpaths import MATRIX
+from ccfem.printing.export.robot_waypoints import write_robot_waypoints
 from ccfem.printing.layer_matrix import layer_matrix
-from ccfem.toolpaths import MATRIX
+from ccfem.slicing.layers.level_surfaces import level_surfaces
 
 MACHINE = Machine(matrix_width=0.8, matrix_speed=11.0)
 

@@ -2,11 +2,11 @@ from dataclasses import replace
 
 import pytest
 
-from ccfem.errors import InputError
-from ccfem.layers.slicing.planar import Planar
+from ccfem.base.errors import InputError
+from ccfem.body.mesh import box_mesh
 from ccfem.machine import Machine
-from ccfem.mesh import box_mesh
 from ccfem.printing.line_counts import check_matrix_lines, check_strands
+from ccfem.slicing.slicers.planar import Planar
 
 MESH = box_mesh((400.0, 100.0, 50.0), (4, 1, 1))
 UP = (0.0, 0.0, 2.0)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.errors import InputError
-from ccfem.layers.slicing.planar import Planar
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.box import box_mesh
 from ccfem.machine import Machine, Process
-from ccfem.mesh.box import box_mesh
+from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.printing.print_plan import plan_print
 from ccfem.printing.stacks import ended_in_stacks, height_over
-from ccfem.toolpaths import FIBRE, Toolpaths
+from ccfem.slicing.slicers.planar import Planar
 
 MACHINE = Machine(minimum_length=20.0, cutter_distance=20.0, matrix_height=0.2)
 SECTION = shapely.box(0.0, 0.0, 100.0, 100.0)

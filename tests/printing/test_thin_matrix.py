@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from ccfem.errors import InputError
-from ccfem.layers.slicing.planar import Planar
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.box import box_mesh
 from ccfem.machine import Machine, updated
-from ccfem.mesh.box import box_mesh
+from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.print_plan import plan_print
-from ccfem.toolpaths import Toolpaths
+from ccfem.slicing.slicers.planar import Planar
 
 
 def strip(height, values):

@@ -8,8 +8,8 @@ from benchmarks.print_checks.filling import amount, volume
 from benchmarks.print_checks.job import own
 from benchmarks.print_checks.motion import bed, support, travel
 from benchmarks.print_checks.tooling import cuts, heat
-from ccfem.errors import InputError
-from ccfem.export.trim_table import write_trims
+from ccfem.base.errors import InputError
+from ccfem.printing.export.trim_table import write_trims
 
 # Two strands joined by a loop 11 mm outside the part; a span of 30 mm over nothing.
 LOOP = np.concatenate(

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.errors import InputError
-from ccfem.layers.layer import Layer
-from ccfem.layers.plane import Plane
+from ccfem.base.errors import InputError
 from ccfem.machine import Machine
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.plane import Plane
 from ccfem.strategies.concentric import Concentric
 from ccfem.strategies.contour_zigzag import ContourZigzag
 from ccfem.strategies.zigzag import Zigzag

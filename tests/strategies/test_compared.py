@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 import shapely
 
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.box import box_mesh
+from ccfem.body.meshing import extrude
 from ccfem.cases import create_case
-from ccfem.elasticity import Force, Problem, Support, solve
-from ccfem.errors import InputError
-from ccfem.evaluation import evaluate
+from ccfem.fem.elasticity import Force, Problem, Support, solve
+from ccfem.fem.materials import isotropic
 from ccfem.geometry.own_way import until_itself
-from ccfem.layers import LayerStress
-from ccfem.layers.slicing.planar import Planar
+from ccfem.judging.evaluation import evaluate
 from ccfem.machine import Machine
-from ccfem.materials import isotropic
-from ccfem.mesh.box import box_mesh
-from ccfem.meshing import extrude
-from ccfem.planning import plan
+from ccfem.paths.planning import plan
+from ccfem.slicing.layers import LayerStress
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
 from ccfem.strategies.offset import _level_sets
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.errors import InputError
-from ccfem.fields.chart import chart_of
+from ccfem.base.errors import InputError
+from ccfem.body.mesh import box_mesh
 from ccfem.geometry.contour_tree import contour_trees
-from ccfem.layers.slicing import Planar
-from ccfem.linking.first_in import first_in_spiral_out
 from ccfem.machine import Machine
-from ccfem.mesh import box_mesh
+from ccfem.paths.fields.chart import chart_of
+from ccfem.paths.linking.first_in import first_in_spiral_out
+from ccfem.slicing.slicers import Planar
 from ccfem.strategies import create
 
 WIDTH = 0.9

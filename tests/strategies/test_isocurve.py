@@ -8,22 +8,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ccfem.base.errors import InputError
+from ccfem.body.mesh import TetMesh
+from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.part_file import read_part
-from ccfem.elasticity import solve
-from ccfem.elasticity.problem import Problem, Support, Traction
-from ccfem.elasticity.stress_field import SolveRecord, StressField
-from ccfem.errors import InputError
-from ccfem.evaluation import evaluate
-from ccfem.evaluation.printable import why_not
-from ccfem.layers.slicing.planar import Planar
+from ccfem.fem.elasticity import solve
+from ccfem.fem.elasticity.problem import Problem, Support, Traction
+from ccfem.fem.elasticity.stress_field import SolveRecord, StressField
+from ccfem.fem.materials import isotropic
+from ccfem.judging.evaluation import evaluate
+from ccfem.judging.evaluation.printable import why_not
 from ccfem.machine import Machine
-from ccfem.materials import isotropic
-from ccfem.mesh import TetMesh
-from ccfem.mesh.box import box_mesh
-from ccfem.planning import plan
+from ccfem.paths.planning import plan
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
 from ccfem.strategies.isocurve import Isocurve
-from ccfem.toolpaths import Toolpaths
 
 MACHINE = Machine()
 

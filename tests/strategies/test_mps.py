@@ -6,17 +6,17 @@ import pytest
 import shapely
 from shapely import affinity
 
+from ccfem.base.errors import InputError
+from ccfem.body.meshing import triangulate
 from ccfem.cases import create_case
-from ccfem.elasticity import solve
-from ccfem.errors import InputError
-from ccfem.evaluation import evaluate
-from ccfem.layers import LayerStress
-from ccfem.layers.layer import Layer
-from ccfem.layers.plane import Plane
-from ccfem.layers.slicing.planar import Planar
+from ccfem.fem.elasticity import solve
+from ccfem.judging.evaluation import evaluate
 from ccfem.machine import Machine
-from ccfem.meshing import triangulate
-from ccfem.planning import plan as plan_part
+from ccfem.paths.planning import plan as plan_part
+from ccfem.slicing.layers import LayerStress
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.plane import Plane
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
 from ccfem.strategies.concentric import Concentric
 from ccfem.strategies.grid import Grid

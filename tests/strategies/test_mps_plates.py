@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.evaluation.indices.stiffness_alignment import agreement
-from ccfem.evaluation.plane_paths import plane_paths
-from ccfem.layers.layer_stress import stress_on
+from ccfem.base.tensor import strongest_in_plane
+from ccfem.judging.evaluation.indices.stiffness_alignment import agreement
+from ccfem.judging.evaluation.plane_paths import plane_paths
 from ccfem.machine import Machine
 from ccfem.papers.plocher_2022.plane_study import bead_area
 from ccfem.papers.plocher_2022.plates import plates
+from ccfem.slicing.layers.layer_stress import stress_on
 from ccfem.strategies.mps import Mps
-from ccfem.tensor import strongest_in_plane
 
 SHARES = {"I": 95.0, "II": 87.0, "III": 90.0}
 """Agreement, %, that the paper reports of its MPS."""

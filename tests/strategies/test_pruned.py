@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 import shapely
 
+from ccfem.base.errors import InputError
 from ccfem.cases import create_case
-from ccfem.elasticity import solve
-from ccfem.errors import InputError
-from ccfem.layers.slicing.planar import Planar
-from ccfem.planning import plan
-from ccfem.planning.equal_fibre import plan_to_length
+from ccfem.fem.elasticity import solve
+from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.virtual_test import virtual_test
+from ccfem.paths.planning import plan
+from ccfem.paths.planning.equal_fibre import plan_to_length
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
 from ccfem.strategies.pruned import Pruned
-from ccfem.virtual_testing.specimen import Specimen
-from ccfem.virtual_testing.virtual_test import virtual_test
 
 
 @pytest.mark.parametrize("name", ["concentric", "contour_zigzag", "isocurve"])

@@ -6,16 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ccfem.elasticity.problem import Force, Problem, Support
-from ccfem.elasticity.solve import solve
-from ccfem.evaluation import evaluate
-from ccfem.export.waypoints import read_waypoints
-from ccfem.io import read_mesh
-from ccfem.layers.slicing.planar import Planar
+from ccfem.body.files import read_mesh
+from ccfem.body.mesh.patches import Cylinder, patches_from_rules
+from ccfem.fem.elasticity.problem import Force, Problem, Support
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.materials import isotropic
+from ccfem.judging.evaluation import evaluate
 from ccfem.machine import Machine
-from ccfem.materials import isotropic
-from ccfem.mesh.patches import Cylinder, patches_from_rules
-from ccfem.planning import plan
+from ccfem.paths.planning import plan
+from ccfem.printing.export.waypoints import read_waypoints
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
 
 FOLDER = "CCFEM_CHEN2021"

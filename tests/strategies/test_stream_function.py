@@ -3,20 +3,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ccfem.elasticity.problem import Force, Problem, Support, Traction
-from ccfem.elasticity.solve import solve
-from ccfem.errors import InputError
-from ccfem.evaluation import evaluate
-from ccfem.fibre_aware.prune import prune
-from ccfem.fibre_aware.upper_bound import upper_bound
-from ccfem.layers.slicing.planar import Planar
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.box import box_mesh
+from ccfem.fem.elasticity.problem import Force, Problem, Support, Traction
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.materials import isotropic
+from ccfem.judging.evaluation import evaluate
+from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine
-from ccfem.materials import isotropic
-from ccfem.mesh.box import box_mesh
-from ccfem.planning import plan
+from ccfem.paths.planning import plan
+from ccfem.slicing.slicers.planar import Planar
+from ccfem.strategies.fibre_aware.prune import prune
+from ccfem.strategies.fibre_aware.upper_bound import upper_bound
 from ccfem.strategies.isocurve import Isocurve
 from ccfem.strategies.stream_function import StreamFunction
-from ccfem.virtual_testing.virtual_test import virtual_test
 
 MACHINE = Machine(minimum_length=20.0)
 PLA = isotropic(3500.0, 0.35)

@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 import shapely
 
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.box import box_mesh
+from ccfem.body.mesh.patches import Plane, patches_from_rules
+from ccfem.body.meshing import extrude
 from ccfem.cases import create_case
-from ccfem.elasticity import Force, Problem, Support, solve
-from ccfem.errors import InputError
-from ccfem.evaluation import evaluate
-from ccfem.evaluation.indices.matching import matching_rate
+from ccfem.fem.elasticity import Force, Problem, Support, solve
+from ccfem.fem.materials import isotropic
 from ccfem.geometry.polylines import resample, turning_angles
-from ccfem.layers.layer_stress import stress_on
-from ccfem.layers.slicing.planar import Planar
+from ccfem.judging.evaluation import evaluate
+from ccfem.judging.evaluation.indices.matching import matching_rate
 from ccfem.machine import Machine
-from ccfem.materials import isotropic
-from ccfem.mesh.box import box_mesh
-from ccfem.mesh.patches import Plane, patches_from_rules
-from ccfem.meshing import extrude
-from ccfem.planning import plan
+from ccfem.paths.planning import plan
+from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
 
 DISC = shapely.Point(0, 0).buffer(9.0, quad_segs=32) & shapely.box(-8.9, -9, 8.9, 9)

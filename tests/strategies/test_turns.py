@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.elasticity.problem import Force, Problem, Support
-from ccfem.elasticity.solve import solve
-from ccfem.evaluation import evaluate
+from ccfem.body.mesh.patches import Box, patches_from_rules
+from ccfem.body.meshing import extrude
+from ccfem.fem.elasticity.problem import Force, Problem, Support
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.materials import isotropic
 from ccfem.geometry.polylines import line_length
-from ccfem.layers.slicing.planar import Planar
+from ccfem.judging.evaluation import evaluate
+from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine
-from ccfem.materials import isotropic
-from ccfem.mesh.patches import Box, patches_from_rules
-from ccfem.meshing import extrude
-from ccfem.planning import plan
-from ccfem.planning.infill import with_turns
+from ccfem.paths.planning import plan
+from ccfem.paths.planning.infill import with_turns
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create, named
-from ccfem.virtual_testing.virtual_test import virtual_test
 
 MACHINE = Machine()
 WITH_TURNS = sorted(name for name, kind in named().items() if hasattr(kind, "turns"))

@@ -9,20 +9,20 @@ import pytest
 import shapely
 from scipy.spatial import cKDTree
 
+from ccfem.base.errors import InputError
+from ccfem.body.mesh import TetMesh, box_mesh
+from ccfem.body.mesh.patches import Cylinder, patches_from_rules
+from ccfem.body.meshing import extrude
 from ccfem.cases.t_bracket import HOLES as WALLS
-from ccfem.elasticity import Bearing, Force, GivenStress, Problem, Support, solve
-from ccfem.errors import InputError
-from ccfem.export.robot_waypoints import read_layer_waypoints
-from ccfem.layers.slicing import Planar
-from ccfem.layers.slicing.surfaces import Surfaces
+from ccfem.fem.elasticity import Bearing, Force, GivenStress, Problem, Support, solve
+from ccfem.fem.materials import isotropic
 from ccfem.machine import Machine
-from ccfem.materials import isotropic
-from ccfem.mesh import TetMesh, box_mesh
-from ccfem.mesh.patches import Cylinder, patches_from_rules
-from ccfem.meshing import extrude
-from ccfem.planning import plan
+from ccfem.paths.planning import plan
+from ccfem.printing.export.robot_waypoints import read_layer_waypoints
+from ccfem.slicing.slicers import Planar
+from ccfem.slicing.slicers.surfaces import Surfaces
 from ccfem.strategies import create
-from ccfem.winding.joint_loops import joint_loops
+from ccfem.strategies.winding_curves.joint_loops import joint_loops
 
 HOLES = np.array([[20.0, 15.0], [60.0, 15.0]])
 MACHINE = Machine()

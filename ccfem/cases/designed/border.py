@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray
-from ccfem.errors import InputError
-from ccfem.mesh.patches import Bounded
-from ccfem.plates import PlaneMesh
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.patches import Bounded
+from ccfem.fem.plates import PlaneMesh
 
 __all__ = ["NEAR", "Hole", "Stretch"]
 

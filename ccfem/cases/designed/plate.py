@@ -9,18 +9,18 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
-from ccfem.arrays import BoolArray, IntArray, freeze
+from ccfem.base.arrays import BoolArray, IntArray, freeze
+from ccfem.base.checks import check_choices, check_fields
+from ccfem.base.progress import Progress, silent
+from ccfem.body.mesh.patches import Cylinder, Plane, patches_from_rules
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.meshing import extrude
 from ccfem.cases.designed.border import NEAR, Hole, Stretch
 from ccfem.cases.stored.stored_files import stored_outline
-from ccfem.checks import check_choices, check_fields
-from ccfem.elasticity.problem import Force, Support
-from ccfem.materials import plane_stress
-from ccfem.mesh.patches import Cylinder, Plane, patches_from_rules
-from ccfem.mesh.tet_mesh import TetMesh
-from ccfem.meshing import extrude
-from ccfem.plates import PlaneProblem, raster_mesh
-from ccfem.progress import Progress, silent
-from ccfem.topopt import Design, Somp, part_shape
+from ccfem.fem.elasticity.problem import Force, Support
+from ccfem.fem.materials import plane_stress
+from ccfem.fem.plates import PlaneProblem, raster_mesh
+from ccfem.fem.topopt import Design, Somp, part_shape
 
 __all__ = ["LAMINATE", "DesignPlate"]
 

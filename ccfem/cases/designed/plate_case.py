@@ -2,15 +2,15 @@
 
 from collections.abc import Callable
 
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases.case import Case
 from ccfem.cases.designed.plate import DesignPlate
 from ccfem.cases.stored.stored_files import mesh_of_case
-from ccfem.elasticity.problem import Force, Order, Problem, Support
-from ccfem.layers.slicing.planar import Planar
+from ccfem.fem.elasticity.problem import Force, Order, Problem, Support
+from ccfem.fem.materials import printed_pla
 from ccfem.machine.machine import Machine
 from ccfem.machine.speed_table import SpeedTable
-from ccfem.materials import printed_pla
-from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.slicing.slicers.planar import Planar
 
 __all__ = ["ELEMENT_SIZE", "THICKNESS", "case_of", "designed_case", "prepreg_printer"]
 

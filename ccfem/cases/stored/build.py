@@ -6,10 +6,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from ccfem.body.files import whole_file, write_mesh
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases.designed import ELEMENT_SIZE, THICKNESS
 from ccfem.cases.stored.stored_files import COMMAND, data_folder, write_outline
-from ccfem.io import whole_file, write_mesh
-from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["CASES", "DESIGNED", "build"]
 

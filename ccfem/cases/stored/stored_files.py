@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ccfem.elasticity.problem import Order
-from ccfem.errors import InputError
-from ccfem.io import read_mesh
-from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.base.errors import InputError
+from ccfem.body.files import read_mesh
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.fem.elasticity.problem import Order
 
 __all__ = [
     "COMMAND",

@@ -9,17 +9,17 @@ from functools import cache
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
-from ccfem.elasticity.solve import solve
-from ccfem.elasticity.stress_field import StressField
-from ccfem.evaluation import Evaluation, evaluate
-from ccfem.export.waypoints import read_waypoints
+from ccfem.base.arrays import FloatArray
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.geometry.polylines import turning_angles
-from ccfem.layers.layer import Layer
-from ccfem.layers.slicing.planar import Planar
+from ccfem.judging.evaluation import Evaluation, evaluate
 from ccfem.machine import Machine
 from ccfem.papers.chen_2021.loop import LAYERS_PUBLISHED, authors_folder, authors_loop
-from ccfem.toolpaths import Toolpaths
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.printing.export.waypoints import read_waypoints
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.slicers.planar import Planar
 
 __all__ = ["STATED", "evaluate_published", "published_paths", "solved_loop", "waypoint_curvature"]
 

@@ -5,17 +5,17 @@ from pathlib import Path
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
-from ccfem.evaluation import Evaluation, evaluate
+from ccfem.base.arrays import FloatArray
+from ccfem.judging.evaluation import Evaluation, evaluate
+from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.strength import first_failure
+from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.papers.chen_2021.authors import STATED
 from ccfem.papers.chen_2021.loop import FOLDER
 from ccfem.papers.chen_2021.study import Model, Study
 from ccfem.papers.chen_2021.virtual_test import MATRIX_STRENGTH, authors_paths
 from ccfem.papers.verdicts import Check, judged
-from ccfem.toolpaths import Toolpaths
-from ccfem.virtual_testing.specimen import Specimen
-from ccfem.virtual_testing.strength import first_failure
-from ccfem.virtual_testing.virtual_test import virtual_test
+from ccfem.paths.toolpaths import Toolpaths
 
 __all__ = ["EXPECTED", "agreement", "quantities", "verdicts"]
 

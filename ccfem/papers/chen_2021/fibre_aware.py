@@ -15,26 +15,26 @@ from time import perf_counter, process_time
 from typing import Any
 
 from ccfem.cases.case import Case
-from ccfem.elasticity.problem import Bearing
-from ccfem.elasticity.solve import solve
-from ccfem.elasticity.stress_field import StressField
-from ccfem.fibre_aware.prune import prune
-from ccfem.fibre_aware.upper_bound import upper_bound
-from ccfem.layers.layer import Layer
-from ccfem.layers.slicing.planar import Planar
+from ccfem.fem.elasticity.problem import Bearing
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.stiffer import HONEST_PROMISE
+from ccfem.judging.virtual_testing.strands import cut_strands
+from ccfem.judging.virtual_testing.strength import first_failure
+from ccfem.judging.virtual_testing.virtual_test import virtual_bracket, virtual_test
 from ccfem.papers.chen_2021.authors import TABLE_2
 from ccfem.papers.chen_2021.loop import LAYERS_TABLE_2, authors_loop
 from ccfem.papers.chen_2021.virtual_test import MATRIX_STRENGTH, authors_paths
-from ccfem.planning import plan
-from ccfem.planning.equal_fibre import plan_to_length
+from ccfem.paths.planning import plan
+from ccfem.paths.planning.equal_fibre import plan_to_length
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.slicers.planar import Planar
+from ccfem.strategies.fibre_aware.prune import prune
+from ccfem.strategies.fibre_aware.upper_bound import upper_bound
 from ccfem.strategies.isocurve import Isocurve
 from ccfem.strategies.stream_function import StreamFunction
-from ccfem.toolpaths import Toolpaths
-from ccfem.virtual_testing.specimen import Specimen
-from ccfem.virtual_testing.stiffer import HONEST_PROMISE
-from ccfem.virtual_testing.strands import cut_strands
-from ccfem.virtual_testing.strength import first_failure
-from ccfem.virtual_testing.virtual_test import virtual_bracket, virtual_test
 
 __all__ = ["LAYER_COUNTS", "LENGTH", "Tested", "bound", "designs", "loop", "sliced", "tested"]
 

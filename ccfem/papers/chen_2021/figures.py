@@ -8,16 +8,16 @@ import numpy as np
 import shapely
 from matplotlib.figure import Figure
 
-from ccfem.arrays import BoolArray, FloatArray
-from ccfem.layers.layer import Layer
+from ccfem.base.arrays import BoolArray, FloatArray
+from ccfem.comparison.plot.canvas import save
+from ccfem.comparison.plot.colours import INK, OUTLINE
 from ccfem.papers.chen_2021.claims import agreement
 from ccfem.papers.chen_2021.pipeline import LayerStages
 from ccfem.papers.chen_2021.study import Model, Study
 from ccfem.papers.contents import drawn_of
 from ccfem.papers.wang_2021.panels import bar, curves, lines_of, panels, section, title
-from ccfem.plot.canvas import save
-from ccfem.plot.colours import INK, OUTLINE
-from ccfem.toolpaths import Toolpaths
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
 
 __all__ = ["draw_all", "figures"]
 

@@ -11,13 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
-from ccfem.elasticity.assembly import cell_gradients
-from ccfem.elasticity.load_kinds import Displacement
-from ccfem.elasticity.problem import Problem, Support
-from ccfem.elasticity.solve import solve
-from ccfem.elasticity.stress_field import StressField
-from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.base.arrays import FloatArray
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.fem.elasticity.assembly import cell_gradients
+from ccfem.fem.elasticity.load_kinds import Displacement
+from ccfem.fem.elasticity.problem import Problem, Support
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.stress_field import StressField
 
 __all__ = ["Turned", "turned_by", "turns_at"]
 

@@ -8,13 +8,13 @@ folder that holds them (with ``Loop`` and ``bar`` in it) is named by the environ
 import os
 from pathlib import Path
 
+from ccfem.base.errors import InputError
+from ccfem.body.files import read_mesh
+from ccfem.body.mesh.patches import Cylinder, patches_from_rules
 from ccfem.cases.case import Case
-from ccfem.elasticity.problem import Force, Problem, Support
-from ccfem.errors import InputError
-from ccfem.io import read_mesh
-from ccfem.layers.slicing.planar import Planar
-from ccfem.materials import isotropic
-from ccfem.mesh.patches import Cylinder, patches_from_rules
+from ccfem.fem.elasticity.problem import Force, Problem, Support
+from ccfem.fem.materials import isotropic
+from ccfem.slicing.slicers.planar import Planar
 
 __all__ = ["FOLDER", "LAYERS_PUBLISHED", "LAYERS_TABLE_2", "authors_folder", "authors_loop"]
 

@@ -14,16 +14,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
-from ccfem.elasticity.problem import Problem
-from ccfem.elasticity.solve import solve
-from ccfem.elasticity.stress_field import StressField
-from ccfem.errors import InputError
-from ccfem.materials import Material
-from ccfem.tensor import from_voigt, strain_from_voigt, to_voigt
-from ccfem.virtual_testing.bars import bar_stiffness
-from ccfem.virtual_testing.specimen import Specimen
-from ccfem.virtual_testing.strands import Strands
+from ccfem.base.arrays import FloatArray
+from ccfem.base.errors import InputError
+from ccfem.base.tensor import from_voigt, strain_from_voigt, to_voigt
+from ccfem.fem.elasticity.problem import Problem
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.materials import Material
+from ccfem.judging.virtual_testing.bars import bar_stiffness
+from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.strands import Strands
 
 __all__ = [
     "fibre_share",
@@ -143,7 +143,7 @@ def oriented_problem(problem: Problem, strands: Strands, fibre: Material, area: 
     Returns
     -------
     Problem
-        Solve it as any other: `ccfem.elasticity.solve.solve`.
+        Solve it as any other: `ccfem.fem.elasticity.solve.solve`.
     """
     volumes = problem.mesh.volumes
     share = fibre_share(strands, volumes, area)

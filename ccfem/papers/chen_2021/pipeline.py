@@ -10,22 +10,22 @@ from time import perf_counter
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
-from ccfem.elasticity.part_stress import PartStress
-from ccfem.fields.compatibility import incompatible
-from ccfem.fields.directed import Directed, directed
-from ccfem.fields.levels import extract_levels
-from ccfem.fields.orientation import orient
-from ccfem.fields.scalar import fit_literal
-from ccfem.fields.tensile import Tension, spatial_tension
+from ccfem.base.arrays import FloatArray
+from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.geometry.isocontours import Isocontours
-from ccfem.layers.holes import holes_on
-from ccfem.layers.layer import Layer
-from ccfem.linking.conformal import lead_into, parallel_curve
-from ccfem.linking.finishing import keep_off_border, linked_paths
 from ccfem.machine.machine import Machine
+from ccfem.paths.fields.compatibility import incompatible
+from ccfem.paths.fields.directed import Directed, directed
+from ccfem.paths.fields.levels import extract_levels
+from ccfem.paths.fields.orientation import orient
+from ccfem.paths.fields.scalar import fit_literal
+from ccfem.paths.fields.tensile import Tension, spatial_tension
+from ccfem.paths.linking.conformal import lead_into, parallel_curve
+from ccfem.paths.linking.finishing import keep_off_border, linked_paths
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.holes import holes_on
+from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.isocurve import Isocurve
-from ccfem.toolpaths import Toolpaths
 
 __all__ = ["STAGES", "LayerStages", "VectorField", "layer_stages", "planned", "vector_field"]
 

@@ -17,15 +17,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
-from ccfem.elasticity import solve
-from ccfem.errors import InputError
-from ccfem.evaluation import evaluate
-from ccfem.io.surface import write_stl
-from ccfem.layers.layer import Layer
+from ccfem.base.arrays import FloatArray
+from ccfem.base.errors import InputError
+from ccfem.body.files.surface import write_stl
+from ccfem.fem.elasticity import solve
+from ccfem.judging.evaluation import evaluate
 from ccfem.papers.chen_2021.loop import authors_loop
-from ccfem.planning.equal_fibre import TOLERANCE, length_per_layer
-from ccfem.toolpaths import Toolpaths
+from ccfem.paths.planning.equal_fibre import TOLERANCE, length_per_layer
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
 
 __all__ = [
     "PATTERNS",

@@ -14,26 +14,26 @@ from functools import cached_property
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
+from ccfem.base.progress import Progress, silent
 from ccfem.cases import create_case
 from ccfem.cases.case import Case
-from ccfem.elasticity import Force, solve
-from ccfem.elasticity.stress_field import StressField
-from ccfem.evaluation import Evaluation, evaluate
-from ccfem.fields.tensile import Tension
-from ccfem.layers.layer import Layer
-from ccfem.layers.slicing.planar import Planar
+from ccfem.fem.elasticity import Force, solve
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.judging.evaluation import Evaluation, evaluate
+from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.papers.chen_2021.large_displacement import Turned, turns_at
 from ccfem.papers.chen_2021.loop import FOLDER, authors_loop
 from ccfem.papers.chen_2021.pipeline import LayerStages, VectorField, planned, vector_field
 from ccfem.papers.contents import WhenAsked
-from ccfem.planning import plan
-from ccfem.planning.equal_fibre import plan_to_length
-from ccfem.progress import Progress, silent
+from ccfem.paths.fields.tensile import Tension
+from ccfem.paths.planning import plan
+from ccfem.paths.planning.equal_fibre import plan_to_length
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
-from ccfem.toolpaths import Toolpaths
-from ccfem.virtual_testing.specimen import Specimen
-from ccfem.virtual_testing.virtual_test import virtual_test
 
 __all__ = ["PARTS_AT_HAND", "POWERS", "Model", "Study", "joined", "model", "run_study"]
 

@@ -12,19 +12,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from ccfem.elasticity.problem import Bearing
-from ccfem.elasticity.solve import solve
-from ccfem.export.waypoints import read_waypoints
-from ccfem.materials import named_material
+from ccfem.fem.elasticity.problem import Bearing
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.materials import named_material
+from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.stiffer import FIRST, HONEST_PROMISE, SECOND, stiffer
+from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.judging.virtual_testing.strands import Strands, cut_strands
+from ccfem.judging.virtual_testing.strength import first_failure, matrix_peak
+from ccfem.judging.virtual_testing.virtual_test import virtual_bracket, virtual_test
 from ccfem.papers.chen_2021.loop import LAYERS_TABLE_2, authors_folder, authors_loop
 from ccfem.papers.chen_2021.oriented import oriented_ratio
-from ccfem.toolpaths import Toolpaths
-from ccfem.virtual_testing.specimen import Specimen
-from ccfem.virtual_testing.stiffer import FIRST, HONEST_PROMISE, SECOND, stiffer
-from ccfem.virtual_testing.strand import Strand
-from ccfem.virtual_testing.strands import Strands, cut_strands
-from ccfem.virtual_testing.strength import first_failure, matrix_peak
-from ccfem.virtual_testing.virtual_test import virtual_bracket, virtual_test
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.printing.export.waypoints import read_waypoints
 
 __all__ = ["MATRIX_STRENGTH", "PHYSICAL", "authors_paths", "ratios"]
 

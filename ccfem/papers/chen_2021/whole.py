@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
-from ccfem.io.csv_table import write_csv
+from ccfem.base.csv_table import write_csv
+from ccfem.base.progress import Progress, silent
 from ccfem.papers.chen_2021.claims import quantities, verdicts
 from ccfem.papers.chen_2021.figures import draw_all
 from ccfem.papers.chen_2021.study import PARTS_AT_HAND, Study, run_study
 from ccfem.papers.chen_2021.tables import length_table, time_table
 from ccfem.papers.verdicts import claim_table
-from ccfem.progress import Progress, silent
 
 __all__ = ["write", "write_all"]
 

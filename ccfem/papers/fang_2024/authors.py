@@ -5,21 +5,21 @@ from pathlib import Path
 
 import numpy as np
 
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.bisection import bisected
+from ccfem.body.mesh.patches import patches_from_rules
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases.t_bracket import HOLES
-from ccfem.elasticity.part_stress import PartStress
-from ccfem.elasticity.problem import Bearing, Problem, Support
-from ccfem.elasticity.solve import solve
-from ccfem.elasticity.stress_field import StressField
-from ccfem.errors import InputError
-from ccfem.export.robot_waypoints import read_layer_waypoints
-from ccfem.layers.layer import Layer
-from ccfem.layers.slicing.surfaces import Surfaces
+from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.fem.elasticity.problem import Bearing, Problem, Support
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.materials import isotropic
 from ccfem.machine import Machine
-from ccfem.materials import isotropic
-from ccfem.mesh.bisection import bisected
-from ccfem.mesh.patches import patches_from_rules
-from ccfem.mesh.tet_mesh import TetMesh
-from ccfem.toolpaths import Toolpaths
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.printing.export.robot_waypoints import read_layer_waypoints
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.slicers.surfaces import Surfaces
 
 __all__ = [
     "authors_folder",

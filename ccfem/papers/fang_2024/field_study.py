@@ -4,13 +4,13 @@ from typing import Any
 
 import numpy as np
 
+from ccfem.base.errors import InputError
 from ccfem.cases.t_bracket import t_bracket
-from ccfem.elasticity.solve import solve
-from ccfem.errors import InputError
+from ccfem.fem.elasticity.solve import solve
 from ccfem.geometry.locate import locate
-from ccfem.layers.slicing.spatial import Spatial, SpatialSlicing
 from ccfem.machine import Machine
-from ccfem.planning import plan
+from ccfem.paths.planning import plan
+from ccfem.slicing.slicers.spatial import Spatial, SpatialSlicing
 from ccfem.strategies import create
 
 __all__ = ["VARIANTS", "field_study", "field_table"]

@@ -7,16 +7,16 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
-from ccfem.arrays import FloatArray, IntArray
-from ccfem.elasticity.part_stress import PartStress
-from ccfem.fields.chart import chart_of
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.geometry.locate import locate
 from ccfem.geometry.polylines import resample, sample_midpoints, turning_angles
-from ccfem.layers.layer import Layer
-from ccfem.principal_lines import strongest_stress
-from ccfem.toolpaths import Toolpaths
-from ccfem.winding.joint_loops import joint_loops
-from ccfem.winding.spaced import CLOSEST
+from ccfem.paths.fields.chart import chart_of
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.principal_lines import strongest_stress
+from ccfem.strategies.winding_curves.joint_loops import joint_loops
+from ccfem.strategies.winding_curves.spaced import CLOSEST
 
 __all__ = ["Strands", "measured"]
 

@@ -14,9 +14,9 @@ from ccfem.cases.t_bracket import t_bracket
 from ccfem.comparison.engine import compare
 from ccfem.comparison.files import write_results
 from ccfem.comparison.result import Comparison
-from ccfem.layers.slicer import Slicer
-from ccfem.layers.slicing.planar import Planar
-from ccfem.layers.slicing.spatial import Spatial
+from ccfem.slicing.layers.slicer import Slicer
+from ccfem.slicing.slicers.planar import Planar
+from ccfem.slicing.slicers.spatial import Spatial
 
 __all__ = ["ROWS", "against", "failure_loads"]
 

@@ -14,22 +14,22 @@ in that order.
 from collections.abc import Sequence
 
 from ccfem.cases.t_bracket import bolt_heads
-from ccfem.elasticity.problem import Bearing, Problem, Support
-from ccfem.elasticity.solve import solve
-from ccfem.elasticity.stress_field import StressField
-from ccfem.elasticity.support_kinds import AnySupport, PressingSupport
-from ccfem.layers import Layer
-from ccfem.layers.slicing.planar import Planar
+from ccfem.fem.elasticity.problem import Bearing, Problem, Support
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.elasticity.support_kinds import AnySupport, PressingSupport
+from ccfem.fem.materials import isotropic
+from ccfem.judging.virtual_testing.interlayer import interlayer
+from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.strength import first_failure
+from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine
-from ccfem.materials import isotropic
 from ccfem.papers.fang_2024.authors import authors_layers, authors_mesh, authors_strands
-from ccfem.planning.equal_fibre import plan_to_length
+from ccfem.paths.planning.equal_fibre import plan_to_length
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers import Layer
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
-from ccfem.toolpaths import Toolpaths
-from ccfem.virtual_testing.interlayer import interlayer
-from ccfem.virtual_testing.specimen import Specimen
-from ccfem.virtual_testing.strength import first_failure
-from ccfem.virtual_testing.virtual_test import virtual_test
 
 __all__ = ["SPECIFIED", "study"]
 

@@ -13,12 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ccfem.elasticity.part_stress import GivenStress, PartStress
-from ccfem.guidance.joint_lines import joint_lines
-from ccfem.guidance.joints import joints_of
-from ccfem.layers.layer import Layer
-from ccfem.layers.layer_stress import stress_on
-from ccfem.layers.slicing.spatial import Spatial, SpatialSlicing
+from ccfem.fem.elasticity.part_stress import GivenStress, PartStress
 from ccfem.machine import Machine
 from ccfem.papers.fang_2024.authors import (
     authors_layers,
@@ -27,11 +22,16 @@ from ccfem.papers.fang_2024.authors import (
     authors_stress,
 )
 from ccfem.papers.fang_2024.measures import Strands, measured
-from ccfem.planning import plan
-from ccfem.planning.strategy import PartStrategy, Strategy
+from ccfem.paths.planning import plan
+from ccfem.paths.planning.strategy import PartStrategy, Strategy
+from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.layer_matrix import layer_matrix
+from ccfem.slicing.guidance.joint_lines import joint_lines
+from ccfem.slicing.guidance.joints import joints_of
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.slicers.spatial import Spatial, SpatialSlicing
 from ccfem.strategies import create
-from ccfem.toolpaths import Toolpaths
 
 __all__ = ["PAPER_SECONDS", "Chain", "study", "timed_chain"]
 

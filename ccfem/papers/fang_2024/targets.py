@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from ccfem.elasticity.part_stress import PartStress
-from ccfem.layers.slicing.spatial import SpatialSlicing
+from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.papers.fang_2024.measures import Strands
-from ccfem.winding.piece import pieces_with_joints
+from ccfem.slicing.slicers.spatial import SpatialSlicing
+from ccfem.strategies.winding_curves.piece import pieces_with_joints
 
 __all__ = ["field_figures", "targets_table"]
 

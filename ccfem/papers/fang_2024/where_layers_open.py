@@ -10,14 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
 from ccfem.comparison.result import Comparison
-from ccfem.elasticity.ball import BALL, ball_averages
-from ccfem.elasticity.stress_field import StressField
-from ccfem.elasticity.zone import ZONE, distance_from_patches
-from ccfem.layers.layer import Layer
+from ccfem.fem.elasticity.ball import BALL, ball_averages
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.elasticity.zone import ZONE, distance_from_patches
+from ccfem.judging.virtual_testing.interlayer import layer_normals
 from ccfem.papers.fang_2024.planar_against_curved import ROWS
-from ccfem.virtual_testing.interlayer import layer_normals
+from ccfem.slicing.layers.layer import Layer
 
 __all__ = [
     "PAPER_LOADS",

@@ -4,9 +4,11 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
+from ccfem.base.progress import Progress, silent
 from ccfem.comparison.files import write_results
+from ccfem.comparison.plot.canvas import png
+from ccfem.comparison.plot.stack_page import space_picture, turning_page
 from ccfem.comparison.result import Comparison
-from ccfem.export.robot_waypoints import write_robot_waypoints
 from ccfem.machine import Machine
 from ccfem.papers.fang_2024.authors import authors_mesh, authors_stress, finer_mesh
 from ccfem.papers.fang_2024.claims import quantities, verdicts
@@ -21,10 +23,8 @@ from ccfem.papers.fang_2024.where_layers_open import (
     openings_table,
 )
 from ccfem.papers.verdicts import claim_table
-from ccfem.plot.canvas import png
-from ccfem.plot.stack_page import space_picture, turning_page
-from ccfem.progress import Progress, silent
-from ccfem.toolpaths import MATRIX
+from ccfem.paths.toolpaths import MATRIX
+from ccfem.printing.export.robot_waypoints import write_robot_waypoints
 
 __all__ = ["write_all"]
 

@@ -7,17 +7,17 @@ import numpy as np
 
 from ccfem.cases import create_case
 from ccfem.cases.case import Case
-from ccfem.elasticity.solve import solve
-from ccfem.elasticity.stress_field import StressField
-from ccfem.guidance.height_field import height_field
-from ccfem.guidance.normal_field import normal_field
-from ccfem.guidance.stress_regions import stress_regions
-from ccfem.layers.slicing.load_oriented import LoadOriented, LoadOrientedSlicing
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.papers.kipping_2023.thickness import Distances, distances_below
-from ccfem.planning import plan
+from ccfem.paths.planning import plan
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.printing.support import SupportLayers, support_layers
+from ccfem.slicing.guidance.height_field import height_field
+from ccfem.slicing.guidance.normal_field import normal_field
+from ccfem.slicing.guidance.stress_regions import stress_regions
+from ccfem.slicing.slicers.load_oriented import LoadOriented, LoadOrientedSlicing
 from ccfem.strategies import create
-from ccfem.support import SupportLayers, support_layers
-from ccfem.toolpaths import Toolpaths
 
 __all__ = ["PAPER_SECONDS", "PARTS", "Chain", "chain", "table_1", "table_2"]
 

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ccfem.layers.layer import Layer
-from ccfem.layers.slicing.load_oriented import LoadOriented
 from ccfem.papers.kipping_2023.chain import PAPER_SECONDS, Chain
 from ccfem.papers.kipping_2023.fiso_shapes import Strand
 from ccfem.papers.kipping_2023.thickness import distances_below
 from ccfem.papers.verdicts import Check, judged
-from ccfem.support import support_columns
+from ccfem.printing.support import support_columns
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.slicers.load_oriented import LoadOriented
 
 __all__ = ["quantities", "support_table", "verdicts"]
 

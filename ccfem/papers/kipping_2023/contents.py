@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping
 
+from ccfem.base.progress import Progress
 from ccfem.papers.contents import Contents, WhenAsked
 from ccfem.papers.kipping_2023.chain import PARTS, Chain, chain, table_1, table_2
 from ccfem.papers.kipping_2023.claims import support_table
 from ccfem.papers.kipping_2023.fiso_shapes import shapes_table
 from ccfem.papers.kipping_2023.strength import failure_loads, on_pressing_supports, strength_table
 from ccfem.papers.kipping_2023.whole import write_all
-from ccfem.progress import Progress
 
 __all__ = ["CONTENTS"]
 

@@ -4,13 +4,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.body.mesh import box_mesh
+from ccfem.comparison.plot.canvas import png
 from ccfem.geometry.polylines import resample
-from ccfem.guidance.height_field import height_field
-from ccfem.guidance.normal_field import normal_field
-from ccfem.guidance.stress_regions import StressRegions
-from ccfem.mesh import box_mesh
-from ccfem.plot.canvas import png
+from ccfem.slicing.guidance.height_field import height_field
+from ccfem.slicing.guidance.normal_field import normal_field
+from ccfem.slicing.guidance.stress_regions import StressRegions
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -13,14 +13,14 @@ from typing import Any, cast
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
-from ccfem.fields.chart import chart_of
-from ccfem.layers.layer_stress import LayerStress
-from ccfem.layers.slicing.planar import Planar
+from ccfem.base.arrays import FloatArray
+from ccfem.body.meshing import extrude
+from ccfem.comparison.plot.canvas import png
 from ccfem.machine import Machine
-from ccfem.meshing import extrude
 from ccfem.papers.kipping_2023.figures import blank
-from ccfem.plot.canvas import png
+from ccfem.paths.fields.chart import chart_of
+from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies.fiso import Fiso
 
 __all__ = [

@@ -5,19 +5,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.cases.arm_bracket import HOLES
-from ccfem.elasticity.ball import BALL, ball_averages
-from ccfem.elasticity.solve import solve
-from ccfem.elasticity.stress_field import StressField
-from ccfem.elasticity.support_kinds import PressingSupport
-from ccfem.layers.layer import Layer
-from ccfem.layers.slicing.planar import Planar
-from ccfem.materials import isotropic
+from ccfem.comparison.plot.canvas import png
+from ccfem.fem.elasticity.ball import BALL, ball_averages
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.elasticity.support_kinds import PressingSupport
+from ccfem.fem.materials import isotropic
+from ccfem.judging.virtual_testing.interlayer import interlayer, layer_normals
 from ccfem.papers.kipping_2023.chain import Chain
 from ccfem.papers.kipping_2023.figures import blank
-from ccfem.plot.canvas import png
-from ccfem.virtual_testing.interlayer import interlayer, layer_normals
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.slicers.planar import Planar
 
 __all__ = ["SHEAR", "failure_loads", "on_pressing_supports", "sliding_picture", "strength_table"]
 

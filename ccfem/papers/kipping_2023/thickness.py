@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
 from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
-from ccfem.layers.layer import Layer
+from ccfem.slicing.layers.layer import Layer
 
 __all__ = ["Distances", "distances_below"]
 

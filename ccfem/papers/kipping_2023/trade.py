@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from ccfem.layers.slicing.load_oriented import LoadOriented
+from ccfem.comparison.plot.canvas import png
 from ccfem.papers.kipping_2023.chain import Chain
 from ccfem.papers.kipping_2023.figures import blank
 from ccfem.papers.kipping_2023.thickness import distances_below
-from ccfem.plot.canvas import png
+from ccfem.slicing.slicers.load_oriented import LoadOriented
 
 __all__ = ["VARIANTS", "trade", "trade_picture", "trade_table"]
 

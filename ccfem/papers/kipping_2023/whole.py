@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+from ccfem.base.progress import Progress, silent
 from ccfem.papers.kipping_2023.chain import PARTS, Chain, chain, table_1, table_2
 from ccfem.papers.kipping_2023.claims import quantities, support_table, verdicts
 from ccfem.papers.kipping_2023.figures import part_figures, senses_figure
@@ -15,7 +16,6 @@ from ccfem.papers.kipping_2023.strength import (
 )
 from ccfem.papers.kipping_2023.trade import trade, trade_picture, trade_table
 from ccfem.papers.verdicts import claim_table
-from ccfem.progress import Progress, silent
 
 __all__ = ["write_all"]
 

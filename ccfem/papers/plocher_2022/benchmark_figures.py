@@ -6,8 +6,11 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from ccfem.arrays import FloatArray
-from ccfem.materials import named_material
+from ccfem.base.arrays import FloatArray
+from ccfem.base.tensor import strongest_in_plane
+from ccfem.comparison.plot.colours import INK, scale
+from ccfem.fem.materials import named_material
+from ccfem.fem.plates import rotate_plane, stack_plane
 from ccfem.papers.plocher_2022.drawing import (
     COLOURS,
     image,
@@ -21,9 +24,6 @@ from ccfem.papers.plocher_2022.drawing import (
 from ccfem.papers.plocher_2022.plane_study import laid_plate, reduced_stiffness, turned_energies
 from ccfem.papers.plocher_2022.sensitivity import ANGLES
 from ccfem.papers.plocher_2022.study import MATERIALS, CaseStudy
-from ccfem.plates import rotate_plane, stack_plane
-from ccfem.plot.colours import INK, scale
-from ccfem.tensor import strongest_in_plane
 
 __all__ = ["benchmark_fields", "layup_moduli", "layups", "shear", "turned_fibre"]
 

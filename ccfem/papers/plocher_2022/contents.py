@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from ccfem.base.progress import Progress
 from ccfem.papers.contents import Contents
 from ccfem.papers.plocher_2022.claims import quantities, raster_quantities, verdicts
 from ccfem.papers.plocher_2022.figures import figures
@@ -9,7 +10,6 @@ from ccfem.papers.plocher_2022.study import RASTER, CaseStudy, run_study
 from ccfem.papers.plocher_2022.tables import case_table, index_table, material_table
 from ccfem.papers.plocher_2022.whole import write_all
 from ccfem.papers.verdicts import claim_table
-from ccfem.progress import Progress
 
 __all__ = ["CONTENTS"]
 

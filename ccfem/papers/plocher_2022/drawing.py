@@ -8,11 +8,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
+from ccfem.base.tensor import strongest_in_plane
+from ccfem.comparison.plot.colours import INK, OUTLINE, SECTION
 from ccfem.papers.plocher_2022.plates import Plate
 from ccfem.papers.plocher_2022.study import CaseStudy
-from ccfem.plot.colours import INK, OUTLINE, SECTION
-from ccfem.tensor import strongest_in_plane
 
 __all__ = ["COLOURS", "image", "plain", "plates_grid", "polar", "section", "strokes", "title"]
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ccfem.arrays import FloatArray, IntArray, read_only
-from ccfem.evaluation.plane_paths import PlanePaths
+from ccfem.base.arrays import FloatArray, IntArray, read_only
 from ccfem.geometry.polylines import arc_lengths, sample_at
+from ccfem.judging.evaluation.plane_paths import PlanePaths
 
 __all__ = ["FibreMap", "fibre_map"]
 

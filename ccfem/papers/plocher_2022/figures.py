@@ -9,12 +9,14 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from ccfem.arrays import FloatArray
-from ccfem.evaluation.indices.sinuosity import LONG
-from ccfem.evaluation.indices.stiffness_alignment import agreement
-from ccfem.evaluation.plane_paths import PlanePaths
-from ccfem.evaluation.sensitivity import OffAxis
-from ccfem.materials import named_material
+from ccfem.base.arrays import FloatArray
+from ccfem.comparison.plot.canvas import save
+from ccfem.comparison.plot.colours import INK, OUTLINE, scale
+from ccfem.fem.materials import named_material
+from ccfem.judging.evaluation.indices.sinuosity import LONG
+from ccfem.judging.evaluation.indices.stiffness_alignment import agreement
+from ccfem.judging.evaluation.plane_paths import PlanePaths
+from ccfem.judging.evaluation.sensitivity import OffAxis
 from ccfem.papers.contents import drawn_of
 from ccfem.papers.plocher_2022.benchmark_figures import (
     benchmark_fields,
@@ -33,10 +35,8 @@ from ccfem.papers.plocher_2022.drawing import (
 )
 from ccfem.papers.plocher_2022.radar import draw_radar
 from ccfem.papers.plocher_2022.study import MATERIALS, CaseStudy, PatternStudy
-from ccfem.plot.canvas import save
-from ccfem.plot.colours import INK, OUTLINE, scale
-from ccfem.raster.patterns import inside_shells
-from ccfem.raster.skeleton import skeleton
+from ccfem.paths.raster.patterns import inside_shells
+from ccfem.paths.raster.skeleton import skeleton
 
 __all__ = ["COLOURS", "draw_all", "figures"]
 

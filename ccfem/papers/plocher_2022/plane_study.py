@@ -7,18 +7,22 @@ from functools import cached_property
 import numpy as np
 import shapely
 
-from ccfem.arrays import BoolArray, FloatArray, read_only
-from ccfem.evaluation.indices.sinuosity import LONG
-from ccfem.evaluation.indices.stiffness_alignment import Reading, agreement, performance_index
-from ccfem.evaluation.plane_paths import PlanePaths
-from ccfem.evaluation.sensitivity import plane_compliance
-from ccfem.linking.print_order import nearest_end_order
-from ccfem.materials import Material
+from ccfem.base.arrays import BoolArray, FloatArray, read_only
+from ccfem.base.tensor import strongest_in_plane
+from ccfem.fem.materials import Material
+from ccfem.fem.plates import PlaneField, PlaneProblem, rotate_plane, solve_plane, stack_plane
+from ccfem.fem.plates.solve import prepare
+from ccfem.judging.evaluation.indices.sinuosity import LONG
+from ccfem.judging.evaluation.indices.stiffness_alignment import (
+    Reading,
+    agreement,
+    performance_index,
+)
+from ccfem.judging.evaluation.plane_paths import PlanePaths
+from ccfem.judging.evaluation.sensitivity import plane_compliance
 from ccfem.papers.plocher_2022.fibre_map import FibreMap
 from ccfem.papers.plocher_2022.sensitivity import ANGLES, Sensitivity
-from ccfem.plates import PlaneField, PlaneProblem, rotate_plane, solve_plane, stack_plane
-from ccfem.plates.solve import prepare
-from ccfem.tensor import strongest_in_plane
+from ccfem.paths.linking.print_order import nearest_end_order
 
 __all__ = [
     "PRINT_SPEED",

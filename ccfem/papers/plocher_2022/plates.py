@@ -14,18 +14,18 @@ import numpy as np
 import shapely
 from scipy import ndimage
 
-from ccfem.arrays import BoolArray, FloatArray, read_only
-from ccfem.elasticity.load_kinds import SurfaceLoad
-from ccfem.elasticity.problem import Force, PointForce, Problem, Support
-from ccfem.elasticity.stress_field import StressField
-from ccfem.errors import InputError
-from ccfem.layers.layer import Layer
-from ccfem.layers.slicing.planar import Planar
-from ccfem.materials import isotropic, plane_stress
-from ccfem.mesh import TetMesh
-from ccfem.meshing import extrude
+from ccfem.base.arrays import BoolArray, FloatArray, read_only
+from ccfem.base.errors import InputError
+from ccfem.body.mesh import TetMesh
+from ccfem.body.meshing import extrude
+from ccfem.fem.elasticity.load_kinds import SurfaceLoad
+from ccfem.fem.elasticity.problem import Force, PointForce, Problem, Support
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.materials import isotropic, plane_stress
+from ccfem.fem.plates import PlaneField, PlaneMesh, PlaneProblem, raster_mesh, solve_plane
 from ccfem.papers.plocher_2022.three_point_bending import three_point_bending
-from ccfem.plates import PlaneField, PlaneMesh, PlaneProblem, raster_mesh, solve_plane
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.slicers.planar import Planar
 
 __all__ = ["Plate", "five_holes", "optimised_beam", "plates", "single_hole"]
 

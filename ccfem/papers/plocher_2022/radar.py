@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
-from ccfem.errors import InputError
-from ccfem.plot.colours import INK, OUTLINE, palette
+from ccfem.base.arrays import FloatArray
+from ccfem.base.errors import InputError
+from ccfem.comparison.plot.colours import INK, OUTLINE, palette
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

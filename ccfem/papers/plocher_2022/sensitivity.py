@@ -6,9 +6,9 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from ccfem.arrays import FloatArray, read_only
-from ccfem.errors import InputError
-from ccfem.evaluation.sensitivity import acute
+from ccfem.base.arrays import FloatArray, read_only
+from ccfem.base.errors import InputError
+from ccfem.judging.evaluation.sensitivity import acute
 
 __all__ = ["ANGLES", "Sensitivity"]
 

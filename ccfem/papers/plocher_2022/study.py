@@ -13,18 +13,20 @@ from typing import Any
 
 import numpy as np
 
-from ccfem.elasticity.stress_field import StressField
-from ccfem.evaluation import evaluate
-from ccfem.evaluation.indices.sinuosity import path_sinuosity, sample_sinuosity, sinuosity_indices
-from ccfem.evaluation.indices.stiffness_alignment import READINGS
-from ccfem.evaluation.plane_paths import PlanePaths, plane_paths
-from ccfem.export.gcode import gcode
+from ccfem.base.progress import Progress, silent
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.materials import named_material
+from ccfem.fem.plates import solve_plane
 from ccfem.geometry.polylines import lengths, pack
-from ccfem.layers.layer import Layer
-from ccfem.layers.layer_stress import stress_on
-from ccfem.linking.print_order import nearest_end_order
+from ccfem.judging.evaluation import evaluate
+from ccfem.judging.evaluation.indices.sinuosity import (
+    path_sinuosity,
+    sample_sinuosity,
+    sinuosity_indices,
+)
+from ccfem.judging.evaluation.indices.stiffness_alignment import READINGS
+from ccfem.judging.evaluation.plane_paths import PlanePaths, plane_paths
 from ccfem.machine import Machine, Process
-from ccfem.materials import named_material
 from ccfem.papers.contents import WhenAsked
 from ccfem.papers.plocher_2022.fibre_map import FibreMap, fibre_map
 from ccfem.papers.plocher_2022.plane_study import (
@@ -40,13 +42,15 @@ from ccfem.papers.plocher_2022.plane_study import (
     reduced_stiffness,
 )
 from ccfem.papers.plocher_2022.plates import Plate, five_holes, plates
-from ccfem.planning import plan
-from ccfem.plates import solve_plane
+from ccfem.paths.linking.print_order import nearest_end_order
+from ccfem.paths.planning import plan
+from ccfem.paths.raster.raster_plan import RasterPlan
+from ccfem.paths.toolpaths import FIBRE, Toolpaths
+from ccfem.printing.export.gcode import gcode
 from ccfem.printing.print_plan import PrintPlan
-from ccfem.progress import Progress, silent
-from ccfem.raster.raster_plan import RasterPlan
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer_stress import stress_on
 from ccfem.strategies import create
-from ccfem.toolpaths import FIBRE, Toolpaths
 
 __all__ = [
     "MATERIALS",

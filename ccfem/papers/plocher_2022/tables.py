@@ -4,8 +4,8 @@ import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
-from ccfem.evaluation import COLUMNS
-from ccfem.materials import named_material
+from ccfem.fem.materials import named_material
+from ccfem.judging.evaluation import COLUMNS
 from ccfem.papers.plocher_2022.plane_study import reduced_stiffness
 from ccfem.papers.plocher_2022.study import MATERIALS, CaseStudy
 

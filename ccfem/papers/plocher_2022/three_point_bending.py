@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from ccfem.arrays import BoolArray, FloatArray, read_only
-from ccfem.elasticity.problem import PointForce, Support
-from ccfem.materials import plane_stress
-from ccfem.plates import PlaneProblem, raster_mesh
-from ccfem.topopt import Design, Simp, outline
+from ccfem.base.arrays import BoolArray, FloatArray, read_only
+from ccfem.fem.elasticity.problem import PointForce, Support
+from ccfem.fem.materials import plane_stress
+from ccfem.fem.plates import PlaneProblem, raster_mesh
+from ccfem.fem.topopt import Design, Simp, outline
 
 __all__ = ["BendingBeam", "three_point_bending", "three_point_bending_problem"]
 

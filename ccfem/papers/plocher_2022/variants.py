@@ -6,21 +6,25 @@ from typing import Any
 
 import numpy as np
 
-from ccfem.evaluation.indices.sinuosity import path_sinuosity, sample_sinuosity, sinuosity_indices
-from ccfem.evaluation.indices.stiffness_alignment import agreement
-from ccfem.evaluation.plane_paths import plane_paths
+from ccfem.base.tensor import strongest_in_plane
+from ccfem.fem.materials import named_material
+from ccfem.fem.plates import PlaneField
 from ccfem.geometry.polylines import pack
-from ccfem.materials import named_material
+from ccfem.judging.evaluation.indices.sinuosity import (
+    path_sinuosity,
+    sample_sinuosity,
+    sinuosity_indices,
+)
+from ccfem.judging.evaluation.indices.stiffness_alignment import agreement
+from ccfem.judging.evaluation.plane_paths import plane_paths
 from ccfem.papers.plocher_2022.fibre_map import fibre_map
 from ccfem.papers.plocher_2022.plane_study import laid_plate, print_seconds, reduced_stiffness
 from ccfem.papers.plocher_2022.plates import Plate, five_holes, single_hole
 from ccfem.papers.plocher_2022.study import RASTER, CaseStudy, machine_of
-from ccfem.planning import plan
-from ccfem.plates import PlaneField
-from ccfem.raster.patterns import concentric_regions, medial_regions
-from ccfem.raster.raster_plan import raster_plan
+from ccfem.paths.planning import plan
+from ccfem.paths.raster.patterns import concentric_regions, medial_regions
+from ccfem.paths.raster.raster_plan import raster_plan
 from ccfem.strategies import create
-from ccfem.tensor import strongest_in_plane
 
 __all__ = [
     "VARIANTS",

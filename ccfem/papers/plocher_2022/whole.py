@@ -3,7 +3,8 @@
 from pathlib import Path
 from time import perf_counter
 
-from ccfem.io.csv_table import write_csv
+from ccfem.base.csv_table import write_csv
+from ccfem.base.progress import Progress, silent
 from ccfem.papers.plocher_2022.claims import quantities, raster_quantities, verdicts
 from ccfem.papers.plocher_2022.figures import draw_all
 from ccfem.papers.plocher_2022.study import RASTER, run_study
@@ -22,7 +23,6 @@ from ccfem.papers.plocher_2022.variants import (
     variant_table,
 )
 from ccfem.papers.verdicts import claim_table
-from ccfem.progress import Progress, silent
 
 __all__ = ["write_all"]
 

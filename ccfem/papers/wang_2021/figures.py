@@ -9,9 +9,10 @@ import shapely
 from matplotlib.figure import Figure
 from scipy.spatial import Voronoi
 
-from ccfem.evaluation.indices.matching import THRESHOLDS
+from ccfem.comparison.plot.canvas import save
+from ccfem.comparison.plot.colours import INK, OUTLINE, palette
 from ccfem.geometry.medial_axis import medial_axis
-from ccfem.linking.print_speed import step_speeds
+from ccfem.judging.evaluation.indices.matching import THRESHOLDS
 from ccfem.papers.contents import drawn_of
 from ccfem.papers.wang_2021.panels import (
     COLOURS,
@@ -27,12 +28,11 @@ from ccfem.papers.wang_2021.panels import (
     title,
 )
 from ccfem.papers.wang_2021.study import BASELINES, LIMIT, PatternStudy, PlateStudy
-from ccfem.plot.canvas import save
-from ccfem.plot.colours import INK, OUTLINE, palette
+from ccfem.paths.linking.print_speed import step_speeds
+from ccfem.strategies.stress_tracing.criterion import Criterion
+from ccfem.strategies.stress_tracing.frame import frame
+from ccfem.strategies.stress_tracing.main_paths import main_paths
 from ccfem.strategies.svt import Svt
-from ccfem.stress_tracing.criterion import Criterion
-from ccfem.stress_tracing.frame import frame
-from ccfem.stress_tracing.main_paths import main_paths
 
 __all__ = ["draw_all", "figures"]
 

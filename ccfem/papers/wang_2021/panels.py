@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 
-from ccfem.arrays import BoolArray, FloatArray
+from ccfem.base.arrays import BoolArray, FloatArray
+from ccfem.base.tensor import in_plane, strongest_in_plane
 from ccfem.cases.designed import DesignPlate
+from ccfem.comparison.plot.colours import INK, OUTLINE, SECTION, palette
 from ccfem.papers.wang_2021.study import PartStudy, PatternStudy
-from ccfem.plot.colours import INK, OUTLINE, SECTION, palette
-from ccfem.tensor import in_plane, strongest_in_plane
 
 __all__ = [
     "COLOURS",

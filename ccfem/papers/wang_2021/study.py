@@ -15,30 +15,30 @@ from typing import Any
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
+from ccfem.base.arrays import FloatArray
+from ccfem.base.progress import Progress, silent
 from ccfem.cases import Case, create_case
 from ccfem.cases.designed import ELEMENT_SIZE, DesignPlate
 from ccfem.cases.stored.build import DESIGNED
-from ccfem.elasticity import StressField, solve
-from ccfem.evaluation import evaluate
-from ccfem.evaluation.indices.curvature import sample_curvature
-from ccfem.evaluation.indices.matching import READINGS, matching_rate
-from ccfem.evaluation.plane_paths import PlanePaths, plane_paths
+from ccfem.fem.elasticity import StressField, solve
+from ccfem.fem.topopt import Design
 from ccfem.geometry.polylines import resample, turning_angles
-from ccfem.layers import LayerStress
-from ccfem.layers.layer import Layer
-from ccfem.layers.layer_stress import stress_on
-from ccfem.layers.slicing.planar import Planar
+from ccfem.judging.evaluation import evaluate
+from ccfem.judging.evaluation.indices.curvature import sample_curvature
+from ccfem.judging.evaluation.indices.matching import READINGS, matching_rate
+from ccfem.judging.evaluation.plane_paths import PlanePaths, plane_paths
+from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.strand import RHO, Strand
+from ccfem.judging.virtual_testing.virtual_test import virtual_bracket
 from ccfem.machine import Machine
 from ccfem.papers.contents import WhenAsked
-from ccfem.planning import plan
-from ccfem.progress import Progress, silent
+from ccfem.paths.planning import plan
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers import LayerStress
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create, named
-from ccfem.toolpaths import Toolpaths
-from ccfem.topopt import Design
-from ccfem.virtual_testing.specimen import Specimen
-from ccfem.virtual_testing.strand import RHO, Strand
-from ccfem.virtual_testing.virtual_test import virtual_bracket
 
 __all__ = [
     "BASELINES",

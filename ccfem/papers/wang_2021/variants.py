@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 from ccfem.cases.bridge import bridge_plate
 from ccfem.cases.designed import Hole, designed_case
-from ccfem.evaluation.indices.curvature import sample_curvature
-from ccfem.evaluation.indices.manufacture import sample_manufacture
-from ccfem.evaluation.plane_paths import PlanePaths, plane_paths
+from ccfem.judging.evaluation.indices.curvature import sample_curvature
+from ccfem.judging.evaluation.indices.manufacture import sample_manufacture
+from ccfem.judging.evaluation.plane_paths import PlanePaths, plane_paths
 from ccfem.papers.wang_2021.study import (
     BASELINES,
     LIMIT,
@@ -20,7 +20,7 @@ from ccfem.papers.wang_2021.study import (
     curvature_along,
     run_part,
 )
-from ccfem.planning import plan
+from ccfem.paths.planning import plan
 from ccfem.strategies import create
 
 __all__ = ["RADII", "Tried", "try_hole", "try_radii", "variant_quantities", "variant_table"]

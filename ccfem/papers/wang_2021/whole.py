@@ -3,8 +3,9 @@
 from pathlib import Path
 from time import perf_counter
 
-from ccfem.evaluation.indices.matching import READINGS, THRESHOLDS
-from ccfem.io.csv_table import write_csv
+from ccfem.base.csv_table import write_csv
+from ccfem.base.progress import Progress, silent
+from ccfem.judging.evaluation.indices.matching import READINGS, THRESHOLDS
 from ccfem.papers.verdicts import claim_table
 from ccfem.papers.wang_2021.claims import quantities, verdicts
 from ccfem.papers.wang_2021.figures import draw_all
@@ -16,7 +17,6 @@ from ccfem.papers.wang_2021.variants import (
     variant_quantities,
     variant_table,
 )
-from ccfem.progress import Progress, silent
 
 __all__ = ["write_all"]
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ccfem.evaluation.indices.alignment import alignment_indices, sample_alignment
-from ccfem.layers.layer_stress import stress_on
+from ccfem.judging.evaluation.indices.alignment import alignment_indices, sample_alignment
+from ccfem.slicing.layers.layer_stress import stress_on
 
 
 def indices(part, *lines):

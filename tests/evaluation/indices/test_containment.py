@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ccfem.evaluation.indices.containment import containment_indices, sample_containment
+from ccfem.judging.evaluation.indices.containment import containment_indices, sample_containment
 
 
 def indices(paths):

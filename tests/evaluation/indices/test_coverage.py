@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.evaluation.indices.coverage import coverage_indices, sample_coverage
-from ccfem.layers.layer_stress import stress_on
+from ccfem.judging.evaluation.indices.coverage import coverage_indices, sample_coverage
+from ccfem.slicing.layers.layer_stress import stress_on
 
 
 def indices(part, *lines, width=1.0):

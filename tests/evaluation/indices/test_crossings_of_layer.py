@@ -1,6 +1,6 @@
 """Crossings between paths and of paths with themselves."""
 
-from ccfem.evaluation.indices.crossings import crossing_indices, sample_crossings
+from ccfem.judging.evaluation.indices.crossings import crossing_indices, sample_crossings
 
 
 def indices(paths):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ccfem.evaluation.indices.curvature import curvature_indices, sample_curvature
+from ccfem.judging.evaluation.indices.curvature import curvature_indices, sample_curvature
 from ccfem.machine import Machine
 
 MACHINE = Machine()

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from ccfem.errors import InputError
-from ccfem.evaluation.indices.head import head_indices, sample_head
-from ccfem.evaluation.printed_stack import printed
-from ccfem.layers.layer import Layer
-from ccfem.layers.plane import Plane, plane_frame
+from ccfem.base.errors import InputError
+from ccfem.judging.evaluation.indices.head import head_indices, sample_head
+from ccfem.judging.evaluation.printed_stack import printed
 from ccfem.machine import Machine
-from ccfem.toolpaths import Toolpaths
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.plane import Plane, plane_frame
 
 UP = (0.0, 0.0, 1.0)
 

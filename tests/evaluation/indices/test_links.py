@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ccfem.evaluation import evaluate
-from ccfem.evaluation.indices.links import link_indices, sample_links
+from ccfem.judging.evaluation import evaluate
+from ccfem.judging.evaluation.indices.links import link_indices, sample_links
 from ccfem.machine import Machine
 
 # 5 mm in the part, 20 mm over the window, 5 mm in the part; later 5 in, 15 out, 5 in.

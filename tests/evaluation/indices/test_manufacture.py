@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ccfem.evaluation.indices.manufacture import manufacture_indices, sample_manufacture
-from ccfem.evaluation.plane_paths import plane_paths
+from ccfem.judging.evaluation.indices.manufacture import manufacture_indices, sample_manufacture
+from ccfem.judging.evaluation.plane_paths import plane_paths
 from ccfem.machine import Machine
-from ccfem.toolpaths import MATRIX, TRAVEL, Toolpaths
+from ccfem.paths.toolpaths import MATRIX, TRAVEL, Toolpaths
 
 MACHINE = Machine(minimum_length=20.0)
 

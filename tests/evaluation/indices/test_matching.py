@@ -6,10 +6,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ccfem.errors import InputError
-from ccfem.evaluation.indices.alignment import alignment_indices, sample_alignment
-from ccfem.evaluation.indices.matching import READINGS, THRESHOLDS, matching_indices, matching_rate
-from ccfem.layers.layer_stress import stress_on
+from ccfem.base.errors import InputError
+from ccfem.judging.evaluation.indices.alignment import alignment_indices, sample_alignment
+from ccfem.judging.evaluation.indices.matching import (
+    READINGS,
+    THRESHOLDS,
+    matching_indices,
+    matching_rate,
+)
+from ccfem.slicing.layers.layer_stress import stress_on
 
 
 def rate(part, paths, reading="path", **options):

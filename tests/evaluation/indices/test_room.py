@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from ccfem.evaluation.indices.room import room_indices, sample_room
-from ccfem.evaluation.printable import why_not
+from ccfem.body.mesh import TetMesh
+from ccfem.body.mesh.box import box_mesh
+from ccfem.judging.evaluation.indices.room import room_indices, sample_room
+from ccfem.judging.evaluation.printable import why_not
 from ccfem.machine import Limits, Machine
-from ccfem.mesh import TetMesh
-from ccfem.mesh.box import box_mesh
 
 MACHINE = Machine(fibre_width=1.0, fibre_height=0.1, filament_area=0.1)
 

@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ccfem.evaluation.indices.sinuosity import (
+from ccfem.geometry.polylines import pack
+from ccfem.judging.evaluation.indices.sinuosity import (
     TOLERANCES,
     SinuositySamples,
     path_sinuosity,
     sample_sinuosity,
     sinuosity_indices,
 )
-from ccfem.geometry.polylines import pack
 
 
 def sinuosity(*lines, width=1.0):

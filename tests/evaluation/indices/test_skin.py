@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ccfem.evaluation.indices.skin import sample_skin, skin_indices
-from ccfem.layers.slicing.planar import Planar
+from ccfem.body.mesh.box import box_mesh
+from ccfem.judging.evaluation.indices.skin import sample_skin, skin_indices
 from ccfem.machine import Machine
-from ccfem.mesh.box import box_mesh
-from ccfem.toolpaths import Toolpaths
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.slicers.planar import Planar
 
 MACHINE = Machine(fibre_width=1.0, fibre_height=0.2, filament_area=0.1)
 MESH = box_mesh((60.0, 40.0, 2.0), (12, 8, 2))

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ccfem.elasticity import GivenStress
-from ccfem.evaluation import evaluate
-from ccfem.layers.slicing import Planar
+from ccfem.body.mesh import box_mesh
+from ccfem.fem.elasticity import GivenStress
+from ccfem.judging.evaluation import evaluate
 from ccfem.machine import Machine
-from ccfem.mesh import box_mesh
-from ccfem.toolpaths import Toolpaths
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.slicers import Planar
 
 MESH = box_mesh((60.0, 20.0, 2.0), (60, 20, 1))
 RADIUS = 25.0

@@ -5,7 +5,7 @@ import pytest
 import shapely
 from shapely.ops import substring
 
-from ccfem.evaluation.indices.spacing import sample_spacing, spacing_indices
+from ccfem.judging.evaluation.indices.spacing import sample_spacing, spacing_indices
 from ccfem.machine import Machine
 
 

@@ -3,19 +3,19 @@
 import numpy as np
 import pytest
 
-from ccfem.elasticity import GivenStress
-from ccfem.errors import InputError
-from ccfem.evaluation import evaluate
-from ccfem.evaluation.indices.stiffness_alignment import (
+from ccfem.base.errors import InputError
+from ccfem.fem.elasticity import GivenStress
+from ccfem.fem.materials import isotropic, named_material
+from ccfem.judging.evaluation import evaluate
+from ccfem.judging.evaluation.indices.stiffness_alignment import (
     READINGS,
     agreement,
     performance_index,
     stiffness_alignment_indices,
 )
-from ccfem.evaluation.sensitivity import OffAxis, acute, strand_lamina
+from ccfem.judging.evaluation.sensitivity import OffAxis, acute, strand_lamina
+from ccfem.judging.virtual_testing import Strand
 from ccfem.machine import Machine
-from ccfem.materials import isotropic, named_material
-from ccfem.virtual_testing import Strand
 
 MACHINE = Machine()
 
@@ -145,7 +145,7 @@ def test_pure_shear_has_no_strongest_direction(make_part, uniform):
 
 
 def test_harmonic_index_weighs_by_energy(pulled):
-    from ccfem.evaluation.indices.alignment import AlignmentSamples
+    from ccfem.judging.evaluation.indices.alignment import AlignmentSamples
 
     # Stress 2 along the fibre, 1 across it: energies 4 to 1 for the stress along the fibre.
     samples = AlignmentSamples(

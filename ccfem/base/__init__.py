@@ -1,0 +1,7 @@
+"""What every wing stands on: arrays, tensors, checks, errors, files written whole."""
+
+from ccfem.base.submodules import submodules
+
+__all__: list[str] = []
+
+__getattr__ = submodules(__name__)

@@ -1,0 +1,97 @@
+"""Plug points: families whose members are the modules of a package, and those of other packages.
+
+One module is one member: it holds a class of its own name in capitals (``contour_zigzag`` holds
+``ContourZigzag``), a frozen dataclass whose fields are the parameters. Other packages add theirs
+by an entry point. Nothing is registered anywhere.
+"""
+
+import importlib
+import importlib.util
+import inspect
+import pkgutil
+import re
+from collections.abc import Mapping
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+from ccfem.base.checks import check_known
+from ccfem.base.errors import InputError, known_names
+from ccfem.base.toml import from_table
+
+__all__ = ["by_class", "class_name", "create", "entries", "found"]
+
+
+def class_name(module: str) -> str:
+    """Name of the class that a module of this name holds."""
+    return module.title().replace("_", "")
+
+
+@cache
+def entries(group: str) -> tuple[EntryPoint, ...]:
+    """Entry points of a group: read once, since all installed packages are asked."""
+    return tuple(entry_points(group=group))
+
+
+def found(package: str, group: str) -> dict[str, Any]:
+    """Every member by name: modules of a package, and entry points of a group."""
+    members: dict[str, Any] = {}
+    for info in pkgutil.iter_modules(importlib.import_module(package).__path__):
+        if info.ispkg:  # what its members stand on
+            continue
+        module = importlib.import_module(f"{package}.{info.name}")
+        members[info.name] = getattr(module, class_name(info.name))
+    for entry in entries(group):
+        members[entry.name] = entry.load()
+    return members
+
+
+def create(
+    kind: str,
+    known: Mapping[str, Any],
+    name: str,
+    parameters: Mapping[str, Any] | None,
+    cure: str = "",
+) -> Any:
+    """Make a member from its name and parameters.
+
+    Parameters
+    ----------
+    kind : str
+        What a member is called in messages, as "strategy".
+    known : mapping of name to class or function
+    name : str
+    parameters : mapping of name to value, optional
+    cure : str, optional
+        What else might have been meant by an unknown name.
+
+    Raises
+    ------
+    InputError
+        For an unknown member or parameter, the known ones listed; for a value of a wrong type.
+    """
+    check_known(kind, name, sorted(known), cure)
+    taken = inspect.signature(known[name]).parameters
+    table = {}
+    for parameter, value in (parameters or {}).items():
+        if parameter not in taken:
+            raise InputError(
+                f"{kind} '{name}' has no parameter '{parameter}'; it has: "
+                f"{known_names(parameter, taken)}"
+            )
+        table[parameter] = list(value) if isinstance(value, tuple) else value
+    return from_table(known[name], table, f"{kind} {name}")
+
+
+def by_class(package: str, name: str) -> Any:
+    """Find a member of a package by the name of its class, for attributes of the package.
+
+    Raises
+    ------
+    AttributeError
+        When no module of the package holds a class of that name.
+    """
+    module = re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
+    if class_name(module) == name and importlib.util.find_spec(f"{package}.{module}"):
+        return getattr(importlib.import_module(f"{package}.{module}"), name)
+    raise AttributeError(f"module '{package}' has no attribute '{name}'")

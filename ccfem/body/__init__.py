@@ -1,0 +1,7 @@
+"""From a file to tetrahedra with named patches."""
+
+from ccfem.base.submodules import submodules
+
+__all__: list[str] = []
+
+__getattr__ = submodules(__name__)

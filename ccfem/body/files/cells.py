@@ -1,0 +1,49 @@
+"""What every reader does with the cells it found: tetrahedra of one order, or an error."""
+
+from collections.abc import Iterable
+from os import PathLike
+
+import numpy as np
+
+from ccfem.base.arrays import IntArray
+from ccfem.base.errors import InputError
+
+__all__ = ["tetrahedra"]
+
+_SOLIDS = ("tetra", "hexahedron", "wedge", "pyramid", "polyhedron", "voxel")
+
+
+def tetrahedra(blocks: Iterable[tuple[str, IntArray]], path: str | PathLike[str]) -> IntArray:
+    """Join the tetrahedra of a file, (m, 4) or (m, 10).
+
+    Parameters
+    ----------
+    blocks : iterable of (type, nodes)
+        Type in meshio's words, nodes (m, k).
+    path : path
+        For the messages.
+
+    Raises
+    ------
+    InputError
+        When there are no tetrahedra, when linear and quadratic ones are mixed, or when some of
+        the volume is meshed with other cells (dropping them would leave holes).
+    """
+    found: dict[str, list[IntArray]] = {}
+    for kind, nodes in blocks:
+        if len(nodes):
+            found.setdefault(kind, []).append(np.asarray(nodes, dtype=np.int64))
+    counts = {kind: sum(map(len, parts)) for kind, parts in found.items()}
+    held = ", ".join(f"{count} {kind}" for kind, count in sorted(counts.items())) or "no cells"
+    solids = sorted(kind for kind in found if kind.startswith(_SOLIDS))
+    if solids == ["tetra"] or solids == ["tetra10"]:
+        return np.concatenate(found[solids[0]])
+    if set(solids) & {"tetra", "tetra10"}:
+        raise InputError(
+            f"{path} must be meshed with linear or with quadratic tetrahedra throughout; it has "
+            f"{held}: mesh it again with one kind"
+        )
+    raise InputError(
+        f"{path} holds no tetrahedra; it has {held}: mesh the volume with tetrahedra, or give a "
+        "closed surface as STL, OBJ or PLY"
+    )

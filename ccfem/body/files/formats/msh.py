@@ -1,0 +1,42 @@
+"""Gmsh ``.msh`` meshes, versions 2.2 and 4.1, text or binary: meshio in a process of its own."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ccfem.base.arrays import IntArray
+from ccfem.base.errors import InputError
+from ccfem.body.files.cells import tetrahedra
+from ccfem.body.isolated.limited import read_isolated
+from ccfem.body.isolated.process import ChildError
+from ccfem.body.mesh.patches import with_groups
+from ccfem.body.mesh.tet_mesh import TetMesh
+
+__all__ = ["read"]
+
+
+def read(path: Path) -> TetMesh:
+    """Read a Gmsh mesh; physical groups of triangles become patches.
+
+    A group without a name is called by its number. Quadratic tetrahedra come in VTK order: Gmsh
+    swaps the last two mid-side nodes and meshio swaps them back.
+    """
+    with path.open("rb") as file:
+        start = file.read(256)
+    if b"$MeshFormat" not in start and not start.startswith(b"$Comments"):
+        raise InputError(f"{path} is not a Gmsh mesh: it must begin with $MeshFormat")
+    try:
+        found = read_isolated("gmsh_files:read", path)
+    except ChildError as error:
+        raise InputError(
+            f"{path} is not a Gmsh mesh that can be read ({error}): save it again as version 4.1"
+        ) from None
+    parts = {name: name.split(":", 2) for name in found}
+    blocks = {p[1]: (p[2], found[name]) for name, p in parts.items() if p[0] == "cells"}
+    mesh = TetMesh(found["points"][:, :3], tetrahedra(blocks.values(), path))
+    groups: dict[str, list[IntArray]] = {}
+    for name, (kind, *rest) in parts.items():
+        if kind == "group":
+            corners = blocks[rest[0]][1][:, :3]
+            groups.setdefault(rest[1], []).append(corners[found[name]])
+    return with_groups(mesh, {name: np.concatenate(each) for name, each in groups.items()})

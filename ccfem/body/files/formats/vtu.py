@@ -1,0 +1,189 @@
+"""VTK unstructured grids (``.vtu``): read by VTK in a process of its own."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.errors import InputError
+from ccfem.body.files.cells import tetrahedra
+from ccfem.body.files.vtk_xml import write_vtk_xml
+from ccfem.body.isolated.limited import read_isolated
+from ccfem.body.isolated.process import ChildError
+from ccfem.body.mesh.patches import with_groups
+from ccfem.body.mesh.tet_mesh import TetMesh
+
+__all__ = ["Grid", "read", "read_grid", "write"]
+
+_PATCH = "patch:"
+_TYPES = {
+    5: "triangle",
+    10: "tetra",
+    11: "voxel",
+    12: "hexahedron",
+    13: "wedge",
+    14: "pyramid",
+    22: "triangle6",
+    24: "tetra10",
+    25: "hexahedron20",
+    26: "wedge15",
+    27: "pyramid13",
+    29: "hexahedron27",
+    42: "polyhedron",
+}
+_TRIANGLE, _TRIANGLE6 = 5, 22
+_TAGS = ("patch", "gmsh:physical", "CellEntityIds", "PhysicalIds")
+"""Integer cell data that number the groups of triangles in files of other programs."""
+
+
+def read(path: Path) -> TetMesh:
+    """Read a VTK unstructured grid.
+
+    Patches come from the field data ``patch:NAME`` that `write` writes, and from triangle
+    cells with an integer cell array named patch, gmsh:physical, CellEntityIds or PhysicalIds
+    (called by their number).
+    """
+    grid = read_grid(path)
+    blocks = {_TYPES.get(kind, f"VTK cell type {kind}"): kind for kind in grid.cells}
+    cells = tetrahedra([(name, grid.cells[kind]) for name, kind in blocks.items()], path)
+    mesh = TetMesh(grid.points, cells)
+    groups = {
+        name.removeprefix(_PATCH): facets.reshape(-1, 3)
+        for name, facets in grid.field.items()
+        if name.startswith(_PATCH) and facets.dtype.kind in "iu" and facets.size % 3 == 0
+    }
+    return with_groups(mesh, {**_tagged_triangles(grid), **groups})
+
+
+@dataclass(frozen=True)
+class Grid:
+    """An unstructured grid as arrays.
+
+    Attributes
+    ----------
+    points : (n, 3) array
+    types : (m,) int array
+        VTK's number of the type of each cell.
+    cells : dict of type to (k, q) int array
+        Nodes of the cells of each type, in their order; (k, 0) of those that ccfem does not take.
+    point, cell, field : dict of name to array
+        Data of points, of cells, and of the whole.
+    components : dict of (where, name) to list of str
+        Names of the components of data, where they have some.
+    """
+
+    points: FloatArray
+    types: IntArray
+    cells: dict[int, IntArray]
+    point: dict[str, Any]
+    cell: dict[str, Any]
+    field: dict[str, Any]
+    components: dict[tuple[str, str], list[str]]
+
+
+def read_grid(path: Path) -> Grid:
+    """Read an unstructured grid."""
+    with path.open("rb") as file:
+        start = file.read(4096)
+    if b"<VTKFile" not in start or b"UnstructuredGrid" not in start:
+        raise InputError(
+            f"{path} is not a VTK unstructured grid: it must hold <VTKFile type='UnstructuredGrid'>"
+        )
+    try:
+        found = read_isolated("vtk_files:read_grid", path)
+    except ChildError as error:
+        raise InputError(
+            f"{path} is not a VTK unstructured grid that can be read: {error}: write it again"
+        ) from None
+    parts: dict[str, dict[str, Any]] = {
+        kind: {k.partition(":")[2]: v for k, v in found.items() if k.startswith(f"{kind}:")}
+        for kind in ("cells", "point", "cell", "field", "components")
+    }
+    return Grid(
+        np.asarray(found["points"], dtype=np.float64),
+        found["types"].astype(np.int64),
+        {int(kind): nodes for kind, nodes in parts["cells"].items()},
+        parts["point"],
+        parts["cell"],
+        parts["field"],
+        {
+            (name.partition(":")[0], name.partition(":")[2]): names.tolist()
+            for name, names in parts["components"].items()
+        },
+    )
+
+
+def _tagged_triangles(grid: Grid) -> dict[str, IntArray]:
+    """Corner nodes (k, 3) of the triangles of each number."""
+    tag = next((name for name in _TAGS if name in grid.cell), None)
+    groups: dict[str, list[IntArray]] = {}
+    if tag is None or grid.cell[tag].dtype.kind not in "iu" or grid.cell[tag].ndim != 1:
+        return {}
+    for kind in (_TRIANGLE, _TRIANGLE6):
+        if kind not in grid.cells:
+            continue
+        numbers = grid.cell[tag][grid.types == kind]
+        for number in np.unique(numbers):
+            groups.setdefault(str(number), []).append(grid.cells[kind][numbers == number][:, :3])
+    return {name: np.concatenate(parts) for name, parts in groups.items()}
+
+
+def write(
+    mesh: TetMesh,
+    path: Path,
+    point: Mapping[str, ArrayLike] | None = None,
+    cell: Mapping[str, ArrayLike] | None = None,
+    field: Mapping[str, ArrayLike] | None = None,
+    components: Mapping[str, Sequence[str]] | None = None,
+) -> None:
+    """Write a mesh as VTK unstructured grid, its patches as field data ``patch:NAME``.
+
+    To be called with a file of `whole_file`.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    path : path
+    point, cell, field : mapping of name to array, optional
+        Data of points, of cells, and of the whole.
+    components : mapping of name to names, optional
+        Names of the components of data of points and cells.
+
+    Raises
+    ------
+    InputError
+        When a name has characters that XML does not know.
+    OSError
+        When the file cannot be written.
+    """
+    number, corners = mesh.cells.shape
+    write_vtk_xml(
+        path,
+        "UnstructuredGrid",
+        {"Points": len(mesh.points), "Cells": number},
+        {
+            _active("PointData", point): point or {},
+            _active("CellData", cell): cell or {},
+            "Points": {"Points": mesh.points},
+            "Cells": {
+                "connectivity": mesh.cells.ravel(),
+                "offsets": corners * np.arange(1, number + 1),
+                "types": np.full(number, 10 if mesh.order == 1 else 24, dtype=np.uint8),
+            },
+        },
+        {
+            **{_PATCH + name: facets for name, facets in mesh.patches.items() if len(facets)},
+            **(field or {}),
+        },
+        components,
+    )
+
+
+def _active(tag: str, arrays: Mapping[str, ArrayLike] | None) -> str:
+    """Tag of a section that makes its first array the one that viewers draw."""
+    return f"{tag} Scalars={quoteattr(next(iter(arrays)))}" if arrays else tag

@@ -1,0 +1,190 @@
+"""Closed triangulated surfaces from STL, OBJ and PLY files."""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ccfem.base.arrays import FloatArray, IntArray, freeze, read_only
+from ccfem.base.checks import FARTHEST, check_number
+from ccfem.base.errors import InputError
+from ccfem.base.whole import existing_file
+from ccfem.body.isolated.limited import read_isolated
+from ccfem.body.isolated.process import ChildError
+
+__all__ = ["Surface", "is_surface", "read_surface", "write_stl"]
+
+_SUFFIXES = (".obj", ".ply", ".stl")
+_NOTHING = 1e-12
+"""Volume over area and diagonal that counts as none."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A closed surface of triangles, outward.
+
+    Attributes
+    ----------
+    points : (n, 3) array, mm
+    triangles : (t, 3) int array
+
+    Raises
+    ------
+    InputError
+        When the surface has no triangle, a coordinate that is not finite, is open, or encloses
+        nothing.
+    """
+
+    points: FloatArray
+    triangles: IntArray
+
+    def __post_init__(self) -> None:
+        freeze(self, points=float, triangles=int)
+        if self.points.ndim != 2 or self.points.shape[1] != 3 or not len(self.triangles):
+            raise InputError(
+                f"a surface needs points (n, 3) and triangles (t, 3); got {self.points.shape} "
+                f"and {self.triangles.shape}: give a triangulated surface"
+            )
+        _check_near(self.points)
+        if self.triangles.min() < 0 or self.triangles.max() >= len(self.points):
+            raise InputError(
+                f"triangles must name points 0 to {len(self.points) - 1}; got "
+                f"{self.triangles.min()} to {self.triangles.max()}: repair the file"
+            )
+        _check_closed(self.points, self.triangles)
+        if abs(self.volume) <= _NOTHING * float(
+            np.prod(_size_and_area(self.points, self.triangles))
+        ):
+            raise InputError(
+                f"the surface encloses no volume ({abs(self.volume):.3g} mm^3): give the outside "
+                "of a solid, each wall once"
+            )
+        if self.volume < 0.0:
+            object.__setattr__(self, "triangles", read_only(self.triangles[:, ::-1], np.int64))
+
+    @property
+    def volume(self) -> float:
+        """Volume inside the surface, mm^3."""
+        a, b, c = np.moveaxis(self.points[self.triangles] - self.points.mean(axis=0), 1, 0)
+        return float(np.einsum("ij,ij->", np.cross(a, b), c)) / 6.0
+
+
+def is_surface(path: str | os.PathLike[str]) -> bool:
+    """Whether the name of a file is that of a surface."""
+    return Path(path).suffix.lower() in _SUFFIXES
+
+
+def read_surface(path: str | os.PathLike[str], scale: float = 1.0) -> Surface:
+    """Read a closed surface.
+
+    Parameters
+    ----------
+    path : path
+        STL, OBJ or PLY; polygons are cut into triangles, equal points merged.
+    scale : float, default 1
+        Factor on the coordinates, to make them mm.
+
+    Raises
+    ------
+    InputError
+        When the file is missing or holds no surface, or the surface is open; it says how many
+        edges are open and where.
+    """
+    path = existing_file(path, "surface file")
+    if not is_surface(path):
+        raise InputError(
+            f"cannot tell the format of surface file {path}: its name must end in "
+            f"{', '.join(_SUFFIXES)}"
+        )
+    check_number("surface scale", scale, above=0.0)
+    try:
+        found = read_isolated("vtk_files:read_surface", path)
+    except ChildError as error:
+        raise InputError(
+            f"{path} is not a surface that can be read: {error}: export it again as binary STL"
+        ) from None
+    with np.errstate(over="ignore"):  # what overflows is refused as infinite
+        points = found["points"] * scale
+    try:
+        return Surface(*_merged(points, found["triangles"]))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def write_stl(path: Path, points: FloatArray, triangles: IntArray) -> None:
+    """Write triangles as binary STL, without normals: readers make them of the order of corners.
+
+    Raises
+    ------
+    OSError
+        When the file cannot be written; VTK's own writer then ends the process.
+    """
+    facets = np.zeros(
+        len(triangles), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")]
+    )
+    facets["corners"] = points[triangles]
+    path.write_bytes(bytes(80) + np.array(len(facets), "<u4").tobytes() + facets.tobytes())
+
+
+def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
+    """Merge points that agree to 1e-6 of the size; drop triangles that lose a side by it."""
+    points, triangles = np.asarray(points), np.asarray(triangles, dtype=np.int64)
+    _check_near(points)
+    size = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
+    _, first, place = np.unique(
+        np.round(points / (1e-6 * size)).astype(np.int64),
+        axis=0,
+        return_index=True,
+        return_inverse=True,
+    )
+    triangles = place.reshape(-1)[triangles]
+    a, b, c = triangles.T
+    return points[first], triangles[(a != b) & (b != c) & (c != a)]
+
+
+def _size_and_area(points: FloatArray, triangles: IntArray) -> tuple[float, float]:
+    """Diagonal, mm, and area, mm^2."""
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    return float(np.linalg.norm(np.ptp(points[triangles], axis=(0, 1)))), area
+
+
+def _check_near(points: FloatArray) -> None:
+    """Raise on coordinates that are not finite, or so large that their squares overflow."""
+    if not np.isfinite(points).all():
+        raise InputError("surface points must be finite; got NaN or infinity: repair the file")
+    if len(points) and np.abs(points).max() > FARTHEST:
+        raise InputError(
+            f"surface points must lie within {FARTHEST:g} mm; got a coordinate of "
+            f"{np.abs(points).max():.3g} mm: repair the file, or correct its scale"
+        )
+
+
+def _check_closed(points: FloatArray, triangles: IntArray) -> None:
+    """Raise unless every edge joins triangles that run along it in opposite directions."""
+    directed = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    edges, place, counts = np.unique(
+        np.sort(directed, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    odd = np.flatnonzero(counts % 2)
+    if len(odd):
+        middle = points[edges[odd]].mean(axis=1)
+        low, high = _place(middle.min(axis=0)), _place(middle.max(axis=0))
+        raise InputError(
+            f"the surface is open: {len(odd)} edges belong to an odd number of triangles, the "
+            f"first at {_place(middle[0])}, all within {low} to {high} mm: close the holes in the "
+            "program that made it"
+        )
+    forward = np.where(directed[:, 0] < directed[:, 1], 1, -1)
+    turned = np.flatnonzero(np.bincount(place.reshape(-1), weights=forward))
+    if len(turned):
+        at = _place(points[edges[turned[0]]].mean(axis=0))
+        raise InputError(
+            f"the surface's triangles do not all face outward: {len(turned)} edges are traversed "
+            f"twice in one direction, the first at {at} mm: unify the normals"
+        )
+
+
+def _place(point: FloatArray) -> str:
+    return "(" + ", ".join(f"{x:.4g}" for x in point) + ")"

@@ -1,0 +1,119 @@
+"""VTK's XML files (.vtu, .vtp), written here: VTK's own writer ends the process on a full disk.
+
+Arrays are inline, compressed and in base64. There are no arrays of strings, which meshio refuses:
+text is the bytes of its UTF-8 (`as_bytes`).
+"""
+
+import base64
+import re
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ccfem.base.errors import InputError, shown
+
+__all__ = ["as_bytes", "write_vtk_xml"]
+
+_EFFORT = 4
+"""Compression level of zlib, 1 to 9; higher ones make the files of the loop no smaller."""
+_TYPES = {"f": ("f8", "Float64"), "b": ("u1", "UInt8")}
+"""Of arrays by the kind of their data type; unsigned bytes stay so, all others are Int64."""
+_NOT_IN_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
+
+
+def write_vtk_xml(
+    path: Path,
+    kind: str,
+    counts: Mapping[str, int],
+    sections: Mapping[str, Mapping[str, ArrayLike]],
+    field: Mapping[str, ArrayLike] | None = None,
+    components: Mapping[str, Sequence[str]] | None = None,
+) -> None:
+    """Write one piece of a data set; to be called with a file of `whole_file`.
+
+    Parameters
+    ----------
+    path : path
+    kind : str
+        ``UnstructuredGrid`` or ``PolyData``.
+    counts : mapping of name to int
+        How many points and cells there are, as ``{"Points": 4, "Cells": 1}``.
+    sections : mapping of tag to mapping of name to array
+        ``PointData``, ``Points`` and so on, with their arrays (k,) or (k, c); the tag may have
+        attributes, as in ``PointData Normals="normals"``.
+    field : mapping of name to array, optional
+        Data of the whole.
+    components : mapping of name to names, optional
+        Names of the components of arrays of points and cells.
+
+    Raises
+    ------
+    InputError
+        When a name has characters that XML does not know.
+    OSError
+        When the file cannot be written.
+    """
+    for name in [name for arrays in (*sections.values(), field or {}) for name in arrays]:
+        if _NOT_IN_XML.search(name):
+            raise InputError(
+                f"the name {shown(name)} has characters that a file of VTK cannot hold: rename it"
+            )
+    with path.open("w", encoding="utf-8") as file:
+        file.writelines(_lines(kind, counts, sections, field or {}, components or {}))
+
+
+def as_bytes(text: str) -> NDArray[np.uint8]:
+    """Text as an array of the bytes of its UTF-8."""
+    return np.frombuffer(text.encode(), dtype=np.uint8)
+
+
+def _lines(
+    kind: str,
+    counts: Mapping[str, int],
+    sections: Mapping[str, Mapping[str, ArrayLike]],
+    field: Mapping[str, ArrayLike],
+    components: Mapping[str, Sequence[str]],
+) -> Iterator[str]:
+    """Lines of the file (VTK file formats, "XML File Formats")."""
+    yield '<?xml version="1.0" encoding="UTF-8"?>\n'
+    yield (
+        f'<VTKFile type="{kind}" version="1.0" byte_order="LittleEndian" header_type="UInt64" '
+        f'compressor="vtkZLibDataCompressor">\n<{kind}>\n'
+    )
+    if field:
+        yield "<FieldData>\n"
+        for name, values in field.items():
+            yield _array(name, values, f' NumberOfTuples="{len(np.asarray(values))}"')
+        yield "</FieldData>\n"
+    numbers = " ".join(f'NumberOf{name}="{count}"' for name, count in counts.items())
+    yield f"<Piece {numbers}>\n"
+    for tag, arrays in sections.items():
+        yield f"<{tag}>\n"
+        for name, values in arrays.items():
+            titles = enumerate(components.get(name, ()))
+            yield _array(name, values, "".join(f' ComponentName{k}="{s}"' for k, s in titles))
+        yield f"</{tag.partition(' ')[0]}>\n"
+    yield f"</Piece>\n</{kind}>\n</VTKFile>\n"
+
+
+def _array(name: str, values: ArrayLike, more: str = "") -> str:
+    """One DataArray: one block of zlib with its sizes in bytes before it."""
+    values = np.asarray(values)
+    size, name_of_type = _TYPES.get(values.dtype.kind, ("i8", "Int64"))
+    if values.dtype == np.uint8:
+        size, name_of_type = _TYPES["b"]
+    data = np.ascontiguousarray(values, dtype=f"<{size}").tobytes()
+    packed = zlib.compress(data, _EFFORT) if data else b""
+    # Number of blocks, size of a block, of a last one that is shorter, and of each when packed.
+    sizes = [1, len(data), 0, len(packed)] if data else [0, 0, 0]
+    header = np.array(sizes, dtype="<u8").tobytes()
+    text = (base64.b64encode(header) + base64.b64encode(packed)).decode("ascii")
+    columns = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
+    return (
+        f'<DataArray type="{name_of_type}" Name={quoteattr(name)}{columns}{more} '
+        f'format="binary">{text}</DataArray>\n'
+    )

@@ -1,0 +1,310 @@
+"""What is wrong with a mesh, and the mesh mended as far as that is safe."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.checks import FARTHEST
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.flaws import STRAIGHT
+from ccfem.body.mesh.hanging import hanging_nodes
+from ccfem.body.mesh.pairing import FREE
+from ccfem.body.mesh.patches import match_boundary
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.geometry.facets import are_among, facet_keys
+from ccfem.geometry.measures import connected, signed_volumes
+
+__all__ = ["MeshReport", "about_slivers", "check_mesh"]
+
+_FLAT = 1e-12
+"""Volume over the cube of the longest edge, at and below which a cell counts as flat."""
+_SLIVER = 100.0
+"""Longest edge over height from which a cell makes the equations ill-conditioned."""
+_TURNED = {4: [0, 2, 1, 3], 10: [0, 2, 1, 3, 6, 5, 4, 7, 9, 8]}
+"""Order of nodes that turns a cell inside out (corners 1 and 2 swapped)."""
+
+
+@dataclass(frozen=True)
+class MeshReport:
+    """What `check_mesh` found, and what it did about it.
+
+    Attributes
+    ----------
+    nodes, cells : int
+        Left in the mesh.
+    turned : int
+        Cells that were inside out: turned.
+    flat, repeated : int
+        Cells without volume, and cells that repeat another: taken out.
+    unused : int
+        Nodes that no cell uses: taken out.
+    moved : int
+        Mid-side nodes that were off the middle of their edge: moved there.
+    farthest : float, mm
+        The longest of these moves.
+    dropped : int
+        Facets of patches that are not on the boundary: taken out.
+    coincident : int
+        Nodes that lie on another one: merged where asked for.
+    merged : bool
+        Whether they were merged.
+    hanging : int
+        Nodes on a facet or a side of another cell without being a node of it: the part is not
+        joined there.
+    components : int
+        Separate pieces of the mesh: left as they are.
+    diagonal : float, mm
+        Of the bounding box.
+    aspect : float
+        Longest edge over least height of the cells, median.
+    """
+
+    nodes: int
+    cells: int
+    turned: int = 0
+    flat: int = 0
+    repeated: int = 0
+    unused: int = 0
+    moved: int = 0
+    farthest: float = 0.0
+    dropped: int = 0
+    coincident: int = 0
+    merged: bool = False
+    hanging: int = 0
+    components: int = 1
+    diagonal: float = 0.0
+    aspect: float = 0.0
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """One line for each thing worth knowing; empty for a sound mesh."""
+        together = "merged" if self.merged else "left apart (merge them to join the pieces)"
+        lines = (
+            (self.turned, f"{self.turned} cells were inside out: turned"),
+            (self.flat, f"{self.flat} cells had no volume: taken out"),
+            (self.repeated, f"{self.repeated} cells repeated another: taken out"),
+            (self.unused, f"{self.unused} nodes belonged to no cell: taken out"),
+            (
+                self.moved,
+                f"{self.moved} mid-side nodes moved to the middle of their straight edge, by up to "
+                f"{self.farthest:.3g} mm: mesh curved walls finer where that is too far",
+            ),
+            (self.dropped, f"{self.dropped} patch facets were not on the boundary: left out"),
+            (self.coincident, f"{self.coincident} nodes lie on another one: {together}"),
+            (
+                self.hanging,
+                f"{self.hanging} nodes hang on a facet of another cell that they are no corner of: "
+                "the part is not joined there",
+            ),
+            (self.components > 1, f"the mesh falls into {self.components} separate pieces"),
+            (
+                self.aspect > _SLIVER,
+                f"most cells are some {self.aspect:.3g} times as long as high: check that all "
+                "lengths are in mm",
+            ),
+        )
+        return tuple(text for wanted, text in lines if wanted)
+
+
+def check_mesh(mesh: TetMesh, merge: bool = False) -> tuple[TetMesh, MeshReport]:
+    """Mend a mesh and say what was found.
+
+    Cells are turned to positive volume; flat and repeated cells, unused nodes and patch facets
+    inside the part are taken out; mid-side nodes are moved to the middle of their edges, since
+    all elements of ccfem are straight-sided. Separate pieces stay.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    merge : bool, default False
+        Merge nodes that lie on each other (to 1e-9 of the diagonal). By default they are only
+        counted: they may be a cut that is meant.
+
+    Returns
+    -------
+    mesh : TetMesh
+        The same object when there was nothing to mend.
+    report : MeshReport
+
+    Raises
+    ------
+    InputError
+        For an invalid mesh: a coordinate of a used node is not finite, all cells are flat, cells
+        overlap, or pieces to be merged have meshes that do not match.
+    """
+    used = np.zeros(len(mesh.points), dtype=bool)
+    used[mesh.cells] = True
+    wrong = np.flatnonzero(used & ~np.isfinite(mesh.points).all(axis=1))
+    if len(wrong):
+        raise InputError(
+            f"mesh coordinates must be finite; {len(wrong)} nodes have NaN or infinity, the first "
+            f"is node {wrong[0]} (from 0): repair the file"
+        )
+    far = np.flatnonzero(used & (np.abs(mesh.points) > FARTHEST).any(axis=1))
+    if len(far):
+        raise InputError(
+            f"mesh coordinates must lie within {FARTHEST:g} mm; {len(far)} nodes lie farther, the "
+            f"first is node {far[0]} (from 0): repair the file, or correct its scale"
+        )
+    diagonal = float(np.linalg.norm(np.ptp(mesh.points[used], axis=0)))
+    leader, coincident = _leaders(mesh.points, used, diagonal)
+    merged = merge and coincident > 0
+    cells = leader[mesh.cells] if merged else np.array(mesh.cells)
+    keep, flat, repeated, turned = _sort_out(mesh.points, cells)
+    cells[turned] = cells[turned][:, _TURNED[cells.shape[1]]]
+    points, moved, farthest = _straight(mesh.points, cells[keep])
+    changed = merged or moved > 0 or bool(turned.any()) or not keep.all()
+    mended = TetMesh(points, cells[keep]) if changed else mesh
+    _check_faces(mended)
+    hanging = hanging_nodes(mended)
+    if merged and len(hanging):
+        at = ", ".join(f"{x:.4g}" for x in mended.points[hanging[0]])
+        raise InputError(
+            f"the pieces cannot be joined: {len(hanging)} nodes hang on a facet of another cell "
+            f"that they are no corner of, the first at ({at}) mm: mesh the pieces together, or "
+            "leave them apart"
+        )
+    groups = {name: leader[f] if merged else f for name, f in _checked_patches(mesh).items()}
+    patches, dropped = _patches(mended, groups, cells[~keep][:, :4])
+    still = np.zeros(len(points), dtype=bool)
+    still[mended.cells] = True
+    report = MeshReport(
+        nodes=int(still.sum()),
+        cells=int(keep.sum()),
+        turned=int((turned & keep).sum()),
+        flat=flat,
+        repeated=repeated,
+        unused=int((~used).sum()),
+        moved=moved,
+        farthest=farthest,
+        dropped=dropped,
+        coincident=coincident,
+        merged=merged,
+        hanging=len(hanging),
+        components=_components(mended.corners, len(points)),
+        diagonal=diagonal,
+        aspect=float(np.median(mended.aspects)),
+    )
+    if not changed and still.all() and not dropped:
+        return mesh, report
+    number = np.cumsum(still) - 1
+    named = {name: number[facets] for name, facets in patches.items()}
+    return TetMesh(points[still], number[mended.cells], named), report
+
+
+def about_slivers(mesh: TetMesh) -> str:
+    """Say how flat the flattest cell is, with the cure; empty where none is very flat."""
+    worst = int(mesh.aspects.argmax())
+    if not mesh.aspects[worst] > _SLIVER:
+        return ""
+    at = ", ".join(f"{x:.4g}" for x in mesh.points[mesh.corners[worst]].mean(axis=0))
+    return (
+        f"the flattest cell, at ({at}) mm, is {mesh.aspects[worst]:.3g} times as long as high: "
+        "check that all lengths are in mm, or mesh the part with cells of more even shape"
+    )
+
+
+def _leaders(points: FloatArray, used: BoolArray, diagonal: float) -> tuple[IntArray, int]:
+    """For each node the one that stands for all those on its spot; the number of others."""
+    nodes = np.flatnonzero(used)
+    grid = np.round(points[nodes] / max(1e-9 * diagonal, 1e-300)) + 0.0
+    order = np.lexsort(grid.T)
+    same = np.concatenate([[False], (np.diff(grid[order], axis=0) == 0).all(axis=1)])
+    heads = np.maximum.accumulate(np.where(same, 0, np.arange(len(order))))
+    leader = np.arange(len(points))
+    leader[nodes[order]] = nodes[order][heads]
+    return leader, int(same.sum())
+
+
+def _checked_patches(mesh: TetMesh) -> Mapping[str, IntArray]:
+    """Patches of the mesh, once their node numbers are known to be right."""
+    for name, facets in mesh.patches.items():
+        if facets.shape != (len(facets), 3) or not (
+            not len(facets) or (facets.min() >= 0 and facets.max() < len(mesh.points))
+        ):
+            raise InputError(
+                f"patch '{name}' must hold facets (k, 3) of nodes 0 to {len(mesh.points) - 1}; "
+                f"got shape {facets.shape}: check the file"
+            )
+    return mesh.patches
+
+
+def _sort_out(points: FloatArray, cells: IntArray) -> tuple[BoolArray, int, int, BoolArray]:
+    """Cells to keep, numbers of flat and of repeated ones, and which are inside out."""
+    corner = points[cells[:, :4]]
+    edges = corner[:, TetMesh.edges[:, 1]] - corner[:, TetMesh.edges[:, 0]]
+    longest = np.sqrt(np.einsum("ijk,ijk->ij", edges, edges).max(axis=1))
+    volumes = signed_volumes(points, cells[:, :4])
+    flat = np.abs(volumes) <= _FLAT * longest**3
+    if flat.all():
+        raise InputError(
+            f"all {len(cells)} cells of the mesh are flat (no volume): mesh a solid body, not a "
+            "surface"
+        )
+    nodes = np.sort(cells[:, :4], axis=1)
+    order = np.lexsort(nodes.T)
+    again = np.concatenate([[False], (np.diff(nodes[order], axis=0) == 0).all(axis=1)])
+    repeated = np.zeros(len(cells), dtype=bool)
+    repeated[order] = again
+    repeated &= ~flat
+    return ~flat & ~repeated, int(flat.sum()), int(repeated.sum()), volumes < 0.0
+
+
+def _straight(points: FloatArray, cells: IntArray) -> tuple[FloatArray, int, float]:
+    """Points with the mid-side nodes at the middle of their edges; how many moved, and how far."""
+    if cells.shape[1] == 4:
+        return points, 0, 0.0
+    ends = points[cells[:, TetMesh.edges]]
+    middle = ends.mean(axis=2)
+    gap = np.linalg.norm(points[cells[:, 4:]] - middle, axis=2)
+    off = gap > 0.1 * STRAIGHT * np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
+    if not off.any():
+        return points, 0, 0.0
+    points = np.array(points)
+    moved = cells[:, 4:][off]
+    points[moved] = middle[off]
+    return points, len(np.unique(moved)), float(gap.max())
+
+
+def _check_faces(mesh: TetMesh) -> None:
+    """Raise when more than two cells share a face, or two on one side of it."""
+    crowded = np.flatnonzero(mesh.partners < FREE)
+    if not len(crowded):
+        return
+    faces = mesh.corners[crowded[:, None] // 4, TetMesh.faces[crowded % 4]]
+    at = ", ".join(f"{x:.4g}" for x in mesh.points[faces[0]].mean(axis=0))
+    count = len(np.unique(facet_keys(faces)[0]))
+    raise InputError(
+        f"{count} faces of the mesh belong to more than two cells, or "
+        f"to two on one side of them, the first at ({at}) mm: cells overlap, mesh the part again"
+    )
+
+
+def _components(corners: IntArray, nodes: int) -> int:
+    """Count the pieces that hang together through nodes."""
+    piece = connected(corners[:, [[0, 1], [0, 2], [0, 3]]].reshape(-1, 2), nodes)
+    return len(np.unique(piece[corners[:, 0]]))
+
+
+def _patches(
+    mended: TetMesh, groups: Mapping[str, IntArray], removed: IntArray
+) -> tuple[dict[str, IntArray], int]:
+    """Patches on the boundary of the mended mesh, and the number of facets dropped.
+
+    Where a flat cell on the boundary was taken out, the faces under it take over its patches.
+    """
+    patches, dropped = {}, 0
+    for name, facets in groups.items():
+        found = match_boundary(mended, facets)
+        lost = len(facets) - len(found)
+        if lost and len(removed):
+            faces = removed[:, TetMesh.faces].reshape(-1, 3)
+            carries = are_among(faces, facets).reshape(-1, 4).any(axis=1)
+            both = np.concatenate([facets, faces[np.repeat(carries, 4)]])
+            found = match_boundary(mended, both)
+            lost = max(len(facets) - len(found), 0)
+        patches[name] = found
+        dropped += lost
+    return patches, dropped

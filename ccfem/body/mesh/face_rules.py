@@ -1,0 +1,234 @@
+"""Rules that choose patches by smooth faces: by place, by number, or all holes of a radius."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.checks import check_fields
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.face_names import number_of_face
+from ccfem.body.mesh.face_places import BodyFaces
+from ccfem.body.mesh.patches import Bounded, Vector, unit_vector
+from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE, Face, given_faces, smooth_faces
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.geometry.facets import are_among
+
+__all__ = ["Faces", "Holes", "OnBody", "numbered_faces", "without_faces"]
+
+_GROUPS = 2
+"""Groups of faces that a mesh made of a body has at least: one may be a group of another sort."""
+_PARALLEL = 0.02
+"""Sine of the largest angle between the axis of a hole and the one that is wanted."""
+
+
+@dataclass(frozen=True)
+class Faces:
+    """Smooth faces by their places, or by their numbers, as ``ccfem faces`` lists both.
+
+    A place holds whatever mesh is made of the body, and when the body is changed elsewhere; numbers
+    change with it.
+
+    Attributes
+    ----------
+    number : int or tuple of int, optional
+        From 1, the largest first; those of equal area from low to high x of their centres, then y,
+        then z. In a mirror image equal faces have each other's numbers. Of a CAD file as it has
+        them, of a mesh with the faces of its body as groups likewise.
+    at : tuple of 3 floats, or tuple of such, mm, optional
+        In place of numbers: a point on each face.
+    normal : str or tuple of 3 floats, optional
+        Outward normal of the faces at these points, within 20 degrees.
+    axis : str or tuple of 3 floats, optional
+        Axis of round walls, in place of a normal.
+    radius : float, mm, optional
+        Of the walls, with their axis.
+    tolerance : float, mm, optional
+        How far a face may be from its point: see `BodyFaces.number_at`.
+    angle : float, degrees
+        Feature angle of the listing.
+    """
+
+    number: int | tuple[int, ...] | None = None
+    at: Vector | tuple[Vector, ...] | None = None
+    normal: str | Vector | None = None
+    axis: str | Vector | None = None
+    radius: float | None = None
+    tolerance: float | None = None
+    angle: float = FEATURE_ANGLE
+
+    def __post_init__(self) -> None:
+        if (self.number is None) == (self.at is None):
+            raise InputError(
+                "rule face needs the place of a face (at, with its normal, or axis and radius), or "
+                f"its number; got {'neither' if self.at is None else 'both'}: see ccfem faces"
+            )
+        if self.at is None:
+            extra = [k for k in ("normal", "axis", "radius") if getattr(self, k) is not None]
+            if extra:
+                raise InputError(f"{', '.join(extra)} of a face goes with at: give a point on it")
+        elif not self._places.size:
+            raise InputError("at must be a point, or several; got none: see ccfem faces for them")
+        elif (self.axis is None) != (self.radius is None) or None not in (self.axis, self.normal):
+            raise InputError(
+                "a face by its place takes normal, or axis and radius together: see ccfem faces"
+            )
+        if self.number is not None and min(self._numbers, default=0) < 1:
+            raise InputError(
+                f"face numbers count from 1; got {self.number}: see ccfem faces for them"
+            )
+        for name in ("normal", "axis"):
+            if getattr(self, name) is not None:
+                unit_vector(getattr(self, name), f"face {name}")
+        check_fields(self, "radius", above=0.0, unit="mm")
+        check_fields(self, "tolerance", at_least=0.0, unit="mm")
+        check_fields(self, "angle", above=0.0, below=180.0, unit="degrees")
+
+    @property
+    def _numbers(self) -> tuple[int, ...]:
+        if self.number is None:
+            return ()
+        return (self.number,) if isinstance(self.number, int) else self.number
+
+    @property
+    def _places(self) -> FloatArray:
+        return np.array(self.at, dtype=np.float64).reshape(-1, 3)
+
+    def numbers_on(self, body: BodyFaces) -> tuple[int, ...]:
+        """Numbers of the faces on a body.
+
+        Raises
+        ------
+        InputError
+            Where the body has no such face, or has two at a place.
+        """
+        if self.at is None:
+            return tuple(number for number in self._numbers if body.face(number))
+        normal, axis = (
+            None if given is None else unit_vector(given, "face")
+            for given in (self.normal, self.axis)
+        )
+        radius = np.nan if self.radius is None else self.radius
+        return tuple(
+            body.number_at(place, normal, axis, radius, self.tolerance) for place in self._places
+        )
+
+    def __call__(self, mesh: Bounded) -> IntArray:
+        """Boundary facets (k, 3) of the faces: of a surface's, where they came as groups."""
+        body = numbered_faces(mesh, self.angle)
+        return _facets(mesh, [body.face(number) for number in self.numbers_on(body)])
+
+
+@dataclass(frozen=True)
+class OnBody:
+    """A rule for faces, looked up on the body that a mesh is made of: before, and whatever mesh.
+
+    Attributes
+    ----------
+    rule : Faces
+    body : BodyFaces
+        Whose faces the mesh has as groups.
+    """
+
+    rule: Faces
+    body: BodyFaces
+
+    @property
+    def axis(self) -> str | Vector | None:
+        """Axis that the rule states."""
+        return self.rule.axis
+
+    def __call__(self, mesh: Bounded) -> IntArray:
+        """Boundary facets (k, 3) of the faces."""
+        numbers = self.rule.numbers_on(self.body)
+        meshed = numbered_faces(mesh, self.rule.angle)
+        for number in numbers:
+            if number not in meshed.numbers:
+                raise InputError(
+                    f"face {number}, a {self.body.face(number).about}, is smaller than the cells, "
+                    "and no facet lies on it: shorten edge_length, or leave it out"
+                )
+        return _facets(mesh, [meshed.face(number) for number in numbers])
+
+
+@dataclass(frozen=True)
+class Holes:
+    """The walls of all holes of a radius.
+
+    Attributes
+    ----------
+    radius : float, mm
+    axis : str or tuple of 3 floats, optional
+        Only holes along this axis.
+    tolerance : float, mm, optional
+        How far a radius may be off; default 2 % of the radius.
+    angle : float, degrees
+        Feature angle that ends a wall.
+    """
+
+    radius: float
+    axis: str | Vector | None = None
+    tolerance: float | None = None
+    angle: float = FEATURE_ANGLE
+
+    def __post_init__(self) -> None:
+        check_fields(self, "radius", above=0.0, unit="mm")
+        check_fields(self, "tolerance", at_least=0.0, unit="mm")
+        check_fields(self, "angle", above=0.0, below=180.0, unit="degrees")
+        if self.axis is not None:
+            unit_vector(self.axis, "holes axis")
+
+    def __call__(self, mesh: Bounded) -> IntArray:
+        """Boundary facets (k, 3) of the walls."""
+        faces = numbered_faces(mesh, self.angle).faces
+        walls = [face for face in faces if face.kind == "cylinder" and face.hollow]
+        chosen = [face for face in walls if self._fits(face)]
+        if not chosen:
+            there = "; ".join(face.about for face in walls[:6]) or "none"
+            raise InputError(
+                f"no hole has radius {self.radius:g} mm"
+                f"{'' if self.axis is None else f' and axis {self.axis}'}; there are: {there}: "
+                "take one of these radii, or a larger tolerance"
+            )
+        return mesh.boundary[np.sort(np.concatenate([face.facets for face in chosen]))]
+
+    def _fits(self, face: Face) -> bool:
+        tolerance = 0.02 * self.radius if self.tolerance is None else self.tolerance
+        if abs(face.radius - self.radius) > tolerance:
+            return False
+        if self.axis is None:
+            return True
+        across = np.cross(face.direction, unit_vector(self.axis, "holes axis"))
+        return float(np.linalg.norm(across)) <= _PARALLEL
+
+
+def numbered_faces(mesh: Bounded, angle: float = FEATURE_ANGLE) -> BodyFaces:
+    """Faces of what a mesh was made from, where they came with it as groups; else its smooth ones.
+
+    The facets of each are rows of `TetMesh.boundary`. A coarse mesh has corners all round a hole;
+    the file that it was made from has not.
+    """
+    groups = {number_of_face(name): facets for name, facets in mesh.patches.items()}
+    rows = {
+        number: np.flatnonzero(are_among(mesh.boundary, groups[number]))
+        for number in sorted(number for number in groups if number is not None)
+    }
+    rows = {number: each for number, each in rows.items() if len(each)}
+    if len(rows) < _GROUPS:
+        return BodyFaces(
+            mesh.points, mesh.boundary, smooth_faces(mesh.points, mesh.boundary, angle)
+        )
+    faces = given_faces(mesh.points, mesh.boundary, rows.values())
+    return BodyFaces(mesh.points, mesh.boundary, faces, numbers=tuple(rows))
+
+
+def _facets(mesh: Bounded, faces: Iterable[Face]) -> IntArray:
+    return mesh.boundary[np.unique(np.concatenate([face.facets for face in faces]))]
+
+
+def without_faces(mesh: TetMesh, kept: Iterable[str]) -> TetMesh:
+    """Mesh without the groups of a surface's faces, but for those with a name that is kept."""
+    wanted = set(kept)
+    patches = {n: f for n, f in mesh.patches.items() if n in wanted or number_of_face(n) is None}
+    return replace(mesh, patches=patches)

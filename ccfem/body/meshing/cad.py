@@ -1,0 +1,139 @@
+"""CAD files: their outside as triangles, and tetrahedra with their faces as patches."""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ccfem.base.arrays import IntArray
+from ccfem.base.checks import check_number
+from ccfem.base.errors import InputError
+from ccfem.base.whole import existing_file
+from ccfem.body.files.surface import Surface
+from ccfem.body.isolated.process import ChildError, in_own_process
+from ccfem.body.mesh.check import check_mesh
+from ccfem.body.mesh.face_names import face_name
+from ccfem.body.mesh.patches import match_boundary
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.meshing.fidelity import fidelity
+from ccfem.body.meshing.volume import check_edge_length
+
+__all__ = ["CadSurface", "is_cad", "mesh_cad", "read_cad"]
+
+_SUFFIXES = (".brep", ".iges", ".igs", ".step", ".stp")
+
+
+@dataclass(frozen=True)
+class CadSurface:
+    """The outside of the solids of a CAD file.
+
+    Attributes
+    ----------
+    surface : Surface
+    face : (t,) int array
+        Number of the face of each triangle, from 1.
+    names : tuple of str
+        Of the faces; empty where the file has none.
+    """
+
+    surface: Surface
+    face: IntArray
+    names: tuple[str, ...]
+
+
+def is_cad(path: str | os.PathLike[str]) -> bool:
+    """Whether the name of a file is that of a CAD file."""
+    return Path(path).suffix.lower() in _SUFFIXES
+
+
+def read_cad(path: str | os.PathLike[str], scale: float = 1.0, size: float = 0.0) -> CadSurface:
+    """Read the outside of a CAD file as triangles.
+
+    Parameters
+    ----------
+    path : path
+        STEP, IGES or BREP; lengths come as mm whatever the unit in the file.
+    scale : float, default 1
+        Factor on the coordinates.
+    size : float, mm, default 0
+        Of the triangles; 0 for a thirtieth of the part.
+
+    Raises
+    ------
+    InputError
+        When the file is missing or holds no solid, or Gmsh is not installed.
+    """
+    made = _made("cad_surface", path, size, scale)
+    names = tuple(str(name) for name in made["names"])
+    surface = Surface(*_used(made["points"], made["triangles"]))
+    return CadSurface(surface, made["face"], names)
+
+
+def mesh_cad(
+    path: str | os.PathLike[str], edge_length: float, scale: float = 1.0
+) -> tuple[TetMesh, str]:
+    """Fill the solids of a CAD file with tetrahedra.
+
+    Returns
+    -------
+    mesh : TetMesh
+        With the faces as patches: ``face_1``, ``face_2``, ... in the order of the file, and under
+        their names where they have some.
+    about : str
+        How well it fits.
+
+    Raises
+    ------
+    InputError
+    """
+    fine = read_cad(path, scale)
+    check_edge_length(fine.surface, edge_length)
+    made = _made("cad_volume", path, edge_length, scale)
+    if not len(made["cells"]):
+        raise InputError(f"{path}: Gmsh left no cells in its solids: shorten edge_length")
+    mesh = TetMesh(made["points"], made["cells"])
+    groups: dict[str, list[IntArray]] = {}
+    for k, name in enumerate(made["names"].tolist(), 1):
+        facets = match_boundary(mesh, made["triangles"][made["face"] == k])
+        for each in (face_name(k), name):
+            if each:
+                groups.setdefault(each, []).append(facets)
+    mesh = mesh.with_patches({name: np.concatenate(those) for name, those in groups.items()})
+    mesh = check_mesh(mesh)[0]
+    return mesh, fidelity(fine.surface, mesh).about("Gmsh")
+
+
+def _made(function: str, path: str | os.PathLike[str], size: float, scale: float) -> dict[str, Any]:
+    """Call Gmsh with a CAD file."""
+    path = existing_file(path, "CAD file")
+    if not is_cad(path):
+        raise InputError(
+            f"cannot tell the format of CAD file {path}: its name must end in "
+            f"{', '.join(_SUFFIXES)}"
+        )
+    check_number("CAD scale", scale, above=0.0)
+    check_number("edge length", size, at_least=0.0, unit="mm")
+    full = str(path.absolute())
+    try:
+        return in_own_process(
+            f"gmsh_meshing:{function}", path=full, size=float(size), scale=float(scale)
+        )
+    except ChildError as error:
+        if "gmsh" in str(error) and "module" in str(error):
+            raise InputError(
+                f"{path}: CAD files are read by Gmsh, which is not installed: pip install "
+                "'ccfem[cad]'"
+            ) from None
+        raise InputError(
+            f"{path} cannot be meshed by Gmsh: {error}: repair it in the program that made it, or "
+            "give it as STL"
+        ) from None
+    except InputError as error:
+        raise InputError(str(error).replace(full, str(path))) from None
+
+
+def _used(points: Any, triangles: Any) -> tuple[Any, Any]:
+    used, rows = np.unique(triangles, return_inverse=True)
+    return points[used], rows.reshape(-1, 3)

@@ -1,0 +1,156 @@
+"""Closed surface to tetrahedra, with Gmsh or fTetWild, each in a process of its own."""
+
+from importlib.util import find_spec
+from typing import Literal, get_args
+
+import numpy as np
+
+from ccfem.base.arrays import FloatArray
+from ccfem.base.checks import check_known, check_number
+from ccfem.base.errors import InputError
+from ccfem.body.files.surface import Surface
+from ccfem.body.isolated.process import ChildError, in_own_process
+from ccfem.body.mesh.check import check_mesh
+from ccfem.body.mesh.in_metres import in_metres
+from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE, smooth_faces
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.meshing.fidelity import Fidelity, fidelity
+from ccfem.geometry.measures import connected
+
+__all__ = ["Mesher", "check_edge_length", "fill", "tetrahedralise"]
+
+Mesher = Literal["auto", "gmsh", "ftetwild"]
+
+_MOST = 2e7
+"""Number of cells above which an edge length is taken for a mistake of units."""
+_LOST = 0.2
+"""Share of the volume that no mesh may lose or gain."""
+_PATIENCE = {"gmsh": 30.0, "ftetwild": 300.0}
+"""Seconds after which a mesher has lost its way, as on a surface that cuts itself."""
+_PER_SECOND = 500.0
+"""Cells to be expected, and triangles given, for which it gets a second more."""
+
+
+def tetrahedralise(surface: Surface, edge_length: float, mesher: Mesher = "auto") -> TetMesh:
+    """Fill a closed surface with tetrahedra.
+
+    Parameters
+    ----------
+    surface : Surface
+    edge_length : float, mm
+        Target edge length.
+    mesher : {"auto", "gmsh", "ftetwild"}, default "auto"
+        Gmsh meshes the smooth faces of the surface anew, which takes a clean surface in one piece;
+        equal input gives equal meshes. fTetWild (Hu et al., Fast Tetrahedral Meshing in the Wild)
+        takes any closed surface and stays within 1e-3 of the part's diagonal of it; it is slower,
+        and makes another mesh each time. "auto" takes Gmsh where it is installed, and fTetWild
+        where that fails or loses 2 % of the volume.
+
+    Returns
+    -------
+    TetMesh
+        Linear, checked, without patches.
+
+    Raises
+    ------
+    InputError
+        When the edge length is too long or too short for the part, no cells are left or a fifth of
+        the volume is lost, the mesher is not installed, or it fails.
+    """
+    return fill(surface, edge_length, mesher)[0]
+
+
+def fill(
+    surface: Surface, edge_length: float, mesher: Mesher = "auto"
+) -> tuple[TetMesh, Fidelity, str]:
+    """Mesh of a surface, how well it fits, and who made it: see `tetrahedralise`."""
+    more = check_edge_length(surface, edge_length) + len(surface.triangles)
+    patience = {name: least + more / _PER_SECOND for name, least in _PATIENCE.items()}
+    check_known("mesher", mesher, get_args(Mesher))
+    why = "it is not installed (pip install 'ccfem[cad]')"
+    if mesher != "ftetwild" and find_spec("gmsh") is not None:
+        try:
+            mesh = _by_gmsh(surface, edge_length, None if mesher == "gmsh" else patience["gmsh"])
+            found = fidelity(surface, mesh)
+            if mesher == "gmsh" or found.good:
+                return mesh, found, "Gmsh"
+        except (ChildError, InputError) as error:
+            why = str(error)
+    if mesher == "gmsh":
+        raise InputError(f"Gmsh cannot mesh the surface: {why}: take mesher = 'ftetwild'")
+    try:
+        made = in_own_process(
+            "ftetwild:fill",
+            patience["ftetwild"],
+            points=surface.points,
+            triangles=surface.triangles,
+            size=edge_length,
+        )
+    except ChildError as error:
+        raise InputError(
+            f"meshing failed: {error}: check that the surface is closed and does not cut itself, "
+            "or take another edge_length"
+        ) from None
+    if not len(made["cells"]):
+        raise InputError(
+            "meshing left no cells inside the surface: check that it is closed, does not cut "
+            "itself, and that the edge length suits its thickness"
+        )
+    mesh = check_mesh(TetMesh(made["points"], made["cells"]))[0]
+    found = fidelity(surface, mesh)
+    if abs(found.volume) > _LOST:
+        raise InputError(
+            f"the mesh of the surface has {1.0 + found.volume:.1%} of its volume: shorten "
+            "edge_length, or mesh the part in another program"
+        )
+    return mesh, found, "fTetWild"
+
+
+def check_edge_length(surface: Surface, edge_length: float) -> float:
+    """Cells to expect; raise on an edge length that is too long or too short for a part."""
+    size = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
+    doubt = in_metres(surface.points)
+    if doubt and edge_length >= size:
+        raise InputError(f"an edge length of {edge_length:g} mm is longer than the part: {doubt}")
+    check_number("edge length", edge_length, above=0.0, below=size, unit="mm (the part's diagonal)")
+    expected = surface.volume / (edge_length**3 / (6.0 * np.sqrt(2.0)))
+    if expected > _MOST:
+        raise InputError(
+            f"an edge length of {edge_length:g} mm would make about {expected:.1g} cells of a "
+            f"part {size:.3g} mm across: choose a longer one"
+        )
+    return float(expected)
+
+
+def _walls(surface: Surface) -> FloatArray:
+    """Round walls of a surface, (k, 8): middle of the axis, direction, radius, half the length."""
+    found: list[FloatArray] = []
+    for face in smooth_faces(surface.points, surface.triangles):
+        if face.kind == "cylinder":
+            nodes = surface.points[np.unique(surface.triangles[face.facets])]
+            half = 0.5 * float(np.ptp(nodes @ face.direction))
+            found.append(np.array([*face.centre, *face.direction, face.radius, half]))
+    return np.array(found).reshape(-1, 8)
+
+
+def _by_gmsh(surface: Surface, edge_length: float, seconds: float | None) -> TetMesh:
+    """Mesh by Gmsh of a surface in one piece."""
+    edges = surface.triangles[:, [[0, 1], [1, 2]]].reshape(-1, 2)
+    piece = connected(edges, len(surface.points))
+    if len(np.unique(piece[surface.triangles[:, 0]])) > 1:
+        raise InputError("it has several pieces or a cavity")
+    sides = np.sort(surface.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    if np.unique(sides, axis=0, return_counts=True)[1].max() > 2:
+        raise InputError("it touches itself along an edge")
+    made = in_own_process(
+        "gmsh_meshing:fill",
+        seconds,
+        points=surface.points,
+        triangles=surface.triangles,
+        size=edge_length,
+        angle=FEATURE_ANGLE,
+        walls=_walls(surface),
+    )
+    if not len(made["cells"]):
+        raise InputError("it left no cells")
+    return check_mesh(TetMesh(made["points"], made["cells"]))[0]

@@ -1,0 +1,19 @@
+"""A part seen before it is solved: its mesh, patches, loads and supports, and what is doubtful."""
+
+from ccfem.cases.inspection.beginning import examples, new_part, write_example
+from ccfem.cases.inspection.body_faces import BodyFaces, faces
+from ccfem.cases.inspection.load_row import LoadRow
+from ccfem.cases.inspection.part_check import Check, check
+from ccfem.cases.inspection.patch_row import PatchRow
+
+__all__ = [
+    "BodyFaces",
+    "Check",
+    "LoadRow",
+    "PatchRow",
+    "check",
+    "examples",
+    "faces",
+    "new_part",
+    "write_example",
+]

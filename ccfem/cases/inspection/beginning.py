@@ -1,0 +1,213 @@
+"""Part files to start from: one for a body, and examples."""
+
+import os
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from ccfem.base.checks import check_known
+from ccfem.base.errors import InputError
+from ccfem.base.whole import existing_file, whole_file
+from ccfem.body.files.surface import is_surface
+from ccfem.body.mesh.face_places import BodyFaces
+from ccfem.body.mesh.smooth_faces import Face, direction_text, place_text
+from ccfem.body.meshing.cad import is_cad
+from ccfem.cases.inspection.body_faces import faces as faces_of
+
+__all__ = ["examples", "new_part", "write_example"]
+
+_PARALLEL = np.cos(np.radians(5.0))
+"""Cosine of the angle up to which planes face the same way."""
+_LISTED = 40
+"""Faces that are listed in a new part file."""
+
+
+def new_part(
+    body: str | os.PathLike[str], out: str | os.PathLike[str] | None = None, force: bool = False
+) -> Path:
+    """Write a part file for a body: its faces listed, a support and a load to be changed.
+
+    The largest plane that faces down is held, with all others at its height, as the feet of a part
+    are; and the face farthest from there is pulled away with 100 N. Cells are a twenty-fifth of the
+    diagonal long. Where the lengths look like metres
+    (`BodyFaces.doubt`), the file scales them by 1000.
+
+    Parameters
+    ----------
+    body : path
+        Surface, CAD file or mesh.
+    out : path, optional
+        Default the name of the body with ``.toml``, in the current folder.
+    force : bool
+        Replace a file that is there.
+
+    Returns
+    -------
+    Path
+        The file that was written.
+
+    Raises
+    ------
+    InputError
+        Where the body cannot be read, or the file is there.
+    """
+    body = Path(body)
+    if body.suffix in ("", ".toml"):
+        raise InputError(
+            f"ccfem new takes a body, such as lever.stl or lever.step; got '{body}': name its file"
+        )
+    existing_file(body, "the body")
+    out = Path(f"{body.stem}.toml" if out is None else out)
+    _refuse_present(out, force)
+    found = faces_of(body)
+    doubt = found.doubt
+    if doubt:
+        found = faces_of(body, scale=1000.0)
+    faces, edge = found.faces, found.size / 25.0
+    held = max(range(len(faces)), key=lambda k: (_faces_down(faces[k]), faces[k].area))
+    feet = _beside(faces, held, 1e-3 * found.size)
+    centre = np.average([faces[k].centre for k in feet], axis=0, weights=_areas(faces, feet))
+    away = [float(np.linalg.norm(face.centre - centre)) for face in faces]
+    others = [k for k in range(len(faces)) if k not in feet]
+    meshable = [k for k in others if faces[k].area > edge**2]
+    pulled = max(meshable or others, key=away.__getitem__, default=0)
+    pull = faces[pulled].centre - centre
+    pull = 100.0 * pull / max(float(np.linalg.norm(pull)), 1e-300)
+    meshed = is_surface(body) or is_cad(body)
+    with whole_file(out) as temporary:
+        cells = edge if meshed else None
+        text = _text(body, cells, found, feet, pulled, pull.tolist(), doubt)
+        temporary.write_text(text, encoding="utf-8")
+    return out
+
+
+def _beside(faces: Sequence[Face], held: int, reach: float) -> list[int]:
+    """Planes beside the one that is held, no farther above or below than `reach`, mm, and itself.
+
+    They face the same way, so that one normal says where all of them are.
+    """
+    foot = faces[held]
+    return [
+        k
+        for k, face in enumerate(faces)
+        if k == held
+        or (
+            foot.kind == face.kind == "plane"
+            and face.direction @ foot.direction > _PARALLEL
+            and abs((face.centre - foot.centre) @ foot.direction) <= reach
+        )
+    ]
+
+
+def _areas(faces: Sequence[Face], chosen: Sequence[int]) -> list[float]:
+    return [max(faces[k].area, 1e-300) for k in chosen]
+
+
+def _faces_down(face: Face) -> bool:
+    return face.kind == "plane" and bool(face.direction[2] < -0.9)
+
+
+def _refuse_present(out: Path, force: bool) -> None:
+    if os.path.lexists(out) and not force:
+        raise InputError(f"{out} is there already: name another file (--out), or --force")
+
+
+def _text(
+    body: Path,
+    edge: float | None,
+    found: BodyFaces,
+    held: Sequence[int],
+    pulled: int,
+    pull: Sequence[float],
+    doubt: str,
+) -> str:
+    """Text of the part file."""
+    path = str(body).replace("\\", "/")
+    given = [f'mesh = "{path}"']
+    if edge is not None:
+        given = [f'surface = "{path}"', f"edge_length = {edge:.3g}           # mm; of the cells"]
+    if doubt:
+        given.append(f"scale = 1000                 # CHANGE: {doubt.partition(': scale')[0]}")
+    listed = [
+        f"#   {number:>3}  at {place_text(found.point_on(face))}, {face.shape}"
+        + (f"  ({found.names[k]})" if any(found.names) else "")
+        for k, (number, face) in enumerate(zip(found.numbers, found.faces, strict=True))
+    ][:_LISTED]
+    more = len(found.faces) - len(listed)
+    if more > 0:
+        listed.append(f"#   and {more} smaller ones: ccfem faces {path}")
+    name = "".join(c if c.isalnum() or c in "-_" else "_" for c in body.stem)
+    return "\n".join(
+        [
+            f"# A part file for {path}: change what is marked, then",
+            "#",
+            "#     ccfem check FILE.toml      what is known before a solve",
+            "#     ccfem compare FILE.toml    plan by several strategies, say which is best",
+            "#",
+            "# All keys are described in ccfem/cases/part_file.py; `ccfem example` has more parts.",
+            "",
+            f'name = "{name}"',
+            *given,
+            'build = "z"                  # CHANGE: direction of printing',
+            "layers = 12                  # CHANGE: layers of fibre",
+            'material = "pla"             # CHANGE: or a table with modulus and poisson',
+            "",
+            "# Faces:",
+            *listed,
+            "",
+            "[patches.held]               # CHANGE: what is fixed",
+            *_rule(found, held),
+            "",
+            "[patches.pulled]             # CHANGE: where the load acts",
+            *_rule(found, [pulled]),
+            "",
+            "[[supports]]",
+            'patch = "held"',
+            "",
+            "[[loads.pull]]",
+            'kind = "force"',
+            'patch = "pulled"',
+            f"vector = [{', '.join(f'{x + 0.0:.1f}' for x in pull)}]   # CHANGE: N",
+            "",
+        ]
+    )
+
+
+def _rule(found: BodyFaces, chosen: Sequence[int]) -> list[str]:
+    """Lines of the rule for faces of one kind, by their places."""
+    numbers = [found.numbers[k] for k in chosen]
+    places = [found.place(number) for number in numbers]
+    points = [place_text(np.array(place["at"])) for place in places]
+    at = points[0] if len(points) == 1 else f"[{', '.join(points)}]"
+    named = f"face{'s' if len(numbers) > 1 else ''} {', '.join(map(str, numbers))}"
+    lines = ['rule = "face"', f"at = {at}   # on {named} of the list above"]
+    for key in ("normal", "axis"):
+        if key in places[0]:
+            direction = direction_text(places[0][key])
+            lines.append(f"{key} = " + (direction if "[" in direction else f'"{direction}"'))
+    return [
+        *lines,
+        *(f"radius = {place['radius']:.5g}" for place in places[:1] if "radius" in place),
+    ]
+
+
+def examples() -> dict[str, str]:
+    """Return the text of each example by its name."""
+    found = files("ccfem.cases").joinpath("examples").iterdir()
+    texts = {each.name: each.read_text(encoding="utf-8") for each in found}
+    return {k.removesuffix(".toml"): texts[k] for k in sorted(texts) if k.endswith(".toml")}
+
+
+def write_example(
+    name: str, out: str | os.PathLike[str] | None = None, force: bool = False
+) -> Path:
+    """Write an example to a file, by default NAME.toml; returns its path."""
+    texts = examples()
+    check_known("example", name, texts)
+    out = Path(f"{name}.toml" if out is None else out)
+    _refuse_present(out, force)
+    with whole_file(out) as temporary:
+        temporary.write_text(texts[name], encoding="utf-8")
+    return out

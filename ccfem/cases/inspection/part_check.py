@@ -1,0 +1,310 @@
+"""Everything that is known about a part before it is solved."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ccfem.base.display import Shown
+from ccfem.base.errors import Mistakes
+from ccfem.body.mesh.check import about_slivers
+from ccfem.cases.case import Case
+from ccfem.cases.inspection.cost import solve_costs
+from ccfem.cases.inspection.load_row import LoadRow, load_row
+from ccfem.cases.inspection.patch_row import PatchRow, patch_rows
+from ccfem.cases.reading import read
+from ccfem.fem.elasticity.held import Held
+from ccfem.fem.elasticity.load_kinds import kind_of, patches_of
+from ccfem.fem.elasticity.loads import load_case
+from ccfem.fem.elasticity.plausibility import about_problem
+from ccfem.fem.elasticity.problem import Problem
+from ccfem.fem.elasticity.support_sets import support_sets
+from ccfem.fem.elasticity.supports import held
+from ccfem.fem.elasticity.system import prepare
+from ccfem.geometry.measures import connected
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.slicers.planar import Planar
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["Check", "check"]
+
+
+@dataclass(frozen=True)
+class Check(Shown):
+    """A part before it is solved.
+
+    Attributes
+    ----------
+    case : Case
+    facts : tuple of str
+        Size, cells, quality, pieces, and the cost of a solve.
+    patches : tuple of PatchRow
+    loads : tuple of LoadRow
+    warnings : tuple of str
+        Things that may be unintended, each with its cure.
+    fibre : tuple of Layer
+        Layers that get fibre, if the part selects them (`Case.fibre`) and they do not depend on the
+        stress.
+    mistakes : tuple of str
+        What prevents the part from being solved.
+    """
+
+    case: Case
+    facts: tuple[str, ...]
+    patches: tuple[PatchRow, ...]
+    loads: tuple[LoadRow, ...]
+    warnings: tuple[str, ...]
+    mistakes: tuple[str, ...]
+    fibre: tuple[Layer, ...] = ()
+
+    @property
+    def known(self) -> str:
+        """All but the mistakes, as text: size, patches, loads, warnings."""
+        lines = [self.case.title, *(f"  {fact}" for fact in self.facts), ""]
+        for frame in (self.to_frame(), self.load_frame()):
+            lines += [] if frame.empty else [*frame.to_string(index=False).splitlines(), ""]
+        lines += [f"warning: {line}" for line in self.warnings]
+        if not self.mistakes:
+            lines.append("nothing keeps this part from being solved")
+        return "\n".join(line.rstrip() for line in lines)
+
+    def __str__(self) -> str:
+        return "\n".join([self.known, *(f"mistake: {line}" for line in self.mistakes)])
+
+    def __repr__(self) -> str:
+        return (
+            f"Check of {self.case.name!r}: {len(self.patches)} patches, {len(self.loads)} loads, "
+            f"{len(self.warnings)} warnings, {len(self.mistakes)} mistakes"
+        )
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        rest = "".join(f"<p>{escape(x)}</p>" for x in (*self.facts, *self.warnings, *self.mistakes))
+        return self.to_frame().to_html(index=False) + self.load_frame().to_html(index=False) + rest
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Table of the patches: a row a patch."""
+        import pandas as pd
+
+        return pd.DataFrame(
+            {
+                "patch": [row.name for row in self.patches],
+                "area, mm^2": [float(f"{row.area:.4g}") for row in self.patches],
+                "centre, mm": [_numbers(row.centre) for row in self.patches],
+                "mean normal": [_numbers(row.normal, 2, 5e-3) for row in self.patches],
+                "facets": [row.facets for row in self.patches],
+                "pieces": [row.pieces for row in self.patches],
+                "carries": [row.carries for row in self.patches],
+            }
+        )
+
+    def load_frame(self) -> "pd.DataFrame":
+        """Table of the loads: a row a load."""
+        import pandas as pd
+
+        return pd.DataFrame(
+            {
+                "load case": [row.case for row in self.loads],
+                "load": [row.what for row in self.loads],
+                "resultant, N": [_numbers(row.resultant) for row in self.loads],
+                "acts at, mm": [_numbers(row.point) for row in self.loads],
+                "moment, N mm": [_numbers(row.moment, 4, 1e-3 * row.size) for row in self.loads],
+            }
+        )
+
+
+def check(part: str | os.PathLike[str] | Case, **parameters: Any) -> Check:
+    """Inspect a part without solving it.
+
+    Parameters
+    ----------
+    part : str, path or Case
+        As `ccfem.read` takes it.
+    **parameters
+        Parameters of a case by name.
+
+    Returns
+    -------
+    Check
+        ``print(check(...))`` shows all of it; `Check.to_frame` is the table of the patches.
+
+    Raises
+    ------
+    InputError
+        For a part that cannot be read; `InputError.mistakes` lists all that is wrong with it.
+    """
+    case = read(part, **parameters)
+    problem, found = case.problem, Mistakes()
+    rows: list[LoadRow] = []
+    doubts: list[str] = []
+    sets = support_sets(problem)
+    for each in sets:
+        rows += _load_rows(each, found, doubts, len(sets) > 1)
+    order = list(problem.loads)
+    rows.sort(key=lambda row: order.index(row.case))
+    if not problem.loads:
+        found.lines.append("the part has no load case: give at least one load")
+    layers = Mistakes()  # which keep the part from being planned on, not from being solved
+    with layers.noted():
+        if isinstance(case.slicing, Planar):
+            case.slicing.check(problem.mesh, case.build, case.machine)
+    doubts += layers.lines
+    fibre: tuple[Layer, ...] = ()
+    with found.noted():
+        fibre = _fibre_layers(case)
+    return Check(
+        case,
+        (*_facts(case), *_about_fibre(case, fibre)),
+        patch_rows(problem.mesh, _carried(case)),
+        tuple(rows),
+        tuple(dict.fromkeys(_warnings(case, rows, doubts))),
+        tuple(dict.fromkeys(found.lines)),
+        fibre,
+    )
+
+
+def _load_rows(problem: Problem, found: Mistakes, doubts: list[str], named: bool) -> list[LoadRow]:
+    """Rows of the loads on one set of supports; mistakes are recorded, with the case if named.
+
+    What is doubtful is added to `doubts`.
+    """
+    at_rest: Held | None = None
+    rows, sound = [], []
+    with found.noted(f"load case '{next(iter(problem.loads))}': " if named else ""):
+        at_rest = held(problem)
+    for name, loads in problem.loads.items():
+        before = len(found.lines)
+        for load in loads:
+            with found.noted(f"load case '{name}': "):
+                rows.append(load_row(problem, name, load, at_rest))
+        if len(found.lines) == before:
+            with found.noted():
+                if at_rest is None:
+                    load_case(problem, name)
+                else:
+                    prepare(replace(problem, loads={name: loads}, combinations={}))
+        if len(found.lines) == before:
+            sound.append(name)
+    if at_rest is not None and len(sound) == len(problem.loads) and problem.combinations:
+        with found.noted():
+            prepare(problem)
+    doubts += about_problem(problem, at_rest, sound)
+    return rows
+
+
+def _facts(case: Case) -> tuple[str, ...]:
+    """Size, cells, quality, pieces and cost."""
+    mesh = case.problem.mesh
+    size = " x ".join(f"{side:.4g}" for side in np.ptp(mesh.bounds, axis=0))
+    pieces = len(np.unique(connected(mesh.neighbours, len(mesh.cells))))
+    kind = "linear" if mesh.order == 1 else "quadratic"
+    costs = " or, if their error is too large, ".join(
+        cost.about for cost in solve_costs(case.problem)
+    )
+    told = tuple(line for line in case.findings if _only_told(line))
+    return (
+        f"{size} mm, {mesh.volumes.sum() / 1e3:.4g} cm^3, {case.problem.material.name}",
+        f"{len(mesh.cells):,} {kind} cells, {len(mesh.points):,} nodes, {pieces} "
+        f"piece{'s' if pieces > 1 else ''}",
+        f"longest edge of a cell over its least height: {np.median(mesh.aspects):.3g} in the "
+        f"middle, {mesh.aspects.max():.3g} at most",
+        *told,
+        f"solve of a load case, {costs}",
+    )
+
+
+def _fibre_layers(case: Case) -> tuple[Layer, ...]:
+    """Layers that get fibre, where the part says which; none where they follow from the stress."""
+    if case.fibre is None or not isinstance(case.slicing, Planar):
+        return ()
+    mesh = case.problem.mesh
+    return case.fibre.on(case.slicing.cut(mesh, case.build), mesh, case.machine)
+
+
+def _about_fibre(case: Case, layers: Sequence[Layer]) -> tuple[str, ...]:
+    """Say which layers get fibre, where the part says so."""
+    if case.fibre is None:
+        return ()
+    if not layers:
+        return (f"fibre: {case.fibre.about()}",)
+    numbers = ", ".join(str(layer.index) for layer in layers)
+    shortened = numbers if len(numbers) <= 60 else f"{numbers[:40].rpartition(',')[0]}, ..."
+    area = np.mean([layer.areas.sum() for layer in layers])
+    return (
+        f"fibre on {len(layers)} layer{'s' * (len(layers) > 1)} ({shortened}), {area:.4g} mm^2 "
+        f"each on average: {case.fibre.about()}",
+    )
+
+
+def _only_told(finding: str) -> bool:
+    """Whether a finding only tells how the mesh was made, and needs no action."""
+    return finding.startswith("meshed by") and ": shorten" not in finding
+
+
+def _carried(case: Case) -> dict[str, list[str]]:
+    """Say what each patch carries."""
+    carried: dict[str, list[str]] = {}
+    problem = case.problem
+    for support in problem.all_supports:
+        held_along = getattr(support, "components", "")
+        within = [c for c, own in problem.case_supports.items() if support in own]
+        only = f" in {', '.join(within)}" if within and support not in problem.supports else ""
+        for name in patches_of(support):
+            word = kind_of(support)
+            carried.setdefault(name, []).append(f"{f'{word} {held_along}'.strip()}{only}")
+    for label, loads in problem.loads.items():
+        for load in loads:
+            for name in patches_of(load):
+                carried.setdefault(name, []).append(f"{kind_of(load)} of {label}")
+    return carried
+
+
+def _warnings(case: Case, rows: Sequence[LoadRow], doubts: Sequence[str]) -> list[str]:
+    """List what may be unintended."""
+    problem = case.problem
+    lines = [line for line in case.findings if not _only_told(line)] + [*doubts]
+    sliver = about_slivers(problem.mesh)
+    if sliver:
+        lines.append(sliver)
+    for row in rows:
+        if row.size == 0.0:
+            lines.append(
+                f"load case '{row.case}': {row.what} has no resultant because its parts cancel: "
+                "check that the patch faces one way"
+            )
+    unused = sorted(set(problem.mesh.patches) - set(problem.held_or_loaded))
+    if unused and len(unused) <= 6:
+        lines.append(f"patches without load or support: {', '.join(unused)}")
+    return lines + _no_room(case)
+
+
+def _no_room(case: Case) -> list[str]:
+    """Say which measures of the machine leave no room for fibre on any layer of the part."""
+    machine = case.machine
+    _, side, longest = np.sort(np.ptp(case.problem.mesh.bounds, axis=0)).tolist()
+    width, least = machine.fibre_width, machine.minimum_length
+    if width > side:
+        return [
+            f"machine.fibre_width = {width:g} mm is wider than the part, {side:.4g} mm: no fibre "
+            "fits: check that all lengths are in mm"
+        ]
+    most = side * longest / width
+    if least > most:
+        return [
+            f"machine.minimum_length = {least:g} mm: no layer has room for a strand that long, at "
+            f"most {most:.4g} mm of {width:g} mm width; are all lengths in mm?"
+        ]
+    return []
+
+
+def _numbers(values: Any, digits: int = 4, least: float = 0.0) -> str:
+    """Components as words; those below the least, or very small beside the largest, are zero."""
+    if np.isnan(values).any():
+        return "-"
+    least = max(least, 1e-4 * float(np.abs(values).max()))
+    return ", ".join(f"{0.0 if abs(x) <= least else x:.{digits}g}" for x in values)

@@ -1,0 +1,198 @@
+"""A part with its patches, loads and supports: a picture, and a page on which it turns."""
+
+import json
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ccfem.base.arrays import FloatArray
+from ccfem.cases.inspection import Check
+from ccfem.comparison.plot.colours import SECTION
+from ccfem.comparison.plot.part_views import Arrow, Label, part_figure
+from ccfem.fem.elasticity.load_kinds import patches_of, points_of
+from ccfem.geometry.facets import are_among
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = [
+    "coloured",
+    "fibre_outlines",
+    "load_arrows",
+    "part_page",
+    "part_picture",
+    "support_marks",
+]
+
+_COLOURS = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#8c7a00", "#d9a58c", "#9ec1e3", "#b9dccb")
+_LOAD = "#b3261e"
+_MARKS = 12
+"""Symbols on a support."""
+
+
+def part_picture(checked: Check) -> "Figure":
+    """Draw a part from two sides: patches coloured and named, loads as arrows, supports marked.
+
+    The arrows are the resultants of the loads, at their points of attack; a load without one has
+    none. Triangles mark what is held, green lines where the part says that fibre lies.
+    """
+    mesh = checked.case.problem.mesh
+    colours, labels = coloured(checked)
+    title = checked.case.title
+    return part_figure(
+        mesh.points,
+        mesh.boundary,
+        colours,
+        labels,
+        load_arrows(checked),
+        title,
+        support_marks(checked),
+        fibre_outlines(checked),
+    )
+
+
+def fibre_outlines(checked: Check) -> list[FloatArray]:
+    """Borders of the layers and regions that get fibre, closed, where the part says which."""
+    return [
+        layer.points[np.append(loop, loop[0])] for layer in checked.fibre for loop in layer.loops
+    ]
+
+
+def coloured(checked: Check) -> tuple[list[str], list[Label]]:
+    """Colour of each boundary facet, and the labels of the patches."""
+    mesh = checked.case.problem.mesh
+    colours = np.full(len(mesh.boundary), SECTION, dtype=object)
+    labels = []
+    middles = mesh.points[mesh.boundary].mean(axis=1)
+    for k, row in enumerate(checked.patches):
+        chosen = np.flatnonzero(are_among(mesh.boundary, mesh.patches[row.name]))
+        if not len(chosen):
+            continue
+        if row.carries:
+            colours[chosen] = _COLOURS[k % len(_COLOURS)]
+        # At the facet nearest to the centre, of those that look one way outward.
+        near = chosen[np.argmin(np.linalg.norm(middles[chosen] - row.centre, axis=1))]
+        normal = row.normal if np.linalg.norm(row.normal) > 0.5 else np.zeros(3)
+        if row.carries:
+            labels.append(Label(row.name, middles[near], normal))
+    return colours.tolist(), labels
+
+
+def load_arrows(checked: Check, case: str | None = None) -> list[Arrow]:
+    """Resultants of the loads; of one load case alone where that has loads of its own."""
+    own = [row for row in checked.loads if row.case == case]
+    return [
+        Arrow(row.point, row.resultant, _LOAD, f"{row.case}: {row.size:.4g} N")
+        for row in own or checked.loads
+        if row.size > 0.0
+    ]
+
+
+def support_marks(checked: Check, case: str | None = None) -> FloatArray:
+    """Places on what is held, in one load case or in any, spread evenly over its facets."""
+    problem = checked.case.problem
+    supports = problem.supports_of(case) if case in problem.cases else problem.all_supports
+    found: list[FloatArray] = []
+    for support in supports:
+        found += [np.asarray(point, dtype=float)[None] for point in points_of(support)]
+        for name in patches_of(support):
+            facets = problem.mesh.patches.get(name, np.zeros((0, 3), dtype=np.int64))
+            middles = problem.mesh.points[facets].mean(axis=1)
+            found.append(_spread(middles[np.lexsort(np.round(middles, 6).T)], _MARKS))
+    return np.concatenate([np.zeros((0, 3)), *found])
+
+
+def _spread(points: FloatArray, count: int) -> FloatArray:
+    """Up to `count` of some points (k, 3), each the farthest from those before it."""
+    chosen: list[int] = []
+    away = np.full(len(points), np.inf)
+    while len(chosen) < min(count, len(points)):
+        chosen.append(int(np.argmax(np.round(away, 6))))
+        away = np.minimum(away, np.linalg.norm(points - points[chosen[-1]], axis=1))
+    return points[chosen]
+
+
+def part_page(checked: Check) -> str:
+    """Write a page, complete in itself, on which the part of `part_picture` turns."""
+    mesh = checked.case.problem.mesh
+    used, triangles = np.unique(mesh.boundary, return_inverse=True)
+    colours, labels = coloured(checked)
+    known = list(dict.fromkeys(colours))
+    points = mesh.points[used]
+    size = float(np.linalg.norm(np.ptp(points, axis=0)))
+    arrows = load_arrows(checked)
+    data = {
+        "points": points.round(3).tolist(),
+        "triangles": triangles.reshape(-1, 3).tolist(),
+        "colours": [[int(name[k : k + 2], 16) for k in (1, 3, 5)] for name in known],
+        "colour": [known.index(name) for name in colours],
+        "labels": [[label.text, label.place.round(3).tolist()] for label in labels],
+        "marks": support_marks(checked).round(3).tolist(),
+        "lines": [line.round(3).tolist() for line in fibre_outlines(checked)],
+        "arrows": [
+            [
+                arrow.text,
+                (arrow.place - arrow.direction * size / 5.0 / np.linalg.norm(arrow.direction))
+                .round(3)
+                .tolist(),
+                np.round(arrow.place, 3).tolist(),
+            ]
+            for arrow in arrows
+        ],
+    }
+    text = json.dumps(data, separators=(",", ":")).replace("</", "<\\/")
+    return _PAGE.replace("@TITLE@", escape(checked.case.title)).replace("@DATA@", text)
+
+
+_PAGE = """<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8"><title>@TITLE@</title>
+<style>body{margin:0;font:14px sans-serif;background:#fff}canvas{display:block}
+#bar{position:fixed;left:12px;top:10px}</style></head><body>
+<div id="bar"><b>@TITLE@</b><br>drag to turn, wheel to zoom; red: loads; triangles: held</div>
+<canvas id="view"></canvas><script>
+const data=@DATA@,view=document.getElementById("view"),pen=view.getContext("2d");
+let low=[1e99,1e99,1e99],high=[-1e99,-1e99,-1e99];
+for(const p of data.points)for(let i=0;i<3;i++){
+low[i]=Math.min(low[i],p[i]);high[i]=Math.max(high[i],p[i]);}
+const mid=low.map((v,i)=>(v+high[i])/2),size=Math.hypot(...low.map((v,i)=>high[i]-v));
+let turn=-0.6,tilt=0.5,zoom=1;
+function draw(){view.width=innerWidth;view.height=innerHeight;
+const s=0.8*zoom*Math.min(view.width,view.height)/size,ct=Math.cos(turn),st=Math.sin(turn),
+ce=Math.cos(tilt),se=Math.sin(tilt);
+// right, up, and towards the reader
+function at(p){const x=p[0]-mid[0],y=p[1]-mid[1],z=p[2]-mid[2],u=ct*x-st*y,v=st*x+ct*y;
+return[view.width/2+s*u,view.height/2-s*(ce*z+se*v),se*z-ce*v];}
+const q=data.points.map(at),seen=[];
+data.triangles.forEach((t,k)=>{const a=q[t[0]],b=q[t[1]],c=q[t[2]];
+const area=(b[0]-a[0])*(c[1]-a[1])-(b[1]-a[1])*(c[0]-a[0]);
+if(area<0)seen.push([a[2]+b[2]+c[2],a,b,c,k]);});
+seen.sort((f,g)=>f[0]-g[0]);
+for(const [d,a,b,c,k] of seen){const f=[b[0]-a[0],b[1]-a[1],(b[2]-a[2])*s],
+g=[c[0]-a[0],c[1]-a[1],(c[2]-a[2])*s],n=[f[1]*g[2]-f[2]*g[1],f[2]*g[0]-f[0]*g[2],
+f[0]*g[1]-f[1]*g[0]],w=0.5+0.5*Math.abs(n[2])/(Math.hypot(...n)||1);
+pen.fillStyle=pen.strokeStyle="rgb("+data.colours[data.colour[k]].map(v=>Math.round(v*w))+")";
+pen.beginPath();pen.moveTo(a[0],a[1]);pen.lineTo(b[0],b[1]);pen.lineTo(c[0],c[1]);
+pen.closePath();pen.fill();pen.stroke();}
+pen.strokeStyle="#2a7a2a";for(const line of data.lines){pen.beginPath();
+for(const p of line){const [x,y]=at(p);pen.lineTo(x,y);}pen.stroke();}
+pen.fillStyle="#fff";pen.strokeStyle="#1d2430";
+for(const m of data.marks){const [x,y]=at(m);pen.beginPath();pen.moveTo(x,y-5);
+pen.lineTo(x-5,y+4);pen.lineTo(x+5,y+4);pen.closePath();pen.fill();pen.stroke();}
+pen.font="14px sans-serif";pen.textAlign="center";
+for(const [word,from,to] of data.arrows){const a=at(from),b=at(to),
+w=Math.atan2(b[1]-a[1],b[0]-a[0]);pen.strokeStyle=pen.fillStyle="#b3261e";pen.lineWidth=3;
+pen.beginPath();pen.moveTo(a[0],a[1]);pen.lineTo(b[0],b[1]);pen.stroke();pen.lineWidth=1;
+pen.beginPath();pen.moveTo(b[0],b[1]);for(const e of [2.7,-2.7])
+pen.lineTo(b[0]+14*Math.cos(w+e),b[1]+14*Math.sin(w+e));pen.fill();pen.fillText(word,a[0],a[1]-6);}
+pen.fillStyle="#1d2430";for(const [word,p] of data.labels){const [x,y]=at(p);
+pen.fillText(word,x,y);}}
+let held=null;
+view.onmousedown=e=>{held=[e.clientX,e.clientY];};
+onmouseup=()=>{held=null;};
+onmousemove=e=>{if(!held)return;turn+=(e.clientX-held[0])/200;tilt+=(e.clientY-held[1])/200;
+held=[e.clientX,e.clientY];draw();};
+view.onwheel=e=>{zoom*=Math.exp(-e.deltaY/800);draw();e.preventDefault();};
+onresize=draw;draw();
+</script></body></html>
+"""

@@ -1,0 +1,261 @@
+"""Layers as the report draws them: border, tension and its direction, error, paths of every run."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.tensor import in_plane, largest_in_plane
+from ccfem.comparison.plot.canvas import extents_of
+from ccfem.comparison.plot.paths import tension_limit
+from ccfem.comparison.report.packing import Rounded, as_bytes
+from ccfem.comparison.report.path_view import DrawnPaths, angle_on_layer, drawn_paths, in_layer
+from ccfem.comparison.result import Comparison
+from ccfem.comparison.runs import Run
+from ccfem.comparison.shown import caption, drawn_layers, middle_layer
+from ccfem.geometry.locate import locate
+from ccfem.paths.fields.chart import flat_view
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer_stress import LayerStress, stress_on
+
+__all__ = ["layer_views"]
+
+_POINTS = 150_000
+"""Points of all paths together: about a megabyte."""
+_STEPS = (1.5, 3.0)
+"""Distances of the points of a path, fibre widths: the second where the first are too many."""
+_STEP = 0.01
+"""What coordinates are rounded to, mm."""
+_CELLS, _FEW_CELLS, _STROKES = 128, 80, 40
+"""Cells across a map of tension, with many layers, and strokes of its direction."""
+_MANY = 30
+"""Layers from which on maps are coarse."""
+
+
+def layer_views(stacks: Mapping[str, Comparison], colours: Mapping[str, str]) -> dict[str, Any]:
+    """Return what the page draws of layers and paths.
+
+    Parameters
+    ----------
+    stacks : mapping of name to Comparison
+        Of each slicing; of one alone, its name is empty.
+    colours : mapping of strategy name to colour
+
+    Returns
+    -------
+    dict
+        A tree for `ccfem.comparison.report.packing.pack`: ``stacks``, each with layers and runs,
+        and the ends of the scales, which are the same everywhere.
+    """
+    lines, step = _lines(stacks)
+    shown = _shown(stacks, lines)
+    stresses = {
+        name: [stress_on(flat_view(k), one.planned_on) for k in shown[name]]
+        for name, one in stacks.items()
+    }
+    tension = max((tension_limit(s) for those in stresses.values() for s in those), default=1e-12)
+    machine = next(iter(stacks.values())).case.machine
+    most = 1.0 if machine.minimum_radius <= 0.0 else 2.0 / machine.minimum_radius
+    forces = [_most_force(each) for each in lines.values()]
+    scales = {
+        "tension": tension,
+        "force": max(forces, default=0.0) or 1e-12,
+        "angle": 90.0,
+        "curvature": most,
+    }
+    found = []
+    for name, one in stacks.items():
+        runs = {run.name: lines[name, run.name] for run in one.succeeded}
+        views = [
+            _layer(layer, stress, one, scales, len(shown[name]))
+            for layer, stress in zip(shown[name], stresses[name], strict=True)
+        ]
+        paths = [
+            _run(run, runs[run.name], shown[name], stresses[name], scales, colours)
+            for run in one.ranking
+            if run.name in runs
+        ]
+        found.append(
+            {
+                "name": name,
+                "count": len(one.layers),
+                "first": [k.index for k in shown[name]].index(middle_layer(one).index),
+                "layers": views,
+                "runs": paths,
+            }
+        )
+    return {"stacks": found, "scales": scales, "step": step, "width": machine.fibre_width}
+
+
+def _lines(stacks: Mapping[str, Comparison]) -> tuple[dict[tuple[str, str], DrawnPaths], float]:
+    """Paths of every run with points as far apart as their number asks for; that distance, mm."""
+    found: dict[tuple[str, str], DrawnPaths] = {}
+    step = 0.0
+    for times in _STEPS:
+        for name, one in stacks.items():
+            width = one.case.machine.fibre_width
+            step = times * width
+            for run in one.succeeded:
+                found[name, run.name] = drawn_paths(run, step, width)
+        if sum(len(each.points) for each in found.values()) <= _POINTS:
+            break
+    return found, step
+
+
+def _shown(
+    stacks: Mapping[str, Comparison], lines: Mapping[tuple[str, str], DrawnPaths]
+) -> dict[str, list[Layer]]:
+    """Layers of each stack that are drawn: all, or every second, third ... where they are many."""
+    total = sum(len(each.points) for each in lines.values())
+    every = max(1, int(np.ceil(total / _POINTS)))
+    found = {}
+    for name, one in stacks.items():
+        drawn = drawn_layers(one)
+        always = [k.index for k in drawn].index(middle_layer(one).index)
+        found[name] = drawn[always % every :: every]
+    return found
+
+
+def _most_force(paths: DrawnPaths) -> float:
+    """Force, N, that 99 % of the pieces stay below."""
+    known = paths.force[~np.isnan(paths.force)]
+    return float(np.quantile(known, 0.99)) if len(known) else 0.0
+
+
+def _layer(
+    layer: Layer,
+    stress: LayerStress,
+    comparison: Comparison,
+    scales: Mapping[str, float],
+    layers: int,
+) -> dict[str, Any]:
+    """Border and maps of a layer."""
+    flat = stress.layer
+    loops = [np.append(loop, loop[:1]) for loop in flat.loops]
+    corner = np.concatenate([np.zeros(0, dtype=np.int64), *loops])
+    box = extents_of(flat.plane.points)
+    where = "curved, laid flat"
+    space: Any = Rounded(layer.points[corner], _STEP)
+    if layer.flat is not None:
+        where = f"at {layer.flat.height:.2f} mm of the build direction"
+        space = [*layer.flat.frame.ravel().tolist(), layer.flat.height]
+    return {
+        "index": layer.index,
+        "where": where,
+        "box": box,
+        "rims": Rounded(flat.plane.points[corner], _STEP),
+        "rim_offsets": np.cumsum([0, *map(len, loops)]),
+        "space": space,
+        **_maps(stress, box, comparison, scales["tension"], layers),
+    }
+
+
+def _maps(
+    stress: LayerStress,
+    box: Sequence[float],
+    comparison: Comparison,
+    limit: float,
+    layers: int,
+) -> dict[str, Any]:
+    """Tension and error on a raster from the upper left on, and direction on a coarser one."""
+    layer = stress.layer
+    cells = _CELLS if layers <= _MANY else _FEW_CELLS
+    points, shape = _raster(box, cells)
+    triangle, weights = locate(layer.plane.points, layer.triangles, points, _size(box) / cells)
+    plane = in_plane(stress.nodal, layer.plane.frame)[layer.triangles[triangle]]
+    largest, _, _ = largest_in_plane(np.einsum("qk,qkc->qc", weights, plane))
+    error = comparison.stress.error.densities(comparison.stress.mesh.volumes)[layer.cell]
+    end = max(float(np.quantile(error, 0.98)), 1e-12) if len(error) else 1.0
+    away = triangle < 0
+    strokes, strokes_shape = _raster(box, _STROKES)
+    at, share = locate(layer.plane.points, layer.triangles, strokes)
+    tensor = in_plane(stress.nodal, layer.plane.frame)[layer.triangles[at]]
+    size, _, angle = largest_in_plane(np.einsum("qk,qkc->qc", share, tensor))
+    shown = (at >= 0) & (size > 0.02 * limit)
+    return {
+        "shape": shape,
+        "tension": as_bytes(np.where(away, np.nan, np.maximum(largest, 0.0)), limit),
+        "error": as_bytes(np.where(away, np.nan, error[triangle]), end),
+        "error_limit": end,
+        "stroke_shape": strokes_shape,
+        "strokes": as_bytes(np.where(shown, np.mod(angle, np.pi), np.nan), np.pi),
+    }
+
+
+def _size(box: Sequence[float]) -> float:
+    return max(box[2] - box[0], box[3] - box[1], 1e-9)
+
+
+def _raster(box: Sequence[float], cells: int) -> tuple[FloatArray, tuple[int, int]]:
+    """Middles of square cells of a box, row by row from its upper left; columns and rows."""
+    side = _size(box) / cells
+    columns = max(1, int(np.ceil((box[2] - box[0]) / side - 1e-9)))
+    rows = max(1, int(np.ceil((box[3] - box[1]) / side - 1e-9)))
+    x = box[0] + (np.arange(columns) + 0.5) * side
+    y = box[3] - (np.arange(rows) + 0.5) * side
+    return np.stack([np.tile(x, rows), np.repeat(y, columns)], axis=1), (columns, rows)
+
+
+def _run(
+    run: Run,
+    paths: DrawnPaths,
+    layers: Sequence[Layer],
+    stresses: Sequence[LayerStress],
+    scales: Mapping[str, float],
+    colours: Mapping[str, str],
+) -> dict[str, Any]:
+    """Paths of a run on each of the layers that are shown."""
+    views = []
+    for layer, stress in zip(layers, stresses, strict=True):
+        mine = np.flatnonzero(paths.layer == layer.index)
+        views.append({"caption": caption(run, layer), **_paths(paths, mine, layer, stress, scales)})
+    return {
+        "name": run.name,
+        "colour": colours[run.name],
+        "layers": views,
+        "failure": _failure(run, layers),
+        "tested": run.tested is not None,
+    }
+
+
+def _paths(
+    paths: DrawnPaths,
+    mine: IntArray,
+    layer: Layer,
+    stress: LayerStress,
+    scales: Mapping[str, float],
+) -> dict[str, Any]:
+    """Return some paths of a run, all on one layer."""
+    sizes = np.diff(paths.offsets)[mine]
+    spans = [np.arange(paths.offsets[k], paths.offsets[k + 1]) for k in mine]
+    rows = np.concatenate([np.zeros(0, dtype=np.int64), *spans])
+    points = paths.points[rows]
+    plane = in_layer(points, layer)
+    curved = {} if layer.flat is not None else {"space": Rounded(points, _STEP)}
+    return {
+        "points": Rounded(plane, _STEP),
+        "offsets": np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
+        "force": as_bytes(np.maximum(paths.force[rows], 0.0), scales["force"]),
+        "angle": as_bytes(angle_on_layer(plane, stress), scales["angle"]),
+        "curvature": as_bytes(paths.curvature[rows], scales["curvature"]),
+        "link": paths.link[rows].astype(np.uint8) if paths.link[rows].any() else None,
+        **curved,
+    }
+
+
+def _failure(run: Run, layers: Sequence[Layer]) -> dict[str, Any] | None:
+    """Where the part first fails, with the place of the nearest of the layers that are flat."""
+    failure = None if run.tested is None else run.tested.failure
+    if failure is None:
+        return None
+    where = np.asarray(failure.where, dtype=np.float64)
+    found = {"what": failure.what, "load": failure.load, "where": where.tolist()}
+    away = [
+        np.inf if k.flat is None else abs(float(where @ k.flat.frame[2]) - k.flat.height)
+        for k in layers
+    ]
+    if not np.isfinite(min(away, default=np.inf)):
+        return found
+    nearest = int(np.argmin(away))
+    return {**found, "layer": nearest, "at": layers[nearest].plane.project(where).tolist()}

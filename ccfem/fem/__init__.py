@@ -1,0 +1,7 @@
+"""Finite elements: materials, elasticity, plates, topology optimisation."""
+
+from ccfem.base.submodules import submodules
+
+__all__: list[str] = []
+
+__getattr__ = submodules(__name__)

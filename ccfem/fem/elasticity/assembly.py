@@ -1,0 +1,363 @@
+"""Stiffness matrix of linear and quadratic tetrahedra, gathered row by row into 3x3 blocks.
+
+Each row of blocks is the sum over the cells round its node, so no element matrix is ever stored.
+Quadratic cells with straight sides are integrated exactly: their gradients are linear in the
+barycentric coordinates, so every block combines the sixteen products of the four corner gradients.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numba import njit
+
+from ccfem.base.arrays import FloatArray, IntArray, freeze, seen_only
+from ccfem.body.mesh.cell_mesh import CellMesh
+from ccfem.body.mesh.tet_mesh import TetMesh
+
+__all__ = ["Pattern", "add_blocks", "assemble", "cell_gradients", "pattern"]
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """Positions of the blocks of the stiffness matrix; the same for every stiffness on a mesh.
+
+    Attributes
+    ----------
+    indptr : (n + 1,) int array
+        First block of each row.
+    indices : (b,) int array
+        Column (node) of each block, ascending within a row.
+    order : (m,) int array
+        Cells by their lowest node, so that rows meet neighbouring cells one after the other.
+    start : (n + 1,) int array
+        First entry of each node in `touching`.
+    touching : (m * q,) int array
+        ``q * k + place`` of each cell ``order[k]`` that a node belongs to and its place there; q
+        is the number of nodes of a cell.
+    """
+
+    indptr: IntArray
+    indices: IntArray
+    order: IntArray
+    start: IntArray
+    touching: IntArray
+
+    def __post_init__(self) -> None:
+        freeze(self, indptr=np.int32, indices=np.int32)
+        freeze(self, order=np.int32, start=np.int32, touching=np.int32)
+
+
+def pattern(mesh: CellMesh) -> Pattern:
+    """Find the pattern of the stiffness matrix of a mesh."""
+    n = len(mesh.points)
+    order = _grouped(_lowest(mesh.cells), np.zeros(n + 1, dtype=np.int32))
+    cells = mesh.cells[order].astype(np.int32)
+    start: Any = np.zeros(n + 1, dtype=np.int32)
+    touching = _grouped(cells, start)
+    indptr: Any = np.zeros(n + 1, dtype=np.int32)
+    indices = _neighbours(cells, start, touching, indptr)
+    return Pattern(indptr, indices, order, start, touching)
+
+
+@njit(cache=True)
+def _lowest(cells):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Lowest node (m, 1) of each cell."""
+    result = np.empty((len(cells), 1), np.int32)
+    for i in range(len(cells)):
+        least = cells[i, 0]
+        for a in range(1, cells.shape[1]):
+            least = min(least, cells[i, a])
+        result[i, 0] = least
+    return result
+
+
+@njit(cache=True)
+def _grouped(values, start):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Entries of (m, q) values, by value; `start` becomes the first entry of each value."""
+    for i in range(values.shape[0]):
+        for a in range(values.shape[1]):
+            start[values[i, a] + 1] += 1
+    for k in range(1, start.size):
+        start[k] += start[k - 1]
+    result = np.empty(values.size, np.int32)
+    place = start[:-1].copy()
+    for i in range(values.shape[0]):
+        for a in range(values.shape[1]):
+            v = values[i, a]
+            result[place[v]] = i * values.shape[1] + a
+            place[v] += 1
+    return result
+
+
+@njit(cache=True)
+def _neighbours(cells, start, touching, indptr):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Nodes that share a cell with each node, ascending; `indptr` becomes where each begins."""
+    q = cells.shape[1]
+    seen = np.full(start.size - 1, -1, np.int32)
+    result = np.empty(16 * start.size, np.int32)
+    for i in range(start.size - 1):
+        first = indptr[i]
+        last = first
+        if first + q * (start[i + 1] - start[i]) > result.size:
+            more = np.empty(2 * result.size + q * (start[i + 1] - start[i]), np.int32)
+            for k in range(first):
+                more[k] = result[k]
+            result = more
+        for e in range(start[i], start[i + 1]):
+            cell = touching[e] // q
+            for b in range(q):
+                j = cells[cell, b]
+                if seen[j] == i:
+                    continue
+                seen[j] = i
+                k = last
+                while k > first and result[k - 1] > j:
+                    result[k] = result[k - 1]
+                    k -= 1
+                result[k] = j
+                last += 1
+        indptr[i + 1] = last
+    return result[: indptr[-1]].copy()
+
+
+def cell_gradients(mesh: TetMesh) -> FloatArray:
+    """Gradients of the four barycentric coordinates in each cell.
+
+    Returns
+    -------
+    (m, 4, 3) array, 1/mm
+        In a linear cell the displacement gradient is ``u.T @ gradients`` with the (4, 3)
+        displacement of its corners.
+    """
+    result = np.empty((len(mesh.cells), 4, 3))
+    _gradients(mesh.points, mesh.cells, result, np.empty(len(mesh.cells)))
+    return result
+
+
+@njit(cache=True)
+def _gradients(points, cells, result, volume):  # type: ignore[no-untyped-def]
+    e = np.empty((3, 3))
+    for cell in range(len(cells)):
+        for a in range(3):
+            for d in range(3):
+                e[a, d] = points[cells[cell, a + 1], d] - points[cells[cell, 0], d]
+        determinant = 0.0
+        for a in range(3):
+            b, c = (a + 1) % 3, (a + 2) % 3
+            for d in range(3):
+                p, q = (d + 1) % 3, (d + 2) % 3
+                result[cell, a + 1, d] = e[b, p] * e[c, q] - e[b, q] * e[c, p]
+        for d in range(3):
+            determinant += e[0, d] * result[cell, 1, d]
+        volume[cell] = determinant / 6.0
+        for d in range(3):
+            total = 0.0
+            for a in range(1, 4):
+                result[cell, a, d] /= determinant
+                total += result[cell, a, d]
+            result[cell, 0, d] = -total
+
+
+@njit(cache=True)
+def _times_gradient(c, g, factor, t):  # type: ignore[no-untyped-def]
+    """Store ``factor * C B`` in t (6, 3), B the strain of displacements with gradient g."""
+    x, y, z = factor * g[0], factor * g[1], factor * g[2]
+    for k in range(6):
+        t[k, 0] = c[k, 0] * x + c[k, 4] * z + c[k, 5] * y
+        t[k, 1] = c[k, 1] * y + c[k, 3] * z + c[k, 5] * x
+        t[k, 2] = c[k, 2] * z + c[k, 3] * y + c[k, 4] * x
+
+
+@njit(cache=True)
+def _against(t, p, x, y, z):  # type: ignore[no-untyped-def]
+    """Row p of ``t.T B``, B the strain of displacements with gradient (x, y, z)."""
+    return (
+        t[0, p] * x + t[4, p] * z + t[5, p] * y,
+        t[1, p] * y + t[3, p] * z + t[5, p] * x,
+        t[2, p] * z + t[3, p] * y + t[4, p] * x,
+    )
+
+
+@njit(cache=True)
+def _mark(indptr, indices, i, slot):  # type: ignore[no-untyped-def]
+    """Store in `slot` the entry of the pattern of each column of row i."""
+    for s in range(indptr[i], indptr[i + 1]):
+        slot[indices[s]] = s
+
+
+@njit(cache=True)
+def _mirror(indptr, indices, i, diagonal, data):  # type: ignore[no-untyped-def]
+    """Copy the blocks left of the diagonal of row i from the rows above; note its diagonal.
+
+    Rows are processed in order, so the wanted blocks of row j come in order too: `diagonal` holds
+    the position of the last one.
+    """
+    for s in range(indptr[i], indptr[i + 1]):
+        j = indices[s]
+        if j == i:
+            diagonal[i] = s
+            break
+        diagonal[j] += 1
+        above = diagonal[j]
+        for p in range(3):
+            for r in range(3):
+                data[s, p, r] = data[above, r, p]
+
+
+@njit(cache=True)
+def _gather_linear(  # type: ignore[no-untyped-def]
+    indptr, indices, start, touching, cells, which, gradients, scale, stiffness, data
+):
+    slot = np.empty(indptr.size - 1, np.int32)
+    diagonal = np.empty(indptr.size - 1, np.int32)
+    t = np.empty((6, 3))
+    for i in range(indptr.size - 1):
+        _mark(indptr, indices, i, slot)
+        for e in range(start[i], start[i + 1]):
+            cell, a = touching[e] // 4, touching[e] % 4
+            _times_gradient(stiffness[which[cell]], gradients[cell, a], scale[cell], t)
+            for b in range(4):
+                j = cells[cell, b]
+                if j < i:
+                    continue
+                x, y, z = gradients[cell, b, 0], gradients[cell, b, 1], gradients[cell, b, 2]
+                s = slot[j]
+                for p in range(3):
+                    u, v, w = _against(t, p, x, y, z)
+                    data[s, p, 0] += u
+                    data[s, p, 1] += v
+                    data[s, p, 2] += w
+        _mirror(indptr, indices, i, diagonal, data)
+
+
+@njit(cache=True)
+def _gather_quadratic(  # type: ignore[no-untyped-def]
+    indptr, indices, start, touching, cells, which, gradients, scale, stiffness, first, second, data
+):
+    # Gradient of shape function a: sum of its terms phi_s g_s. A corner i has one term,
+    # (4 L_i - 1) g_i; the edge (i, j) has two, 4 L_j g_i and 4 L_i g_j. Written with the corner
+    # that the linear factor belongs to, any two terms integrate to 16 (1 + [same]) / 20, less 1
+    # where one of them is a corner's (twice less 1, plus 1, where both are).
+    slot = np.empty(indptr.size - 1, np.int32)
+    diagonal = np.empty(indptr.size - 1, np.int32)
+    t, h = np.empty((6, 3)), np.empty(4)
+    for i in range(indptr.size - 1):
+        _mark(indptr, indices, i, slot)
+        for e in range(start[i], start[i + 1]):
+            cell, a = touching[e] // 10, touching[e] % 10
+            c, g = stiffness[which[cell]], gradients[cell]
+            less = 1.0 if a < 4 else 0.0
+            for k in range(1 if a < 4 else 2):
+                corner, linear = (first[a], second[a]) if k == 0 else (second[a], first[a])
+                _times_gradient(c, g[corner], scale[cell], t)
+                for d in range(4):
+                    h[d] = 0.8 - less
+                h[linear] += 0.8
+                for b in range(10):
+                    j = cells[cell, b]
+                    if j < i:
+                        continue
+                    p, q = first[b], second[b]
+                    if b < 4:
+                        w = h[p] + less - 1.0
+                        x, y, z = w * g[p, 0], w * g[p, 1], w * g[p, 2]
+                    else:
+                        x = h[q] * g[p, 0] + h[p] * g[q, 0]
+                        y = h[q] * g[p, 1] + h[p] * g[q, 1]
+                        z = h[q] * g[p, 2] + h[p] * g[q, 2]
+                    s = slot[j]
+                    for r in range(3):
+                        u, v, w = _against(t, r, x, y, z)
+                        data[s, r, 0] += u
+                        data[s, r, 1] += v
+                        data[s, r, 2] += w
+        _mirror(indptr, indices, i, diagonal, data)
+
+
+_FIRST = np.concatenate([np.arange(4), TetMesh.edges[:, 0]])
+_SECOND = np.concatenate([np.arange(4), TetMesh.edges[:, 1]])
+
+
+def assemble(
+    mesh: TetMesh,
+    stiffness: FloatArray,
+    density: FloatArray | None = None,
+    where: Pattern | None = None,
+) -> sp.bsr_array:
+    """Stiffness matrix of a mesh.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+        Linear, or quadratic with straight sides.
+    stiffness : (6, 6) or (m, 6, 6) array, MPa
+        Symmetric, in the global frame, for all cells or for each.
+    density : (m,) array, optional
+        Factor on the stiffness of each cell.
+    where : Pattern, optional
+        From `pattern`, if already known.
+
+    Returns
+    -------
+    bsr_array (3n, 3n) with 3x3 blocks, N/mm
+        Its columns are sorted and its ``indptr`` and ``indices`` are those of the pattern.
+    """
+    where = pattern(mesh) if where is None else where
+    stiffness = seen_only(np.asarray(stiffness, dtype=np.float64)).reshape(-1, 6, 6)
+    if len(stiffness) not in (1, len(mesh.cells)):
+        raise ValueError(
+            f"stiffness must have shape (6, 6) or ({len(mesh.cells)}, 6, 6); got "
+            f"{len(stiffness)} matrices: give one a cell"
+        )
+    which = where.order if len(stiffness) > 1 else np.zeros_like(where.order)
+    cells = mesh.cells[where.order]
+    gradients, scale = np.empty((len(cells), 4, 3)), np.empty(len(cells))
+    _gradients(mesh.points, seen_only(cells), gradients, scale)
+    if density is not None:
+        scale *= density[where.order]
+    data = np.zeros((len(where.indices), 3, 3))
+    arguments = (where.indptr, where.indices, where.start, where.touching, cells, seen_only(which))
+    if mesh.order == 1:
+        _gather_linear(*arguments, gradients, scale, stiffness, data)
+    else:
+        _gather_quadratic(*arguments, gradients, scale, stiffness, _FIRST, _SECOND, data)
+    n = 3 * len(mesh.points)
+    return sp.bsr_array((data, where.indices, where.indptr), shape=(n, n))
+
+
+@njit(cache=True)
+def _scatter(indptr, indices, nodes, blocks, data):  # type: ignore[no-untyped-def]
+    q = nodes.shape[1]
+    for e in range(nodes.shape[0]):
+        for a in range(q):
+            i = nodes[e, a]
+            for b in range(q):
+                low, high = indptr[i], indptr[i + 1] - 1
+                while low < high:
+                    middle = (low + high) // 2
+                    if indices[middle] < nodes[e, b]:
+                        low = middle + 1
+                    else:
+                        high = middle
+                for p in range(3):
+                    for r in range(3):
+                        data[low, p, r] += blocks[e, 3 * a + p, 3 * b + r]
+
+
+def add_blocks(matrix: sp.bsr_array, nodes: IntArray, blocks: FloatArray) -> None:
+    """Add element matrices to an assembled matrix, in place.
+
+    Parameters
+    ----------
+    matrix : bsr_array (3n, 3n)
+        From `assemble`. Every pair of nodes of an element must share a cell of its mesh.
+    nodes : (k, q) int array
+        Nodes of each element.
+    blocks : (k, 3q, 3q) array, N/mm
+        Element matrices, the components of a node together.
+    """
+    _scatter(
+        matrix.indptr, matrix.indices, seen_only(nodes), np.ascontiguousarray(blocks), matrix.data
+    )

@@ -1,0 +1,247 @@
+"""Held components of a displacement, and the reduced equations."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.fem.elasticity.ties import Ties
+
+__all__ = ["Held", "rigid_modes"]
+
+_BED = 1e-11
+"""Stiffness, over the mean of the diagonal, that a lifted-off component keeps, so that a part that
+nothing presses any more has a solution; the force it carries is checked."""
+
+_PULLS = 1e-6
+"""Force of a support that pulls, over the largest force, that counts as rounding error."""
+
+_SINKS = 1e-7
+"""Displacement into a support, over the largest displacement, that counts as rounding error."""
+
+
+def rigid_modes(points: FloatArray) -> FloatArray:
+    """Displacements (3n, 6) of points (n, 3) in the three translations and three rotations."""
+    x, y, z = points.T
+    modes = np.zeros((len(points), 3, 6))
+    modes[:, [0, 1, 2], [0, 1, 2]] = 1.0
+    modes[:, 1, 3], modes[:, 2, 3] = -z, y
+    modes[:, 2, 4], modes[:, 0, 4] = -x, z
+    modes[:, 0, 5], modes[:, 1, 5] = -y, x
+    return modes.reshape(-1, 6)
+
+
+@dataclass(frozen=True)
+class Held:
+    """Which components are held, and at which values; in the plane each node has two components.
+
+    Attributes
+    ----------
+    free : (n, 3) bool array
+        Components that the solve finds.
+    value : (n, 3) array, mm
+        Values of held components; zero elsewhere.
+    nodes : (k,) int array
+        Nodes with at least one free component: the rows of the reduced matrix.
+    ties : Ties, optional
+        Where nodes have axes of their own, or move together as a rigid body. Then `free`, `value`
+        and `nodes` refer to the nodes that the ties leave, along their axes.
+    presses : (n, 3) bool array, optional
+        Components that may move back, below zero, but not forth. Those in contact are not free.
+    """
+
+    free: BoolArray
+    value: FloatArray
+    nodes: IntArray
+    ties: Ties | None = None
+    presses: BoolArray | None = None
+
+    @cached_property
+    def _pressing(self) -> tuple[IntArray, IntArray, FloatArray]:
+        """Node, component and axis (3,) of all pressing components."""
+        assert self.presses is not None
+        assert self.ties is not None
+        node, component = np.nonzero(self.presses)
+        return node, component, self.ties.axes[node, :, component]
+
+    def along_pressing(self, vectors: FloatArray) -> FloatArray:
+        """Components (k,) of nodal vectors (n, 3) along the pressing axes, out of the part."""
+        node, _, axis = self._pressing
+        return np.einsum("ki,ki->k", axis, vectors[node])
+
+    @property
+    def contact(self) -> BoolArray:
+        """Mask (k,) of the pressing components that are in contact."""
+        node, component, _ = self._pressing
+        return ~self.free[node, component]
+
+    def with_contact(self, contact: BoolArray) -> "Held":
+        """Return the same supports in another contact (k,)."""
+        node, component, _ = self._pressing
+        free = self.free.copy()
+        free[node, component] = ~contact
+        return replace(self, free=free)
+
+    def touching(self, displacement: FloatArray) -> "Held":
+        """Return the same supports with the contact of a solution (n, 3), mm."""
+        if self.presses is None:
+            return self
+        back = -1e-12 * float(np.abs(displacement).max())
+        return self.with_contact(self.along_pressing(displacement) >= back)
+
+    def following(self, displacement: FloatArray, reactions: FloatArray) -> "Held":
+        """Contact that follows from a solution; self if it is unchanged.
+
+        Components that pull are released, those that sink in are held: the primal-dual active set
+        method (Hintermueller, Ito and Kunisch, SIAM J. Optimization 13, 2002, 865-888).
+
+        Parameters
+        ----------
+        displacement : (n, 3) array, mm
+        reactions : (n, 3) array, N
+            Of all supports on the part.
+        """
+        if self.presses is None:
+            return self
+        before = self.contact
+        pulls, sinks = self.along_pressing(reactions), self.along_pressing(displacement)
+        pulled = pulls > _PULLS * np.abs(pulls[before]).max(initial=0.0)
+        sunk = sinks > _SINKS * float(np.abs(displacement).max())
+        after = np.where(before, ~pulled, sunk)
+        return self if (after == before).all() else self.with_contact(after)
+
+    def at(self, value: FloatArray) -> "Held":
+        """Return the same held components at other values (n, 3), mm."""
+        return replace(self, value=value)
+
+    @property
+    def unknowns(self) -> int:
+        """Free components."""
+        return int(self.free.sum())
+
+    def reduce(self, matrix: sp.bsr_array) -> sp.bsr_array:
+        """Return the matrix (3k, 3k) of the nodes that can move.
+
+        Held components of such nodes keep a row with nothing but a diagonal entry, as large as
+        the mean one.
+        """
+        if self.ties is not None:
+            matrix = self.ties.reduce(matrix)
+        (n, d), k = self.free.shape, len(self.nodes)
+        place = np.full(n, -1, dtype=np.int32)
+        place[self.nodes] = np.arange(k, dtype=np.int32)
+        row = np.repeat(place, np.diff(matrix.indptr))
+        column = place[matrix.indices]
+        kept = (row >= 0) & (column >= 0)
+        row, column, data = row[kept], column[kept], matrix.data[kept]
+        free = self.free[self.nodes]
+        partly = np.logical_not(free.all(axis=1))
+        size = (
+            0.0
+            if not partly.any() and self.presses is None
+            else float(np.abs(matrix.diagonal()).mean())
+        )
+        if self.presses is not None:
+            own = np.flatnonzero(row == column)
+            lifted = (self.presses & self.free)[self.nodes][row[own]]
+            data[own] += _BED * size * np.eye(d) * lifted[:, :, None]
+        if partly.any():
+            cut = np.flatnonzero(partly[row] | partly[column])
+            data[cut] *= free[row[cut], :, None] & free[column[cut], None, :]
+            diagonal = cut[row[cut] == column[cut]]
+            data[diagonal] += size * np.eye(d) * np.logical_not(free[row[diagonal]])[:, :, None]
+        indptr = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=k))]).astype(np.int32)
+        return sp.bsr_array((data, column, indptr), shape=(d * k, d * k))
+
+    def right_hand_side(self, matrix: sp.bsr_array, forces: FloatArray) -> FloatArray:
+        """Right-hand side (3k,), N, of the reduced matrix, for nodal forces (n, 3)."""
+        rest = forces
+        if self.value.any():
+            moved = self.value if self.ties is None else self.ties.expand(self.value)
+            rest = forces - (matrix @ moved.reshape(-1)).reshape(forces.shape)
+        return self.project(rest)
+
+    def project(self, forces: FloatArray) -> FloatArray:
+        """Sum forces (3k,), N, on the free components, of nodal forces (n, 3)."""
+        if self.ties is not None:
+            forces = self.ties.gather(forces)
+        own = forces[self.nodes]
+        return (own if self._whole else own * self.free[self.nodes]).reshape(-1)
+
+    @cached_property
+    def _whole(self) -> bool:
+        """Whether every node that can move can do so in all components."""
+        return bool(self.free[self.nodes].all())
+
+    def expand(self, solution: FloatArray) -> FloatArray:
+        """Displacement (n, 3) of a solution (3k,) of the reduced system, mm."""
+        return self._displacement(self.value.copy(), solution)
+
+    def motion(self, solution: FloatArray) -> FloatArray:
+        """Displacement (n, 3) of a solution (3k,) with everything else held at zero, mm."""
+        return self._displacement(np.zeros_like(self.value), solution)
+
+    def _displacement(self, result: FloatArray, solution: FloatArray) -> FloatArray:
+        values = solution.reshape(-1, self.free.shape[1])
+        result[self.nodes] += values if self._whole else values * self.free[self.nodes]
+        return result if self.ties is None else self.ties.expand(result)
+
+    def restrict(self, displacement: FloatArray) -> FloatArray:
+        """Solution (3k,) of the reduced system that stands for a displacement (n, 3)."""
+        if self.ties is not None:
+            displacement = self.ties.restrict(displacement)
+        return np.where(self.free, displacement, 0.0)[self.nodes].reshape(-1)
+
+    def supported(self, forces: FloatArray) -> FloatArray:
+        """Keep what of nodal forces (n, 3) acts on held components; zero elsewhere."""
+        if self.ties is None:
+            return np.where(self.free, 0.0, forces)
+        return np.where(self.ties.touched(~self.free)[:, None], forces, 0.0)
+
+    def modes(self, points: FloatArray) -> FloatArray:
+        """Rigid motions (3k, 6) of points (n, 3), mm, as solutions of the reduced system.
+
+        Rotations are about the centre of the points, by the inverse of their extent.
+        """
+        size = float(np.ptp(points, axis=0).max())
+        if self.ties is None:
+            points = points[self.nodes]
+            return rigid_modes((points - points.mean(axis=0)) / size)
+        modes = rigid_modes((points - points.mean(axis=0)) / size).reshape(-1, 3, 6)
+        tied = np.stack([self.ties.restrict(modes[:, :, k]) for k in range(6)], axis=2)
+        return tied[self.nodes].reshape(-1, 6)
+
+    def prolongation(self, ends: IntArray) -> tuple[sp.bsr_array, IntArray]:
+        """Linear displacements among the solutions, where there are ties.
+
+        Parameters
+        ----------
+        ends : (n, 2) int array
+            The two corners of each node; a corner is its own.
+
+        Returns
+        -------
+        prolong : bsr_array (3k, 3c)
+        nodes : (c,) int array
+            Rows of nodes that stand for corners and rigid bodies.
+        """
+        assert self.ties is not None
+        rows = (3 * self.nodes[:, None] + np.arange(3)).reshape(-1)
+        kept = self.ties.prolongation(ends).tocsr()[rows][:, rows]
+        nodes = np.flatnonzero(np.diff(kept.tocsc().indptr).reshape(-1, 3).any(axis=1))
+        columns = (3 * nodes[:, None] + np.arange(3)).reshape(-1)
+        return kept[:, columns].tobsr((3, 3)), nodes
+
+    def parents(self, ends: IntArray) -> IntArray:
+        """Rows of the two corners that each row's node is the middle of; -1 for a held corner.
+
+        Parameters
+        ----------
+        ends : (n, 2) int array
+            The two corners of each node; a corner is its own.
+        """
+        place = np.full(len(self.free), -1)
+        place[self.nodes] = np.arange(len(self.nodes))
+        return place[ends[self.nodes]]

@@ -1,0 +1,217 @@
+"""Nodal forces of loads, consistent with linear and quadratic facets."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.errors import InputError
+from ccfem.fem.elasticity.body import LoadedBody, SupportedProblem
+from ccfem.fem.elasticity.load_kinds import (
+    Bearing,
+    BodyForce,
+    Displacement,
+    Force,
+    Gravity,
+    Load,
+    PointForce,
+    Pressure,
+    SurfaceLoad,
+    Temperature,
+    Traction,
+    sizes_of,
+)
+from ccfem.fem.elasticity.nodes import facet_normals, nearest_node, patch_facets
+from ccfem.fem.elasticity.problem import Problem
+from ccfem.fem.elasticity.volume_loads import heat_forces, volume_forces
+from ccfem.geometry.facets import positions
+
+__all__ = ["check_load", "load_case", "load_cases", "nodal_forces"]
+
+_SMALLEST, _LARGEST = 1e-12, 1e12
+"""Magnitude of a load below which it is zero, and above which it is a mistake."""
+_ALONG = 1e-3
+"""Share of a bearing force along the axis of its wall that is taken for the error of that axis."""
+
+
+def _outward(mesh: LoadedBody, name: str) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Facets of a patch with their areas and outward unit normals."""
+    facets = patch_facets(mesh, name)
+    at = positions(facets, mesh.boundary)
+    if (at < 0).any():
+        raise InputError(
+            f"patch '{name}' has facets inside the part: pressure and bearing need boundary facets"
+        )
+    facets = mesh.boundary[at]
+    return facets, *mesh.facet_areas(facets)
+
+
+def _spread(mesh: LoadedBody, facets: IntArray, forces: FloatArray) -> FloatArray:
+    """Nodal forces (n, 3) of forces (k, 3) spread evenly over facets; (n, 2) of (k, 2) on a sheet.
+
+    A linear facet gives a third to each corner; a quadratic one a third to each middle; an edge
+    of a sheet a half to each end.
+    """
+    nodes = mesh.facet_nodes(facets)[:, -3:]
+    share = nodes.shape[1]
+    result: FloatArray = np.zeros(mesh.points.shape)
+    for k in range(mesh.points.shape[1]):
+        weights = np.repeat(forces[:, k] / share, share)
+        result[:, k] = np.bincount(nodes.reshape(-1), weights, len(mesh.points))
+    return result
+
+
+def _vector(mesh: LoadedBody, load: Force | Traction | Bearing | PointForce) -> FloatArray:
+    """Components of a load in the space of the mesh; PlaneProblem refuses one out of its plane."""
+    return np.array(load.vector, dtype=np.float64)[: mesh.points.shape[1]]
+
+
+def _force(mesh: LoadedBody, load: Force) -> FloatArray:
+    facets = patch_facets(mesh, load.patch)
+    area, _ = mesh.facet_areas(facets)
+    return _spread(mesh, facets, area[:, None] / area.sum() * _vector(mesh, load))
+
+
+def _traction(mesh: LoadedBody, load: Traction) -> FloatArray:
+    facets = patch_facets(mesh, load.patch)
+    area, _ = mesh.facet_areas(facets)
+    return _spread(mesh, facets, area[:, None] * _vector(mesh, load))
+
+
+def _pressure(mesh: LoadedBody, load: Pressure) -> FloatArray:
+    facets, area, normal = _outward(mesh, load.patch)
+    return _spread(mesh, facets, -load.magnitude * area[:, None] * normal)
+
+
+def _bearing(mesh: LoadedBody, load: Bearing) -> FloatArray:
+    """Pressure ``-normal . a`` where that is positive, with a fitted to the total force.
+
+    On an evenly meshed half cylinder a is parallel to the force, and the pressure is a cosine. On a
+    round wall it acts through the axis: a pin without friction passes no moment about it.
+    """
+    facets, area, normal = _outward(mesh, load.patch)
+    if mesh.points.shape[1] == 3:
+        normal = facet_normals(mesh, facets, mesh.points[facets].mean(axis=1)[:, None])[:, 0]
+    force = _vector(mesh, load)
+    touched = normal @ force < 0.0
+    for _ in range(50):
+        weighted = (area * touched)[:, None] * normal
+        a = np.asarray(np.linalg.lstsq(weighted.T @ normal, force, rcond=1e-9)[0])
+        now = -(normal @ a) > 1e-9 * np.linalg.norm(a)
+        if np.array_equal(now, touched):
+            break
+        touched = now
+    forces = weighted * (normal @ a)[:, None]
+    rest = force - forces.sum(axis=0)
+    if not np.linalg.norm(rest) <= _ALONG * np.linalg.norm(force):
+        raise InputError(
+            f"bearing load {load.vector} cannot press on patch '{load.patch}': give a force "
+            "across the axis of the hole, toward the wall that the patch covers"
+        )
+    # The axis of a wall is that of its nodes, which is off by rounding or by chords.
+    return _spread(mesh, facets, forces + area[:, None] / area.sum() * rest)
+
+
+def _point(mesh: LoadedBody, load: PointForce) -> FloatArray:
+    result = np.zeros(mesh.points.shape)
+    result[nearest_node(mesh, load.point, "a point force")] = _vector(mesh, load)
+    return result
+
+
+_KINDS: dict[type, Callable[..., FloatArray]] = {
+    Force: _force,
+    Traction: _traction,
+    Pressure: _pressure,
+    Bearing: _bearing,
+    PointForce: _point,
+}
+
+
+def check_load(load: Load) -> None:
+    """Refuse a load that is not finite, absurdly large, or zero; displacements may be zero."""
+    for value in vars(load).values():
+        if value is None or isinstance(value, str):
+            continue
+        if not np.isfinite(value).all():
+            raise InputError(f"a load must be finite; got {load}: correct its numbers")
+        if np.max(np.abs(value)) > _LARGEST:
+            raise InputError(
+                f"numbers of a load must be at most {_LARGEST:g} (N, MPa, mm); got {load}: correct "
+                "its numbers"
+            )
+    sizes = ("vector", "magnitude", "acceleration", "change")
+    size = next(getattr(load, name) for name in sizes if hasattr(load, name))
+    if np.max(np.abs(size)) < _SMALLEST and not isinstance(load, Displacement):
+        raise InputError(f"a load must not be zero; got {load}: give it a size or leave it out")
+    for what, value, bounds in sizes_of(load):
+        bounds.check(what, value)
+
+
+def nodal_forces(mesh: LoadedBody, load: SurfaceLoad) -> FloatArray:
+    """Return the forces at the nodes that do the same work as a load on the surface.
+
+    Parameters
+    ----------
+    mesh : TetMesh, or Sheet of a plate
+    load : Force, Traction, Pressure, Bearing or PointForce
+
+    Returns
+    -------
+    (n, 3) array, or (n, 2) on a sheet, N
+
+    Raises
+    ------
+    InputError
+        For a load that is zero or not finite, on an empty or unknown patch, a point force outside
+        the part, or a bearing load that no pressure on its patch can carry.
+    """
+    check_load(load)
+    return _KINDS[type(load)](mesh, load)
+
+
+def load_case(problem: SupportedProblem, name: str) -> FloatArray:
+    """Nodal forces (n, 3), or (n, 2) in the plane, N, of one load case of a problem.
+
+    Raises
+    ------
+    InputError
+        For a bad load, or when the loads cancel at every node and no support moves.
+    """
+    loads = problem.loads[name]
+    parts = []
+    for load in loads:
+        check_load(load)
+        if isinstance(load, SurfaceLoad):
+            parts.append(nodal_forces(problem.body, load))
+        elif isinstance(load, BodyForce | Gravity):
+            assert isinstance(problem, Problem)
+            parts.append(volume_forces(problem, load))
+    heat = any(isinstance(load, Temperature) for load in loads)
+    if heat:
+        assert isinstance(problem, Problem)
+        parts.append(heat_forces(problem, name))
+    total: FloatArray = sum(parts, np.zeros(problem.body.points.shape))
+    largest = max((float(np.abs(part).max()) for part in parts), default=0.0)
+    moved: list[Any] = [load.vector for load in loads if isinstance(load, Displacement)]
+    moved += [getattr(support, "value", 0.0) for support in problem.supports]
+    moved += [getattr(support, "angle", 0.0) for support in problem.supports]
+    still = not heat and not any(np.any(value) for value in moved)
+    if still and np.abs(total).max() <= 1e-12 * largest:
+        raise InputError(
+            f"load case '{name}' is zero and no support moves: nothing to solve for; give a load"
+        )
+    return total
+
+
+def load_cases(problem: SupportedProblem) -> dict[str, FloatArray]:
+    """Nodal forces of every load case of a problem: see `load_case`.
+
+    Raises
+    ------
+    InputError
+        For a bad load, and for a problem without one.
+    """
+    if not problem.loads:
+        raise InputError("the part has no load case: give at least one load")
+    return {name: load_case(problem, name) for name in problem.loads}

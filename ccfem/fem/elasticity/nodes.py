@@ -1,0 +1,103 @@
+"""Nodes of patches, of the edges where they meet, and nearest to points."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.cell_mesh import CellMesh
+from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE, smooth_faces
+from ccfem.fem.elasticity.body import LoadedBody
+
+__all__ = [
+    "edge_nodes",
+    "facet_normals",
+    "nearest_node",
+    "patch_facets",
+    "patch_nodes",
+    "patch_normals",
+]
+
+_COARSE = 50.0
+"""Feature angle, degrees, at which a bore of 8 facets is a round wall, and a hexagon is none."""
+
+
+def patch_facets(mesh: CellMesh | LoadedBody, name: str) -> IntArray:
+    """Facets of a patch, which must not be empty."""
+    facets = mesh.patch(name)
+    if not len(facets):
+        raise InputError(f"patch '{name}' is empty: no boundary facet matches its rule")
+    return facets
+
+
+def patch_nodes(mesh: CellMesh, name: str) -> IntArray:
+    """Nodes (k,) of a patch, ascending."""
+    return np.unique(mesh.facet_nodes(patch_facets(mesh, name)))
+
+
+def edge_nodes(mesh: CellMesh, names: tuple[str, str]) -> IntArray:
+    """Nodes (k,) that two patches have in common."""
+    first, second = (patch_nodes(mesh, name) for name in names)
+    common = np.intersect1d(first, second)
+    if not len(common):
+        raise InputError(
+            f"patches '{names[0]}' and '{names[1]}' do not meet: name two with a common edge"
+        )
+    return common
+
+
+def nearest_node(mesh: CellMesh | LoadedBody, point: Sequence[float], what: str) -> int:
+    """Node of some cell that is nearest to a point of the part.
+
+    Raises
+    ------
+    InputError
+        When the point is farther from it than the cells there are long, that is outside the part.
+    """
+    used = np.unique(mesh.cells)
+    wanted = np.asarray(point, dtype=np.float64)[: mesh.points.shape[1]]
+    distance = np.linalg.norm(mesh.points[used] - wanted, axis=1)
+    node = int(used[distance.argmin()])
+    near = mesh.cells[(mesh.cells == node).any(axis=1)]
+    reach = float(np.linalg.norm(mesh.points[near] - mesh.points[node], axis=2).max())
+    if not distance.min() <= reach:
+        at = ", ".join(f"{x:.4g}" for x in mesh.points[node])
+        raise InputError(
+            f"{what} at {tuple(float(x) for x in point)} mm lies {distance.min():.4g} mm from the "
+            f"nearest node, ({at}), where cells are {reach:.4g} mm long: give a point of the part"
+        )
+    return node
+
+
+def facet_normals(mesh: LoadedBody, facets: IntArray, places: FloatArray) -> FloatArray:
+    """Outward unit normals (k, q, 3) of facets (k, 3) at places on them (k, q, 3), mm.
+
+    On round walls they are those of the cylinder that their nodes lie on: the normals of its facets
+    are off by degrees, which holds a part against turning on a bore. Elsewhere those of the facets.
+    """
+    _, normal = mesh.facet_areas(facets)
+    result = np.repeat(normal[:, None], places.shape[1], axis=1)
+    rows = np.arange(len(facets))
+    for angle in (_COARSE, FEATURE_ANGLE):
+        flat = []
+        for face in smooth_faces(mesh.points, facets[rows], angle):
+            chosen = rows[face.facets]
+            exact = face.normals_at(places[chosen].reshape(-1, 3))
+            if exact is None:
+                flat.append(chosen)
+            else:
+                result[chosen] = exact.reshape(-1, *result.shape[1:])
+        rows = np.concatenate([*flat, np.zeros(0, dtype=np.int64)])
+    return result
+
+
+def patch_normals(mesh: LoadedBody, facets: IntArray, nodes: IntArray) -> FloatArray:
+    """Average unit normals (k, 3) at nodes of facets, weighted by the areas of the facets."""
+    area, _ = mesh.facet_areas(facets)
+    all_nodes = mesh.facet_nodes(facets)
+    weighted = area[:, None, None] * facet_normals(mesh, facets, mesh.points[all_nodes])
+    total = np.zeros(mesh.points.shape)
+    np.add.at(total, all_nodes, weighted)
+    size = np.linalg.norm(total[nodes], axis=1)
+    return total[nodes] / np.maximum(size, 1e-300)[:, None]

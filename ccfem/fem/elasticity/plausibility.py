@@ -1,0 +1,432 @@
+"""Whether a part and its solution can be as they were meant: one look at both.
+
+Impossible numbers are refused where they are given (`ccfem.base.checks.Range`). Here the part is
+judged as a whole: sizes that are usual in another unit, loads that supports take at once, walls
+with too few cells; and of the solution equilibrium, and the limits of linear theory and of the
+material. What is improbable is said in a line, each with its cure; what cannot be right is refused:
+
+* reactions that do not balance the loads, since equilibrium is a law;
+* a load case without effect, since its zero would pass for an answer;
+* a displacement of more than ten times the size of the part: either a unit is wrong or hardly
+  anything holds it. Between a twentieth and ten times there is a remark only, since solutions are
+  proportional to the load: paths and ratios of stiffness under a load of any size, as under a unit
+  load on a slender part, are those under the load at which it works.
+"""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from ccfem.base.arrays import FloatArray
+from ccfem.base.checks import BED, SPRING
+from ccfem.base.errors import InputError, SolveError
+from ccfem.body.mesh.in_metres import about_size
+from ccfem.body.mesh.wall_cells import coarse_wall
+from ccfem.fem.elasticity.held import Held, rigid_modes
+from ccfem.fem.elasticity.load_kinds import (
+    Displacement,
+    Load,
+    SurfaceLoad,
+    in_words,
+    kind_of,
+    patches_of,
+    sizes_of,
+)
+from ccfem.fem.elasticity.loads import nodal_forces
+from ccfem.fem.elasticity.order import LARGEST_ERROR, about_error, linear_locks
+from ccfem.fem.elasticity.problem import Problem
+from ccfem.fem.elasticity.support_kinds import (
+    AnySupport,
+    Foundation,
+    PointSpring,
+    RigidPatch,
+    Spring,
+)
+from ccfem.fem.elasticity.zone import averaged_mises
+from ccfem.fem.materials import Material
+from ccfem.geometry.facets import are_among
+
+__all__ = [
+    "about_held_share",
+    "about_problem",
+    "about_solution",
+    "check_balance",
+    "check_effect",
+    "check_size_of_motion",
+    "held_share",
+]
+
+_LINEAR = 0.05
+"""Displacement over the size of the part, and strain, up to which linear theory holds: the tip of a
+cantilever that moves by a twentieth of its length is off by less than 1 %."""
+_FARTHEST = 10.0
+"""Displacement over the size of the part above which a solution is refused: a part that works moves
+by a hundredth or less, and units that are taken for each other differ by a thousand or more."""
+_DEGREES = 5.0
+"""Rotation of a support up to which linear theory holds: sqrt(1 + angle^2) is 1.004."""
+_RIGID = 0.02
+"""Deformation over displacement below which a part moves nearly as a rigid body."""
+_BALANCE = 1e-4
+"""Force and moment that reactions may leave, over the sum of the forces: as `contact` allows."""
+_ROUNDING = 1e-12
+"""The same over the sizes that cancel in the equations: stiffness of a cell times displacement."""
+_NONE = 1e-9
+"""Part of the forces of a load case that moves something, below which none does."""
+_ALL, _SOME = 1.0 - 1e-9, 0.02
+"""Shares of a load on held nodes from which it has no effect, and from which there is a remark."""
+_LONG = 1.5
+"""Longest edge over thickness of a wall of one quadratic cell from which there is a remark, if the
+error is not known: the deflection of a plate is right to 1 % at 3.3, stress round holes is not."""
+
+
+def about_problem(
+    problem: Problem,
+    at_rest: Held | None = None,
+    cases: Iterable[str] | None = None,
+    error: float = np.nan,
+) -> tuple[str, ...]:
+    """Say what of a part may be in another unit, or not as it was meant.
+
+    Parameters
+    ----------
+    problem : Problem
+        With one set of supports.
+    at_rest : Held, optional
+        Its supports; without them the loads on held nodes are not looked for.
+    cases : iterable of str, optional
+        Load cases to be looked at; default all.
+    error : float, optional
+        Estimated error of the solution, if it is known: cells that leave little of it are fine
+        enough.
+
+    Returns
+    -------
+    tuple of str
+        One line each, with its cure.
+    """
+    names = list(problem.loads if cases is None else cases)
+    lines = [about_size(problem.mesh.points)]
+    for material, _ in problem.materials:
+        lines += _about_material(material)
+    for support in problem.supports:
+        lines += _about_support(support, problem)
+    for name in names:
+        for load in problem.loads[name]:
+            lines += [f"load case '{name}': {line}" for line in _about_load(load, problem) if line]
+            share = 0.0 if at_rest is None else held_share(problem, load, at_rest)
+            lines.append(about_held_share(name, load, share))
+    lines += _shared_facets(problem, names)
+    lines.append(_about_walls(problem, error))
+    if problem.mesh.order == 1 and problem.order == 1 and linear_locks(problem):
+        lines.append(
+            "the material hardly changes its volume, and linear cells lock then: displacements are "
+            "too small, whatever the estimated error: use quadratic cells (order = 2)"
+        )
+    return tuple(dict.fromkeys(line for line in lines if line))
+
+
+def _about_material(material: Material) -> list[str]:
+    """Say which numbers of a material are usual in another unit."""
+    name = f"of material '{material.name}'"
+    return [sizes.about(f"{what} {name}", value) for what, value, sizes in material.sizes]
+
+
+def _about_support(support: AnySupport, problem: Problem) -> list[str]:
+    """Say which springs are of an unusual stiffness, and which motions are too large."""
+    where = " on ".join((kind_of(support), *patches_of(support)))
+    if isinstance(support, Spring | PointSpring):
+        return [SPRING.about(f"stiffness of {where}", value) for value in set(support.stiffness)]
+    if isinstance(support, Foundation):
+        return [BED.about(f"stiffness of {where}", value)
+                for value in {support.normal, support.tangential}]  # fmt: skip
+    lines = [_about_motion(where, getattr(support, "value", 0.0), problem)]
+    if isinstance(support, RigidPatch) and max(map(abs, support.angle)) > _DEGREES:
+        lines.append(
+            f"{where} turns by {max(map(abs, support.angle)):g} degrees, and rotations are linear "
+            f"here: beyond {_DEGREES:g} degrees take the stress for a rough guess, or turn it less"
+        )
+    return lines
+
+
+def _about_motion(where: str, motion: float | tuple[float, ...], problem: Problem) -> str:
+    """Say that a support moves too far for linear theory."""
+    far, size = float(np.linalg.norm(motion)), _size(problem)
+    if far <= _LINEAR * size:
+        return ""
+    return (
+        f"{where} moves by {far:.4g} mm, {far / size:.0%} of the size of the part: linear theory "
+        f"holds to about {_LINEAR:.0%}: give the motion in mm, or a smaller one, since stress is "
+        "proportional to it"
+    )
+
+
+def _moved(problem: Problem, case: str) -> float:
+    """Farthest that a load case moves a support, mm: `about_problem` remarks on it."""
+    motions = [getattr(support, "value", 0.0) for support in problem.supports]
+    motions += [load.vector for load in problem.loads_of(case) if isinstance(load, Displacement)]
+    return max(float(np.linalg.norm(motion)) for motion in motions or [0.0])
+
+
+def _about_load(load: Load, problem: Problem) -> list[str]:
+    """Say which sizes of a load are usual in another unit."""
+    if isinstance(load, Displacement):
+        return [_about_motion(in_words(load), load.vector, problem)]
+    return [sizes.about(what, value) for what, value, sizes in sizes_of(load)]
+
+
+def _size(problem: Problem) -> float:
+    """Diagonal of a part, mm."""
+    return float(np.linalg.norm(np.ptp(problem.mesh.points[problem.mesh.corners], axis=(0, 1))))
+
+
+def held_share(problem: Problem, load: Load, at_rest: Held) -> float:
+    """Share of the nodal forces of a load on a patch that supports take at once.
+
+    It is 0 for a load in the volume, whose share on held nodes is meant, and where nodes have axes
+    of their own.
+    """
+    if at_rest.ties is not None or not isinstance(load, SurfaceLoad):
+        return 0.0
+    forces = nodal_forces(problem.mesh, load)
+    sizes = np.linalg.norm(forces, axis=1)
+    moving = np.linalg.norm(np.where(at_rest.free[: len(forces)], forces, 0.0), axis=1)
+    return 1.0 - float(moving.sum() / sizes.sum())
+
+
+def about_held_share(case: str, load: Load, share: float) -> str:
+    """Say that supports take a share of a load at once; empty for next to nothing."""
+    if share >= _ALL:
+        return (
+            f"load case '{case}': {in_words(load)} acts on held nodes alone and does nothing: "
+            "choose another patch for the load, or for the support"
+        )
+    if share <= _SOME:
+        return ""
+    return (
+        f"load case '{case}': {share:.0%} of {in_words(load)} acts on held nodes and has no "
+        "effect: keep the patches of loads and supports apart"
+    )
+
+
+def _shared_facets(problem: Problem, cases: Iterable[str]) -> list[str]:
+    """Say which patches are loaded and held at once."""
+    supported = {name for support in problem.supports for name in patches_of(support)}
+    loaded = {
+        name
+        for case in cases
+        for load in problem.loads[case]
+        if not isinstance(load, Displacement)
+        for name in patches_of(load)
+    }
+    lines = []
+    for load in sorted(loaded):
+        for support in sorted(supported - {load}):
+            both = are_among(problem.mesh.patch(load), problem.mesh.patch(support))
+            if both.any():
+                lines.append(
+                    f"patches '{load}' (loaded) and '{support}' (held) share {int(both.sum())} of "
+                    f"{len(both)} facets: choose patches that do not overlap"
+                )
+    return lines
+
+
+def _about_walls(problem: Problem, error: float) -> str:
+    """Say that walls have one cell across, where that spoils what is wanted of them."""
+    if error <= LARGEST_ERROR:
+        return ""
+    linear = problem.mesh.order == 1 and problem.order == 1
+    wall = coarse_wall(problem.mesh)
+    if wall is None or not (linear or wall.edge > _LONG * wall.thickness):
+        return ""
+    at = ", ".join(f"{x:.4g}" for x in wall.place)
+    spoilt = (
+        "which are several times too stiff where the wall bends: use quadratic cells (order = 2), "
+        f"or edges of at most {0.5 * wall.thickness:.3g} mm"
+        if linear
+        else "too long for the stress round holes and corners: use edges of at most "
+        f"{wall.thickness:.3g} mm"
+    )
+    return (
+        f"walls of {wall.thickness:.3g} mm, as at ({at}) mm, have one cell across, with edges of "
+        f"{wall.edge:.3g} mm, {spoilt}"
+    )
+
+
+def check_effect(problem: Problem, case: str, held: Held, forces: FloatArray, size: float) -> None:
+    """Refuse a load case, or a combination, under which nothing moves.
+
+    Parameters
+    ----------
+    problem : Problem
+    case : str
+    held : Held
+        At its values in the case.
+    forces : (n, 3) array, N
+        Of the case.
+    size : float, N
+        Sum of the sizes of the forces that it is added up from.
+
+    Raises
+    ------
+    InputError
+        With the cause: cases of a combination that cancel, or loads on held nodes alone.
+    """
+    if held.value.any():
+        return
+    if case in problem.combinations and np.linalg.norm(forces, axis=1).sum() <= _NONE * size:
+        factors = problem.factors(case).items()
+        terms = " + ".join(f"{factor:g} {name}" for name, factor in factors)
+        raise InputError(
+            f"combination '{case}' is zero, for its load cases cancel ({terms}): change a factor, "
+            "or leave it out"
+        )
+    lifts = held.presses is not None and (held.along_pressing(forces) < 0.0).any()
+    if not lifts and np.linalg.norm(held.project(forces)) <= _NONE * size:
+        names = sorted({name for load in problem.loads_of(case) for name in patches_of(load)})
+        on = f" (on {', '.join(names)})" if names else ""
+        raise InputError(
+            f"load case '{case}'{on} acts on held nodes alone and does nothing: choose another "
+            "patch for the load, or for the support"
+        )
+
+
+def check_balance(
+    problem: Problem,
+    case: str,
+    displacement: FloatArray,
+    forces: FloatArray,
+    reactions: FloatArray,
+    moved: bool,
+) -> None:
+    """Refuse a solution whose reactions do not balance its loads.
+
+    Parameters
+    ----------
+    problem : Problem
+    case : str
+    displacement : (n, 3) array, mm
+    forces, reactions : (n, 3) array, N
+    moved : bool
+        Whether supports move: the reactions are then loads, too.
+
+    Raises
+    ------
+    SolveError
+        With what is left of force and moment.
+    """
+    mesh, both = problem.mesh, forces + reactions
+    arm = mesh.points - mesh.points[mesh.corners].mean(axis=(0, 1))
+    cell = float(np.abs(problem.cell_stiffness).max()) * float(np.cbrt(mesh.volumes.max()))
+    sizes = float(np.linalg.norm(forces, axis=1).sum())
+    if moved:
+        sizes += float(np.linalg.norm(reactions, axis=1).sum())
+    most = _BALANCE * sizes + _ROUNDING * cell * float(np.linalg.norm(displacement, axis=1).sum())
+    force = float(np.linalg.norm(both.sum(axis=0)))
+    moment = float(np.linalg.norm(np.cross(arm, both).sum(axis=0)))
+    if not (force <= most and moment <= most * _size(problem)):
+        raise SolveError(
+            f"load case '{case}': the reactions leave {force:.3g} N and {moment:.3g} N mm of "
+            f"forces of {sizes:.3g} N in all, so they do not balance the loads: hold the part "
+            "better, or take a direct backend"
+        )
+
+
+def check_size_of_motion(problem: Problem, case: str, displacement: FloatArray) -> None:
+    """Refuse a displacement (n, 3), mm, of more than ten times the part: see the top.
+
+    Raises
+    ------
+    InputError
+        That names a part which hardly anything holds as such.
+    """
+    far, size = _spread(displacement), _size(problem)
+    if not far <= _FARTHEST * size:
+        raise InputError(f"load case '{case}': {_about_far(problem, displacement, far, size)}")
+
+
+def _spread(displacement: FloatArray) -> float:
+    """Difference of the displacements of a part, mm: moving as a whole is no matter."""
+    return float(np.linalg.norm(np.ptp(displacement, axis=0)))
+
+
+def _about_far(problem: Problem, displacement: FloatArray, far: float, size: float) -> str:
+    """Say that a part moves too far for linear theory, and the likely reason."""
+    points = problem.mesh.points
+    modes = rigid_modes((points - points.mean(axis=0)) / size)
+    moved = displacement.reshape(-1) / far if np.isfinite(far) else np.zeros(displacement.size)
+    share = np.linalg.lstsq(modes.T @ modes, modes.T @ moved, rcond=None)[0]
+    rest = float(np.linalg.norm(moved - modes @ share)) / max(float(np.linalg.norm(moved)), 1e-300)
+    about = f"the part moves by {far:.4g} mm, {far / size:.3g} times its size of {size:.4g} mm, "
+    if rest < _RIGID:
+        return about + (
+            "nearly as a rigid body, so hardly anything holds it: add a support, or a stiffer "
+            "spring"
+        )
+    return about + (
+        f"and linear theory holds to about {_LINEAR:g} times: check the units of loads and moduli "
+        "(N, mm, MPa), or give a smaller load, since all results are proportional to it"
+    )
+
+
+def about_solution(
+    problem: Problem,
+    case: str,
+    displacement: FloatArray,
+    stress: FloatArray,
+    error: float,
+) -> tuple[str, ...]:
+    """Say what of a solution lies beyond linear theory, the strength, or the cells.
+
+    Parameters
+    ----------
+    problem : Problem
+        As it was solved.
+    case : str
+    displacement : (n, 3) array, mm
+    stress : (m, 3, 3) array, MPa
+        Of the cells.
+    error : float
+        Estimated error in energy norm.
+
+    Returns
+    -------
+    tuple of str
+        One line each, with its cure.
+    """
+    lines = [about_error(error, problem)]
+    far, size = _spread(displacement), _size(problem)
+    if far > _LINEAR * size and not _moved(problem, case) > _LINEAR * size:
+        lines.append(_about_far(problem, displacement, far, size))
+    lines.append(_about_strength(problem, case, stress))
+    return tuple(line for line in lines if line)
+
+
+def _about_strength(problem: Problem, case: str, stress: FloatArray) -> str:
+    """Say that the averaged stress is above the strength, or the strain above linear theory."""
+    judged, average, centroid = averaged_mises(problem, case, stress)
+    if not len(judged):
+        return ""
+    strength, modulus = np.full(len(stress), np.inf), np.full(len(stress), np.inf)
+    for material, cells in problem.materials:
+        strength[cells] = material.tensile_strength or np.inf
+        modulus[cells] = float(1.0 / np.linalg.inv(material.stiffness)[0, 0])
+    used = average / strength[judged]
+    worst = int(used.argmax())
+    at = ", ".join(f"{x:.4g}" for x in centroid[judged[worst]])
+    if used[worst] > 1.0:
+        return (
+            f"averaged over 2 mm, the von Mises stress at ({at}) mm is {average[worst]:.4g} MPa, "
+            f"above the tensile strength of {strength[judged[worst]]:.4g} MPa: without fibre the "
+            f"part fails there at {1.0 / used[worst]:.2g} times this load"
+        )
+    if problem.stiffness is not None or problem.density is not None:
+        return ""
+    strain = average / modulus[judged]
+    worst = int(strain.argmax())
+    if strain[worst] <= _LINEAR:
+        return ""
+    at = ", ".join(f"{x:.4g}" for x in centroid[judged[worst]])
+    return (
+        f"the part strains by {strain[worst]:.3g} at ({at}) mm, and linear theory holds to about "
+        f"{_LINEAR:g}: check the units of loads and moduli (N, mm, MPa)"
+    )

@@ -1,0 +1,127 @@
+"""Stress from displacement: in the cells, and averaged at the nodes."""
+
+import numpy as np
+import scipy.sparse as sp
+
+from ccfem.base.arrays import FloatArray
+from ccfem.base.tensor import from_voigt
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.fem.elasticity.assembly import cell_gradients
+
+__all__ = [
+    "cell_strain",
+    "cell_stress",
+    "nodal_stress",
+    "shape_gradients",
+    "strain_at_nodes",
+    "times",
+    "voigt_strain",
+]
+
+
+def voigt_strain(gradient: FloatArray) -> FloatArray:
+    """Voigt strain (..., 6) of displacement gradients (..., 3, 3) with entries du_p / dx_r."""
+    g = gradient
+    return np.stack(
+        [
+            g[..., 0, 0],
+            g[..., 1, 1],
+            g[..., 2, 2],
+            g[..., 1, 2] + g[..., 2, 1],
+            g[..., 0, 2] + g[..., 2, 0],
+            g[..., 0, 1] + g[..., 1, 0],
+        ],
+        axis=-1,
+    )
+
+
+def times(stiffness: FloatArray, strain: FloatArray) -> FloatArray:
+    """Stress (m, ..., 6) of strain (m, ..., 6) with one stiffness or one per cell."""
+    if stiffness.ndim == 2:
+        return strain @ stiffness.T
+    return (strain.reshape(len(strain), -1, 6) @ stiffness.transpose(0, 2, 1)).reshape(strain.shape)
+
+
+def shape_gradients(gradients: FloatArray, at: FloatArray, edges: FloatArray) -> FloatArray:
+    """Gradients (m, 10, 3) of the quadratic shape functions at barycentric coordinates (4,)."""
+    corner = (4.0 * at - 1.0)[:, None] * gradients
+    i, j = edges.T
+    middle = 4.0 * (at[j][:, None] * gradients[:, i] + at[i][:, None] * gradients[:, j])
+    return np.concatenate([corner, middle], axis=1)
+
+
+def cell_strain(mesh: TetMesh, displacement: FloatArray) -> FloatArray:
+    """Voigt strain (m, 6) with engineering shear, at the centroid of each cell."""
+    gradients = cell_gradients(mesh)
+    if mesh.order == 2:
+        gradients = shape_gradients(gradients, np.full(4, 0.25), mesh.edges)
+    return voigt_strain(displacement[mesh.cells].transpose(0, 2, 1) @ gradients)
+
+
+def strain_at_nodes(mesh: TetMesh, displacement: FloatArray) -> FloatArray:
+    """Voigt strain (m, q, 6) of each cell at its own nodes (q = 4, or 10 on quadratic cells)."""
+    if mesh.order == 1:
+        return np.repeat(cell_strain(mesh, displacement)[:, None], 4, axis=1)
+    gradients = cell_gradients(mesh)
+    u = displacement[mesh.cells].transpose(0, 2, 1)
+    barycentric = np.concatenate([np.eye(4), np.eye(4)[mesh.edges].mean(axis=1)])
+    at_nodes = [voigt_strain(u @ shape_gradients(gradients, at, mesh.edges)) for at in barycentric]
+    return np.stack(at_nodes, axis=1)
+
+
+def cell_stress(
+    mesh: TetMesh,
+    displacement: FloatArray,
+    stiffness: FloatArray,
+    free: FloatArray | None = None,
+) -> FloatArray:
+    """Stress of each cell, at its centroid.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    displacement : (n, 3) array, mm
+    stiffness : (6, 6) or (m, 6, 6) array, MPa
+    free : (m, 6) array, optional
+        Stress-free strain of each cell, Voigt, such as thermal strain.
+
+    Returns
+    -------
+    (m, 3, 3) array, MPa
+    """
+    strain = cell_strain(mesh, displacement)
+    return from_voigt(times(stiffness, strain if free is None else strain - free))
+
+
+def nodal_stress(
+    mesh: TetMesh,
+    displacement: FloatArray,
+    stiffness: FloatArray,
+    free: FloatArray | None = None,
+) -> FloatArray:
+    """Stress at the nodes: volume-weighted average over the cells round each node.
+
+    In quadratic cells the stress of a cell is taken at the node itself.
+
+    Returns
+    -------
+    (n, 3, 3) array, MPa
+        Zero at nodes without a cell.
+    """
+    m, q = mesh.cells.shape
+    if mesh.order == 1:
+        strain = cell_strain(mesh, displacement)
+        stress = times(stiffness, strain if free is None else strain - free)
+        entries = np.repeat(np.arange(m), q)
+    else:
+        strain = strain_at_nodes(mesh, displacement)
+        stress = times(stiffness, strain if free is None else strain - free[:, None])
+        stress = stress.reshape(-1, 6)
+        entries = np.arange(m * q)
+    weights = np.repeat(mesh.volumes, q)
+    nodes, n = mesh.cells.reshape(-1), len(mesh.points)
+    average = sp.csc_array(
+        sp.coo_array((weights, (nodes, entries)), shape=(n, len(stress))),
+    )
+    total = np.bincount(nodes, weights, n)
+    return from_voigt((average @ stress) / np.where(total > 0.0, total, 1.0)[:, None])

@@ -1,0 +1,333 @@
+"""Conversion of supports to held components, nodal axes and rigid bodies, for each load case."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, read_only
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.cell_mesh import CellMesh
+from ccfem.body.mesh.patches import unit_vector
+from ccfem.fem.elasticity.body import LoadedBody, SupportedProblem
+from ccfem.fem.elasticity.frames import node_frames
+from ccfem.fem.elasticity.held import Held
+from ccfem.fem.elasticity.load_kinds import Displacement
+from ccfem.fem.elasticity.nodes import (
+    edge_nodes,
+    nearest_node,
+    patch_facets,
+    patch_nodes,
+    patch_normals,
+)
+from ccfem.fem.elasticity.rigid_motion import Holds, check_motion
+from ccfem.fem.elasticity.springs import soft_holds
+from ccfem.fem.elasticity.support_kinds import (
+    AnySupport,
+    EdgeSupport,
+    Foundation,
+    Pin,
+    PointSpring,
+    PointSupport,
+    PressingSupport,
+    RigidPatch,
+    SlidingSupport,
+    Spring,
+    Support,
+)
+from ccfem.fem.elasticity.ties import Body, Ties
+
+__all__ = ["check_support", "held", "held_in"]
+
+
+def held(problem: SupportedProblem) -> Held:
+    """Collect the supports of a problem and check that they hold the part.
+
+    Nodes that belong to no cell are held at zero.
+
+    Raises
+    ------
+    InputError
+        For no support, an empty or unknown patch, values that contradict each other or are not
+        finite, and a part that is free to move; the message names the motion.
+    """
+    if not problem.supports:
+        raise InputError("the part has no support: hold at least one patch")
+    collected = _collect(problem, {})
+    check_motion(problem.mesh, _in_space(problem.mesh.points), collected.holds())
+    return collected.held()
+
+
+def held_in(problem: SupportedProblem, case: str, at_rest: Held) -> Held:
+    """Return the held components at the values of one load case.
+
+    Parameters
+    ----------
+    problem : Problem, or PlaneProblem
+    case : str
+    at_rest : Held
+        From `held`.
+
+    Raises
+    ------
+    InputError
+        For a displacement of a patch that no support holds.
+    """
+    loads = problem.loads[case]
+    moves = {load.patch: load.vector for load in loads if isinstance(load, Displacement)}
+    if not moves:
+        return at_rest
+    for patch, vector in moves.items():
+        holding = [s for s in problem.supports if type(s) in _KINDS and _moves(s) == patch]
+        holding = [s for s in holding if not isinstance(s, PressingSupport)]
+        known = {letter for s in holding for letter in getattr(s, "components", "xyz")}
+        wanted = {letter for letter, size in zip("xyz", vector, strict=True) if size}
+        if not np.isfinite(vector).all() or not wanted <= known:
+            raise InputError(
+                f"load case '{case}' moves patch '{patch}' by {tuple(vector)} mm, and supports on "
+                f"it hold {', '.join(sorted(known)) or 'nothing'}: hold the components to be moved"
+            )
+    return at_rest.at(_collect(problem, moves).held().value)
+
+
+def check_support(mesh: CellMesh, fixed: BoolArray) -> None:
+    """Check that no piece of the part can move as a rigid body.
+
+    Parameters
+    ----------
+    mesh : TetMesh, or mesh of a plate
+    fixed : (n, 3) bool array, or (n, 2) in the plane
+
+    Raises
+    ------
+    InputError
+        Names the free motion.
+    """
+    check_motion(mesh, _in_space(mesh.points), Holds(*_axis_holds(fixed)))
+
+
+def _in_space(points: FloatArray) -> FloatArray:
+    """Points of the plane as points with z = 0; points in space unchanged."""
+    return points if points.shape[1] == 3 else np.pad(points, ((0, 0), (0, 1)))
+
+
+def _axis_holds(fixed: BoolArray) -> tuple[IntArray, FloatArray]:
+    """Nodes and directions of held components; in the plane, every node is held normal to it."""
+    if fixed.shape[1] == 2:
+        fixed = np.pad(fixed, ((0, 0), (0, 1)), constant_values=True)
+    nodes, components = np.nonzero(fixed)
+    return nodes, np.eye(3)[components]
+
+
+@dataclass
+class _Rigid:
+    """A rigid patch: the held components of its motion along its axes, and their values."""
+
+    label: str
+    body: Body
+    held: BoolArray
+    value: FloatArray
+
+
+@dataclass
+class _Collected:
+    """Collected effect of the supports of a problem."""
+
+    mesh: CellMesh
+    surface: LoadedBody
+    free: BoolArray
+    value: FloatArray
+    oblique: list[tuple[IntArray, FloatArray, FloatArray]] = field(default_factory=list)
+    pressing: list[tuple[IntArray, FloatArray]] = field(default_factory=list)
+    rigid: list[_Rigid] = field(default_factory=list)
+    soft: list[tuple[IntArray, FloatArray]] = field(default_factory=list)
+
+    def components(
+        self, nodes: IntArray, components: str, value: Sequence[float], what: str
+    ) -> None:
+        """Hold components of nodes."""
+        if not np.isfinite(value).all():
+            raise InputError(f"a support must be held at finite values; got {value} on {what}")
+        known = "xyz"[: self.mesh.points.shape[1]]
+        for component in sorted(set(components) & set(known)):
+            k = "xyz".index(component)
+            before = nodes[~self.free[nodes, k]]
+            if (np.abs(self.value[before, k] - value[k]) > 1e-12).any():
+                raise InputError(
+                    f"supports contradict each other: nodes of {what} are held in {component} at "
+                    f"{value[k]} mm and at another value: give one value"
+                )
+            self.free[nodes, k] = False
+            self.value[nodes, k] = value[k]
+
+    def holds(self) -> Holds:
+        """Directions that are held, including those of springs and pressing supports."""
+        nodes, directions = _axis_holds(~self.free)
+        more = [(n, d) for n, d, _ in self.oblique] + self.pressing + self.soft
+        moved = [(k, a) for k, r in enumerate(self.rigid) for a in r.body.axes.T[r.held[0]]]
+        turned = [(k, a) for k, r in enumerate(self.rigid) for a in r.body.axes.T[r.held[1]]]
+        which = np.array([k for k, _ in moved], dtype=np.int64)
+        return Holds(
+            nodes=np.concatenate([nodes, *(n for n, _ in more)]),
+            directions=np.concatenate([directions, *(d for _, d in more)]),
+            bodies=tuple(r.body.nodes for r in self.rigid),
+            centres=np.array([r.body.centre for r in self.rigid]).reshape(-1, 3),
+            moved=which,
+            along=np.array([a for _, a in moved]).reshape(-1, 3),
+            turned=np.array([k for k, _ in turned], dtype=np.int64),
+            about=np.array([a for _, a in turned]).reshape(-1, 3),
+            centre_of=which,
+        )
+
+    def held(self) -> Held:
+        """Held components, with the ties due to oblique and rigid supports."""
+        free, value, ties = self.free.copy(), self.value.copy(), None
+        unused = np.ones(len(free), dtype=bool)
+        unused[self.mesh.cells] = False
+        free[unused] = False
+        presses = np.zeros(free.shape, dtype=bool)
+        if self.oblique or self.rigid or self.pressing:
+            turned, frames = node_frames(self.oblique, self.pressing, free, value, presses)
+            ties = Ties(self.mesh.points, turned, frames, tuple(r.body for r in self.rigid))
+            self._check_slaves(ties, free)
+            free[ties.slaves] = False
+            for rigid in self.rigid:
+                free = np.concatenate([free, ~rigid.held])
+                presses = np.concatenate([presses, np.zeros((2, 3), dtype=bool)])
+                value = np.concatenate([value, np.where(rigid.held, rigid.value, 0.0)])
+        nodes = np.flatnonzero((free | presses).any(axis=1))
+        return Held(
+            read_only(free, np.bool_),
+            read_only(value),
+            read_only(nodes, np.int64),
+            ties,
+            read_only(presses, np.bool_) if presses.any() else None,
+        )
+
+    def _check_slaves(self, ties: Ties, free: BoolArray) -> None:
+        """Refuse nodes of a rigid patch that are also held, or belong to two rigid patches."""
+        seen = np.zeros(len(self.mesh.points), dtype=bool)
+        for rigid in self.rigid:
+            nodes = rigid.body.nodes
+            if seen[nodes].any():
+                raise InputError(
+                    f"{rigid.label} shares nodes with another rigid patch: make one patch of both, "
+                    "or leave a gap between them"
+                )
+            seen[nodes] = True
+            if not free[nodes].all() or np.isin(nodes, ties.turned).any():
+                raise InputError(
+                    f"{rigid.label} has nodes that another support holds as well: hold the rigid "
+                    "patch itself, or leave a gap between them"
+                )
+
+
+def _collect(problem: SupportedProblem, moves: Mapping[str, Sequence[float]]) -> _Collected:
+    """Collect what the supports hold; some patches take other values."""
+    mesh = problem.mesh
+    free = np.ones(mesh.points.shape, dtype=bool)
+    collected = _Collected(mesh, problem.body, free, np.zeros(mesh.points.shape))
+    for support in problem.supports:
+        move = moves.get(_moves(support))
+        if isinstance(support, Spring | PointSpring | Foundation):
+            collected.soft += soft_holds(mesh, problem.body, support)
+        else:
+            _KINDS[type(support)](collected, support, move)
+    return collected
+
+
+def _moves(support: AnySupport) -> str:
+    """Patch through which a `Displacement` moves a support; empty for none."""
+    return getattr(support, "patch", "")
+
+
+def _patch(found: _Collected, support: Support, move: Sequence[float] | None) -> None:
+    nodes = patch_nodes(found.mesh, support.patch)
+    value = support.value if move is None else move
+    found.components(nodes, support.components, value, f"patch '{support.patch}'")
+
+
+def _edge(found: _Collected, support: EdgeSupport, move: Sequence[float] | None) -> None:
+    nodes = edge_nodes(found.mesh, support.patches)
+    found.components(nodes, support.components, support.value, f"the edge of {support.patches}")
+
+
+def _point(found: _Collected, support: PointSupport, move: Sequence[float] | None) -> None:
+    node = np.array([nearest_node(found.mesh, support.point, "a point support")])
+    found.components(node, support.components, support.value, f"the point {support.point}")
+
+
+def _sliding(found: _Collected, support: SlidingSupport, move: Sequence[float] | None) -> None:
+    nodes = patch_nodes(found.mesh, support.patch)
+    if support.normal is None:
+        facets = patch_facets(found.surface, support.patch)
+        normals = patch_normals(found.surface, facets, nodes)
+    else:
+        normal = unit_vector(support.normal, "normal of the sliding support")
+        normals = np.tile(normal, (len(nodes), 1))
+    values = np.full(len(nodes), support.value) if move is None else normals @ np.asarray(move)
+    found.oblique.append((nodes, normals, values))
+
+
+def _pressing(found: _Collected, support: PressingSupport, move: Sequence[float] | None) -> None:
+    mesh = found.mesh
+    facets, nodes = patch_facets(found.surface, support.patch), patch_nodes(mesh, support.patch)
+    if len(mesh.cells[0]) > len(mesh.corners[0]):
+        nodes = np.setdiff1d(nodes, facets)
+    if support.normal is None:
+        normals = patch_normals(found.surface, facets, nodes)
+    else:
+        normal = unit_vector(support.normal, "normal of the pressing support")
+        normals = np.tile(normal, (len(nodes), 1))
+    found.pressing.append((nodes, normals))
+
+
+def _rigid(found: _Collected, support: RigidPatch, move: Sequence[float] | None) -> None:
+    value = support.value if move is None else move
+    held = np.array([[c in letters for c in "xyz"] for letters in
+                     (support.components, support.rotations)])  # fmt: skip
+    centre = None if support.centre is None else np.array(support.centre)
+    angle = np.radians(support.angle)
+    label = f"rigid patch '{support.patch}'"
+    _add_body(found, label, support.patch, centre, np.eye(3), held, np.array([value, angle]))
+
+
+def _pin(found: _Collected, support: Pin, move: Sequence[float] | None) -> None:
+    axis = unit_vector(support.axis, "axis of the pin")
+    axes = np.linalg.svd(axis[None])[2].T
+    axes[:, 0] = axis
+    held = np.array([[not support.slides, True, True], [False, True, True]])
+    value = np.array([axes.T @ np.array(support.value if move is None else move), np.zeros(3)])
+    label = f"the pin in patch '{support.patch}'"
+    _add_body(found, label, support.patch, np.array(support.point), axes, held, value)
+
+
+def _add_body(
+    found: _Collected,
+    label: str,
+    patch: str,
+    centre: FloatArray | None,
+    axes: FloatArray,
+    held: BoolArray,
+    value: FloatArray,
+) -> None:
+    """Make a patch a rigid body; `value` is its translation and its rotation, mm and radians."""
+    facets, nodes = patch_facets(found.mesh, patch), patch_nodes(found.mesh, patch)
+    if centre is None:
+        area, _ = found.surface.facet_areas(facets)
+        centre = area @ found.mesh.points[facets].mean(axis=1) / area.sum()
+    size = float(np.linalg.norm(found.mesh.points[nodes] - centre, axis=1).max())
+    body = Body(nodes, np.asarray(centre, dtype=np.float64), axes, size)
+    found.rigid.append(_Rigid(label, body, held, value * np.array([[1.0], [size]])))
+
+
+_KINDS: dict[type, Callable[..., None]] = {
+    Support: _patch,
+    EdgeSupport: _edge,
+    PointSupport: _point,
+    SlidingSupport: _sliding,
+    PressingSupport: _pressing,
+    RigidPatch: _rigid,
+    Pin: _pin,
+}
+"""Functions that collect supports of each kind, except elastic ones."""

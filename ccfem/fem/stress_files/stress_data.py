@@ -1,0 +1,73 @@
+"""Stress as a file holds it, before it is mapped to a mesh."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ccfem.base.arrays import FloatArray, IntArray, freeze
+from ccfem.base.errors import InputError
+
+__all__ = ["COMPONENTS", "StressData", "component_of", "component_order"]
+
+COMPONENTS = ("xx", "yy", "zz", "yz", "xz", "xy")
+"""Voigt components in their order."""
+
+
+@dataclass(frozen=True)
+class StressData:
+    """Stress at nodes, in cells, or both.
+
+    Attributes
+    ----------
+    points : (n, 3) array, or None
+        Nodes, mm; None where the file has numbers only, and these are those of the mesh.
+    corners : (c, 4) int array, or None
+        Corner nodes of the cells.
+    nodal : (n, 6) array, or None
+        Voigt.
+    cell : (c, 6) array, or None
+        Voigt.
+    unit : str
+        Of the stress, as the file says; empty where it does not.
+    nodes, cells : (n,) and (c,) int array, or None
+        Numbers by which the file calls its nodes and cells; None where it counts them from 0.
+    """
+
+    points: FloatArray | None
+    corners: IntArray | None
+    nodal: FloatArray | None
+    cell: FloatArray | None
+    unit: str = ""
+    nodes: IntArray | None = None
+    cells: IntArray | None = None
+
+    def __post_init__(self) -> None:
+        freeze(self, points=float, corners=int, nodal=float, cell=float, nodes=int, cells=int)
+
+
+def component_of(name: str) -> int:
+    """Voigt component that a name like xx, Sxx, sigma_xz, S11 or SZX means; -1 for none."""
+    letters = re.sub(r"[^a-z0-9]", "", name.lower())
+    found = re.fullmatch(r"(?:s|sig|sigma|stress|t)?([xyz123]{2})", letters)
+    if found is None:
+        return -1
+    pair = "".join(sorted(found[1].translate(str.maketrans("123", "xyz"))))
+    return COMPONENTS.index(pair)
+
+
+def component_order(names: Sequence[str], what: str) -> list[int]:
+    """Column of each Voigt component by the names of the columns.
+
+    Raises
+    ------
+    InputError
+        Where a component is missing or comes twice.
+    """
+    found = [component_of(name) for name in names]
+    if sorted(k for k in found if k >= 0) != list(range(6)):
+        given = ", ".join(repr(name) for name in names)
+        raise InputError(
+            f"{what} must name the components xx, yy, zz, yz, xz and xy, each once (as Sxx or S11 "
+            f"too); got {given}: name them"
+        )
+    return [found.index(k) for k in range(6)]

@@ -1,0 +1,155 @@
+"""Compliance of a part with a factor on the stiffness of its cells, solved again and again."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.errors import InputError
+from ccfem.fem.elasticity.problem import Problem
+from ccfem.fem.elasticity.solvers import Solver
+from ccfem.fem.plates.problem import PlaneProblem
+from ccfem.fem.topopt.equations import PlateEquations, TetEquations
+from ccfem.fem.topopt.groups import CellGroups
+
+__all__ = ["Compliance", "Response"]
+
+_TOLERANCE = 1e-6
+"""Relative residual of a solve; contrasts of 1e9 leave no less in double precision."""
+
+
+class Response(NamedTuple):
+    """Response of a part to its load cases.
+
+    Attributes
+    ----------
+    cases : dict of load case name to float, N mm
+        Compliance under each: the work of its loads, ``f . u``.
+    compliance : float, N mm
+        Their weighted sum.
+    energy : (g,) array, N mm
+        Weighted ``u^T k u`` of each group of cells at full density.
+    displacement : dict of load case name to (n, d) array, mm
+    """
+
+    cases: dict[str, float]
+    compliance: float
+    energy: FloatArray
+    displacement: dict[str, FloatArray]
+
+
+class Compliance:
+    """Compliance of a plate or of a part of linear tetrahedra.
+
+    It keeps the last factorisation and displacement: iterative backends start at the latter. A
+    stiffness is that of full density in the global axes, one of each group: a (g, k, k) array, MPa,
+    with k 3 for plates and 6 for tetrahedra.
+
+    Parameters
+    ----------
+    problem : PlaneProblem or Problem
+        With the stiffness of full density; supports at rest.
+    weights : mapping of load case name to float, optional
+        One non-negative weight a load case; default 1 each.
+    backend : str, default "auto"
+    groups : (m,) int array, optional
+        Cells with the same number share their factor; default each has its own (g = m).
+
+    Attributes
+    ----------
+    cells : CellGroups
+    centres : (g, d) array, mm
+    volumes : (g,) array, mm^3
+
+    Raises
+    ------
+    InputError
+        For weights or groups that do not fit the problem, supports that move, quadratic
+        tetrahedra, and a problem that has a density already.
+    """
+
+    def __init__(
+        self,
+        problem: PlaneProblem | Problem,
+        weights: Mapping[str, float] | None = None,
+        backend: str = "auto",
+        groups: IntArray | None = None,
+    ) -> None:
+        self.weights = _checked_weights(problem, weights)
+        self._equations: PlateEquations | TetEquations = (
+            PlateEquations(problem) if isinstance(problem, PlaneProblem) else TetEquations(problem)
+        )
+        system = self._equations.system
+        if any(system.held_in(case).value.any() for case in system.forces):
+            raise InputError("topology optimisation takes supports at rest: hold them at zero")
+        if system.held.presses is not None:
+            raise InputError(
+                "topology optimisation takes supports that hold both ways; got some that only "
+                "press: hold their patches, or let them slide (SlidingSupport)"
+            )
+        self._backend = self._equations.backend() if backend == "auto" else backend
+        self._solver: Solver | None = None
+        self._displacement: dict[str, FloatArray] = {}
+        volumes = self._equations.volumes
+        self.cells = CellGroups.of_cells(groups, len(volumes))
+        self.volumes = self.cells.sum(volumes)
+        self.centres = self.cells.mean(self._equations.centres, volumes)
+
+    def __call__(self, factor: FloatArray, stiffness: FloatArray | None = None) -> Response:
+        """Response with factors (g,) in (0, 1], and where given with another stiffness.
+
+        Raises
+        ------
+        SolveError
+            When a solve misses its tolerance.
+        """
+        equations, member = self._equations, self.cells.member
+        elements = equations.elements(None if stiffness is None else stiffness[member])
+        self._solve(equations.assemble(factor[member], elements))
+        cases, energy = {}, np.zeros(len(member))
+        for case, displacement in self._displacement.items():
+            forces = equations.system.forces[case]
+            cases[case] = float(np.einsum("ij,ij->", forces, displacement))
+            energy += self.weights[case] * equations.energy(displacement, elements)
+        compliance = sum(self.weights[case] * work for case, work in cases.items())
+        return Response(cases, compliance, self.cells.sum(energy), dict(self._displacement))
+
+    def _solve(self, matrix: sp.bsr_array) -> None:
+        """Find the displacement of every load case."""
+        system = self._equations.system
+        held = system.held
+        if self._solver is None:
+            self._solver = system.factorise(matrix, self._backend, len(system.forces))
+        else:
+            self._solver = self._solver.refactorise(held.reduce(matrix))
+        for case, forces in system.forces.items():
+            before = self._displacement.get(case)
+            start = None if before is None else held.restrict(before)
+            solution = self._solver.solve(held.right_hand_side(matrix, forces), start, _TOLERANCE)
+            self._displacement[case] = held.expand(solution.values)
+
+    def energy(self, displacement: FloatArray, stiffness: FloatArray) -> FloatArray:
+        """Energy ``u^T k u`` of each group, (g,), N mm, at a displacement (n, d)."""
+        elements = self._equations.elements(stiffness[self.cells.member])
+        return self.cells.sum(self._equations.energy(displacement, elements))
+
+    def stress(self, displacement: FloatArray, stiffness: FloatArray) -> FloatArray:
+        """Mean stress [s11, s22, s12] of each group in the x-y plane, (g, 3), MPa."""
+        stress = self._equations.stress(displacement, stiffness[self.cells.member])
+        return self.cells.mean(stress, self._equations.volumes)
+
+
+def _checked_weights(
+    problem: PlaneProblem | Problem, weights: Mapping[str, float] | None
+) -> dict[str, float]:
+    chosen = dict.fromkeys(problem.loads, 1.0) if weights is None else dict(weights)
+    if set(chosen) != set(problem.loads) or not all(0.0 <= w < np.inf for w in chosen.values()):
+        raise InputError(
+            f"weights must be one number >= 0 for each load case ({', '.join(problem.loads)}); "
+            f"got {chosen}"
+        )
+    if not any(chosen.values()):
+        raise InputError("all weights of load cases are zero: give one a weight")
+    return chosen

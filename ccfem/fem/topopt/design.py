@@ -1,0 +1,127 @@
+"""The result of a topology optimisation."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ccfem.base.arrays import BoolArray, FloatArray, freeze, in_brief
+from ccfem.base.checks import check_number
+from ccfem.fem.elasticity.problem import Order, Problem
+from ccfem.fem.plates.problem import PlaneProblem
+from ccfem.fem.topopt.material_axes import axes_about_z
+
+__all__ = ["FALLS_APART", "Design"]
+
+_APART = "falls apart between its loads and supports"
+_CURE = "raise the volume fraction or the filter radius"
+FALLS_APART = f"the design {_APART}: {_CURE}"
+"""What is wrong with densities whose part joins not all of them, and the cure."""
+
+
+@dataclass(frozen=True)
+class Design:
+    """Densities that an optimisation found.
+
+    Attributes
+    ----------
+    full : PlaneProblem or Problem
+        The problem at full density.
+    density : (m,) array in [0, 1]
+        Of each cell (filtered, with a density filter).
+    variables : (m,) array in [0, 1]
+        What the optimiser changes: equal to `density` unless that is filtered. Start from them to
+        continue a run.
+    factor : (m,) array in (0, 1]
+        On the stiffness of each cell, from its density.
+    compliance : (k,) array, N mm
+        Weighted compliance of every iterate, the last one being that of `density`.
+    change : (k - 1,) array
+        Largest change of a variable in every iteration.
+    converged : str
+        "change", "objective", or "" when the iterations ran out.
+    angle : (m,) array, radians, or None
+        Of the material axis of each cell, where it was optimised.
+    """
+
+    full: PlaneProblem | Problem
+    density: FloatArray
+    variables: FloatArray
+    factor: FloatArray
+    compliance: FloatArray
+    change: FloatArray
+    converged: str
+    angle: FloatArray | None = None
+
+    __repr__ = in_brief
+
+    def __post_init__(self) -> None:
+        freeze(self, density=float, variables=float, factor=float, angle=float)
+        freeze(self, compliance=float, change=float)
+
+    @property
+    def iterations(self) -> int:
+        """Iterations taken."""
+        return len(self.change)
+
+    @property
+    def apart(self) -> str:
+        """What is wrong where its part joins not all loads and supports, and the cure."""
+        if self.converged or not self.iterations:
+            return FALLS_APART
+        return (
+            f"the design has not converged (iterations: {self.iterations}) and {_APART}: give it "
+            f"more iterations (--iterations), or {_CURE}"
+        )
+
+    @property
+    def volumes(self) -> FloatArray:
+        """Volume of each cell, (m,), mm^3."""
+        full = self.full
+        return full.volumes if isinstance(full, PlaneProblem) else full.mesh.volumes
+
+    @property
+    def volume_fraction(self) -> float:
+        """Share of the volume that is filled."""
+        return float(self.volumes @ self.density / self.volumes.sum())
+
+    @property
+    def grey(self) -> float:
+        """Sigmund's measure of non-discreteness, the mean of 4 rho (1 - rho): 0 is black/white."""
+        return float(np.mean(4.0 * self.density * (1.0 - self.density)))
+
+    @property
+    def problem(self) -> PlaneProblem | Problem:
+        """The problem with the stiffness that the densities give, on the cells as they are."""
+        if isinstance(self.full, PlaneProblem):
+            return replace(self.full, stiffness=self.factor[:, None, None] * self.full.stiffness)
+        order: Order = 1 if self.full.mesh.order == 1 else 2
+        return replace(self.full, density=self.factor, order=order)
+
+    def axes_at(self, points: FloatArray) -> FloatArray | None:
+        """Material axes (k, 3, 3), as columns, of the cells nearest to points (k, 3), mm.
+
+        None where the design has no angles.
+        """
+        if self.angle is None:
+            return None
+        mesh = self.full.mesh
+        centres = mesh.points[mesh.cells].mean(axis=1)
+        return axes_about_z(self.angle[cKDTree(centres).query(points[:, : centres.shape[1]])[1]])
+
+    def filled(self, volume_fraction: float | None = None) -> BoolArray:
+        """Densest cells, as an (m,) mask, that make up a share of the volume.
+
+        Parameters
+        ----------
+        volume_fraction : float in (0, 1], optional
+            Default that of the design.
+        """
+        share = self.volume_fraction if volume_fraction is None else volume_fraction
+        check_number("volume_fraction", share, above=0.0, at_most=1.0)
+        order = np.argsort(-self.density, kind="stable")
+        reached = np.cumsum(self.volumes[order])
+        count = int(np.searchsorted(reached, share * reached[-1] * (1.0 + 1e-12), side="right"))
+        result = np.zeros(len(order), dtype=bool)
+        result[order[: max(count, 1)]] = True
+        return result

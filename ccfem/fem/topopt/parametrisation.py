@@ -1,0 +1,141 @@
+"""Penalised densities: from the variables of an optimiser to stiffness, and gradients back."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ccfem.base.arrays import BoolArray, FloatArray
+from ccfem.base.errors import InputError
+from ccfem.fem.topopt.compliance import Compliance
+from ccfem.fem.topopt.filters import ConeFilter
+from ccfem.fem.topopt.groups import CellGroups
+from ccfem.fem.topopt.parameters import Parameters
+
+__all__ = ["Parametrisation"]
+
+
+@dataclass(frozen=True)
+class Parametrisation:
+    """How variables become densities and stiffness, with the gradients back.
+
+    Attributes
+    ----------
+    parameters : Parameters
+    cells : CellGroups
+        g groups of m cells; all that follows is by groups.
+    cone : ConeFilter
+    solid, void : (g,) bool arrays
+        Passive cells, whose density stays 1 or 0.
+    """
+
+    parameters: Parameters
+    cells: CellGroups
+    cone: ConeFilter
+    solid: BoolArray
+    void: BoolArray
+
+    @classmethod
+    def of_part(
+        cls,
+        parameters: Parameters,
+        part: Compliance,
+        solid: BoolArray | None,
+        void: BoolArray | None,
+    ) -> "Parametrisation":
+        """Make the filter of a part, and check its passive cells, (m,) bool arrays or None.
+
+        Raises
+        ------
+        InputError
+            For cells that are both solid and void, a volume fraction that the passive cells make
+            impossible, and a radius so large that it reaches too many cells.
+        """
+        cells = part.cells
+        solid, void = _mask(cells, "solid", solid), _mask(cells, "void", void)
+        if (solid & void).any():
+            raise InputError("a cell cannot be both solid and void: correct the masks")
+        total, share = float(part.volumes.sum()), parameters.volume_fraction
+        filled, empty = (float(part.volumes[mask].sum()) / total for mask in (solid, void))
+        if not filled < share < 1.0 - empty:
+            raise InputError(
+                f"volume fraction {share} cannot be met: solid cells fill {filled:.3g} and void "
+                f"cells {empty:.3g} of the volume"
+            )
+        cone = ConeFilter.of_cells(part.centres, part.volumes, parameters.radius)
+        return cls(parameters, cells, cone, solid, void)
+
+    @cached_property
+    def free(self) -> BoolArray:
+        """Groups whose density is to be found, (g,)."""
+        return ~(self.solid | self.void)
+
+    def start(self, given: FloatArray | None) -> FloatArray:
+        """Variables (g,) to begin with: given (m,), or uniform where they are free."""
+        volumes = self.cone.volumes
+        if given is not None:
+            variables = np.array(self.cells.reduced("start", given), dtype=np.float64)
+            if not ((variables >= 0.0) & (variables <= 1.0)).all():
+                raise InputError(
+                    f"start must be densities in [0, 1]; got {variables.min()} to {variables.max()}"
+                )
+        else:
+            rest = self.parameters.volume_fraction * volumes.sum() - volumes[self.solid].sum()
+            variables = np.full(len(volumes), rest / volumes[self.free].sum())
+        variables[self.solid], variables[self.void] = 1.0, 0.0
+        return variables
+
+    def density(self, variables: FloatArray) -> FloatArray:
+        """Densities (g,) of the variables (g,)."""
+        filtered = self.parameters.filter == "density"
+        density = self.cone.average(variables) if filtered else variables.copy()
+        density[self.solid], density[self.void] = 1.0, 0.0
+        return density
+
+    def factor(self, density: FloatArray) -> FloatArray:
+        """Factor (g,) on the stiffness of each group, by modified SIMP.
+
+        ``least + density**penalty * (1 - least)`` with the minimum stiffness (Sigmund, Struct.
+        Multidisc. Optim. 33 (2007) 401).
+        """
+        least = self.parameters.minimum_stiffness
+        return least + density**self.parameters.penalty * (1.0 - least)
+
+    def gradient(self, density: FloatArray, energy: FloatArray) -> FloatArray:
+        """Differentiate the compliance by the variables, exactly: (g,) array.
+
+        Parameters
+        ----------
+        density : (g,) array
+        energy : (g,) array, N mm
+            ``u^T k u`` of each group at full density.
+        """
+        penalty, least = self.parameters.penalty, self.parameters.minimum_stiffness
+        slope = penalty * density ** (penalty - 1.0) * (1.0 - least)
+        return self._by_variables(-slope * energy)
+
+    def volume_gradient(self) -> FloatArray:
+        """Differentiate the volume by the variables: (g,) array, mm^3."""
+        return self._by_variables(self.cone.volumes)
+
+    def _by_variables(self, by_density: FloatArray) -> FloatArray:
+        """Gradient (g,) by the variables from that by the densities: the chain rule."""
+        own = np.where(self.free, by_density, 0.0)
+        return self.cone.transposed(own) if self.parameters.filter == "density" else own
+
+    def sensitivities(
+        self, variables: FloatArray, density: FloatArray, energy: FloatArray
+    ) -> FloatArray:
+        """Gradient (g,) that the update takes: with the sensitivity filter, smoothed."""
+        gradient = self.gradient(density, energy)
+        if self.parameters.filter == "sensitivity":
+            return self.cone.sensitivities(variables, gradient)
+        return gradient
+
+
+def _mask(cells: CellGroups, name: str, given: BoolArray | None) -> BoolArray:
+    """Mask (g,) of the groups from one (m,) of the cells, or empty."""
+    mask = np.zeros(len(cells.member), dtype=bool) if given is None else np.asarray(given)
+    if mask.dtype != np.bool_:
+        raise InputError(f"{name} must be a bool array; got {mask.dtype}: compare, as in x > 0")
+    return cells.reduced(name, mask)

@@ -1,0 +1,151 @@
+"""SOMP: densities and the axis of an anisotropic material, by SIMP and principal stress."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Literal
+
+import numpy as np
+
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.checks import check_fields
+from ccfem.base.errors import InputError
+from ccfem.base.progress import Progress, silent
+from ccfem.fem.elasticity.problem import Problem
+from ccfem.fem.plates.problem import PlaneProblem
+from ccfem.fem.topopt.compliance import Compliance
+from ccfem.fem.topopt.design import Design
+from ccfem.fem.topopt.filters import ConeFilter
+from ccfem.fem.topopt.iteration import iterate
+from ccfem.fem.topopt.material_axes import harmonics, sheet
+from ccfem.fem.topopt.oriented_compliance import (
+    OrientedCompliance,
+    Turn,
+    down_the_gradient,
+    to_principal_stress,
+)
+from ccfem.fem.topopt.parameters import Parameters
+from ccfem.fem.topopt.parametrisation import Parametrisation
+
+__all__ = ["Somp"]
+
+
+@dataclass(frozen=True)
+class Somp(Parameters):
+    """Densities and material axes of least compliance with a given volume.
+
+    Wang et al., Composites Part A 140 (2021) 106181, eq. 1, with the axis along the principal
+    stress of largest size: averaged over the filter in double-angle form, weighted by its size and
+    the penalised density. On tetrahedra the axis turns about z, and the stress is that in the x-y
+    plane: for plates that lie in it.
+
+    Attributes
+    ----------
+    volume_fraction, penalty, radius, filter
+        As in `Simp`; so are move, tolerance, objective_tolerance, max_iterations and backend.
+    minimum_stiffness : float in (0, 1), default 1e-3
+        Share of the stiffness that an empty cell keeps.
+    orientation : str, default "principal"
+        "principal", "gradient" (steps of at most 5 degrees down the filtered gradient) or "fixed".
+    relaxation : float in (0, 1], default 0.5
+        Share of the way to the principal direction that is gone in an iteration.
+
+    Raises
+    ------
+    InputError
+        For a parameter out of its range.
+    """
+
+    minimum_stiffness: float = 1e-3
+    orientation: Literal["principal", "gradient", "fixed"] = "principal"
+    relaxation: float = 0.5
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_fields(self, "relaxation", above=0.0, at_most=1.0)
+
+    def __call__(
+        self,
+        problem: PlaneProblem | Problem,
+        stiffness: FloatArray,
+        *,
+        angle: FloatArray | float = 0.0,
+        weights: Mapping[str, float] | None = None,
+        solid: BoolArray | None = None,
+        void: BoolArray | None = None,
+        groups: IntArray | None = None,
+        start: FloatArray | None = None,
+        progress: Progress = silent,
+    ) -> Design:
+        """Optimise a plate or a part.
+
+        Parameters
+        ----------
+        problem : PlaneProblem or Problem
+            Its stiffness is replaced. One layer of tetrahedra held along z at every node, with
+            `groups`, is a plate in plane stress.
+        stiffness : (3, 3) array, MPa, or (6, 6) on tetrahedra
+            Of the laminate or material, in its axes. On tetrahedra, (3, 3) is a thin sheet in plane
+            stress.
+        angle : (m,) array or float, radians, default 0
+            Of the material axis at the start.
+        weights, solid, void, progress
+            As in `Simp`.
+        groups : (m,) int array, optional
+            Cells with the same number share density and angle: the columns of a plate of
+            tetrahedra.
+        start : (m,) array in [0, 1], optional
+            As in `Simp`. To continue a run give its variables, and its `angle` as `angle`.
+
+        Returns
+        -------
+        Design
+            With `angle`, in (-pi/2, pi/2].
+
+        Raises
+        ------
+        InputError
+            As in `Simp`, and for a material that is not symmetric about the x-y plane.
+        SolveError
+            When a solve misses its tolerance.
+        """
+        m = len(problem.mesh.cells)
+        first, stiffness = _first_angle(angle, m), _checked_stiffness(problem, stiffness)
+        uniform = np.broadcast_to(stiffness, (m, *stiffness.shape))
+        part = Compliance(replace(problem, stiffness=uniform), weights, self.backend, groups)
+        space = Parametrisation.of_part(self, part, solid, void)
+        first = part.cells.reduced("angle", first)
+        oriented = OrientedCompliance(part, harmonics(stiffness), first)
+        turn = self._turn(space.cone)
+        design, oriented = iterate(problem, oriented, space, start, progress, turn)
+        member = part.cells.member
+        full = replace(problem, stiffness=oriented.stiffness()[member])
+        return replace(design, full=full, angle=oriented.angle[member])
+
+    def _turn(self, cone: ConeFilter) -> Turn | None:
+        """How the axes turn from one iteration to the next."""
+        if self.orientation == "principal":
+            return partial(to_principal_stress, cone=cone, relaxation=self.relaxation)
+        return partial(down_the_gradient, cone=cone) if self.orientation == "gradient" else None
+
+
+def _first_angle(angle: FloatArray | float, m: int) -> FloatArray:
+    """Angle of the material axis of each cell at the start, (m,), radians."""
+    first = np.asarray(angle, dtype=np.float64)
+    if first.shape not in ((), (m,)) or not np.isfinite(first).all():
+        raise InputError(f"angle must be one number or one a cell ({m}); got shape {first.shape}")
+    return np.broadcast_to(first, (m,))
+
+
+def _checked_stiffness(problem: PlaneProblem | Problem, stiffness: FloatArray) -> FloatArray:
+    """Stiffness in material axes of the size that the problem's cells take."""
+    stiffness = np.asarray(stiffness, dtype=np.float64)
+    size = 3 if isinstance(problem, PlaneProblem) else 6
+    if size == 6 and stiffness.shape == (3, 3):
+        return sheet(stiffness)
+    if stiffness.shape != (size, size):
+        raise InputError(
+            f"stiffness must have shape ({size}, {size}) here; got {stiffness.shape}: give "
+            "Material.stiffness for tetrahedra, plane_stress(...) for a plate"
+        )
+    return stiffness

@@ -1,0 +1,274 @@
+"""The evaluator: every index of a set of paths, for each layer and in total."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ccfem.base.arrays import FloatArray, IntArray, freeze
+from ccfem.base.display import Shown
+from ccfem.base.errors import InputError
+from ccfem.base.threads import in_threads
+from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.fem.materials import Material, named_material
+from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
+from ccfem.judging.evaluation import indices
+from ccfem.judging.evaluation.column import Column
+from ccfem.judging.evaluation.indices.alignment import AlignmentSamples
+from ccfem.judging.evaluation.indices.curvature import CurvatureSamples
+from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
+from ccfem.judging.evaluation.plane_paths import PlanePaths, plane_paths, pool
+from ccfem.judging.evaluation.printed_stack import Printed, printed
+from ccfem.judging.evaluation.sensitivity import strand_lamina
+from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.machine.machine import Machine
+from ccfem.paths.fields.chart import chart_of
+from ccfem.paths.toolpaths import FIBRE, Toolpaths
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer_stress import stress_on
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["COLUMNS", "Evaluation", "FibreSamples", "evaluate"]
+
+COLUMNS: tuple[Column, ...] = tuple(
+    column for module in indices.named().values() for column in module.COLUMNS
+)
+"""Every index in the order of the tables."""
+
+_ROUNDING = 1e-3
+"""Rounding, mm, of coordinates in path files."""
+
+
+@dataclass(frozen=True)
+class FibreSamples:
+    """Samples along the fibre of one layer, from which curves are drawn.
+
+    Attributes
+    ----------
+    curvature : CurvatureSamples
+    alignment : AlignmentSamples
+    """
+
+    curvature: CurvatureSamples
+    alignment: AlignmentSamples
+
+
+@dataclass(frozen=True)
+class Evaluation(Shown):
+    """Every index of a set of paths.
+
+    Totals are computed from the samples of all layers together; they are not means of the layers.
+
+    Attributes
+    ----------
+    layers : (L,) int array
+        Index of each layer.
+    values : mapping of column name to (L + 1,) array
+        One value a layer, then the total. NaN only where `Column.range` says so; `COLUMNS` says
+        what each value is.
+    samples : tuple of L FibreSamples
+        Of each layer.
+    """
+
+    layers: IntArray
+    values: Mapping[str, FloatArray]
+    samples: tuple[FibreSamples, ...]
+
+    def __repr__(self) -> str:
+        return f"Evaluation of {len(self.layers)} layers by {len(self.values)} indices"
+
+    def _repr_html_(self) -> str:
+        return str(self.to_frame().T.to_html(float_format="{:.4g}".format))
+
+    def __post_init__(self) -> None:
+        freeze(self, layers=int, values=float)
+
+    @property
+    def total(self) -> Mapping[str, float]:
+        """Each index of the whole part."""
+        return {name: float(column[-1]) for name, column in self.values.items()}
+
+    def of_layer(self, index: int) -> Mapping[str, float]:
+        """Each index of one layer.
+
+        Raises
+        ------
+        InputError
+            When the layer was not evaluated.
+        """
+        row = np.flatnonzero(self.layers == index)
+        if not len(row):
+            known = ", ".join(str(k) for k in self.layers)
+            raise InputError(f"no layer {index} was evaluated; there are: {known}")
+        return {name: float(column[row[0]]) for name, column in self.values.items()}
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Table with one row a layer, then the row "total"; its index is named "layer".
+
+        ``frame.attrs["columns"]`` holds the description of each column: unit, formula, range.
+        """
+        import pandas as pd
+
+        index = pd.Index([*self.layers.tolist(), "total"], name="layer", dtype=object)
+        frame = pd.DataFrame(dict(self.values), index=index)
+        frame.attrs["columns"] = {
+            c.name: {"unit": c.unit, "formula": c.formula, "range": c.range} for c in COLUMNS
+        }
+        return frame
+
+
+def evaluate(
+    toolpaths: Toolpaths,
+    layers: Sequence[Layer],
+    stress: PartStress,
+    machine: Machine,
+    strand: Strand | None = None,
+    build: Sequence[float] | None = None,
+) -> Evaluation:
+    """Evaluate the fibre paths of a part.
+
+    Sampling distances scale with the fibre width of the machine.
+
+    Parameters
+    ----------
+    toolpaths : Toolpaths
+        Paths of other kinds than fibre count in the print time only.
+    layers : sequence of Layer
+        Flat or curved, among them every layer that has a path. What is measured in the plane of
+        a flat layer is measured in the chart of a curved one (`ccfem.paths.fields.chart`), with the
+        lengths of the paths in space.
+    stress : PartStress
+    machine : Machine
+    strand : Strand, optional
+        How stiff the fibre is in the index of stiffness alignment; by default as in the virtual
+        test. It counts where `stress` knows the material of the part.
+    build : sequence of 3 floats, optional
+        Build direction. The head's tilt on curved layers is measured from it, and flat layers
+        normal to it serve for comparison (`across_flat`). Default: mean normal of the layers.
+
+    Returns
+    -------
+    Evaluation
+
+    Raises
+    ------
+    InputError
+        When there is no layer, or a path lies on none of the layers.
+    """
+    layers = tuple(layers)
+    if not layers:
+        raise InputError("expected at least one layer to evaluate; got none: slice the part")
+    _check_layers(toolpaths, layers)
+    fibre = toolpaths.of_kind(FIBRE).layer
+    late = fibre[fibre < np.maximum.accumulate(fibre)]
+    stack = printed(layers, build)
+    upright = _upright(layers, build)
+
+    def sampled(layer: Layer) -> dict[str, Any]:
+        behind = int(np.count_nonzero(late == layer.index))
+        on_layer = toolpaths.on_layer(layer.index)
+        below = _below(layer, layers)
+        view = _view(on_layer, layer, stress, machine, below, behind, stack, upright)
+        kinds = indices.named().items()
+        return {name: kind.sample(view) for name, kind in kinds if hasattr(kind, "sample")}
+
+    samples = in_threads(sampled, layers)
+    basis = Basis(machine, _material(layers, stress, machine, strand or Strand()))
+    rows = [_indices(each, basis) for each in (*samples, _pooled(samples))]
+    return Evaluation(
+        np.array([layer.index for layer in layers]),
+        {column.name: np.array([row[column.name] for row in rows]) for column in COLUMNS},
+        tuple(FibreSamples(each["curvature"], each["alignment"]) for each in samples),
+    )
+
+
+def _check_layers(toolpaths: Toolpaths, layers: Sequence[Layer]) -> None:
+    """Refuse paths that do not lie on a given layer, at its height."""
+    known = {layer.index: layer for layer in layers}
+    for index in np.unique(toolpaths.layer).tolist():
+        if index not in known:
+            raise InputError(
+                f"a path lies on layer {index}, but only layers {sorted(known)} were given: give "
+                "the layers that the paths were planned on"
+            )
+        layer, points = known[index], toolpaths.on_layer(index).points
+        if layer.flat is None:
+            away = nearest_on_triangles(layer.points, layer.triangles, points).distance
+        else:
+            away = np.abs(points @ layer.flat.frame[2] - layer.flat.height)
+        apart = float(away.max())
+        if apart > 0.5 * layer.thickness + _ROUNDING:
+            raise InputError(
+                f"a path of layer {index} lies {apart:.3g} mm above or below it: give the layers "
+                "that the paths were planned on"
+            )
+
+
+def _upright(layers: Sequence[Layer], build: Sequence[float] | None) -> FloatArray:
+    """Return the unit vector of the build direction, by default the mean normal of the layers."""
+    total = np.sum([layer.areas @ layer.normals for layer in layers], axis=0)
+    up = total if build is None else np.asarray(build, dtype=np.float64)
+    return np.asarray(up / max(float(np.linalg.norm(up)), 1e-300))
+
+
+def _below(layer: Layer, layers: Sequence[Layer]) -> Layer | None:
+    """Find the flat layer under a flat one; None where it is the lowest, and for curved layers."""
+    if layer.flat is None:
+        return None
+    height = layer.flat.height
+    flat = [each for each in layers if each.flat is not None and each.plane.height < height]
+    return max(flat, key=lambda each: each.plane.height, default=None)
+
+
+def _view(
+    toolpaths: Toolpaths,
+    layer: Layer,
+    stress: PartStress,
+    machine: Machine,
+    below: Layer | None,
+    late: int,
+    stack: Printed | None,
+    build: FloatArray,
+) -> LayerPaths:
+    """See the paths of one layer in every way that an index may need."""
+    seen, flat = toolpaths, layer
+    if layer.flat is None:
+        chart = chart_of(layer)
+        seen, flat = chart.flattened(toolpaths), chart.flat
+    paths = plane_paths(seen, flat)
+    fibre = toolpaths.select(toolpaths.kind == FIBRE)
+    inside = fibre if layer.flat is None else _in_space(paths.in_part)
+    about = (layer, stress_on(flat, stress), stress, machine, below, late, stack, build)
+    return LayerPaths(toolpaths, fibre, inside, paths, *about)
+
+
+def _in_space(paths: PlanePaths) -> Toolpaths:
+    """Paths of a flat layer as toolpaths."""
+    lines = np.split(paths.points, paths.offsets[1:-1]) if len(paths) else []
+    return Toolpaths.from_plane(lines, paths.layer, paths.closed.tolist())
+
+
+def _pooled(samples: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Join the samples of all layers."""
+    return {name: pool([each[name] for each in samples]) for name in samples[0]}
+
+
+def _material(
+    layers: Sequence[Layer], stress: PartStress, machine: Machine, strand: Strand
+) -> Material:
+    """Material of a part that is full of strands, fibre along axis 1."""
+    if stress.material is None:
+        return named_material("c_fram")
+    section = machine.fibre_width * float(np.mean([layer.thickness for layer in layers]))
+    return strand_lamina(stress.material, strand.rho / section)
+
+
+def _indices(samples: Mapping[str, Any], basis: Basis) -> dict[str, float]:
+    """Value of each of `COLUMNS`."""
+    values: dict[str, float] = {}
+    for name, kind in indices.named().items():
+        values |= kind.indices(samples[getattr(kind, "SAMPLES", name)], basis)
+    return values

@@ -1,0 +1,36 @@
+"""Indices of fibre paths: one module for those that come from the same samples.
+
+A module has
+
+* ``COLUMNS``, a tuple of `Column`: the name, unit, formula and range of each index;
+* ``sample(paths)``, which takes the samples of one layer from `LayerPaths`: a dataclass of arrays,
+  which are joined over the layers; or ``SAMPLES``, the name of the module whose samples it takes;
+* ``indices(samples, basis)``, the value of each index by name, of one layer or of all together;
+* ``PLACE``, a number that says where its columns stand in tables; default behind all others.
+
+Modules of other packages are found by entry points of the group ``ccfem.indices``. Nothing is
+registered anywhere.
+"""
+
+import importlib
+import pkgutil
+from collections.abc import Mapping
+from functools import cache
+from types import ModuleType
+
+from ccfem.base import plugins
+
+__all__ = ["named"]
+
+_LAST = 1000
+
+
+@cache
+def named() -> Mapping[str, ModuleType]:
+    """Every module of indices by name, in the order of the tables."""
+    modules = {
+        info.name: importlib.import_module(f"{__name__}.{info.name}")
+        for info in pkgutil.iter_modules(__path__)
+    }
+    modules |= {entry.name: entry.load() for entry in plugins.entries("ccfem.indices")}
+    return dict(sorted(modules.items(), key=lambda pair: getattr(pair[1], "PLACE", _LAST)))

@@ -1,0 +1,253 @@
+"""Room: how much of the fibre lies on other fibre, over it, outside the part, or on nothing."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+
+from ccfem.base.arrays import BoolArray, FloatArray
+from ccfem.geometry.beads import Beads, beads
+from ccfem.geometry.places import INSIDE, VOID, section_places
+from ccfem.geometry.polylines import sample_midpoints
+from ccfem.geometry.shapes import Region
+from ccfem.judging.evaluation.column import Column
+from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
+from ccfem.judging.evaluation.plane_paths import PlanePaths
+from ccfem.machine.machine import Machine
+from ccfem.slicing.layers.layer import Layer
+
+__all__ = ["COLUMNS", "PLACE", "RoomSamples", "indices", "room_indices", "sample", "sample_room"]
+
+PLACE = 80
+"""Of these columns in tables: the smaller, the farther to the left."""
+
+
+_BANDS = (
+    "a strand is a band one fibre width wide; links outside the section or over a void are left out"
+)
+_NONE = "NaN without fibre"
+
+COLUMNS = (
+    Column(
+        "on_fibre",
+        "1",
+        "Share of the fibre that lies on other fibre of its layer and about its direction, within "
+        "30 degrees: where m such bands overlap, (m - 1)/m of them. It adds no stiffness in the "
+        f"virtual test ({_BANDS}).",
+        f"0 to 1, 0 is best; {_NONE}",
+    ),
+    Column(
+        "across_fibre",
+        "1",
+        "Share of the fibre that lies on other fibre of its layer and crosses it at more than 30 "
+        "degrees: the layer is higher there.",
+        f"0 to 1, 0 is best; {_NONE}",
+    ),
+    Column(
+        "overlap_area",
+        "mm^2",
+        f"Area of the bands of all strands less that of their union ({_BANDS}).",
+        ">= 0, 0 is best",
+    ),
+    Column(
+        "stack_99",
+        "1",
+        "Number of strands above each other that 99 % of the fibre's length stays at or below.",
+        f">= 1, 1 is best; {_NONE}",
+    ),
+    Column(
+        "fibre_fraction",
+        "1",
+        "Volume of the fibre whose band lies in the section over the volume of the part's layers.",
+        "0 to 1",
+    ),
+    Column(
+        "fibre_fraction_99",
+        "1",
+        "Fibre volume fraction that 99 % of the fibre's length stays at or below: strands above "
+        "each other times filament area, over fibre width times height of the layer.",
+        f">= 0, above 1 it does not fit; {_NONE}",
+    ),
+    Column(
+        "outside_width",
+        "1",
+        f"Share of the bands' area that lies outside the section of their layer ({_BANDS}).",
+        f"0 to 1, 0 is best; {_NONE}",
+    ),
+    Column(
+        "free_span",
+        "mm",
+        "Longest run of fibre axis with nothing to lie on: outside the section of its layer, or "
+        "more than half a width outside that of the layer below. Links beyond the outer border are "
+        "left out, since they are laid beside the part and cut off.",
+        ">= 0, 0 is best",
+    ),
+    Column("free_length", "mm", "Length of all such runs (see free_span).", ">= 0, 0 is best"),
+    Column(
+        "out_of_order",
+        "1",
+        "Number of fibre paths that come after one of a higher layer.",
+        ">= 0, 0 is best",
+    ),
+)
+
+_ACROSS = (-0.375, -0.125, 0.125, 0.375)
+"""Positions across a band, in widths, that are tested for lying inside."""
+
+
+@dataclass(frozen=True)
+class RoomSamples:
+    """Parts of the strands of a layer, about a quarter of a width long, and unsupported runs.
+
+    Attributes
+    ----------
+    length, alone, every, fill, stack : (s,) arrays
+        As of `ccfem.geometry.beads.Beads`.
+    inside : (s,) array in [0, 1]
+        Share of the width that lies in the section.
+    fraction : (s,) array
+        Fibre volume fraction.
+    free : (f,) array, mm
+        Lengths of the runs that lie on nothing.
+    overlap : (1,) array, mm^2
+        Area of all bands less that of their union.
+    fibre, volume : (1,) arrays, mm^3
+        Of the fibre in the section, and of the part that the layer stands for.
+    late : (1,) array
+        Number of paths printed after one of a higher layer.
+    """
+
+    length: FloatArray
+    alone: FloatArray
+    every: FloatArray
+    fill: FloatArray
+    stack: FloatArray
+    inside: FloatArray
+    fraction: FloatArray
+    free: FloatArray
+    overlap: FloatArray
+    fibre: FloatArray
+    volume: FloatArray
+    late: FloatArray
+
+
+def sample_room(
+    paths: PlanePaths, machine: Machine, below: Layer | None = None, late: int = 0
+) -> RoomSamples:
+    """Find the room of the strands of a layer.
+
+    Parameters
+    ----------
+    paths : PlanePaths
+    machine : Machine
+    below : Layer, optional
+        The layer under it; by default it lies on the bed.
+    late : int
+        Number of paths printed after one of a higher layer.
+    """
+    layer, width = paths.layer, machine.fibre_width
+    lines = paths.in_part
+    flat = np.column_stack([lines.points, np.zeros(len(lines.points))])
+    up = np.broadcast_to([0.0, 0.0, 1.0], flat.shape)
+    same = np.zeros(len(lines), dtype=np.int64)
+    found = beads(flat, up, lines.offsets, lines.closed, same, width, machine.strand_height)
+    inside = _inside(found, width, layer.plane.polygon)
+    height = max(layer.thickness, 1e-300)
+    return RoomSamples(
+        found.length,
+        found.alone,
+        found.every,
+        found.fill,
+        found.stack,
+        inside,
+        found.fill * machine.filament_area / (width * height),
+        _free_runs(paths, 0.5 * width, None if below is None else below.plane.polygon),
+        np.array([width * float((found.length * (1.0 - found.every)).sum())]),
+        np.array([machine.filament_area * float((found.length * inside).sum())]),
+        np.array([float(layer.areas.sum()) * layer.thickness]),
+        np.array([float(late)]),
+    )
+
+
+def _inside(found: Beads, width: float, section: Region) -> FloatArray:
+    """Share of the width of each part that lies in the section."""
+    share = np.ones(len(found.length))
+    inner = section.buffer(-0.5 * width * (1.0 + 1e-6))
+    near = np.arange(len(share))
+    if not inner.is_empty:
+        shapely.prepare(inner)
+        x, y = np.ascontiguousarray(found.middle[:, :2].T)
+        near = np.flatnonzero(~shapely.intersects_xy(inner, x, y))
+    if not len(near):
+        return share
+    shapely.prepare(section)
+    side = np.column_stack([-found.direction[near, 1], found.direction[near, 0]])
+    share[near] = 0.0
+    for place in _ACROSS:
+        x, y = (found.middle[near, :2] + place * width * side).T
+        within = shapely.intersects_xy(section, np.ascontiguousarray(x), np.ascontiguousarray(y))
+        share[near] += within / len(_ACROSS)
+    return share
+
+
+def _free_runs(paths: PlanePaths, reach: float, below: Region | None) -> FloatArray:
+    """Lengths of the runs of fibre that lie on nothing."""
+    strands = _runs(paths.strands, reach, below, False)
+    if not paths.link.any():
+        return strands
+    links = replace(paths, link=~paths.link).strands
+    return np.concatenate([strands, _runs(links, reach, below, True)])
+
+
+def _runs(paths: PlanePaths, reach: float, below: Region | None, link: bool) -> FloatArray:
+    points, _, length, line = sample_midpoints(paths.points, paths.offsets, reach)
+    if not len(points):
+        return np.zeros(0)
+    place = section_places(points, paths.layer.plane.polygon)
+    free: BoolArray = place == VOID if link else place != INSIDE
+    if below is not None:
+        wider = below.buffer(reach)
+        shapely.prepare(wider)
+        hangs = ~shapely.intersects_xy(wider, *np.ascontiguousarray(points.T))
+        free |= hangs & (place == INSIDE)
+    begins = free & ~np.concatenate([[False], free[:-1] & (line[1:] == line[:-1])])
+    run = np.cumsum(begins)[free] - 1
+    return np.asarray(np.bincount(run, length[free], int(begins.sum())), dtype=np.float64)
+
+
+def room_indices(samples: RoomSamples) -> dict[str, float]:
+    """Values of `COLUMNS`."""
+    length = samples.length
+    total = float(length.sum())
+
+    def mean(values: FloatArray) -> float:
+        return float(length @ values) / total if total > 0.0 else float("nan")
+
+    def most(values: FloatArray) -> float:
+        if not total > 0.0:
+            return float("nan")
+        return float(np.quantile(values, 0.99, weights=length, method="inverted_cdf"))
+
+    volume = float(samples.volume.sum())
+    return {
+        "on_fibre": mean(1.0 - samples.alone),
+        "across_fibre": mean(samples.alone - samples.every),
+        "overlap_area": float(samples.overlap.sum()),
+        "stack_99": most(samples.stack),
+        "fibre_fraction": float(samples.fibre.sum()) / volume if volume > 0.0 else float("nan"),
+        "fibre_fraction_99": most(samples.fraction),
+        "outside_width": mean(1.0 - samples.inside),
+        "free_span": float(samples.free.max(initial=0.0)),
+        "free_length": float(samples.free.sum()),
+        "out_of_order": float(samples.late.sum()),
+    }
+
+
+def sample(paths: LayerPaths) -> RoomSamples:
+    """Take the samples of one layer."""
+    return sample_room(paths.plane, paths.machine, paths.below, paths.late)
+
+
+def indices(samples: RoomSamples, _: Basis) -> dict[str, float]:
+    """Value of each of `COLUMNS`."""
+    return room_indices(samples)

@@ -1,0 +1,123 @@
+"""Fibre that stands out of the top or bottom of the part."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ccfem.base.arrays import BoolArray, FloatArray, read_only
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.geometry.locate import locate
+from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
+from ccfem.geometry.places import INSIDE, section_places
+from ccfem.geometry.polylines import merge_repeated, sample_midpoints
+from ccfem.judging.evaluation.column import Column
+from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
+from ccfem.machine.machine import Machine
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
+
+__all__ = ["COLUMNS", "PLACE", "SkinSamples", "indices", "sample", "sample_skin", "skin_indices"]
+
+PLACE = 110
+"""Of these columns in tables: the smaller, the farther to the left."""
+
+
+_TOLERANCE = 0.1
+"""Share of its height by which a strand may stand out of the part."""
+_COARSE = 2.0
+"""Distance, mm, of the samples of the fibre."""
+
+COLUMNS = (
+    Column(
+        "outside_height",
+        "1",
+        "Share of the fibre's length at which a strand, half its height (machine.fibre_height, or "
+        "filament_area over fibre_width) above and below its axis, stands out of the part's top or "
+        f"bottom by more than {_TOLERANCE:g} of its height; what lies beside the section is left "
+        f"out (sampled every {_COARSE:g} mm).",
+        "0 to 1, 0 is best; NaN without fibre",
+    ),
+)
+
+
+@dataclass(frozen=True)
+class SkinSamples:
+    """Samples of the fibre of a layer.
+
+    Attributes
+    ----------
+    length : (s,) array, mm
+    stands_out : (s,) bool array
+    """
+
+    length: FloatArray
+    stands_out: BoolArray
+
+    def __post_init__(self) -> None:
+        for name, values in vars(self).items():
+            object.__setattr__(self, name, read_only(values))
+
+
+def sample_skin(fibre: Toolpaths, layer: Layer, mesh: TetMesh, machine: Machine) -> SkinSamples:
+    """Take the samples of one layer.
+
+    Parameters
+    ----------
+    fibre : Toolpaths
+        On this layer.
+    layer : Layer
+    mesh : TetMesh
+        Of the part.
+    machine : Machine
+        With the height of a strand.
+    """
+    points, offsets, _ = merge_repeated(fibre.points, fibre.offsets, 1e-6)
+    middle, _, length, _ = sample_midpoints(points, offsets, _COARSE)
+    if not len(middle):
+        return SkinSamples(np.zeros(0), np.zeros(0, dtype=bool))
+    normal, beside = _over(layer, middle)
+    reach = (0.5 - _TOLERANCE) * machine.strand_height * normal
+    inside = _in_part(mesh, np.concatenate([middle - reach, middle + reach]))
+    out = ~inside.reshape(2, -1).all(axis=0)
+    return SkinSamples(length, out & ~beside)
+
+
+def _over(layer: Layer, points: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """Return the normal of the layer at each point, and whether it lies beside its section."""
+    if layer.flat is not None:
+        plane = layer.plane
+        beside = section_places(plane.project(points), plane.polygon) != INSIDE
+        return np.broadcast_to(plane.frame[2], points.shape), beside
+    found = nearest_on_triangles(layer.points, layer.triangles, points)
+    corners = layer.point_normals[layer.triangles[found.triangle]]
+    normal = np.einsum("sk,skd->sd", found.weights, corners)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    along = points - found.points
+    along = along - np.einsum("sd,sd->s", along, normal)[:, None] * normal
+    return normal, np.linalg.norm(along, axis=1) > 0.5 * found.distance + 1e-6
+
+
+def _in_part(mesh: TetMesh, points: FloatArray) -> BoolArray:
+    """Whether points (s, 3) lie in the part."""
+    ends = mesh.points[mesh.corners]
+    low, high = points.min(axis=0), points.max(axis=0)
+    near = ((ends.min(axis=1) <= high) & (ends.max(axis=1) >= low)).all(axis=1)
+    cell, _ = locate(mesh.points, mesh.corners[near], points)
+    return np.asarray(cell >= 0)
+
+
+def skin_indices(samples: SkinSamples) -> dict[str, float]:
+    """Values of `COLUMNS`."""
+    total = float(samples.length.sum())
+    share = float(samples.length @ samples.stands_out) / total if total > 0.0 else float("nan")
+    return {"outside_height": share}
+
+
+def sample(paths: LayerPaths) -> SkinSamples:
+    """Take the samples of one layer."""
+    return sample_skin(paths.fibre, paths.layer, paths.stress.mesh, paths.machine)
+
+
+def indices(samples: SkinSamples, _: Basis) -> dict[str, float]:
+    """Value of each of `COLUMNS`."""
+    return skin_indices(samples)

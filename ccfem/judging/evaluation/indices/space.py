@@ -1,0 +1,255 @@
+"""The fibre in space: its angle to the strongest principal stress, its bends, the linked joints."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, read_only
+from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.geometry.locate import locate
+from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
+from ccfem.geometry.polylines import (
+    inner_points,
+    lengths,
+    merge_repeated,
+    resample,
+    sample_midpoints,
+    turning_angles,
+)
+from ccfem.judging.evaluation.column import Column
+from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.principal_lines.strongest import strongest_stress
+
+__all__ = ["COLUMNS", "PLACE", "SpaceSamples", "indices", "sample", "sample_space", "space_indices"]
+
+PLACE = 140
+"""Of these columns in tables: the smaller, the farther to the left."""
+
+
+_ANGLES = (10, 20, 30)
+_REACH = 10.0
+"""Distance, in fibre widths, within which a strand counts as linking a joint."""
+
+_ANGLE = (
+    "of the angle in space between the fibre and the principal stress of the largest size, tension "
+    "or compression, of the nodal stress (samples as for angle_mean)"
+)
+_NONE = "NaN without fibre at any stress"
+
+COLUMNS = (
+    Column(
+        "space_angle_mean",
+        "degrees",
+        f"Mean over the fibre's length {_ANGLE}.",
+        f"0 to 90, 0 is best; {_NONE}",
+    ),
+    Column(
+        "space_angle_stress",
+        "degrees",
+        f"Mean {_ANGLE}, weighted with the size of that stress too.",
+        f"0 to 90, 0 is best; {_NONE}",
+    ),
+    *(
+        Column(
+            f"space_aligned_{a}",
+            "1",
+            f"Share of the fibre's length where that angle (space_angle_mean) is below {a} "
+            "degrees.",
+            f"0 to 1, 1 is best; {_NONE}",
+        )
+        for a in _ANGLES
+    ),
+    Column(
+        "space_curvature_95",
+        "1/mm",
+        "95th percentile of the curvature in space over the fibre's length, "
+        "resampled as for curvature_95: on curved layers that one is the curvature in the surface.",
+        ">= 0; NaN where no path has three resampled points",
+    ),
+    Column(
+        "across_tension",
+        "1",
+        "Tension that acts across the layers over all tension: sum over the layers' area of the "
+        "normal stress on them, where positive, over that of the largest principal stress, where "
+        "positive.",
+        "0 to 1, 0 is best; NaN without tension",
+    ),
+    Column(
+        "joints_linked",
+        "1",
+        "Number of held or loaded patches within ten fibre widths of a strand, along its layer, "
+        "mean over strands by length.",
+        ">= 0; NaN without fibre",
+    ),
+    Column("thickness_5", "mm", "5th percentile by area of the layers' thickness.", "> 0"),
+    Column("thickness_95", "mm", "95th percentile by area of the layers' thickness.", "> 0"),
+)
+
+
+@dataclass(frozen=True)
+class SpaceSamples:
+    """Samples of a layer.
+
+    Attributes
+    ----------
+    length, angle, size : (s,) arrays
+        Length, mm, of the fibre at each sample, its angle to the strongest stress, degrees, nan
+        where there is none, and that stress's size, MPa.
+    curvature : (c,) array, 1/mm
+    strand, linked : (k,) arrays
+        Length of each strand, mm, and number of patches near it.
+    area, thickness, across, tension : (t,) arrays
+        Of each triangle: mm^2, mm, normal stress and largest principal stress, MPa, 0 where
+        negative.
+    """
+
+    length: FloatArray
+    angle: FloatArray
+    size: FloatArray
+    curvature: FloatArray
+    strand: FloatArray
+    linked: FloatArray
+    area: FloatArray
+    thickness: FloatArray
+    across: FloatArray
+    tension: FloatArray
+
+    def __post_init__(self) -> None:
+        for name, values in vars(self).items():
+            object.__setattr__(self, name, read_only(values))
+
+
+def sample_space(fibre: Toolpaths, layer: Layer, stress: PartStress, step: float) -> SpaceSamples:
+    """Take the samples of one layer.
+
+    Parameters
+    ----------
+    fibre : Toolpaths
+        On this layer, without links outside the section or over a void.
+    layer : Layer
+    stress : PartStress
+        Its nodal values are used for the fibre, those of the cells for the layer.
+    step : float, mm
+        Fibre width: distance of samples.
+    """
+    points, offsets, _ = merge_repeated(fibre.points, fibre.offsets, 1e-6)
+    middle, tangent, length, _ = sample_midpoints(points, offsets, step)
+    cells = stress.stress[layer.cell]
+    angle, size = np.zeros(0), np.zeros(0)
+    if len(middle):
+        triangle, weights = _on_layer(layer, middle)
+        corners = layer.interpolate(stress.nodal)[layer.triangles[triangle]]
+        strongest = strongest_stress(np.einsum("sk,skij->sij", weights, corners))
+        cosine = np.abs(np.einsum("sd,sd->s", tangent, strongest.direction))
+        angle = np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0)))
+        size = np.abs(strongest.value)
+        angle[size <= 0.0] = np.nan
+    normal = np.einsum("ti,tij,tj->t", layer.normals, cells, layer.normals)
+    return SpaceSamples(
+        length,
+        angle,
+        size,
+        _curvature(points, offsets, fibre.closed, step),
+        fibre.lengths,
+        _linked(fibre, layer, stress.held_or_loaded, _REACH * step),
+        layer.areas,
+        layer.local_thickness[layer.triangles].mean(axis=1),
+        np.maximum(normal, 0.0),
+        np.maximum(np.linalg.eigvalsh(cells)[:, 2], 0.0),
+    )
+
+
+def _on_layer(layer: Layer, points: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Triangle of a layer nearest to each point, and barycentric coordinates there."""
+    triangle = np.full(len(points), -1, dtype=np.int64)
+    weights = np.zeros((len(points), 3))
+    if layer.flat is not None:
+        plane = layer.plane
+        triangle, weights = locate(plane.points, layer.triangles, plane.project(points))
+    left = np.flatnonzero(triangle < 0)
+    if len(left):
+        found = nearest_on_triangles(layer.points, layer.triangles, points[left])
+        triangle[left], weights[left] = found.triangle, found.weights
+    return triangle, weights
+
+
+def _curvature(points: FloatArray, offsets: IntArray, closed: BoolArray, step: float) -> FloatArray:
+    """Curvature at points equally far apart."""
+    if not len(points):
+        return np.zeros(0)
+    size = lengths(points, offsets)
+    even, ends = resample(points, offsets, step)
+    angle = turning_angles(even, ends, closed)
+    parts = np.diff(ends)
+    apart = np.repeat(size / np.maximum(parts - 1, 1), parts)
+    inner = inner_points(ends, closed) & (apart > 0.0)
+    return np.asarray(angle[inner] / apart[inner])
+
+
+def _linked(fibre: Toolpaths, layer: Layer, patches: Sequence[str], reach: float) -> FloatArray:
+    """Count the patches near each strand."""
+    found = np.zeros(len(fibre))
+    if not len(fibre):
+        return found
+    for name in patches:
+        edges = layer.patches.get(name)
+        if edges is None or not len(edges):
+            continue
+        away, _ = cKDTree(layer.points[np.unique(edges)]).query(fibre.points)
+        found += np.minimum.reduceat(away, fibre.offsets[:-1]) <= reach
+    return found
+
+
+def space_indices(samples: SpaceSamples) -> dict[str, float]:
+    """Values of `COLUMNS`."""
+    known = ~np.isnan(samples.angle)
+    length, angle = samples.length[known], samples.angle[known]
+    force = length * samples.size[known]
+    values = {
+        "space_angle_mean": _mean(angle, length),
+        "space_angle_stress": _mean(angle, force),
+    }
+    for a in _ANGLES:
+        values[f"space_aligned_{a}"] = _mean((angle < a).astype(np.float64), length)
+    bend = samples.curvature
+    low, high = _quantiles(samples.thickness, samples.area)
+    tension = float(samples.area @ samples.tension)
+    return {
+        **values,
+        "space_curvature_95": (
+            float(np.quantile(bend, 0.95, method="inverted_cdf")) if len(bend) else np.nan
+        ),
+        "across_tension": float(samples.area @ samples.across) / tension if tension else np.nan,
+        "joints_linked": _mean(samples.linked, samples.strand),
+        "thickness_5": low,
+        "thickness_95": high,
+    }
+
+
+def _mean(values: FloatArray, weight: FloatArray) -> float:
+    total = float(weight.sum())
+    return float(weight @ values) / total if total > 0.0 else float("nan")
+
+
+def _quantiles(values: FloatArray, weight: FloatArray) -> tuple[float, float]:
+    """5th and 95th percentile by weight."""
+    if not weight.sum() > 0.0:
+        return float("nan"), float("nan")
+    order = np.argsort(values, kind="stable")
+    below = np.cumsum(weight[order]) / weight.sum()
+    low, high = np.minimum(np.searchsorted(below, (0.05, 0.95)), len(values) - 1)
+    return float(values[order[low]]), float(values[order[high]])
+
+
+def sample(paths: LayerPaths) -> SpaceSamples:
+    """Take the samples of one layer."""
+    return sample_space(paths.inside, paths.layer, paths.stress, paths.machine.fibre_width)
+
+
+def indices(samples: SpaceSamples, _: Basis) -> dict[str, float]:
+    """Value of each of `COLUMNS`."""
+    return space_indices(samples)

@@ -1,0 +1,162 @@
+"""Strength between layers: the averaged traction on the layer against what the bond holds.
+
+The stress tensor of the matrix is averaged over a ball (averaging over a length: Whitney and
+Nuismer, J. Composite Materials 8, 1974, 253-265). Its traction on the layer is judged by the
+quadratic criterion ``f^2 = (max(t_n, 0) / Z)^2 + (t_s / S)^2``, t_n opening the layers and t_s
+sliding them on each other. Compression across layers neither harms nor helps. The index serves to
+compare layers of one part under the same supports and to find where layers open. It does not serve
+for absolute loads: strengths published for one material differ by a factor of 2.4.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ccfem.base.arrays import FloatArray, freeze
+from ccfem.base.checks import check_number
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.fem.elasticity.ball import BALL, ball_averages
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.elasticity.zone import ZONE, distance_from_patches
+from ccfem.fem.materials import Material
+from ccfem.slicing.layers import Layer
+
+__all__ = ["ZONES", "Interlayer", "interlayer", "layer_normals"]
+
+ZONES = (ZONE, 0.5 * ZONE, 0.0)
+"""Distances, mm, from patches of loads and supports within which nothing is judged. The first gives
+the result; the others show how much it depends on the zone."""
+
+_NEAREST = 6
+"""Triangles of curved layers that give the normal of a cell."""
+
+_ROUNDING = 1e-6
+"""Traction, over the largest averaged stress, that counts as rounding error of a solve."""
+
+
+@dataclass(frozen=True)
+class Interlayer:
+    """When and where layers first come apart.
+
+    Attributes
+    ----------
+    index : float
+        Largest f outside the first zone: 1 at failure.
+    where : (3,) array, mm
+        Middle of the cell that has it.
+    opening, sliding : float, MPa
+        Traction across the layer there, negative where it presses, and in the layer.
+    zone_indices : tuple of 3 floats
+        Largest f outside each of `ZONES`; the first is `index`.
+    note : str
+        Where the ball is smaller than the cells; else empty.
+    """
+
+    index: float
+    where: FloatArray
+    opening: float
+    sliding: float
+    zone_indices: tuple[float, ...]
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        freeze(self, where=float)
+
+
+def interlayer(
+    stress: StressField,
+    layers: Sequence[Layer],
+    material: Material | None = None,
+    radius: float = BALL,
+) -> Interlayer:
+    """Judge the bond between layers under the load of a solution.
+
+    Parameters
+    ----------
+    stress : StressField
+        Of the matrix, with fibres or without.
+    layers : sequence of Layer
+        At least one. Their normals count, not their distance.
+    material : Material, optional
+        With the strengths between layers; default that of the part.
+    radius : float, mm, default 2
+        Radius of the ball. Below the mean edge of the cells the result depends on the mesh, and a
+        note says so.
+
+    Raises
+    ------
+    InputError
+        Where the material has no interlayer strength, and where all cells lie in the zone of a
+        load or a support.
+    """
+    material = stress.problem.material if material is None else material
+    tensile, shear = material.interlayer_tensile, material.interlayer_shear
+    if tensile is None:
+        raise InputError(
+            f"material '{material.name}' has no strength between layers: give interlayer_tensile, "
+            "MPa, measured on a bar printed upright"
+        )
+    check_number("radius of the ball", radius, above=0.0, unit="mm")
+    mesh = stress.mesh
+    centroid = mesh.points[mesh.corners].mean(axis=1)
+    distance = distance_from_patches(stress.problem, stress.case, centroid, ZONE)
+    if not (distance > ZONE).any():
+        raise InputError(
+            f"no cell lies farther than {ZONE:g} mm from the patches of loads and supports, so the "
+            "bond between layers cannot be judged: the part is too small for this index"
+        )
+    every = np.arange(len(centroid))
+    tensor = ball_averages(centroid, stress.stress.reshape(-1, 9), mesh.volumes, every, radius)
+    tensor = tensor.reshape(-1, 3, 3)
+    normal = layer_normals(layers, centroid)
+    traction = np.einsum("mij,mj->mi", tensor, normal)
+    opening = np.einsum("mi,mi->m", traction, normal)
+    sliding = np.linalg.norm(traction - opening[:, None] * normal, axis=1)
+    shear = tensile if shear is None else shear
+    index = np.hypot(np.maximum(opening, 0.0) / tensile, sliding / shear)
+    index[np.hypot(np.maximum(opening, 0.0), sliding) <= _ROUNDING * np.abs(tensor).max()] = 0.0
+    zones = tuple(float(index[distance > zone].max()) for zone in ZONES)
+    peak = int(np.where(distance > ZONE, index, -1.0).argmax())
+    return Interlayer(
+        index=zones[0],
+        where=centroid[peak],
+        opening=float(opening[peak]),
+        sliding=float(sliding[peak]),
+        zone_indices=zones,
+        note=_about_ball(mesh, radius),
+    )
+
+
+def layer_normals(layers: Sequence[Layer], places: FloatArray) -> FloatArray:
+    """Find the unit normals (k, 3) of the layers at places (k, 3), of either sign.
+
+    For flat layers, the normal of their plane. For curved layers, the axis nearest to the normals n
+    of the six nearest triangles: the first eigenvector of the sum of ``n n^T``. Vectors are never
+    averaged, since a normal has no sign.
+    """
+    frames = [layer.flat.frame[2] for layer in layers if layer.flat is not None]
+    if not layers:
+        raise InputError("the bond between layers needs layers; got none: slice the part")
+    if len(frames) == len(layers) and (np.ptp(frames, axis=0) == 0.0).all():
+        return np.broadcast_to(frames[0], places.shape)
+    area = np.concatenate([layer.areas for layer in layers]) > 0.0
+    normal = np.concatenate([layer.normals for layer in layers])[area]
+    middle = np.concatenate([layer.points[layer.triangles].mean(axis=1) for layer in layers])[area]
+    _, near = cKDTree(middle).query(places, k=min(_NEAREST, len(middle)))
+    found = normal[near.reshape(len(places), -1)]
+    return np.asarray(np.linalg.eigh(np.einsum("kni,knj->kij", found, found))[1][:, :, -1])
+
+
+def _about_ball(mesh: TetMesh, radius: float) -> str:
+    """Say where the ball is smaller than the cells."""
+    ends = mesh.points[mesh.corners][:, TetMesh.edges]
+    edge = float(np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).mean())
+    if radius >= edge:
+        return ""
+    return (
+        f"the stress between layers is averaged over {radius:g} mm, less than the mean edge of "
+        f"the cells of {edge:.2g} mm, so its peak depends on the mesh: use smaller cells"
+    )

@@ -1,0 +1,254 @@
+"""Smooth, differentiable indices of how near a part is to its first failure.
+
+First failure (`ccfem.judging.virtual_testing.strength`) depends on peaks: of the force in the
+fibre, of the stress in the matrix, of the traction between layers. Each peak is paired with a
+p-norm over the part, and the relative change of the norm stands for that of the peak. The peaks
+themselves say how much each of them counts (Le, Norato, Bruns, Ha and Tortorelli, Structural and
+Multidisciplinary Optimization 41, 2010, 605-620: the p-norm, and its factor that follows the true
+peak).
+"""
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+
+from ccfem.base.arrays import FloatArray, IntArray, in_brief
+from ccfem.base.errors import InputError
+from ccfem.base.tensor import from_voigt, to_voigt, von_mises
+from ccfem.fem.elasticity.ball import BALL, ball_averages, ball_shares
+from ccfem.fem.elasticity.recovery import cell_strain, times
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.elasticity.volume_loads import strain_forces
+from ccfem.fem.elasticity.zone import ZONE, distance_from_patches
+from ccfem.judging.virtual_testing.strength import FIBRE_SHARE
+from ccfem.judging.virtual_testing.strengths import Limits
+
+__all__ = ["POWER", "MatrixPeaks", "Peak", "check_stretched", "nearness", "stretched_index"]
+
+Key = TypeVar("Key", bound=Hashable)
+
+POWER = 16.0
+"""Power p of the norm over cells or pieces of fibre."""
+
+_BETWEEN = 8.0
+"""Power of the norm over the indices, which approximates the largest of them."""
+
+_HOT = 1e-9
+"""Share of the largest weight below which a cell does not count in a derivative."""
+
+_ENGINEERING = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
+
+
+@dataclass(frozen=True)
+class Peak:
+    """One index.
+
+    Attributes
+    ----------
+    index : float
+        Its peak: 1 at failure.
+    norm : float
+        Its p-norm, in a scale of its own.
+    by_displacement : (n, 3) array, 1/mm
+        Derivative of the logarithm of the norm.
+    """
+
+    index: float
+    norm: float
+    by_displacement: FloatArray
+
+    __repr__ = in_brief
+
+    def over(self, ratio: float) -> "Peak":
+        """Peak under the load divided by a ratio."""
+        return replace(self, index=self.index / ratio, norm=self.norm / ratio)
+
+
+def nearness(
+    peaks: Mapping[Key, Peak], factors: Mapping[Key, float]
+) -> tuple[float, dict[Key, float]]:
+    """Logarithm of a smooth maximum of the indices, and the weight of each; the weights add to 1.
+
+    Parameters
+    ----------
+    peaks : mapping of key to Peak
+    factors : mapping of key to float
+        Index over norm when last computed. Peaks without a factor, or with 0, do not count.
+    """
+    known = {key: factors.get(key, 0.0) * one.norm for key, one in peaks.items()}
+    logs = {key: float(np.log(index)) for key, index in known.items() if index > 0.0}
+    largest = max(logs.values())
+    terms = {key: float(np.exp(_BETWEEN * (log - largest))) for key, log in logs.items()}
+    whole = sum(terms.values())
+    counts = {key: terms.get(key, 0.0) / whole for key in peaks}
+    return largest + float(np.log(whole)) / _BETWEEN, counts
+
+
+def check_stretched(strains: Sequence[FloatArray]) -> None:
+    """Check that fibre is stretched somewhere, in one load case at least.
+
+    Parameters
+    ----------
+    strains : sequence of (s,) array
+        Along the fibre, of each load case.
+
+    Raises
+    ------
+    InputError
+        Where it is not.
+    """
+    if not any(strain.max(initial=0.0) > 0.0 for strain in strains):
+        raise InputError(
+            "strength is planned for where fibre is stretched; it is so nowhere: turn the load "
+            "round, or plan with strength = 0"
+        )
+
+
+def stretched_index(
+    strain: FloatArray, length: FloatArray, limit: float
+) -> tuple[float, float, FloatArray]:
+    """Index of the fibre, its norm, and how much each piece counts in that; the sum is 1.
+
+    Parameters
+    ----------
+    strain : (s,) array
+        Along pieces of fibre, of which at least one is stretched; the others do not count.
+    length : (s,) array, mm
+        Length of fibre that each piece stands for.
+    limit : float
+        Strain at which a strand breaks.
+    """
+    most = float(strain.max())
+    order = np.argsort(strain, kind="stable")
+    reached = np.cumsum(length[order])
+    at = order[min(np.searchsorted(reached, FIBRE_SHARE * reached[-1]), len(order) - 1)]
+    power = length * (np.maximum(strain, 0.0) / most) ** POWER
+    whole = float(power.sum())
+    norm = most * whole ** (1.0 / POWER) / limit
+    return max(float(strain[at]), 0.0) / limit, norm, power / whole
+
+
+@dataclass(frozen=True)
+class MatrixPeaks:
+    """The cells of a part in which the matrix is judged, for any number of displacements.
+
+    Attributes
+    ----------
+    part : StressField
+        Without fibre: its problem says what holds and loads the part, and the material.
+    """
+
+    part: StressField
+
+    __repr__ = in_brief
+
+    @cached_property
+    def _centroids(self) -> FloatArray:
+        mesh = self.part.mesh
+        return np.asarray(mesh.points[mesh.corners].mean(axis=1))
+
+    @cached_property
+    def judged(self) -> IntArray:
+        """Cells outside the zone round loads and supports, as in `matrix_peak`."""
+        part = self.part
+        distance = distance_from_patches(part.problem, part.case, self._centroids, ZONE)
+        return np.flatnonzero(np.isinf(distance))
+
+    @cached_property
+    def _stiffness(self) -> FloatArray:
+        problem = self.part.problem
+        stiffness = problem.cell_stiffness
+        return stiffness if problem.density is None else problem.density[:, None, None] * stiffness
+
+    def _averages(self, values: FloatArray) -> FloatArray:
+        """Averages (k, c) of the values (m, c) of all cells over a ball round each judged cell."""
+        volumes = self.part.mesh.volumes
+        return ball_averages(self._centroids, values, volumes, self.judged, BALL)
+
+    def _back(self, slopes: FloatArray) -> FloatArray:
+        """Transpose of `_averages`: (m, c) of derivatives (k, c) by the averages."""
+        size = np.abs(slopes).max(axis=1)
+        hot = np.flatnonzero(size > _HOT * size.max())
+        volumes = self.part.mesh.volumes
+        return ball_shares(self._centroids, slopes[hot], volumes, self.judged[hot], BALL)
+
+    def _norm(self, index: FloatArray) -> tuple[float, float, FloatArray]:
+        """Peak and norm of an index (k,), and the derivative of the norm's logarithm by it."""
+        peak = float(index.max())
+        weight = self.part.mesh.volumes[self.judged] * (index / peak) ** POWER
+        whole = float(weight.sum())
+        slope = np.where(index > 0.0, weight / (whole * np.where(index > 0.0, index, 1.0)), 0.0)
+        return peak, peak * whole ** (1.0 / POWER), slope
+
+    def _forces(self, by_stress: FloatArray) -> FloatArray:
+        """Turn a derivative by the stress (m, 6) of each cell into one by the displacement."""
+        mesh, stiffness = self.part.mesh, self._stiffness
+        turned = np.swapaxes(stiffness, -1, -2)
+        return strain_forces(mesh, times(turned, by_stress) / mesh.volumes[:, None])
+
+    def matrix(self, displacement: FloatArray, strength: float) -> Peak:
+        """Von Mises stress of the matrix, averaged over a ball, over its strength, MPa.
+
+        `displacement` (n, 3), mm, is that of the part with its fibre.
+        """
+        stress = self._stress(displacement)
+        mises = von_mises(stress)
+        average = self._averages(mises[:, None])[:, 0]
+        peak, norm, slope = self._norm(average / strength)
+        by_mises = self._back(slope[:, None] / strength)
+        deviator = stress - np.trace(stress, axis1=1, axis2=2)[:, None, None] / 3.0 * np.eye(3)
+        size = np.where(mises > 0.0, mises, 1.0)
+        by_stress = to_voigt(1.5 * deviator) * _ENGINEERING * (by_mises / size[:, None])
+        return Peak(peak, norm, self._forces(by_stress))
+
+    def bond(
+        self, displacement: FloatArray, normal: FloatArray, strength: tuple[float, float]
+    ) -> Peak | None:
+        """Traction on layers of one normal (3,), as in `interlayer`; None where there is none."""
+        tensile, shear = strength
+        stress = self._stress(displacement)
+        traction = self._averages(to_voigt(stress))
+        traction = from_voigt(traction) @ normal
+        opening = traction @ normal
+        sliding = traction - opening[:, None] * normal
+        opening = np.maximum(opening, 0.0)
+        index = np.hypot(opening / tensile, np.linalg.norm(sliding, axis=1) / shear)
+        if not index.max() > 0.0:
+            return None
+        peak, norm, slope = self._norm(index)
+        by_traction = opening[:, None] / tensile**2 * normal + sliding / shear**2
+        by_traction *= (slope / np.where(index > 0.0, index, 1.0))[:, None]
+        tensor = 0.5 * (by_traction[:, :, None] * normal + normal[:, None] * by_traction[:, None])
+        return Peak(peak, norm, self._forces(self._back(to_voigt(tensor) * _ENGINEERING)))
+
+    def peaks(
+        self,
+        displacement: FloatArray,
+        fibre: Peak | None,
+        limits: Limits,
+        normal: FloatArray | None,
+    ) -> dict[str, Peak]:
+        """All indices: of the fibre, of the matrix and, where it can be judged, of the bond.
+
+        Parameters
+        ----------
+        displacement : (n, 3) array, mm
+        fibre : Peak, optional
+            None where no fibre is stretched.
+        limits : Limits
+        normal : (3,) array, optional
+            Of all layers.
+        """
+        found = {} if fibre is None else {"fibre": fibre}
+        found["matrix"] = self.matrix(displacement, limits.matrix)
+        if limits.bond is not None and normal is not None:
+            bond = self.bond(displacement, normal, limits.bond)
+            found |= {} if bond is None else {"interlayer": bond}
+        return found
+
+    def _stress(self, displacement: FloatArray) -> FloatArray:
+        strain = cell_strain(self.part.mesh, displacement)
+        return from_voigt(times(self._stiffness, strain))

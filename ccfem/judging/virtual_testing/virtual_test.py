@@ -1,0 +1,213 @@
+"""The virtual test: stiffness of the part with its fibres, and the force in every strand."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from ccfem.base.arrays import FloatArray, freeze, in_brief
+from ccfem.base.display import Shown
+from ccfem.fem.elasticity.stress_field import SolveRecord, StressField
+from ccfem.judging.virtual_testing.equilibrium import BONDED, TENSION, equilibrium
+from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.strand import RHO_SPAN, Strand
+from ccfem.judging.virtual_testing.strands import Strands, cut_strands
+from ccfem.machine.machine import Machine
+from ccfem.paths.toolpaths import Toolpaths
+
+__all__ = ["Bracket", "VirtualTest", "virtual_bracket", "virtual_test"]
+
+_SPAN_TOLERANCE = 1e-3
+"""Relative residual of the solves for the span; the error of the ratio is of its square."""
+
+
+@dataclass(frozen=True)
+class VirtualTest(Shown):
+    """What a set of fibre paths does to a part under one load case.
+
+    Attributes
+    ----------
+    mode : str
+        "bonded" or "tension".
+    rho : float, mm^2
+        EA of a strand over Young's modulus of the matrix.
+    unreinforced : StressField
+        The part without fibres.
+    solution : StressField
+        The part with fibres: its stress is that of the matrix; its strain energy and reactions
+        are those of matrix and fibres together.
+    strands : Strands
+        Pieces of fibre.
+    axial_force : (s,) array, N
+        Force in a strand that has room, at each piece; tension is positive.
+    fibre_energy : float, N mm
+        Strain energy of the fibres.
+    force : float, N
+        Size of the load.
+    stiffness, unreinforced_stiffness : float, N/mm
+        Force squared over work of the load.
+    span : tuple of (rho, ratio)
+        Stiffness ratio at other values of rho, mm^2.
+    updates : int
+        Solves until the set of fibres in tension was converged.
+    """
+
+    mode: str
+    rho: float
+    unreinforced: StressField
+    solution: StressField
+    strands: Strands
+    axial_force: FloatArray
+    fibre_energy: float
+    force: float
+    stiffness: float
+    unreinforced_stiffness: float
+    span: tuple[tuple[float, float], ...]
+    updates: int
+
+    __repr__ = in_brief
+
+    def __post_init__(self) -> None:
+        freeze(self, axial_force=float)
+
+    @property
+    def ratio(self) -> float:
+        """Stiffness over that of the unreinforced part; 1 without fibres."""
+        return self.stiffness / self.unreinforced_stiffness
+
+    @property
+    def gain_per_metre(self) -> float:
+        """Gain of the ratio per metre of fibre inside the part, 1/m."""
+        return (self.ratio - 1.0) / (1e-3 * self.strands.total)
+
+
+@dataclass(frozen=True)
+class Bracket:
+    """The two tests between which a printed part is expected to lie.
+
+    Attributes
+    ----------
+    tension, bonded : VirtualTest
+        Fibres that carry tension only, and fibres bonded in tension and compression.
+    """
+
+    tension: VirtualTest
+    bonded: VirtualTest
+
+    __repr__ = in_brief
+
+
+def virtual_test(
+    fibres: Toolpaths | Strands,
+    part: StressField | Specimen,
+    strand: Strand | None = None,
+    mode: str = TENSION,
+    span: Sequence[float] = RHO_SPAN,
+    machine: Machine | None = None,
+    known: Sequence[FloatArray] = (),
+    tolerance: float = 1e-8,
+) -> VirtualTest:
+    """Test a part with its fibres under the load case that it was solved for.
+
+    Fibres are axial bars in the cells of the mesh; the part is linear elastic. The load case
+    need not be the one that the paths were planned for: solve the same mesh under another one.
+
+    Parameters
+    ----------
+    fibres : Toolpaths or Strands
+        In the frame of the mesh; only fibre counts.
+    part : StressField or Specimen
+        The part without fibres. A specimen shares its factorisation, by the solver that it was
+        made with, among tests.
+    strand : Strand, optional
+        Stiffness of a strand; default rho = EA/E = 4 mm^2.
+    mode : str, default "tension"
+        "tension": fibres in compression carry nothing. "bonded": all fibres carry.
+    span : sequence of float, mm^2, default (2, 6)
+        Further values of rho to report the ratio at; () for none.
+    machine : Machine, optional
+        With a machine, and `fibres` as Toolpaths, fibre that lies on other fibre adds no stiffness
+        (`ccfem.judging.virtual_testing.strand_room`). Default: every strand counts in full.
+    known : sequence of (n, 3) arrays, mm, optional
+        Displacements near the solution, to start from; the nearest last.
+    tolerance : float, default 1e-8
+        Largest relative residual; the error of the stiffness is of its square.
+
+    Returns
+    -------
+    VirtualTest
+
+    Raises
+    ------
+    InputError
+        For no fibre, or more than 1 % of it outside the mesh.
+    SolveError
+        When the solve misses its tolerance.
+    """
+    specimen, strands = _prepared(fibres, part, machine)
+    before = specimen.unreinforced
+    axial = (Strand() if strand is None else strand).stiffness(specimen.modulus)
+    started = perf_counter()
+    found = equilibrium(specimen, strands, axial, mode, known, tolerance)
+    record = SolveRecord(
+        backend=specimen.solver.backend,
+        iterations=found.iterations,
+        residual=found.residual,
+        assembly_seconds=0.0,
+        solve_seconds=perf_counter() - started,
+        unknowns=before.record.unknowns,
+    )
+    after = specimen.system.field(before.case, found.displacement, found.matrix, record)
+    unreinforced = specimen.stiffness(before.displacement, before.strain_energy)
+    ratios, known = [], [before.displacement]
+    for rho in span:
+        other = equilibrium(
+            specimen,
+            strands,
+            rho * specimen.modulus,
+            mode,
+            known=[*known, found.displacement],
+            tolerance=_SPAN_TOLERANCE,
+        )
+        known.append(other.displacement)
+        stiffness = specimen.stiffness(other.displacement, 0.5 * other.work)
+        ratios.append((float(rho), stiffness / unreinforced))
+    force = np.where(found.carries, axial * found.strain, 0.0)
+    return VirtualTest(
+        mode=mode,
+        rho=axial / specimen.modulus,
+        unreinforced=before,
+        solution=after,
+        strands=strands,
+        axial_force=force,
+        fibre_energy=0.5 * float(np.vdot(force * strands.length * strands.share, found.strain)),
+        force=specimen.force(after.reactions),
+        stiffness=specimen.stiffness(after.displacement, after.strain_energy),
+        unreinforced_stiffness=unreinforced,
+        span=tuple(ratios),
+        updates=found.updates,
+    )
+
+
+def _prepared(
+    fibres: Toolpaths | Strands, part: StressField | Specimen, machine: Machine | None
+) -> tuple[Specimen, Strands]:
+    specimen = Specimen.of(part) if isinstance(part, StressField) else part
+    if isinstance(fibres, Toolpaths):
+        fibres = cut_strands(fibres, specimen.unreinforced.mesh, machine=machine)
+    return specimen, fibres
+
+
+def virtual_bracket(
+    fibres: Toolpaths | Strands,
+    part: StressField | Specimen,
+    strand: Strand | None = None,
+    span: Sequence[float] = RHO_SPAN,
+    machine: Machine | None = None,
+) -> Bracket:
+    """Both tests of `virtual_test`, with one factorisation; parameters as there."""
+    specimen, strands = _prepared(fibres, part, machine)
+    tension = virtual_test(strands, specimen, strand, TENSION, span)
+    known = (specimen.unreinforced.displacement, tension.solution.displacement)
+    return Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span, known=known))

@@ -1,0 +1,259 @@
+"""Improving the order of many clusters by exchanges (2-opt, Or-opt).
+
+Every order is evaluated with its best terminals, found by dynamic programming along it. Only the
+part that an exchange changes is recomputed. See `ordering` for what a cluster is.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.errors import InputError
+
+__all__ = ["Clusters", "greedy_order", "improved_order", "strands"]
+
+_BLOCK = 3
+"""Maximum number of clusters that Or-opt moves at once."""
+_MANY = 50
+"""Number of clusters above which fewer rounds are made."""
+_MOST_WORK = 5e7
+"""Rounds times the cube of the number of clusters, about what a round costs: no more rounds are
+made. Up to about a hundred clusters need less."""
+
+
+class Clusters(NamedTuple):
+    """Items with terminals, each to be visited once.
+
+    Attributes
+    ----------
+    links : (t, t) array
+        Cost >= 0 from leaving at a terminal to entering at another, of another cluster.
+    visit : (t, t) array
+        Cost >= 0 of entering a cluster at one terminal and leaving it at another; inf where that is
+        impossible.
+    offsets : (p + 1,) int array
+        Cluster c has the terminals ``offsets[c]`` up to ``offsets[c + 1]``.
+    first, last : int
+        Terminals at which the whole way starts and ends; -1 for any.
+    """
+
+    links: FloatArray
+    visit: FloatArray
+    offsets: IntArray
+    first: int = -1
+    last: int = -1
+
+
+def strands(links: FloatArray, first: int = -1, last: int = -1) -> Clusters:
+    """Strands as clusters: terminals 2k and 2k + 1 are the ends of strand k; visits are free."""
+    ends = np.arange(len(links))
+    visit = np.full(links.shape, np.inf)
+    visit[ends, ends ^ 1] = 0.0
+    offsets = np.arange(0, len(links) + 1, 2)
+    return Clusters(np.ascontiguousarray(links, dtype=np.float64), visit, offsets, first, last)
+
+
+def improved_order(order: IntArray, clusters: Clusters, rounds: int) -> IntArray:
+    """Terminals (p, 2) entered and left, in an order no worse than the given one (p,).
+
+    Each round perturbs the best order and makes exchanges until none helps. The number of rounds
+    follows from that of the clusters: the same input gives the same order on every machine.
+    """
+    best, count = order.copy(), len(order)
+    least = _exchange(best, clusters)
+    random = np.random.default_rng(0)
+    fixed, free = int(clusters.first >= 0), count - int(clusters.last >= 0)
+    wanted = round(rounds * min(1.0, (_MANY / count) ** 2))
+    for _ in range(min(wanted, max(1, round(_MOST_WORK / count**3)))):
+        # Swap two neighbouring stretches: exchanges of single stretches do not undo that.
+        i, j, k = np.sort(random.integers(fixed, free + 1, 3))
+        trial = np.concatenate([best[:i], best[j:k], best[i:j], best[k:]])
+        cost = _exchange(trial, clusters)
+        if cost < least - 1e-9 * abs(least):
+            best, least = trial, cost
+    if not np.isfinite(least):
+        raise InputError("there is no way through all clusters: some visit must be possible")
+    return _along(best, clusters)
+
+
+def greedy_order(clusters: Clusters) -> IntArray:
+    """Order (p,) in which the next cluster is always the one that is cheapest to reach."""
+    links, visit, offsets, first, last = clusters
+    cluster = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+    free = np.ones(len(links), dtype=bool)
+    final = cluster[last] if last >= 0 else -1
+    free[cluster == final] = False
+    value = np.where(cluster == (cluster[first] if first >= 0 else cluster[free][0]), 0.0, np.inf)
+    order: list[int] = []
+    while free.any():
+        chosen = int(cluster[np.flatnonzero(free)[np.argmin(value[free])]])
+        order.append(chosen)
+        own = cluster == chosen
+        free[own] = False
+        leave = (value[own][:, None] + visit[np.ix_(own, own)]).min(axis=0)
+        value = (leave[:, None] + links[own]).min(axis=0)
+    return np.array([*order, final] if last >= 0 else order, dtype=np.int64)
+
+
+@njit(cache=True, nogil=True)
+def _step(value, c, d, clusters, entry, out):  # type: ignore[no-untyped-def]
+    """Write costs of leaving cluster d to `out`, given those of leaving c; return the least."""
+    links, visit, offsets, _, _ = clusters
+    least = np.inf
+    for a in range(offsets[d], offsets[d + 1]):
+        entry[a] = np.inf
+        for t in range(offsets[c], offsets[c + 1]):
+            entry[a] = min(entry[a], value[t] + links[t, a])
+    for b in range(offsets[d], offsets[d + 1]):
+        cost = np.inf
+        for a in range(offsets[d], offsets[d + 1]):
+            cost = min(cost, entry[a] + visit[a, b])
+        out[b] = cost
+        least = min(least, cost)
+    return least
+
+
+@njit(cache=True, nogil=True)
+def _begin(c, clusters, out):  # type: ignore[no-untyped-def]
+    """Write costs of leaving the first cluster c of a way to `out`; return the least."""
+    _, visit, offsets, first, _ = clusters
+    least = np.inf
+    for b in range(offsets[c], offsets[c + 1]):
+        out[b] = np.inf
+        for a in range(offsets[c], offsets[c + 1]):
+            if first < 0 or first == a:
+                out[b] = min(out[b], visit[a, b])
+        least = min(least, out[b])
+    return least
+
+
+@njit(cache=True, nogil=True)
+def _table(order, clusters, ahead, behind):  # type: ignore[no-untyped-def]
+    """Fill tables of costs: from the start to leaving each cluster, from entering it to the end."""
+    links, visit, offsets, first, last = clusters
+    entry = np.empty(len(links))
+    _begin(order[0], clusters, ahead)
+    for k in range(1, len(order)):
+        _step(ahead, order[k - 1], order[k], clusters, entry, ahead)
+    for k in range(len(order) - 1, -1, -1):
+        c = order[k]
+        for b in range(offsets[c], offsets[c + 1]):
+            entry[b] = 0.0 if last < 0 or last == b else np.inf
+            if k < len(order) - 1:
+                entry[b] = np.inf
+                d = order[k + 1]
+                for a in range(offsets[d], offsets[d + 1]):
+                    entry[b] = min(entry[b], links[b, a] + behind[a])
+        for a in range(offsets[c], offsets[c + 1]):
+            behind[a] = np.inf
+            for b in range(offsets[c], offsets[c + 1]):
+                behind[a] = min(behind[a], visit[a, b] + entry[b])
+    c = order[0]
+    least = np.inf
+    for a in range(offsets[c], offsets[c + 1]):
+        if first < 0 or first == a:
+            least = min(least, behind[a])
+    return least
+
+
+@njit(cache=True, nogil=True)
+def _rearranged(window, variant, out):  # type: ignore[no-untyped-def]
+    """Fill `out` with the window reversed, or with a block moved from one of its ends to the other.
+
+    Variant 0 reverses. Then, for 1 to 3 clusters: a block from the front, from the back, each as it
+    is or reversed. Returns whether the variant is a new one for a window of this size.
+    """
+    size = len(window)
+    if variant == 0:
+        for k in range(size):
+            out[k] = window[size - 1 - k]
+        return True
+    block, way = (variant - 1) // 4 + 1, (variant - 1) % 4
+    if block >= size or (block == 1 and way > 1):
+        return False
+    # Where the block and the rest come from, and where they go.
+    block_from, block_to = (0, size - block) if way % 2 == 0 else (size - block, 0)
+    rest_from, rest_to = (block, 0) if way % 2 == 0 else (0, block)
+    for k in range(size - block):
+        out[rest_to + k] = window[rest_from + k]
+    for k in range(block):
+        out[block_to + k] = window[block_from + (k if way < 2 else block - 1 - k)]
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _exchange(order, clusters):  # type: ignore[no-untyped-def]
+    """Rearrange windows of `order`, in place, until no rearrangement helps; the cost."""
+    count = len(clusters.links)
+    ahead, behind = np.empty(count), np.empty(count)
+    value, entry = np.empty(count), np.empty(count)
+    least = _table(order, clusters, ahead, behind)
+    trial = np.empty_like(order)
+    lowest, highest = int(clusters.first >= 0), len(order) - int(clusters.last >= 0)
+    helped = True
+    while helped:
+        helped = False
+        for i in range(lowest, highest):
+            for j in range(i + 2, highest + 1):
+                for variant in range(1 + 4 * _BLOCK):
+                    part = trial[: j - i]
+                    if not _rearranged(order[i:j], variant, part):
+                        continue
+                    limit = least * (1.0 - 1e-9)
+                    cost = _cost_with(part, i, order, clusters, ahead, behind, value, entry, limit)
+                    if cost < limit:
+                        for k in range(j - i):
+                            order[i + k] = part[k]
+                        least = _table(order, clusters, ahead, behind)
+                        helped = True
+    return least
+
+
+@njit(cache=True, nogil=True)
+def _cost_with(part, i, order, clusters, ahead, behind, value, entry, limit):  # type: ignore[no-untyped-def]
+    """Cost of the way with `part` from position i on; inf once it cannot be below the limit."""
+    links, _, offsets, _, _ = clusters
+    j = i + len(part)
+    rest = 0.0
+    if j < len(order):
+        rest = np.inf
+        for a in range(offsets[order[j]], offsets[order[j] + 1]):
+            rest = min(rest, behind[a])
+    if i == 0:
+        cost = _begin(part[0], clusters, value)
+    else:
+        cost = _step(ahead, order[i - 1], part[0], clusters, entry, value)
+    for k in range(1, len(part)):
+        if cost + rest >= limit:
+            return np.inf
+        cost = _step(value, part[k - 1], part[k], clusters, entry, value)
+    if j == len(order):
+        return cost
+    c, d = part[-1], order[j]
+    cost = np.inf
+    for t in range(offsets[c], offsets[c + 1]):
+        for a in range(offsets[d], offsets[d + 1]):
+            cost = min(cost, value[t] + links[t, a] + behind[a])
+    return cost
+
+
+def _along(order: IntArray, clusters: Clusters) -> IntArray:
+    """Terminals entered and left on the best way through clusters in a given order."""
+    links, visit, offsets, first, last = clusters
+    ahead, behind = np.full(len(links), np.inf), np.empty(len(links))
+    _table(order, clusters, ahead, behind)
+    way: list[tuple[int, int]] = []
+    value = np.where(np.arange(len(links)) == first, 0.0, np.inf if first >= 0 else 0.0)
+    for k, c in enumerate(order):
+        own = slice(offsets[c], offsets[c + 1])
+        entered = int(offsets[c] + np.argmin(value[own] + behind[own]))
+        rest = np.where(np.arange(len(links)) == last, 0.0, np.inf if last >= 0 else 0.0)
+        if k + 1 < len(order):
+            following = slice(offsets[order[k + 1]], offsets[order[k + 1] + 1])
+            rest = (links[:, following] + behind[following]).min(axis=1)
+        left = int(offsets[c] + np.argmin(visit[entered, own] + rest[own]))
+        way.append((entered, left))
+        value = links[left]
+    return np.array(way)

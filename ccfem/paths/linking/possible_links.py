@@ -1,0 +1,239 @@
+"""Possible links between the ends of polylines, and a check for free space."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+from scipy.spatial import cKDTree
+
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.geometry.polylines import along_line, is_closed, points_along
+from ccfem.geometry.shapes import Region, Shapes, strings
+from ccfem.paths.linking.smooth_links import smooth_links
+
+__all__ = [
+    "CLEARANCE",
+    "CLOSING_TURN",
+    "Link",
+    "cut_back",
+    "cut_start",
+    "free_links",
+    "possible_links",
+    "ring_arc",
+    "shortened",
+]
+
+CLEARANCE = 0.9
+"""Least distance of a link from other strands, in widths. Ends on a slanted boundary are slightly
+nearer to each other than the strands are."""
+
+CLOSING_TURN = np.deg2rad(60.0)
+"""Largest turn, both ends together, of a link that closes a path to a ring. A path of two
+neighbouring strands that closes on itself could no longer join the next strand."""
+
+_ON_BORDER = 1e-6
+"""Distance, mm, by which rounding may move points off a border."""
+
+
+@dataclass(frozen=True)
+class Link:
+    """A possible link between two ends; each line is cut back to where the link leaves it.
+
+    Attributes
+    ----------
+    cost : float, mm
+    turn : float, radians
+        Total over both ends.
+    first, second : int
+        The ends: line k starts with end 2 k and stops with end 2 k + 1.
+    path : (n, 2) array, mm
+        From the cut end of `first` to that of `second`.
+    smooth : bool, default False
+        Whether the link keeps the radius.
+    """
+
+    cost: float
+    turn: float
+    first: int
+    second: int
+    path: FloatArray
+    smooth: bool = False
+
+
+def possible_links(
+    lines: Sequence[FloatArray],
+    section: Region,
+    limit: float,
+    width: float,
+    turn_cost: float = 1.0,
+    along_boundary: bool = True,
+    radius: float = 0.0,
+) -> list[Link]:
+    """Find links between near ends: straight, along the boundary, and smooth if there is a radius.
+
+    Parameters as in `ccfem.paths.linking.joining.link_ends`. Free space is not checked yet.
+    """
+    opened = [k for k, line in enumerate(lines) if not is_closed(line)]
+    if not opened or limit <= 0.0:
+        return []
+    ends = np.array([2 * k + side for k in opened for side in (0, 1)])
+    points = np.array([lines[end // 2][-(end % 2)] for end in ends])
+    outward = np.array([_outward(lines[end // 2], end % 2) for end in ends])
+    links = _straight_links(points, outward, ends, limit, turn_cost)
+    if along_boundary:
+        links += _boundary_links(
+            lines, points, outward, ends, section, 0.5 * width, limit, turn_cost
+        )
+    if radius > 0.0:
+        found = smooth_links(lines, ends, limit, width, radius)
+        links += [Link(*link, smooth=True) for link in found]
+    return links
+
+
+def free_links(
+    lines: Sequence[FloatArray], paths: Any, owners: Any, section: Region, clearance: float
+) -> Any:
+    """Mask (l,) of links inside the section and clear of all strands except their own."""
+    # The link between two ends on one edge of the border lies on it: rounding must not matter.
+    grown = shapely.buffer(section, _ON_BORDER)
+    shapely.prepare(grown)
+    free = shapely.covers(grown, paths)
+    tree = shapely.STRtree(strings(lines))
+    link, strand = tree.query(paths[free], predicate="dwithin", distance=clearance)
+    link = np.flatnonzero(free)[link]
+    free[link[(owners[link] != strand[:, None]).all(axis=1)]] = False
+    return free
+
+
+def cut_back(line: FloatArray, link: Link, k: int) -> FloatArray:
+    """Line k, cut back to where the link leaves it at the ends that the link uses."""
+    if link.first == 2 * k or link.second == 2 * k:
+        line = cut_start(line, link.path[0] if link.first == 2 * k else link.path[-1])
+    if link.first == 2 * k + 1 or link.second == 2 * k + 1:
+        point = link.path[0] if link.first == 2 * k + 1 else link.path[-1]
+        line = cut_start(line[::-1], point)[::-1]
+    return line
+
+
+def cut_start(line: FloatArray, point: FloatArray) -> FloatArray:
+    """Replace the start of a line, up to a point on it, by that point."""
+    if np.array_equal(line[0], point):
+        return line
+    step = np.diff(line, axis=0)
+    length = np.maximum((step**2).sum(axis=1), 1e-30)
+    share = np.clip(((point - line[:-1]) * step).sum(axis=1) / length, 0.0, 1.0)
+    gap = np.linalg.norm(line[:-1] + share[:, None] * step - point, axis=1)
+    piece = int(np.argmax(gap < 1e-9 + gap.min()))
+    rest = line[piece + 1 :]
+    return np.concatenate([[point], rest[1:] if np.allclose(rest[0], point) else rest])
+
+
+def shortened(path: FloatArray, share: float = 1e-3) -> FloatArray:
+    """Path without a share of its first and last step, which may touch the lines it joins."""
+    result = path.copy()
+    result[0] += share * (path[1] - path[0])
+    result[-1] += share * (path[-2] - path[-1])
+    return result
+
+
+def _straight_links(
+    points: FloatArray, outward: FloatArray, ends: Any, limit: float, turn_cost: float
+) -> list[Link]:
+    pairs = cKDTree(points).query_pairs(limit, output_type="ndarray")
+    a, b = pairs[:, 0], pairs[:, 1]
+    step = points[b] - points[a]
+    length = np.linalg.norm(step, axis=1)
+    turn = _angles(outward[a], step) + _angles(outward[b], -step)
+    cost = length + turn_cost * turn / (0.5 * np.pi)
+    return [
+        Link(float(cost[k]), float(turn[k]), int(ends[a[k]]), int(ends[b[k]]), points[pairs[k]])
+        for k in np.flatnonzero(length > 0.0)
+    ]
+
+
+def _boundary_links(
+    lines: Sequence[FloatArray],
+    points: FloatArray,
+    outward: FloatArray,
+    ends: Any,
+    section: Region,
+    inset: float,
+    limit: float,
+    turn_cost: float,
+) -> list[Link]:
+    """Links along the boundary, `inset` inside it, between neighbouring ends on it."""
+    links: list[Link] = []
+    starts = shapely.points(points)
+    heads = strings(
+        [_head(lines[e // 2] if e % 2 == 0 else lines[e // 2][::-1], limit) for e in ends]
+    )
+    for ring in shapely.get_rings(shapely.buffer(section, -inset)):
+        near = np.flatnonzero(shapely.dwithin(ring, starts, 1.5 * inset))
+        meeting, met = _first_meetings(heads[near], starts[near], ring)
+        if not len(met):
+            continue
+        end = near[met]
+        position = shapely.line_locate_point(ring, shapely.points(meeting))
+        around = np.lexsort((end, position))
+        for k, after in zip(around, np.roll(around, -1), strict=True):
+            gap = float((position[after] - position[k]) % ring.length)
+            if not 0.0 < gap <= limit:
+                continue
+            arc = ring_arc(ring, float(position[k]), gap)
+            arc[0], arc[-1] = meeting[k], meeting[after]
+            leaving = np.stack([arc[1] - arc[0], arc[-2] - arc[-1]])
+            turn = float(_angles(outward[end[[k, after]]], leaving).sum())
+            cost = gap + turn_cost * turn / (0.5 * np.pi)
+            links.append(Link(cost, turn, int(ends[end[k]]), int(ends[end[after]]), arc))
+    return links
+
+
+def _first_meetings(
+    heads: Shapes, starts: Shapes, ring: shapely.LinearRing
+) -> tuple[FloatArray, IntArray]:
+    """Points (k, 2) where heads first meet a ring, and the numbers (k,) of the heads that do.
+
+    A head that starts on the ring meets it there. Strands kept half a width off the border end on
+    it, and rounding puts some ends just inside and others just outside.
+    """
+    starts_on = shapely.dwithin(ring, starts, _ON_BORDER)
+    on, off = np.flatnonzero(starts_on), np.flatnonzero(~starts_on)
+    crossed, index = shapely.get_coordinates(
+        shapely.intersection(heads[off], ring), return_index=True
+    )
+    passed = shapely.line_locate_point(heads[off][index], shapely.points(crossed))
+    order = np.lexsort((passed, index))
+    _, first = np.unique(index[order], return_index=True)
+    meeting = np.concatenate([shapely.get_coordinates(starts[on]), crossed[order[first]]])
+    return meeting, np.concatenate([on, off[index[order[first]]]])
+
+
+def ring_arc(ring: shapely.LinearRing, start: float, length: float) -> FloatArray:
+    """Points (n, 2) of a closed ring over a `length` from arc length `start`, with both ends."""
+    corners = shapely.get_coordinates(ring)
+    along = along_line(corners)
+    twice = np.concatenate([along[:-1], along + along[-1]])
+    inner = twice[(twice > start + 1e-9) & (twice < start + length - 1e-9)]
+    wanted = np.concatenate([[start], inner, [start + length]]) % along[-1]
+    return points_along(corners, along, wanted)
+
+
+def _head(line: FloatArray, reach: float) -> FloatArray:
+    """Return the first `reach` mm of a line, or at least its first piece."""
+    distance = np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))
+    return line[: int(np.searchsorted(distance, reach)) + 2]
+
+
+def _angles(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Angle between vectors (k, 2), radians in [0, pi]."""
+    cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return np.asarray(np.abs(np.arctan2(cross, (a * b).sum(axis=1))))
+
+
+def _outward(line: FloatArray, side: int, reach: float = 1.0) -> FloatArray:
+    """Return the unit vector along which a line leaves its first or last (side 1) point."""
+    head = _head(line if side == 0 else line[::-1], reach)
+    step = head[0] - head[-1]
+    return step / max(float(np.linalg.norm(step)), 1e-12)

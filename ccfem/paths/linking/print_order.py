@@ -1,0 +1,44 @@
+"""The order in which paths are printed."""
+
+import numpy as np
+
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+
+__all__ = ["nearest_end_order"]
+
+
+def nearest_end_order(starts: FloatArray, ends: FloatArray) -> tuple[IntArray, BoolArray, float]:
+    """Order of printing in which the path with the nearest end always comes next.
+
+    Parameters
+    ----------
+    starts, ends : (k, 2) or (k, 3) arrays, mm
+        Ends of the paths; for a closed path the same point twice. The first path comes first.
+
+    Returns
+    -------
+    order : (k,) int array
+    reversed : (k,) bool array
+        Whether the path at that place of the order is printed from its end.
+    travel : float, mm
+        Sum of the straight ways between them.
+    """
+    count = len(starts)
+    order, backward = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=bool)
+    points = np.concatenate([starts, ends])
+    entry = np.arange(2 * count)  # k: path k at its start; count + k: at its end
+    left = points.T.copy()
+    chosen, travel = 0, 0.0
+    for k in range(count):
+        if k:
+            here = points[(chosen + count) % (2 * count)]
+            way = left - here[:, None]
+            chosen = int(entry[np.einsum("ij,ij->j", way, way).argmin()])
+            travel += float(np.linalg.norm(points[chosen] - here))
+        backward[k], order[k] = divmod(chosen, count)
+        taken = np.searchsorted(entry, [order[k], count + order[k]])
+        left[:, taken] = np.inf
+        if k % 64 == 63:
+            kept = np.isfinite(left[0])
+            left, entry = left[:, kept], entry[kept]
+    return order, backward, travel

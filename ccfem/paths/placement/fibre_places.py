@@ -1,0 +1,254 @@
+"""Which layers of a part get fibre, and where on them: the same for every strategy."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import shapely
+
+from ccfem.base.checks import check_choices, check_fields
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.geometry.shapes import Region
+from ccfem.machine.machine import Machine
+from ccfem.paths.placement.cut_layer import cut_layer
+from ccfem.paths.placement.region_shapes import Shape
+from ccfem.slicing.layers.layer import Layer
+
+__all__ = ["FibrePlaces", "FibreRegion"]
+
+_SAME = 1e-6
+"""Heights closer than this, mm, are the same."""
+
+
+@dataclass(frozen=True)
+class FibreRegion:
+    """A region that gets fibre, or none.
+
+    Attributes
+    ----------
+    shape : Shape
+    mode : {"only", "exclude"}
+        "only": fibre lies in regions of this mode alone; "exclude": none lies in this one.
+    priority : int, default 1
+        Where regions overlap the one with the lowest number counts, and of equal ones that which
+        excludes. At least 1.
+    """
+
+    shape: Shape
+    mode: Literal["only", "exclude"] = "only"
+    priority: int = 1
+
+    def __post_init__(self) -> None:
+        check_choices(self)
+        check_fields(self, "priority", at_least=1)
+
+
+@dataclass(frozen=True)
+class FibrePlaces:
+    """Which layers and regions of a part get fibre.
+
+    Of the layers that a slicer cuts those stay that all of the rules leave, in their order:
+    `layers`, `from_height` and `to_height`, `every`, `between`, `covered`. The others are printed
+    of matrix. A layer keeps its number and the thickness that it stands for.
+
+    Attributes
+    ----------
+    layers : str or tuple of int, optional
+        Numbers of layers, 0 at the bottom, or a range "FIRST:END:STEP" as of Python's slices, END
+        not included and negative from the top: "2:-2" leaves two without fibre at either end.
+    from_height, to_height : float, mm, optional
+        Heights over the part's lowest point between which fibre lies.
+    every : int, default 1
+        Every how many layers.
+    between : int, default 0
+        Least number of matrix layers that the machine prints between two layers of fibre.
+    covered : bool, default True
+        Leave out layers that lie nearer to the bottom or the top of the part than
+        `Process.cover`, where matrix would not hold them; and pieces of layers narrower than a
+        strand.
+    regions : tuple of FibreRegion
+    """
+
+    layers: str | tuple[int, ...] | None = None
+    from_height: float | None = None
+    to_height: float | None = None
+    every: int = 1
+    between: int = 0
+    covered: bool = True
+    regions: tuple[FibreRegion, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_fields(self, "from_height", "to_height", unit="mm")
+        check_fields(self, "every", at_least=1)
+        check_fields(self, "between", at_least=0)
+        low, high = self.from_height, self.to_height
+        if low is not None and high is not None and low > high:
+            raise InputError(f"fibre from {low:g} mm to {high:g} mm is upside down: swap the two")
+        if isinstance(self.layers, str):
+            _slice(self.layers)
+
+    def on(self, layers: Sequence[Layer], mesh: TetMesh, machine: Machine) -> tuple[Layer, ...]:
+        """Return the layers that get fibre, cut down to the regions that do.
+
+        Parameters
+        ----------
+        layers : sequence of Layer
+            From the bottom to the top.
+        mesh : TetMesh
+            The part.
+        machine : Machine
+
+        Raises
+        ------
+        InputError
+            Where no layer is left, and for regions on curved layers.
+        """
+        kept = self._between(self._chosen(layers, mesh)[:: self.every], machine)
+        if self.covered:
+            kept = [layer for layer in kept if _is_covered(layer, mesh, machine)]
+        if self.regions or self.covered:
+            kept = [cut for layer in kept if (cut := self._cut(layer, mesh, machine)) is not None]
+        if not kept:
+            raise InputError(
+                f"of {len(layers)} layers none is left for fibre ({self.about()}): choose more in "
+                "[fibre], or make its regions larger"
+            )
+        return tuple(kept)
+
+    def about(self) -> str:
+        """Say the rules in a few words."""
+        said = []
+        if self.layers is not None:
+            names = (
+                self.layers if isinstance(self.layers, str) else ", ".join(map(str, self.layers))
+            )
+            said.append(f"layers {names}")
+        if self.from_height is not None:
+            said.append(f"from {self.from_height:g} mm")
+        if self.to_height is not None:
+            said.append(f"to {self.to_height:g} mm")
+        if self.every > 1:
+            said.append(f"every {self.every} layers")
+        if self.between:
+            said.append(f"{self.between} matrix layers between")
+        for mode in ("only", "exclude"):
+            count = sum(one.mode == mode for one in self.regions)
+            if count:
+                said.append(f"{count} regions {mode}" if count > 1 else f"1 region {mode}")
+        if self.covered:
+            said.append("covered by matrix")
+        return ", ".join(said) or "all layers"
+
+    def _chosen(self, layers: Sequence[Layer], mesh: TetMesh) -> list[Layer]:
+        """Layers by their numbers and heights."""
+        known = [layer.index for layer in layers]
+        if isinstance(self.layers, str):
+            # Numbers of layers, not places in the sequence: a slicer may leave some out.
+            wanted = set(range(max(known, default=-1) + 1)[_slice(self.layers)])
+        else:
+            wanted = set(known if self.layers is None else self.layers)
+            missing = sorted(wanted - set(known))
+            if missing:
+                raise InputError(
+                    f"fibre is asked for on layer {missing[0]}, but there are {min(known)} to "
+                    f"{max(known)}: correct fibre.layers"
+                )
+        low = -np.inf if self.from_height is None else self.from_height - _SAME
+        high = np.inf if self.to_height is None else self.to_height + _SAME
+        return [
+            layer
+            for layer in layers
+            if layer.index in wanted
+            and (np.isinf([low, high]).all() or low <= _height(layer, mesh) <= high)
+        ]
+
+    def _between(self, layers: Sequence[Layer], machine: Machine) -> list[Layer]:
+        """Layers with enough of matrix between them."""
+        if not self.between:
+            return list(layers)
+        kept: list[Layer] = []
+        for layer in layers:
+            if not kept:
+                kept.append(layer)
+                continue
+            gap = layer.plane.height - kept[-1].plane.height - machine.strand_height
+            if np.ceil(gap / machine.matrix_height - _SAME) >= self.between:
+                kept.append(layer)
+        return kept
+
+    def _cut(self, layer: Layer, mesh: TetMesh, machine: Machine) -> Layer | None:
+        """Part of a layer that gets fibre; None where nothing does."""
+        if layer.flat is None:
+            if self.regions:
+                raise InputError(
+                    f"fibre.regions work on flat layers only; layer {layer.index} is curved: "
+                    "choose method = 'planar' in [slicing], or leave the regions out"
+                )
+            return layer
+        region = self._region(layer, mesh)
+        parts = shapely.get_parts(region)
+        parts = parts[shapely.get_type_id(parts) == 3]
+        if self.covered:
+            parts = parts[~shapely.is_empty(shapely.buffer(parts, -0.5 * machine.fibre_width))]
+        if not len(parts):
+            return None
+        return cut_layer(layer, shapely.multipolygons(list(parts)), mesh)
+
+    def _region(self, layer: Layer, mesh: TetMesh) -> Region:
+        """Region of a layer that gets fibre."""
+        plane = layer.plane
+        section = plane.polygon
+        reach = float(np.abs(plane.points).max()) + 1.0
+        only = any(one.mode == "only" for one in self.regions)
+        found: Region = shapely.Polygon() if only else section
+        for one in sorted(self.regions, key=lambda one: (-one.priority, one.mode == "exclude")):
+            shape = one.shape.section(plane, mesh, reach)
+            if one.mode == "only":
+                found = shapely.union(found, shapely.intersection(shape, section))
+            else:
+                found = shapely.difference(found, shape)
+        return found
+
+
+def _slice(text: str) -> slice:
+    """Range of a text such as "3:20:2"."""
+    parts = [part.strip() for part in text.split(":")]
+    try:
+        numbers = [int(part) if part else None for part in parts]
+        found = slice(*numbers)
+        if len(parts) == 1 or found.step == 0:
+            raise ValueError
+    except (ValueError, TypeError):
+        raise InputError(
+            f"fibre.layers must be a range FIRST:END:STEP as '3:20:2', or a list; got '{text}': "
+            'write "2:-2" or [0, 1, 2]'
+        ) from None
+    return found
+
+
+def _levels(layer: Layer, mesh: TetMesh) -> tuple[float, float, float]:
+    """Height of a flat layer, and the lowest and highest point of the part along its normal."""
+    level = mesh.points[np.unique(mesh.corners)] @ layer.plane.frame[2]
+    return layer.plane.height, float(level.min()), float(level.max())
+
+
+def _height(layer: Layer, mesh: TetMesh) -> float:
+    """Height of a flat layer over the part's lowest point."""
+    if layer.flat is None:
+        raise InputError(
+            f"fibre.from and fibre.to work on flat layers only; layer {layer.index} is curved: "
+            "choose by fibre.layers"
+        )
+    height, low, _ = _levels(layer, mesh)
+    return height - low
+
+
+def _is_covered(layer: Layer, mesh: TetMesh, machine: Machine) -> bool:
+    """Whether matrix below and above a flat layer holds it."""
+    if layer.flat is None:
+        return True
+    height, low, high = _levels(layer, mesh)
+    room = min(height - low, high - height) - 0.5 * machine.strand_height
+    return room >= machine.process.cover - _SAME

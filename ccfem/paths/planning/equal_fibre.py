@@ -1,0 +1,392 @@
+"""Planning to a wanted length of fibre, so that strategies are compared at equal cost.
+
+A strategy that lays more fibre wins almost any comparison. Every strategy therefore names the
+parameter that sets how much it lays (`Strategy.amount`), and `plan_to_length` searches for its
+value. A `LengthStrategy` takes the length itself.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from ccfem.base.checks import check_number
+from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.machine.machine import Machine
+from ccfem.paths.planning.dial import Dial, around
+from ccfem.paths.planning.mixing import layer_lengths, mixed
+from ccfem.paths.planning.plan import check_layers, plan, plan_layers
+from ccfem.paths.planning.planned import Planned
+from ccfem.paths.planning.short_pieces import about_short_pieces
+from ccfem.paths.planning.strategy import LengthStrategy, Strategy
+from ccfem.paths.toolpaths import FIBRE, Toolpaths
+from ccfem.slicing.layers.layer import Layer
+
+__all__ = [
+    "TOLERANCE",
+    "Planned",
+    "check_wanted",
+    "extremes",
+    "length_per_layer",
+    "plan_to_length",
+    "plan_to_lengths",
+    "sampled_length",
+]
+
+TOLERANCE = 0.01
+"""Share by which a length may differ from the wanted one and still count as equal."""
+_GUESSES = 3
+"""Plans of the whole stack tried from a known plan before a search."""
+_CLOSE = 0.1
+"""Difference of two plans on either side of the wanted length, as a share of it, up to which some
+layers may take one plan and some the other without further search."""
+_ROUNDS = 3
+"""Plans of the whole stack after a search on a few layers."""
+_STEPS = 8
+"""Plans of the few layers that represent the stack, in each round."""
+_FINEST = 1e-5
+"""Turn of the dial below which a jump in length is accepted as such."""
+_BEYOND = 0.05
+"""Overshoot of these while lengths are known on one side of the wanted one only, as a share."""
+_HALVINGS = 6
+"""Plans of the whole stack in the search for the least that leaves no layer empty."""
+_FEW = 4
+"""Number of layers up to which the whole stack is searched directly."""
+
+
+def length_per_layer(toolpaths: Toolpaths, layers: Sequence[Layer]) -> float:
+    """Fibre length divided by the number of layers, mm."""
+    return float(toolpaths.of_kind(FIBRE).lengths.sum()) / max(len(layers), 1)
+
+
+def check_wanted(wanted: float) -> None:
+    """Refuse a wanted length per layer, mm, that is not a positive number."""
+    check_number("fibre per layer", wanted, above=0.0, unit="mm")
+
+
+def plan_to_length(
+    strategy: Strategy,
+    layers: Sequence[Layer],
+    stress: PartStress,
+    machine: Machine,
+    wanted: float,
+    start: Planned | None = None,
+    tolerance: float = TOLERANCE,
+    sampled: float | None = None,
+) -> Planned:
+    """Plan to a wanted length of fibre.
+
+    Plans are searched on both sides of the wanted length, on a few layers unless plans of the whole
+    stack are known. Some layers, spread evenly, then take the plan that lays more. Where that
+    leaves room, strands are cut to fit it, but never below the shortest that can be printed. No
+    layer is left empty that one of the plans fills.
+
+    Parameters
+    ----------
+    strategy : Strategy
+        The search starts from its own value.
+    layers : sequence of Layer
+    stress : PartStress
+    machine : Machine
+    wanted : float, mm
+        Fibre per layer: mean over the stack. It is met within the share `tolerance` and not
+        exceeded, if it lies between the least and the most that the strategy lays. Otherwise the
+        nearer of these is laid, and `Planned.reached` and `note` say so.
+    start : Planned, optional
+        The plan of the strategy with its own value, if it exists already.
+    tolerance : float, default 0.01
+        Share by which less may be laid.
+    sampled : float, mm, optional
+        Length on a few layers with the strategy's own value (`sampled_length`), if known.
+
+    Returns
+    -------
+    Planned
+
+    Raises
+    ------
+    InputError
+        When `wanted` is not a positive number, or whatever the strategy raises.
+    """
+    known = () if start is None else (start,)
+    lengths = (wanted,)
+    return plan_to_lengths(strategy, layers, stress, machine, lengths, known, tolerance, sampled)[0]
+
+
+def sampled_length(
+    strategy: Strategy, layers: Sequence[Layer], stress: PartStress, machine: Machine
+) -> float | None:
+    """Length per layer that a strategy lays with its own value, mm, judged by a few layers.
+
+    None where the stack is small and they are all there are. Parameters as in `plan_to_length`.
+    """
+    search = _Search(Dial(strategy), layers, stress, machine)
+    return None if search.few is layers else search.sample(search.dial.own)
+
+
+def plan_to_lengths(
+    strategy: Strategy,
+    layers: Sequence[Layer],
+    stress: PartStress,
+    machine: Machine,
+    lengths: Sequence[float],
+    known: Sequence[Planned] = (),
+    tolerance: float = TOLERANCE,
+    sampled: float | None = None,
+) -> list[Planned]:
+    """Plan to several lengths of fibre, mm per layer, reusing the plans for one for the others.
+
+    Parameters
+    ----------
+    strategy, layers, stress, machine
+        As in `plan_to_length`.
+    lengths : sequence of float, mm
+    known : sequence of Planned
+        Plans of the strategy with its own value or at its extremes, if there are any.
+    tolerance : float, default 0.01
+        Share by which less may be laid.
+    sampled : float, mm, optional
+        As in `plan_to_length`.
+    """
+    for wanted in lengths:
+        check_wanted(wanted)
+    if isinstance(strategy, LengthStrategy):
+        check_layers(strategy, layers, machine)
+        found = strategy.to_lengths(stress, layers, machine, lengths)
+        return [
+            _told(
+                told,
+                plan_layers(planner, layers, layers, stress, machine),
+                layers,
+                machine,
+                wanted,
+            )
+            for (told, planner), wanted in zip(found, lengths, strict=True)
+        ]
+    search = _Search(Dial(strategy), layers, stress, machine, tolerance)
+    search.learn(known)
+    if sampled is not None:
+        search.sampled[search.dial.own] = sampled
+    return [search.to(wanted) for wanted in lengths]
+
+
+def extremes(
+    strategy: Strategy,
+    layers: Sequence[Layer],
+    stress: PartStress,
+    machine: Machine,
+    known: Sequence[Planned] = (),
+) -> tuple[Planned, Planned]:
+    """Plan the least and the most that a strategy lays; parameters as in `plan_to_lengths`."""
+    search = _Search(Dial(strategy), layers, stress, machine)
+    search.learn(known)
+    most = max(search.whole(search.dial.end), *search.tried.values(), key=_length)
+    return search.least_filled(), most
+
+
+def _length(planned: Planned) -> float:
+    return planned.length_per_layer
+
+
+def _told(
+    strategy: Strategy,
+    toolpaths: Toolpaths,
+    layers: Sequence[Layer],
+    machine: Machine,
+    wanted: float,
+) -> Planned:
+    """Plan of a strategy that was told the length."""
+    length = length_per_layer(toolpaths, layers)
+    if _meets(length, wanted):
+        return Planned(strategy, toolpaths, length)
+    note = f"lays {length:.0f} of {wanted:.0f} mm per layer: its most"
+    note += about_short_pieces(layers, machine)
+    return Planned(strategy, toolpaths, length, note, reached=False)
+
+
+def _meets(length: float, wanted: float, tolerance: float = TOLERANCE) -> bool:
+    return (1.0 - tolerance) * wanted <= length <= wanted * (1.0 + 1e-9)
+
+
+@dataclass
+class _Search:
+    """Plans of one strategy at several turns of its dial, while a length is searched for."""
+
+    dial: Dial
+    layers: Sequence[Layer]
+    stress: PartStress
+    machine: Machine
+    tolerance: float = TOLERANCE
+    tried: dict[float, Planned] = field(default_factory=dict)
+    sampled: dict[float, float] = field(default_factory=dict)
+
+    def learn(self, known: Sequence[Planned]) -> None:
+        """Take over known plans."""
+        for turn in (self.dial.own, 0.0, self.dial.end):
+            for one in known:
+                if one.strategy == self.dial.at(turn):
+                    self.tried.setdefault(turn, one)
+
+    @cached_property
+    def few(self) -> Sequence[Layer]:
+        """Layers that represent the stack."""
+        layers = self.layers
+        return layers if len(layers) <= _FEW else [layers[0], layers[len(layers) // 2], layers[-1]]
+
+    def whole(self, turn: float) -> Planned:
+        """Plan of the whole stack."""
+        if turn not in self.tried:
+            strategy = self.dial.at(turn)
+            same = [one for one in self.tried.values() if one.strategy == strategy]
+            if same:  # a parameter of whole numbers
+                self.tried[turn] = same[0]
+            else:
+                paths = plan(strategy, self.layers, self.stress, self.machine)
+                length = length_per_layer(paths, self.layers)
+                self.tried[turn] = Planned(strategy, paths, length)
+        return self.tried[turn]
+
+    def sample(self, turn: float) -> float:
+        """Length per layer on the few layers, mm."""
+        if turn not in self.sampled:
+            known = self.tried.get(turn)
+            if known is None and self.few is self.layers:
+                known = self.whole(turn)
+            if known is None:
+                paths = plan(self.dial.at(turn), self.few, self.stress, self.machine)
+                self.sampled[turn] = length_per_layer(paths, self.few)
+            else:
+                self.sampled[turn] = float(layer_lengths(known.toolpaths, self.few).mean())
+        return self.sampled[turn]
+
+    def meets(self, length: float, wanted: float) -> bool:
+        return _meets(length, wanted, self.tolerance)
+
+    def lengths(self) -> Mapping[float, float]:
+        return {turn: one.length_per_layer for turn, one in self.tried.items()}
+
+    def filled(self, one: Planned) -> bool:
+        """Whether a plan lays fibre on every layer that any known one does."""
+        laid = layer_lengths(one.toolpaths, self.layers) > 0.0
+        return not any(
+            (~laid & (layer_lengths(other.toolpaths, self.layers) > 0.0)).any()
+            for other in self.tried.values()
+        )
+
+    def least_filled(self) -> Planned:
+        """Plan with the least fibre that leaves no layer empty which some amount fills."""
+        self.whole(0.0)
+        full = [turn for turn in self.tried if self.filled(self.tried[turn])]
+        low, high = 0.0, min(full, default=self.dial.end)
+        for _ in range(_HALVINGS if high > 0.0 else 0):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if self.filled(self.whole(middle)) else (middle, high)
+        plans = list(self.tried.values())
+        return min([one for one in plans if self.filled(one)] or plans, key=_length)
+
+    def to(self, wanted: float) -> Planned:
+        """Plan to a length per layer, mm."""
+        if self.tried:
+            for _ in range(_GUESSES):
+                found = self.between(wanted, _CLOSE)
+                if found is not None:
+                    return found
+                turn = self.dial.guess(self.lengths(), (1.0 - 0.5 * self.tolerance) * wanted)
+                if turn in self.tried:
+                    break
+                self.whole(turn)
+        return self.between(wanted, _CLOSE) or self.searched(wanted)
+
+    def searched(self, wanted: float) -> Planned:
+        """Search on the few layers and check on the stack; repeat with the ratio of the two."""
+        for _ in range(1 if self.few is self.layers else _ROUNDS):
+            for turn in self.bracket(wanted / self.ratio(wanted)):
+                if turn is not None:
+                    self.whole(turn)
+                    found = self.between(wanted, _CLOSE)
+                    if found is not None:
+                        return found
+        if not any(one.length_per_layer <= wanted for one in self.tried.values()):
+            self.whole(0.0)
+        if not any(one.length_per_layer >= wanted for one in self.tried.values()):
+            self.whole(self.dial.end)
+        return self.between(wanted, np.inf) or self.off(wanted)
+
+    def ratio(self, wanted: float) -> float:
+        """Length on the stack over that on the few layers, for the nearest known plan."""
+        off = {
+            turn: abs(one.length_per_layer - wanted)
+            for turn, one in self.tried.items()
+            if self.sample(turn) > 0.0 and one.length_per_layer > 0.0
+        }
+        if not off:
+            return 1.0
+        nearest = min(off, key=off.__getitem__)
+        return self.tried[nearest].length_per_layer / self.sample(nearest)
+
+    def bracket(self, target: float) -> tuple[float | None, float | None]:
+        """Find turns on either side of a length on the few layers, as near as a few steps allow."""
+        known, enough = self.sampled, (1.0 - 0.5 * self.tolerance) * target
+        turn = min(self.dial.own, 1.0)
+        low = high = None
+        for step in range(_STEPS):
+            self.sample(turn)
+            low, high = around(known, target)
+            if low is not None and known[low] >= enough:
+                break
+            if low is not None and high is not None and abs(high - low) <= _FINEST:
+                break
+            turn = self.dial.guess(known, target, _BEYOND)
+            if low is not None and high is not None and step % 3 == 2:
+                turn = 0.5 * (low + high)  # so that a curved relation cannot stall the search
+            if low is None and step == _STEPS - 2:  # out of proportion: the end itself
+                turn = 0.0
+            if turn in known:
+                break
+        return low, high
+
+    def between(self, wanted: float, close: float) -> Planned | None:
+        """Mix the known plans on either side of a length, if they are close enough."""
+        below = [one for one in self.tried.values() if one.length_per_layer <= wanted * (1 + 1e-9)]
+        above = [one for one in self.tried.values() if one.length_per_layer > wanted * (1 + 1e-9)]
+        less = max(below, key=_length, default=None)
+        more = min(above, key=_length, default=None)
+        if less is not None and self.meets(less.length_per_layer, wanted) and self.filled(less):
+            return less
+        if less is None or more is None:
+            return None
+        if more.length_per_layer - less.length_per_layer > close * wanted:
+            return None
+        count = len(self.layers)
+        found = mixed(
+            less.toolpaths,
+            more.toolpaths,
+            self.layers,
+            wanted * count,
+            self.machine.minimum_length,
+        )
+        length = length_per_layer(found.toolpaths, self.layers)
+        if not self.meets(length, wanted) and np.isfinite(close):
+            return None
+        said = f"{self.dial.says(more.strategy)} on {found.more} of {count} layers"
+        if found.cut:
+            said += f", strands cut back on {found.cut}"
+        if not self.meets(length, wanted):
+            said += (
+                f"; lays {length:.0f} of {wanted:.0f} mm per layer: the nearest that strands of "
+            )
+            said += f"{self.machine.minimum_length:g} mm allow"
+        return Planned(less.strategy, found.toolpaths, length, said, self.meets(length, wanted))
+
+    def off(self, wanted: float) -> Planned:
+        """Return the extreme plan nearest to a length that the strategy does not reach."""
+        plans = [self.tried[turn] for turn in sorted(self.tried)]
+        much = min(map(_length, plans)) > wanted
+        best = min(plans, key=_length) if much else max(plans[::-1], key=_length)
+        end = "least" if much else "most"
+        note = (
+            f"lays {best.length_per_layer:.0f} of {wanted:.0f} mm per layer: its {end}, at "
+            f"{self.dial.says(best.strategy)}"
+        )
+        return Planned(best.strategy, best.toolpaths, best.length_per_layer, note, reached=False)

@@ -1,0 +1,107 @@
+"""Paths planned by another program, as a strategy that lays them unchanged."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from ccfem.base.arrays import FloatArray
+from ccfem.base.errors import InputError
+from ccfem.machine.machine import Machine
+from ccfem.paths.planning.strategy import Amount
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer_stress import LayerStress
+
+__all__ = ["GivenPaths"]
+
+_SAME = 1e-3
+"""Heights nearer than this, mm, are equal: it allows for the rounding of path files."""
+
+
+@dataclass(frozen=True)
+class GivenPaths:
+    """Given paths, evaluated like those of strategies, but never changed.
+
+    Attributes
+    ----------
+    toolpaths : Toolpaths
+        In the frame of the mesh.
+    source : str
+        Where they come from; for reports.
+    """
+
+    toolpaths: Toolpaths
+    source: str = ""
+
+    flat_layers_only: ClassVar[bool] = True
+    amount: ClassVar[Amount] = Amount("", 1.0, 1.0)
+    crosses: ClassVar[bool] = True
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        """Return the paths of one layer."""
+        return self.toolpaths.on_layer(layer.index)
+
+    def heights(self, direction: FloatArray) -> FloatArray:
+        """Heights of the layers that the paths lie on, mm, from the bottom to the top.
+
+        Parameters
+        ----------
+        direction : (3,) array
+            Unit vector of the build direction.
+
+        Raises
+        ------
+        InputError
+            When a path is not flat across the build direction.
+        """
+        return np.unique(self._levels(np.asarray(direction, dtype=np.float64)).round(3))
+
+    def _levels(self, direction: FloatArray) -> FloatArray:
+        """Height of each path, mm."""
+        paths, start = self.toolpaths, self.toolpaths.offsets[:-1]
+        if not len(paths):
+            return np.zeros(0)
+        level = paths.points @ direction
+        low, high = np.minimum.reduceat(level, start), np.maximum.reduceat(level, start)
+        worst = int((high - low).argmax())
+        if high[worst] - low[worst] > 2.0 * _SAME:
+            raise InputError(
+                f"{self.source or 'given paths'}: path {worst} spans {high[worst] - low[worst]:.3g}"
+                " mm along the build direction, so it lies in no flat layer: give flat paths, in "
+                "the frame that they are in"
+            )
+        return np.asarray(0.5 * (low + high))
+
+    def on(self, layers: Sequence[Layer]) -> "GivenPaths":
+        """Return these paths, each with the number of the layer that it lies on.
+
+        Parameters
+        ----------
+        layers : sequence of Layer
+            Flat layers.
+
+        Raises
+        ------
+        InputError
+            When a path lies on none of them: farther from it than half its height.
+        """
+        heights = np.array([layer.plane.height for layer in layers])
+        level = self._levels(layers[0].plane.frame[2])
+        if not len(level):
+            return self
+        apart = np.abs(level[:, None] - heights[None])
+        nearest = apart.argmin(axis=1)
+        reach = 0.5 * np.array([layer.thickness for layer in layers])[nearest] + _SAME
+        off = apart[np.arange(len(level)), nearest] > reach
+        if off.any():
+            path = int(np.flatnonzero(off)[0])
+            raise InputError(
+                f"{self.source or 'given paths'}: path {path} lies at {level[path]:.6g} mm along "
+                f"the build direction, on none of the {len(layers)} layers, which reach from "
+                f"{heights.min():.6g} to {heights.max():.6g} mm: name the frame that the paths "
+                "are in, or give their heights"
+            )
+        index = np.array([layer.index for layer in layers])[nearest]
+        return replace(self, toolpaths=replace(self.toolpaths, layer=index))

@@ -1,0 +1,105 @@
+"""Planning the paths of a whole part."""
+
+from collections.abc import Sequence
+
+from ccfem.base.checks import check_instance
+from ccfem.base.errors import InputError
+from ccfem.base.threads import in_threads
+from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.machine.machine import Machine
+from ccfem.paths.fields.chart import chart_of, flat_view
+from ccfem.paths.planning.steps import in_even_steps
+from ccfem.paths.planning.strategy import LayerPlanner, PartStrategy, Strategy
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.layers.pitch import check_pitch
+
+__all__ = ["check_layers", "plan", "plan_layers"]
+
+
+def plan(
+    strategy: Strategy, layers: Sequence[Layer], stress: PartStress, machine: Machine
+) -> Toolpaths:
+    """Plan the paths of a whole part, several layers at a time.
+
+    A strategy that works in a plane (`in_plane`) plans on curved layers by their charts.
+
+    Parameters
+    ----------
+    strategy : Strategy
+        Called from several threads at once, each with a layer of its own.
+    layers : sequence of Layer
+    stress : PartStress
+        A `StressField`, or a `GivenStress` for strategies that do not solve the part again.
+    machine : Machine
+
+    Returns
+    -------
+    Toolpaths
+        The paths of all layers, in their order, in steps of at most a fibre width.
+
+    Raises
+    ------
+    InputError
+        When the strategy plans on flat layers only and a layer is curved, when layers are nearer
+        than a strand is high; and whatever the strategy raises.
+    """
+    check_instance("strategy", strategy)
+    check_layers(strategy, layers, machine)
+    in_plane = getattr(strategy, "in_plane", False)
+    views: Sequence[Layer] = layers
+    if in_plane:
+        views = in_threads(flat_view, layers)
+    if isinstance(strategy, PartStrategy):
+        planner: LayerPlanner = strategy.for_part(stress, views, machine)
+    else:
+        planner = strategy
+    return plan_layers(planner, layers, views, stress, machine)
+
+
+def plan_layers(
+    planner: LayerPlanner,
+    layers: Sequence[Layer],
+    views: Sequence[Layer],
+    stress: PartStress,
+    machine: Machine,
+) -> Toolpaths:
+    """Paths of all layers by one planner, in steps of at most a fibre width.
+
+    Parameters
+    ----------
+    planner : LayerPlanner
+        Called from several threads at once, each with a layer of its own.
+    layers : sequence of Layer
+    views : sequence of Layer
+        The same layers as passed to the planner: laid flat if it works in a plane.
+    stress : PartStress
+    machine : Machine
+    """
+
+    def planned(layer: Layer, view: Layer) -> Toolpaths:
+        paths = planner(view, stress_on(view, stress), machine)
+        paths = in_even_steps(paths, machine.fibre_width)
+        return paths if view is layer else chart_of(layer).lifted(paths)
+
+    return Toolpaths.concatenate(in_threads(planned, layers, views))
+
+
+def check_layers(strategy: Strategy, layers: Sequence[Layer], machine: Machine) -> None:
+    """Refuse layers that no strategy, or not this strategy, can plan on.
+
+    Raises
+    ------
+    InputError
+        When the strategy plans on flat layers only and a layer is curved, and when layers are
+        nearer than a strand is high.
+    """
+    curved = [layer.index for layer in layers if layer.flat is None]
+    if curved and getattr(strategy, "flat_layers_only", False):
+        raise InputError(
+            f"{type(strategy).__name__} plans on flat layers only; {len(curved)} of {len(layers)} "
+            f"layers are curved, the first is layer {curved[0]}: choose a planar slicing, or a "
+            "strategy for curved layers"
+        )
+    check_pitch(layers, machine)

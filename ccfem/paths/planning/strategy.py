@@ -1,0 +1,143 @@
+"""The protocols that strategies follow."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Protocol, runtime_checkable
+
+from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.machine.machine import Machine
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer_stress import LayerStress
+
+__all__ = [
+    "Amount",
+    "CasesStrategy",
+    "LayerPlanner",
+    "LayerStrategy",
+    "LengthStrategy",
+    "PartStrategy",
+    "Strategy",
+]
+
+
+@dataclass(frozen=True)
+class Amount:
+    """The parameter of a strategy that sets how much fibre it lays.
+
+    Attributes
+    ----------
+    parameter : str
+        Name of the field.
+    most, least : float
+        Values that lay the most and the least fibre.
+    beyond : tuple of (str, float), default ()
+        Further parameters, each with the value that lays the most. If the first parameter at its
+        most lays too little, these change in turn from the strategy's own values to that value.
+    """
+
+    parameter: str
+    most: float
+    least: float
+    beyond: tuple[tuple[str, float], ...] = ()
+
+
+class LayerPlanner(Protocol):
+    """Plans the paths of one layer."""
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        """Plan the paths of one layer."""
+        ...
+
+
+@runtime_checkable
+class LayerStrategy(Protocol):
+    """A frozen dataclass whose fields are the parameters, called for each layer with data.
+
+    A strategy that works in the plane of a layer has a class variable ``in_plane = True``: `plan`
+    then passes curved layers laid flat. A strategy that cannot plan on curved layers at all, such
+    as one that solves the part again layer by layer, has ``flat_layers_only = True``: `plan`
+    refuses curved layers before any work.
+
+    Attributes
+    ----------
+    amount : Amount
+        The parameter that sets how much fibre is laid.
+    variants : mapping of str to parameters, optional
+        Further parameter sets, by a short name, that the tests common to all strategies also run:
+        ``{"literal": {"fit": "literal"}}``, one for each branch that the defaults never take. A
+        point in them must be the origin, about which these tests rotate their part.
+    direction : str, optional
+        The parameter, in degrees, that sets a direction independent of the stress.
+    ignores_stress : bool, default False
+        Whether its paths are the same under any load.
+    crosses : bool, default False
+        Whether strands cross each other on purpose.
+    on_axes : bool, default False
+        Whether paths follow the axes of the layer, as paths of pixels do, and so do not rotate with
+        the part.
+    """
+
+    amount: ClassVar[Amount]
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        """Plan the paths of one layer."""
+        ...
+
+
+@runtime_checkable
+class PartStrategy(Protocol):
+    """A frozen dataclass like a `LayerStrategy`, which sees the whole part before its layers."""
+
+    amount: ClassVar[Amount]
+
+    def for_part(
+        self, stress: PartStress, layers: Sequence[Layer], machine: Machine
+    ) -> LayerPlanner:
+        """Prepare what all layers share, and return the planner of each layer."""
+        ...
+
+
+@runtime_checkable
+class LengthStrategy(PartStrategy, Protocol):
+    """A `PartStrategy` that takes the length of fibre itself, so that no search is needed."""
+
+    def natural_length(self, layers: Sequence[Layer], machine: Machine) -> float:
+        """Length that its parameters ask for, mm per layer, known without planning."""
+        ...
+
+    def to_lengths(
+        self,
+        stress: PartStress,
+        layers: Sequence[Layer],
+        machine: Machine,
+        lengths: Sequence[float],
+    ) -> "Sequence[tuple[Strategy, LayerPlanner]]":
+        """Plan to several lengths, mm per layer; one plan is cut for several where that is as good.
+
+        Returns
+        -------
+        sequence of (Strategy, LayerPlanner)
+            For each length, the strategy that lays it and the planner of the layers. No plan lays
+            more than asked for; if even the whole plan is too short, it is taken as a whole.
+        """
+        ...
+
+
+@runtime_checkable
+class CasesStrategy(LengthStrategy, Protocol):
+    """A `LengthStrategy` that plans for several load cases at once."""
+
+    def for_cases(
+        self,
+        cases: WeightedCases,
+        layers: Sequence[Layer],
+        machine: Machine,
+        lengths: Sequence[float],
+    ) -> "Sequence[tuple[Strategy, LayerPlanner]]":
+        """Plan for all cases; lengths and result as in `to_lengths`."""
+        ...
+
+
+Strategy = LayerStrategy | PartStrategy

@@ -1,0 +1,209 @@
+"""Toolpaths: the polylines that every strategy returns and every index is computed from."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
+from ccfem.base.display import Shown
+from ccfem.slicing.layers.layer import Layer
+
+__all__ = ["FIBRE", "KINDS", "MATRIX", "SUPPORT", "TRAVEL", "Toolpaths"]
+
+KINDS = ("fibre", "matrix", "support", "travel")
+FIBRE, MATRIX, SUPPORT, TRAVEL = range(4)
+
+
+@dataclass(frozen=True)
+class Toolpaths(Shown):
+    """Polylines of a whole part, stored as one array of points with offsets (as in CSR).
+
+    Attributes
+    ----------
+    points : (P, 3) array, mm
+        In the frame of the mesh. A closed path repeats its first point at its end.
+    normals : (P, 3) array
+        Unit normal of the layer at each point.
+    offsets : (K + 1,) int array
+        Path k holds ``points[offsets[k]:offsets[k + 1]]``.
+    layer : (K,) int array
+        Index of the layer (`Layer.index`) that each path lies on.
+    kind : (K,) int array
+        FIBRE, MATRIX, SUPPORT or TRAVEL (index into `KINDS`).
+    closed : (K,) bool array
+        Whether the path is a closed curve.
+    link : (P,) bool array, optional
+        Whether the step from each point to the next one of its path is a link: fibre that only
+        joins two strands and is not meant to carry load. False at the last point of a path.
+        Default: no step is a link.
+        A strategy marks links that may leave the section or cross a void, as `svt` does, since
+        these are evaluated separately. Short links inside the section that follow the border or the
+        field, as those of `isocurve` and `zigzag`, count as fibre and are not marked.
+    """
+
+    points: FloatArray
+    normals: FloatArray
+    offsets: IntArray
+    layer: IntArray
+    kind: IntArray
+    closed: BoolArray
+    link: BoolArray = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        length = float(self.of_kind(FIBRE).lengths.sum())
+        return (
+            f"Toolpaths: {len(self)} paths on {len(np.unique(self.layer))} layers, "
+            f"{length:.0f} mm of fibre"
+        )
+
+    def __post_init__(self) -> None:
+        if self.link is None:
+            object.__setattr__(self, "link", np.zeros(len(self.points), dtype=np.bool_))
+        freeze(self, points=float, normals=float, offsets=int)
+        freeze(self, layer=int, kind=int, closed=bool, link=bool)
+        count = len(self.layer)
+        if self.points.shape != self.normals.shape or self.points.ndim != 2:
+            raise ValueError(
+                f"points and normals must both have shape (P, 3); got {self.points.shape} "
+                f"and {self.normals.shape}"
+            )
+        if self.offsets.shape != (count + 1,) or self.offsets[-1] != len(self.points):
+            raise ValueError("offsets must have one entry more than there are paths and end at P")
+        if self.link.shape != (len(self.points),) or self.link[self.offsets[1:] - 1].any():
+            raise ValueError("link must have shape (P,), and be false at the end of every path")
+        if not np.isfinite(self.points).all():
+            raise ValueError("points must be finite; got NaN or infinity")
+
+    @classmethod
+    def empty(cls) -> "Toolpaths":
+        """No path at all."""
+        none = np.zeros(0, dtype=np.int64)
+        start = np.zeros(1, dtype=np.int64)
+        return cls(np.zeros((0, 3)), np.zeros((0, 3)), start, none, none, none.astype(bool))
+
+    @classmethod
+    def from_plane(
+        cls,
+        lines: Sequence[FloatArray],
+        layer: Layer,
+        closed: Sequence[bool] | None = None,
+        link: Sequence[BoolArray] | None = None,
+    ) -> "Toolpaths":
+        """Fibre paths on one flat layer from polylines in its plane coordinates.
+
+        Parameters
+        ----------
+        lines : sequence of (n_i, 2) arrays, mm
+            Polylines with at least two points; others are dropped.
+        layer : Layer
+            A flat layer.
+        closed : sequence of bool, optional
+            By default a line is closed when its last point equals its first.
+        link : sequence of (n_i,) bool arrays, optional
+            Which steps of each line are links; by default none.
+        """
+        keep = [k for k, line in enumerate(lines) if len(line) >= 2]
+        if not keep:
+            return cls.empty()
+        if closed is None:
+            closed = [len(line) > 0 and np.array_equal(line[0], line[-1]) for line in lines]
+        sizes = [len(lines[k]) for k in keep]
+        points = layer.plane.to_space(np.concatenate([lines[k] for k in keep]))
+        return cls(
+            points=points,
+            normals=np.broadcast_to(layer.plane.frame[2], points.shape),
+            offsets=np.concatenate([[0], np.cumsum(sizes)]),
+            layer=np.full(len(keep), layer.index),
+            kind=np.full(len(keep), FIBRE),
+            closed=np.array([closed[k] for k in keep]),
+            link=np.zeros(len(points), dtype=bool)
+            if link is None
+            else np.concatenate([link[k] for k in keep]),
+        )
+
+    @classmethod
+    def in_space(
+        cls,
+        lines: Sequence[FloatArray],
+        normals: Sequence[FloatArray],
+        layer: Layer,
+        kind: int = FIBRE,
+    ) -> "Toolpaths":
+        """Paths on one layer, flat or curved, from polylines in space.
+
+        Parameters
+        ----------
+        lines : sequence of (n_i, 3) arrays, mm
+            Polylines with at least two points; others are dropped. A line is closed when its last
+            point equals its first.
+        normals : sequence of (n_i, 3) arrays
+            Unit normal of the layer at each of their points.
+        layer : Layer
+        kind : int, default FIBRE
+        """
+        keep = [k for k, line in enumerate(lines) if len(line) >= 2]
+        if not keep:
+            return cls.empty()
+        return cls(
+            points=np.concatenate([lines[k] for k in keep]),
+            normals=np.concatenate([normals[k] for k in keep]),
+            offsets=np.concatenate([[0], np.cumsum([len(lines[k]) for k in keep])]),
+            layer=np.full(len(keep), layer.index),
+            kind=np.full(len(keep), kind),
+            closed=np.array([np.array_equal(lines[k][0], lines[k][-1]) for k in keep]),
+        )
+
+    @classmethod
+    def concatenate(cls, parts: Iterable["Toolpaths"]) -> "Toolpaths":
+        """All paths of `parts`, in their order."""
+        found = [part for part in parts if len(part)]
+        if not found:
+            return cls.empty()
+        sizes = np.concatenate([np.diff(part.offsets) for part in found])
+        joined = {
+            name: np.concatenate([getattr(part, name) for part in found])
+            for name in ("points", "normals", "layer", "kind", "closed", "link")
+        }
+        return cls(offsets=np.concatenate([[0], np.cumsum(sizes)]), **joined)
+
+    def __len__(self) -> int:
+        return len(self.layer)
+
+    def __iter__(self) -> Iterator[FloatArray]:
+        """Iterate over the paths as (n_i, 3) arrays, mm."""
+        for start, end in zip(self.offsets[:-1], self.offsets[1:], strict=True):
+            yield self.points[start:end]
+
+    def select(self, wanted: BoolArray) -> "Toolpaths":
+        """Only the paths where the (K,) mask `wanted` is true."""
+        mask = np.repeat(np.asarray(wanted, dtype=bool), np.diff(self.offsets))
+        sizes = np.diff(self.offsets)[wanted]
+        return replace(
+            self,
+            points=self.points[mask],
+            normals=self.normals[mask],
+            offsets=np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
+            layer=self.layer[wanted],
+            kind=self.kind[wanted],
+            closed=self.closed[wanted],
+            link=self.link[mask],
+        )
+
+    def on_layer(self, index: int) -> "Toolpaths":
+        """Only the paths of one layer."""
+        return self.select(self.layer == index)
+
+    def of_kind(self, kind: int) -> "Toolpaths":
+        """Only the paths of one kind (FIBRE, MATRIX, SUPPORT or TRAVEL)."""
+        return self.select(self.kind == kind)
+
+    @property
+    def lengths(self) -> FloatArray:
+        """Length of each path, (K,), mm."""
+        if not len(self):
+            return np.zeros(0)
+        steps = np.zeros(len(self.points))
+        steps[1:] = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
+        steps[self.offsets[:-1]] = 0.0
+        return np.add.reduceat(steps, self.offsets[:-1])

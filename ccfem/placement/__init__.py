@@ -1,6 +1,0 @@
-"""Which layers and regions of a part get fibre, settled before any strategy plans."""
-
-from ccfem.placement.fibre_places import FibrePlaces, FibreRegion
-from ccfem.placement.region_shapes import InBody, InBox, InCylinder, NearPatch
-
-__all__ = ["FibrePlaces", "FibreRegion", "InBody", "InBox", "InCylinder", "NearPatch"]

@@ -1,0 +1,272 @@
+"""G-code of a whole part: matrix by tool 0, fibre by tool 1 with its cuts, moves between them.
+
+Conventions of the file: mm and mm/min; X, Y, Z absolute, E relative (M83). G1 lays material, G0
+only travels. E of the matrix is length of filament, so that a line has the volume of its length,
+its width and the height that it lays (`ccfem.printing.matrix_flow`). E of the fibre is length of
+fibre: before a path, the distance from the cutter to the nozzle and a little more (G1 with E
+alone), then the distance that the nozzle moves. The cut comes that first distance before the end of
+the path; the rest is dragged out and laid by G1 without E.
+
+All that happens is decided before, in `ccfem.printing`; here it is only written.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from ccfem.base.arrays import FloatArray
+from ccfem.base.whole import whole_file
+from ccfem.machine.kinematics import axis_values
+from ccfem.machine.machine import Machine
+from ccfem.printing.export.gcode_head import gcode_head
+from ccfem.printing.moves import (
+    CUT,
+    EVENTS,
+    FAN,
+    FEED,
+    LAY,
+    LAYER,
+    PATH_END,
+    PATH_START,
+    ROLES,
+    TOOL,
+    TRAVEL,
+    WAIT,
+    Moves,
+)
+from ccfem.printing.part_moves import part_moves
+from ccfem.printing.print_plan import COORDINATE_DIGITS, PrintPlan
+
+__all__ = ["gcode", "gcode_of_moves", "write_gcode"]
+
+_FEED_DIGITS = 5
+"""Decimals of E, mm."""
+
+TYPES = {
+    "prusa": {
+        "contour": "External perimeter",
+        "infill": "Solid infill",
+        "fibre": "Internal infill",
+        "tail": "Internal infill",
+        "short": "Internal infill",
+        "pad": "Support material",
+        "block": "Wipe tower",
+        "skirt": "Skirt/Brim",
+    },
+    "cura": {
+        "contour": "WALL-OUTER",
+        "infill": "SKIN",
+        "fibre": "FILL",
+        "tail": "FILL",
+        "short": "FILL",
+        "pad": "SUPPORT",
+        "block": "PRIME-TOWER",
+        "skirt": "SKIRT",
+    },
+}
+"""Words of ``;TYPE:`` by what viewers read."""
+
+
+def write_gcode(path: str | Path, plan: PrintPlan, machine: Machine, title: str = "") -> None:
+    """Write the G-code of a part, whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+    plan : PrintPlan
+    machine : Machine
+        The one that the plan was made for.
+    title : str, optional
+        Said at the head of the file.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be written, or a nozzle would leave the bed.
+    """
+    text = gcode(plan, machine, title)
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def gcode(plan: PrintPlan, machine: Machine, title: str = "") -> str:
+    """G-code of a part, as `write_gcode` writes it."""
+    return gcode_of_moves(part_moves(plan, machine), plan, machine, title)
+
+
+def gcode_of_moves(moves: Moves, plan: PrintPlan, machine: Machine, title: str = "") -> str:
+    """G-code of moves that were made of a plan."""
+    lines = _Lines(machine, plan)
+    axes, values = _axes(moves, machine), {**lines.values}
+    start = np.concatenate([axes[:1], axes[:-1]])
+    speed = _speeds(moves, axes, start)
+    warm = machine.process if machine.process.warm_height > 0.0 else None
+    values["bed_temperature"] += warm.warm_bed if warm else 0.0
+    values["matrix_temperature"] += warm.warm_matrix if warm else 0.0
+    lines.fill("start", **values)
+    columns = (moves.event, moves.tool, moves.feed, moves.beside, speed, moves.amount)
+    rows = zip(*(column.tolist() for column in columns), start.tolist(), axes.tolist(), strict=True)
+    about = zip(
+        moves.role.tolist(),
+        moves.width.tolist(),
+        moves.height.tolist(),
+        moves.strand.tolist(),
+        strict=True,
+    )
+    first = True
+    for (event, tool, feed, beside, speed, value, old, new), (role, width, height, strand) in zip(
+        rows, about, strict=True
+    ):
+        if event in (TRAVEL, LAY):
+            if event == LAY:
+                lines.say(role, width, height)
+            lines.move(event, tool, old, new, feed, beside, speed, first)
+            first = False
+        elif event == FEED:
+            lines.feed(tool, feed, beside, speed)
+        else:
+            lines.happen(event, tool, value, strand)
+    lines.fill("end")
+    return "\n".join([*gcode_head(moves, plan, machine, title), *lines.lines]) + "\n"
+
+
+def _axes(moves: Moves, machine: Machine) -> FloatArray:
+    """Values of X, Y and Z, and of axes that turn, after each row (n, 3) or (n, 5)."""
+    linear, turning = axis_values(machine.kinematics, moves.place, moves.normal)
+    if not machine.kinematics.letters:
+        return moves.place
+    return np.column_stack([linear, turning]).round(COORDINATE_DIGITS)
+
+
+def _speeds(moves: Moves, axes: FloatArray, start: FloatArray) -> FloatArray:
+    """Speed that F tells: along X, Y and Z, while the nozzle goes along the part as it should.
+
+    Firmware takes F for the way of X, Y and Z alone where these move, else for degrees.
+    """
+    if axes.shape[1] == 3:
+        return moves.speed
+    step = np.abs(axes - start)
+    way = np.linalg.norm(step[:, :3], axis=1)
+    way = np.where(way > 0.0, way, step[:, 3:].max(axis=1))
+    length = np.where(moves.length > 0.0, moves.length, way)
+    share = np.divide(way, length, out=np.ones(len(way)), where=(length > 0.0) & (way > 0.0))
+    return np.asarray((moves.speed * share).round(4))
+
+
+class _Lines:
+    """Lines of the file so far, and what was said last."""
+
+    def __init__(self, machine: Machine, plan: PrintPlan) -> None:
+        self.machine, self.profile, self.plan = machine, machine.gcode, plan
+        self.values: dict[str, float] = {
+            "bed_temperature": machine.bed_temperature,
+            "matrix_temperature": machine.matrix_temperature,
+            "fibre_temperature": machine.fibre_temperature,
+            "matrix_standby": machine.matrix_standby,
+            "fibre_standby": machine.fibre_standby,
+            "wait": 1000.0 * machine.cut_wait,
+            "tool": 0,
+        }
+        self.lines: list[str] = []
+        self._said = ("", "", "")
+        self._line: tuple[int, float, float] | None = None
+        self._letters = "".join(("X", "Y", "Z", *machine.kinematics.letters))
+        self._rate, self._speed = "", -1.0
+        by_file = self.profile.offset_by == "gcode"
+        self._offset = self.profile.offset if by_file else (0.0, 0.0, 0.0)
+
+    def fill(self, kind: str, **values: float) -> None:
+        """Add the lines of the profile for something."""
+        self.lines += self.profile.fill(getattr(self.profile, kind), {**self.values, **values})
+        self._rate = ""
+
+    def say(self, role: int, width: float, height: float) -> None:
+        """Comments for viewers, where they change."""
+        if (role, width, height) == self._line:
+            return
+        self._line = (role, width, height)
+        kind = TYPES[self.profile.comments].get(ROLES[role])
+        if kind is None:
+            return
+        said = (f";TYPE:{kind}", f";WIDTH:{width:.3f}", f";HEIGHT:{height:.3f}")
+        self.lines += [new for new, old in zip(said, self._said, strict=True) if new != old]
+        self._said = said
+
+    def move(
+        self,
+        event: int,
+        tool: int,
+        old: list[float],
+        new: list[float],
+        feed: float,
+        beside: float,
+        speed: float,
+        first: bool,
+    ) -> None:
+        """Add a move; the first one goes up before it goes sideways."""
+        if tool == 1 and any(self._offset):
+            places = [at - by for at, by in zip(new, (*self._offset, 0.0, 0.0), strict=False)]
+        else:
+            places = new
+        words = [
+            f"{axis}{place:.{COORDINATE_DIGITS}f}"
+            for axis, was, at, place in zip(self._letters, old, new, places, strict=False)
+            if first or at != was
+        ]
+        if first:
+            self.lines.append(f"G0 {words[2]}{self._at(self.profile.lift_speed)}")
+            words = words[:2] + words[3:]
+        axes = self._fed(tool, feed, beside) if event == LAY else ""
+        rapid = "G0" if event == TRAVEL else "G1"
+        self.lines.append(f"{rapid} {' '.join(words)}{axes}{self._at(speed)}")
+
+    def feed(self, tool: int, feed: float, beside: float, speed: float) -> None:
+        """Add a feed without a move."""
+        self.lines.append(f"G1{self._fed(tool, feed, beside)}{self._at(speed)}")
+
+    def _fed(self, tool: int, feed: float, beside: float) -> str:
+        """Words of what is fed; nothing where nothing is."""
+        letter = self.profile.axes.fibre if tool == 1 else "E"
+        found = f" {letter}{feed:.{_FEED_DIGITS}f}" if feed else ""
+        return found + (f" {self.profile.axes.matrix}{beside:.{_FEED_DIGITS}f}" if beside else "")
+
+    def _at(self, speed: float) -> str:
+        """Feed rate of a move, where it differs from that of the move before."""
+        if speed == self._speed and self._rate:
+            return ""
+        rate = f" F{60.0 * speed:.6g}"
+        said, self._rate, self._speed = self._rate, rate, speed
+        return "" if rate == said else rate
+
+    def happen(self, event: int, tool: int, value: float, strand: int) -> None:
+        """Add what happens where the nozzle stands."""
+        if event == LAYER:
+            self._layer(int(value))
+        elif event == PATH_START:
+            cut = value - self.machine.tail
+            number = strand if strand >= 0 else "beside"
+            self.lines.append(f";CCFEM:strand={number} length={value:.3f} cut={cut:.3f}")
+            self.fill("path_start", length=value)
+        elif event == PATH_END:
+            self.fill("path_end", length=value)
+        elif event == CUT:
+            self.fill("cut")
+        elif event == WAIT:
+            self.lines.append(f"G4 P{1000.0 * value:.10g}")
+        elif event == TOOL:
+            self.fill("tool", tool=tool)
+        elif event == FAN:
+            self.fill("fan", tool=tool, fan=float(np.round(255.0 * value)))
+        else:
+            self.fill(EVENTS[event].replace(" ", "_"), tool=tool, temperature=value)
+
+    def _layer(self, number: int) -> None:
+        top, thickness = self.plan.top[number], self.plan.thickness[number]
+        self.lines += [
+            ";LAYER_CHANGE",
+            f";Z:{top:.3f}",
+            f";HEIGHT:{thickness:.4f}",
+            f";LAYER:{number}",
+        ]
+        self._said, self._line = ("", "", ""), None
+        self.fill("layer", layer=number)

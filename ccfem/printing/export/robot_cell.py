@@ -1,0 +1,84 @@
+"""What a cell of robots does, as CSV: the moves of the G-code, and how the head stands."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ccfem.base.whole import whole_file
+from ccfem.printing.moves import (
+    CUT,
+    EVENTS,
+    FEED,
+    LAY,
+    PATH_END,
+    PATH_START,
+    TOOL,
+    TRAVEL,
+    Moves,
+)
+
+__all__ = ["write_robot_cell"]
+
+_HEADER = "path,tool,layer,x,y,z,nx,ny,nz,speed,feed,beside,width,height,event"
+
+
+def write_robot_cell(path: str | Path, moves: Moves) -> None:
+    """Write moves as CSV, one row a move or an event.
+
+    Parameters
+    ----------
+    path : str or Path
+    moves : Moves
+
+    Notes
+    -----
+    Columns: ``path, tool, layer, x, y, z, nx, ny, nz, speed, feed, beside, width, height, event``.
+    A row is where the nozzle goes, mm, on the bed of the machine, and how its head stands there;
+    with the speed, mm/s, of the way there, and for lines the filament that it feeds, mm per mm:
+    that of the tool, and matrix beside the fibre. ``path`` is the number of the strand, -1 for all
+    else. Events are ``travel``, ``lay``, ``feed L`` of L mm where the nozzle stands, ``start`` and
+    ``end`` of a strand, ``cut``, ``tool N``, and those with a value: ``standby``, ``preheat``,
+    ``heat`` and ``work`` with the temperature of the tool, ``heat bed``, ``fan`` with a share,
+    ``wait`` with seconds.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be written.
+    """
+    length = moves.length
+    laid = (moves.event == LAY) & (length > 0.0)
+    share = [
+        np.divide(fed, length, out=np.zeros(len(moves)), where=laid)
+        for fed in (moves.feed, moves.beside)
+    ]
+    table = np.column_stack(
+        [moves.strand, moves.tool, moves.layer, moves.place, moves.normal, moves.speed, *share]
+    )
+    table = np.column_stack([table, moves.width, moves.height])
+    names = [
+        _named(event, feed, amount, tool)
+        for event, feed, amount, tool in zip(
+            moves.event.tolist(),
+            moves.feed.tolist(),
+            moves.amount.tolist(),
+            moves.tool.tolist(),
+            strict=True,
+        )
+    ]
+    with whole_file(path) as temporary, temporary.open("w", encoding="ascii") as file:
+        file.write(_HEADER + "\n")
+        for row, name in zip(table.tolist(), names, strict=True):
+            file.write(",".join(f"{value:.8g}" for value in row) + f",{name}\n")
+
+
+def _named(event: int, feed: float, amount: float, tool: int) -> str:
+    """Say in words what a row is."""
+    name = EVENTS[event]
+    if event == FEED:
+        return f"{name} {feed:g}"
+    if event == TOOL:
+        return f"{name} {tool}"
+    if event in (TRAVEL, LAY, CUT, PATH_START, PATH_END):
+        return name
+    return f"{name} {amount:g}"

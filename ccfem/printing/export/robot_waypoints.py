@@ -1,0 +1,155 @@
+"""Waypoints for robots: place and normal of the layer, with its height and the feed."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ccfem.base.arrays import FloatArray
+from ccfem.base.errors import InputError
+from ccfem.base.whole import existing_file, whole_file
+from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
+from ccfem.machine.machine import Machine
+from ccfem.paths.linking.print_speed import step_speeds
+from ccfem.paths.toolpaths import FIBRE, Toolpaths
+from ccfem.slicing.layers.layer import Layer
+
+__all__ = ["read_layer_waypoints", "write_layer_waypoints", "write_robot_waypoints"]
+
+_HEADER = "layer,path,x,y,z,nx,ny,nz,height,feed"
+_JUMP = 3.0
+"""Steps of a published file longer than this, mm, are travel between strands."""
+
+
+def write_robot_waypoints(
+    path: str | Path,
+    toolpaths: Toolpaths,
+    layers: Sequence[Layer],
+    machine: Machine,
+    kind: int = FIBRE,
+) -> None:
+    """Write paths of one kind as CSV: ``layer, path, x, y, z, nx, ny, nz, height, feed``.
+
+    Parameters
+    ----------
+    path : str or Path
+    toolpaths : Toolpaths
+        Paths of other kinds are left out.
+    layers : sequence of Layer
+        Layers that the paths lie on.
+    machine : Machine
+        Says the feed, mm/s, with which the step from each point to the next is laid.
+    kind : int, default FIBRE
+        As in `ccfem.paths.toolpaths`: MATRIX for the paths of `layer_matrix`.
+
+    Notes
+    -----
+    x, y, z and height (of the layer at the point) in mm, in the frame of the mesh.
+
+    Raises
+    ------
+    InputError
+        When a path lies on a layer that is not given, or the file cannot be written.
+    """
+    fibre, known = toolpaths.of_kind(kind), {layer.index: layer for layer in layers}
+    missing = set(fibre.layer.tolist()) - set(known)
+    if missing:
+        raise InputError(
+            f"paths lie on layer {min(missing)}, which is not among the layers given: give the "
+            "layers that the paths were planned on"
+        )
+    feed, number = (
+        step_speeds(fibre, machine),
+        np.repeat(np.arange(len(fibre)), np.diff(fibre.offsets)),
+    )
+    owner = fibre.layer[number]
+    height = np.zeros(len(fibre.points))
+    for index, layer in known.items():
+        here = owner == index
+        if here.any():
+            height[here] = _height(layer, fibre.points[here])
+    table = np.column_stack([fibre.points, fibre.normals, height, feed])
+    with whole_file(path) as temporary, temporary.open("w", encoding="ascii") as file:
+        file.write(_HEADER + "\n")
+        for k, p, row in zip(owner.tolist(), number.tolist(), table.tolist(), strict=True):
+            file.write(f"{k},{p}," + ",".join(f"{value:.6g}" for value in row) + "\n")
+
+
+def _height(layer: Layer, points: FloatArray) -> FloatArray:
+    """Thickness of a layer at points on it, mm."""
+    found = nearest_on_triangles(layer.points, layer.triangles, points)
+    corners = layer.local_thickness[layer.triangles[found.triangle]]
+    return np.asarray(np.einsum("qk,qk->q", found.weights, corners))
+
+
+def write_layer_waypoints(path: str | Path, toolpaths: Toolpaths, layer: int) -> None:
+    """Write one layer as the files published with Fang et al. 2024.
+
+    Rows of ``x y z nx ny nz`` and three flags: the third last is 0, the second last 1 in the first
+    row only, the last 2; the strands follow each other.
+
+    Parameters
+    ----------
+    path : str or Path
+    toolpaths : Toolpaths
+    layer : int
+        Index of the layer.
+
+    Raises
+    ------
+    InputError
+        When the layer has no fibre, or the file cannot be written.
+    """
+    fibre = toolpaths.of_kind(FIBRE).on_layer(layer)
+    if not len(fibre):
+        raise InputError(f"layer {layer} has no fibre to write: name one that has")
+    start = np.zeros(len(fibre.points))
+    start[0] = 1.0
+    flags = np.column_stack([np.zeros(len(start)), start, np.full(len(start), 2.0)])
+    with whole_file(path) as temporary, temporary.open("w", encoding="ascii") as file:
+        rows = np.column_stack([fibre.points, fibre.normals])
+        for row, flag in zip(rows.tolist(), flags.tolist(), strict=True):
+            numbers = " ".join(f"{value:.6f}" for value in row)
+            file.write(numbers + " " + " ".join(f"{value:g}" for value in flag) + "\n")
+
+
+def read_layer_waypoints(path: str | Path, layer: Layer) -> Toolpaths:
+    """Read one layer of fibre from a file as published with Fang et al. 2024.
+
+    Steps longer than 3 mm are travel: the strands are cut there, and those whose ends lie within
+    3 mm of each other are closed. Points are put on the layer, whose normals they take, since some
+    of the published ones are missing.
+
+    Parameters
+    ----------
+    path : str or Path
+    layer : Layer
+        That the strands lie on.
+
+    Raises
+    ------
+    InputError
+        When the file is none of this kind.
+    """
+    file = existing_file(path, "waypoint file")
+    try:
+        table = np.loadtxt(file, ndmin=2)
+        points = table[:, :3]
+    except (ValueError, IndexError):
+        raise InputError(
+            f"{path} is no waypoint file: expected rows of x y z nx ny nz and flags, got other "
+            "text: check its name"
+        ) from None
+    if not np.isfinite(points).all():
+        raise InputError(f"{path} has a place that is no number: mend or leave out that row")
+    found = nearest_on_triangles(layer.points, layer.triangles, points)
+    corners = layer.point_normals[layer.triangles[found.triangle]]
+    normals = np.einsum("qk,qkd->qd", found.weights, corners)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    cut = np.flatnonzero(np.linalg.norm(np.diff(points, axis=0), axis=1) > _JUMP) + 1
+    lines, across = np.split(points, cut), np.split(normals, cut)
+    for k, line in enumerate(lines):
+        if len(line) > 3 and np.linalg.norm(line[0] - line[-1]) <= _JUMP:
+            lines[k] = np.vstack([line, line[:1]])
+            across[k] = np.vstack([across[k], across[k][:1]])
+    return Toolpaths.in_space(lines, across, layer)

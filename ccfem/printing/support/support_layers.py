@@ -1,0 +1,209 @@
+"""Layers of the support of a part, matched to the part's own."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ccfem.base.arrays import FloatArray, IntArray, freeze
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.machine.machine import Machine
+from ccfem.printing.support.column_mesh import ColumnMesh, column_mesh
+from ccfem.printing.support.support_field import SupportField, support_field
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.slicer import Slicer, Vector
+from ccfem.slicing.layers.standing import standing
+from ccfem.slicing.layers.sublayers import layers_within
+from ccfem.slicing.principal_lines.trace import mean_edge
+
+__all__ = ["SupportLayers", "slice_with_support", "support_layers"]
+
+_CARRIED = 45.0
+"""Degrees from upright up to which flat layers carry themselves."""
+_LIFT = 10
+"""Layers of support below the lowest point of curved layers [Kipping and Schueppstuhl, table 1]."""
+_HIGHER = 1.4
+"""... times this as often as it takes for none to lie upside down, so many times at most:"""
+_TIMES = 5
+_INVERTED = 5e-4
+"""Share of the volume of the support in which layers may lie upside down."""
+_RANGE = (0.57, 1.43)
+"""Thickness in the support, in that of the part's layers: 0.2 to 0.5 mm for 0.35 [ditto]."""
+_SHORTEST = 0.3
+_LEAST_AREA = 1.0
+"""Shortest edge of the layers' triangles, in mean edges of the part; smallest piece, mm^2."""
+
+
+@dataclass(frozen=True)
+class SupportLayers:
+    """Support of a part, in layers.
+
+    Attributes
+    ----------
+    layers : tuple of Layer
+        From the bed up. Their cells and nodes are those of ``columns.mesh``.
+    before : (k,) int array
+        Number of the part's layer at the same level; where it has none, as below its first, of the
+        next above. A layer of support is printed just before it.
+    columns : ColumnMesh
+        The space that they fill, with its volume and where it touches.
+    field : SupportField
+        Whose levels they are.
+    thickness : float, mm
+        Mean by area.
+    """
+
+    layers: tuple[Layer, ...]
+    before: IntArray
+    columns: ColumnMesh
+    field: SupportField
+    thickness: float
+
+    def __post_init__(self) -> None:
+        freeze(self, before=int)
+
+    def __repr__(self) -> str:
+        return (
+            f"SupportLayers: {len(self.layers)} layers of {self.thickness:.3g} mm, "
+            f"{self.columns.volume:.4g} mm^3, {self.columns.contact:.4g} mm^2 of the part on them"
+        )
+
+    def layers_before(self, number: int) -> tuple[Layer, ...]:
+        """Layers of support that are printed just before a layer of the part."""
+        return tuple(self.layers[k] for k in np.flatnonzero(self.before == number).tolist())
+
+
+def support_layers(
+    mesh: TetMesh,
+    layers: Sequence[Layer],
+    build: Vector = (0.0, 0.0, 1.0),
+    field: FloatArray | None = None,
+    step: float | None = None,
+    angle: float | None = None,
+    lift: float | None = None,
+    size: float | None = None,
+) -> SupportLayers:
+    """Lay support below a part, in layers that continue its own.
+
+    The field whose levels are the part's layers is continued into the space below, where it ends
+    flat on the bed: see `support_field`. Where layers would be thinner or thicker than 0.57 to 1.43
+    of the part's, some are left out or put in between.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+        The part.
+    layers : sequence of Layer
+        Of the part, from the first printed to the last.
+    build : tuple of 3 floats, default z
+        Build direction.
+    field : (n,) array, optional
+        At the nodes of the part: its layers lie where this has certain values. Only flat layers
+        need none; `slice_with_support` knows that of a slicer.
+    step : float, optional
+        Of the field from layer to layer, by default the commonest.
+    angle : float, degrees, optional
+        Faces that lean over by more than this, from upright, are supported: by default 45 for flat
+        layers, and 0, all that look down, for curved ones.
+    lift : float, mm, optional
+        Height of the lowest point of the part above the bed: by default 0 for flat layers, and for
+        curved ones 10 layers, in which they become flat, or as many more as that takes.
+    size : float, mm, optional
+        Of the cells, as in `column_mesh`.
+
+    Raises
+    ------
+    InputError
+        Without a field for curved layers; where nothing hangs over; where layers of the support
+        would lie upside down.
+    """
+    if not layers:
+        raise InputError("support is laid below layers; got none: cut the part into layers first")
+    flat = all(layer.flat is not None for layer in layers)
+    if field is None:
+        first = layers[0].flat
+        if not flat or first is None:
+            raise InputError(
+                "support below curved layers needs the field they were cut from: call "
+                "slice_with_support with their slicer"
+            )
+        field = mesh.points @ first.frame[2]
+    levels = np.array([float(np.median(layer.interpolate(field))) for layer in layers])
+    rise = np.diff(levels)
+    step = float(step or (np.median(rise) if len(rise) else layers[0].thickness))
+    nominal = float(np.mean([layer.thickness for layer in layers]))
+    angle = (_CARRIED if flat else 0.0) if angle is None else angle
+    lifts = [_LIFT * nominal * _HIGHER**k for k in range(_TIMES + 1)] if not flat else [0.0]
+    for height in lifts if lift is None else [lift]:
+        columns = column_mesh(mesh, build, angle, height, size)
+        origin = float(levels[0]) - 0.5 * step
+        found = support_field(columns, field, step / nominal, step, origin, _INVERTED)
+        if found.inverted <= _INVERTED:
+            break
+    else:
+        raise InputError(
+            f"support layers lie upside down in {100.0 * found.inverted:.2g} % of the support: "
+            f"raise lift, over which the lowest layers flatten, above {height:.3g} mm"
+        )
+    thinnest, thickest = (share * nominal for share in _RANGE)
+    cut = layers_within(
+        columns.mesh,
+        found.values,
+        step,
+        thinnest,
+        thickest,
+        _SHORTEST * mean_edge(mesh),
+        _LEAST_AREA,
+        origin,
+    )
+    own = [float(np.median(layer.interpolate(found.values))) for layer in cut.layers]
+    before = np.searchsorted(levels, np.array(own) - 1e-3 * step)
+    area = np.array([float(layer.areas.sum()) for layer in cut.layers])
+    thick = np.array([layer.thickness for layer in cut.layers])
+    mean = float(area @ thick / area.sum()) if len(area) else 0.0
+    return SupportLayers(cut.layers, before, columns, found, mean)
+
+
+def slice_with_support(
+    slicer: Slicer,
+    stress: PartStress,
+    build: Vector = (0.0, 0.0, 1.0),
+    machine: Machine | None = None,
+    angle: float | None = None,
+    lift: float | None = None,
+) -> tuple[tuple[Layer, ...], SupportLayers]:
+    """Cut a part into layers, and the support below it.
+
+    Parameters
+    ----------
+    slicer : Slicer
+        Of flat layers, or one that says the field of its layers (`slice`).
+    stress : PartStress
+    build : tuple of 3 floats, default z
+        Where curved layers look down from there, the support is laid below the part as it stands
+        along their mean normal (`standing`): ``support.columns.up``.
+    machine : Machine, optional
+    angle, lift : float, optional
+        As of `support_layers`.
+
+    Returns
+    -------
+    layers : tuple of Layer
+    support : SupportLayers
+    """
+    sliced: Any = slicer.slice(stress, build) if hasattr(slicer, "slice") else None
+    if sliced is None:
+        layers = slicer(stress, build, Machine() if machine is None else machine)
+        return layers, support_layers(stress.mesh, layers, build, None, None, angle, lift)
+    if getattr(sliced, "inverted", 0.0) > 0.0:
+        raise InputError(
+            f"layers lie upside down in {100.0 * sliced.inverted:.2g} % of the part, where no "
+            "support carries them: raise load_oriented.blend, or leave it out"
+        )
+    layers, up = sliced.layers, standing(sliced.layers, build)
+    values = None if all(layer.flat is not None for layer in layers) else sliced.field.values
+    step = None if values is None else sliced.step
+    return layers, support_layers(stress.mesh, layers, up, values, step, angle, lift)

@@ -1,0 +1,7 @@
+"""Layers, flat and curved, and the slicers that cut a part into them."""
+
+from ccfem.base.submodules import submodules
+
+__all__: list[str] = []
+
+__getattr__ = submodules(__name__)

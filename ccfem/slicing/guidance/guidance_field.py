@@ -1,0 +1,304 @@
+"""The guidance field: one linear solve for a scalar field whose level surfaces are the layers.
+
+Fang et al. 2024 (arXiv:2311.17265), section 2.3, minimise an energy of the field that has no scale
+of its own, so that a constant field minimises it. Here the joints set the scale.
+"""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
+
+from ccfem.base.arrays import FloatArray, IntArray, read_only
+from ccfem.base.errors import InputError, SolveError
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.fem.elasticity.assembly import cell_gradients
+from ccfem.slicing.guidance.energies import (
+    alignment_energy,
+    gradient_energy,
+    gradient_source,
+    smoothness_energy,
+)
+from ccfem.slicing.guidance.equal_values import equal_value_energy, slabs
+from ccfem.slicing.guidance.joints import Joint
+
+__all__ = ["GuidanceField", "JointForm", "Weights", "guidance_field"]
+
+JointForm = Literal["axis", "ring", "literal"]
+
+_MOST_SIGNS = 12
+"""Number of joints up to which all signs are tried; above it each is flipped in turn."""
+_RESIDUAL = 1e-6
+_UP = read_only(np.array([0.0, 0.0, 1.0]))
+_FREE = 0.05
+"""Share of the stress by which a direction may exceed the least stressed one and count as equal."""
+_ANCHOR = 0.01
+"""Weight of the direction of least stress if no joint has an axis."""
+_TIE = 0.005
+"""Share of the lowest energy within which energies tie with it. Joints that are far apart hardly
+influence each other's signs (on the T-bracket of the paper, all combinations are within 0.3 %), and
+on parts with a mirror plane they come in pairs. Of tied combinations, the one is taken whose layers
+are stacked most along the build direction."""
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Weights of the terms of the field.
+
+    Attributes
+    ----------
+    stress : float
+        Layers along the strongest stress.
+    smoothness : float
+        Equal gradients in neighbouring cells.
+    joints : float
+        Layers normal to the axes of the joints, or of one value round them.
+    length : float, mm
+        Length over which smoothness acts.
+    """
+
+    stress: float
+    smoothness: float
+    joints: float
+    length: float
+
+
+@dataclass(frozen=True)
+class GuidanceField:
+    """A scalar field on a part whose level surfaces are its layers.
+
+    Attributes
+    ----------
+    mesh : TetMesh
+    values : (n,) array, mm
+        At the nodes; the mean size of its gradient is 1. Zero at nodes that are no cell's corner.
+    gradient : (m, 3) array
+    signs : tuple of int
+        Sense, 1 or -1, in which the field rises along the direction of each joint.
+    energies : mapping of signs to float
+        Energy of every combination of signs that was tried, without its constant term.
+    """
+
+    mesh: TetMesh
+    values: FloatArray
+    gradient: FloatArray
+    signs: tuple[int, ...]
+    energies: dict[tuple[int, ...], float]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", read_only(self.values))
+        object.__setattr__(self, "gradient", read_only(self.gradient))
+
+
+def guidance_field(
+    mesh: TetMesh,
+    tension: FloatArray,
+    importance: FloatArray,
+    joints: Sequence[Joint],
+    weights: Weights,
+    form: JointForm = "axis",
+    signs: Sequence[int] | None = None,
+    slab: float = 0.5,
+    build: FloatArray = _UP,
+) -> GuidanceField:
+    """Find the field: gradients normal to the stress, smooth, and along the joints' axes.
+
+    Minimises
+
+        w_s sum_e V_e omega_e (g_e . tau_e)^2 + w_c l^2 sum_f A_f / h_f |g_e - g_e'|^2 + joints
+
+    with the term of the joints, by `form`,
+
+    * "axis": ``w_b sum_k sum_e V_e |g_e - s_k a_k|^2`` over the cells of each joint, s_k = 1 or -1;
+    * "literal": one value in each joint, as the paper prints it (eq. 3);
+    * "ring": one value in each slab of a joint normal to its direction.
+
+    The last two set no scale, so it is set by a mean gradient along the axes. Joints without a
+    direction have no effect in "axis". If no joint has a direction, ``0.01 sum_e V_e |g_e - d|^2``
+    is used instead, with the direction d of least stress.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    tension : (m, 3) array
+        Direction tau of the strongest stress.
+    importance : (m,) array
+        omega: 0 where the stress has no effect.
+    joints : sequence of Joint
+    weights : Weights
+    form : {"axis", "ring", "literal"}
+    signs : sequence of {1, -1}, optional
+        s_k; by default those of the lowest energy.
+    slab : float, mm
+        Height of a slab for "ring".
+    build : (3,) array
+        Unit vector of the build direction: the mean gradient does not point against it.
+
+    Returns
+    -------
+    GuidanceField
+
+    Raises
+    ------
+    InputError
+        When neither stress nor joints determine the layers, or the signs do not fit.
+    SolveError
+        When the solve misses its tolerance.
+    """
+    gradients, cells, n = cell_gradients(mesh), mesh.corners, len(mesh.points)
+    volume = mesh.volumes
+    used = np.unique(cells)
+    place = np.full(n, -1)
+    place[used] = np.arange(len(used))
+    cells, points = place[cells], mesh.points[used]
+    if not weights.joints > 0.0:  # joints without weight leave the field to the stress
+        joints = ()
+    groups = _groups(points, cells, joints, form, slab)
+    count = len(used) + sum(number for _, _, number in groups)
+    stress = weights.stress * volume * importance
+    matrix = alignment_energy(gradients, cells, tension, stress, count)
+    smooth = smoothness_energy(points, gradients, cells, mesh.faces, mesh.across, count)
+    matrix = matrix + weights.smoothness * weights.length**2 * smooth
+    sources, first = [], len(used)
+    for k, joint in enumerate(joints):
+        share = np.zeros(len(cells))
+        share[joint.region] = weights.joints * volume[joint.region]
+        if form == "axis" and joint.direction is not None:
+            matrix = matrix + gradient_energy(gradients, cells, share, count)
+        elif form != "axis":
+            nodes, group, number = groups[k]
+            weight = float(share.sum()) / weights.length**2
+            matrix = matrix + equal_value_energy(nodes, group, weight, first, count)
+            first += number
+        if joint.direction is not None:
+            sources.append(gradient_source(gradients, cells, joint.direction, share, count))
+    if not sources:
+        direction = _least_stressed(tension, volume * importance, build)
+        share = _ANCHOR * volume
+        matrix = matrix + gradient_energy(gradients, cells, share, count)
+        sources.append(gradient_source(gradients, cells, direction, share, count))
+    solve = _factorised(matrix)
+    found = np.stack([solve(source) for source in sources])
+    energies = _energies(np.array(sources) @ found.T, signs)
+    rising = np.einsum("e,eid,kei,d->k", volume, gradients, found[:, cells], build, optimize=True)
+    best = _lowest(energies, rising)
+    values = np.zeros(n)
+    values[used] = (np.array(best) @ found)[: len(used)]
+    gradient = np.einsum("eid,ei->ed", gradients, values[mesh.corners])
+    mean = float((volume * np.linalg.norm(gradient, axis=1)).sum() / volume.sum())
+    if not mean > 0.0:
+        raise InputError("the guidance field is constant: name joints, or give it stress to follow")
+    if float((volume @ gradient) @ build) < 0.0:
+        mean = -mean
+    signs_found = best if mean > 0.0 else tuple(-s for s in best)
+    return GuidanceField(mesh, values / mean, gradient / mean, signs_found, energies)
+
+
+def _groups(
+    points: FloatArray,
+    cells: IntArray,
+    joints: Sequence[Joint],
+    form: JointForm,
+    slab: float,
+) -> list[tuple[IntArray, IntArray, int]]:
+    """Nodes of each joint, the group of each node, and the number of groups; none for "axis"."""
+    found: list[tuple[IntArray, IntArray, int]] = []
+    for joint in joints if form != "axis" else ():
+        nodes = np.unique(cells[joint.region])
+        height, direction = np.inf, np.zeros(3)
+        if form == "ring":
+            if joint.direction is None:
+                raise InputError(
+                    f"joint '{joint.name}' is no cylinder and has no slabs: say in directions "
+                    "which way the layers are stacked there, or leave it out of the joints"
+                )
+            height, direction = slab, joint.direction
+        found.append((nodes, *slabs(points, nodes, direction, height)))
+    return found
+
+
+def _lowest(energies: dict[tuple[int, ...], float], rising: FloatArray) -> tuple[int, ...]:
+    """Signs of the lowest energy; of those that tie with it, the first of those that rise most.
+
+    `rising`, (k,), is the rise of the field of each joint along the build direction.
+    """
+    least = min(energies.values())
+    limit = least + _TIE * abs(least)
+    tied = [signs for signs, energy in energies.items() if energy <= limit]
+    height = {signs: abs(float(np.array(signs) @ rising)) for signs in tied}
+    most = max(height.values())
+    enough = most - 1e-6 * float(np.abs(rising).sum())
+    return next(signs for signs in tied if height[signs] >= enough)
+
+
+def _least_stressed(tension: FloatArray, weight: FloatArray, build: FloatArray) -> FloatArray:
+    """Direction of least stress; of several equal ones, the nearest to the build direction."""
+    total = np.einsum("e,ei,ej->ij", weight, tension, tension)
+    if not np.trace(total) > 0.0:
+        raise InputError("the layers have nothing to follow: give a stress, or name joints")
+    values, vectors = np.linalg.eigh(total)
+    free = vectors[:, values <= values[0] + _FREE * values.sum()]
+    direction = free @ (free.T @ build)
+    if np.linalg.norm(direction) < _FREE:
+        direction = free[:, 0]
+    return np.asarray(direction / np.linalg.norm(direction))
+
+
+def _factorised(matrix: sp.csr_array) -> Any:
+    """Solver of the matrix with the first node fixed at zero; every residual is checked."""
+    inner = sp.csc_array(matrix[1:, 1:])
+    options = {"SymmetricMode": True}
+    try:
+        factor = splu(inner, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    except RuntimeError as error:
+        raise SolveError(
+            f"guidance field: {error}: check that the part is in one piece and the smoothness "
+            "above 0"
+        ) from error
+
+    def solve(rhs: FloatArray) -> FloatArray:
+        wanted = rhs[1:]
+        x = factor.solve(wanted)
+        x += factor.solve(wanted - inner @ x)
+        residual = np.linalg.norm(wanted - inner @ x) / np.linalg.norm(wanted)
+        if not residual <= _RESIDUAL:
+            raise SolveError(
+                f"guidance field: relative residual {residual:.1e} above {_RESIDUAL:.1e}: are "
+                "there cells without volume?"
+            )
+        return np.concatenate([[0.0], x])
+
+    return solve
+
+
+def _energies(product: FloatArray, wanted: Sequence[int] | None) -> dict[tuple[int, ...], float]:
+    """Energy of combinations of signs: ``-s^T P s`` with ``P_jk = b_j . G_k``.
+
+    The field of signs s is ``sum s_k G_k``, so no combination needs a solve of its own. One sign is
+    fixed, since flipping all signs flips the field.
+    """
+    count = len(product)
+
+    def energy(signs: tuple[int, ...]) -> float:
+        s = np.array(signs, dtype=np.float64)
+        return -float(s @ product @ s)
+
+    if wanted is not None:
+        signs = tuple(int(s) for s in wanted)
+        if len(signs) != count or any(abs(s) != 1 for s in signs):
+            raise InputError(f"signs must be {count} numbers 1 or -1, one a joint; got {signs}")
+        return {signs: energy(signs)}
+    if count <= _MOST_SIGNS:
+        rest = itertools.product((1, -1), repeat=count - 1)
+        return {(1, *others): energy((1, *others)) for others in rest}
+    found: dict[tuple[int, ...], float] = {}
+    signs = (1,) * count
+    while signs not in found:
+        found[signs] = energy(signs)
+        flips = [(*signs[:k], -signs[k], *signs[k + 1 :]) for k in range(1, count)]
+        signs = min([signs, *flips], key=energy)
+    return found

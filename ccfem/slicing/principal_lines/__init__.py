@@ -1,0 +1,15 @@
+"""Lines along the strongest principal stress of a part, and the region that carries the load."""
+
+from ccfem.slicing.principal_lines.critical import CriticalRegion, critical_region
+from ccfem.slicing.principal_lines.strongest import Strongest, strongest_stress
+from ccfem.slicing.principal_lines.trace import Traced, Tracer, trace
+
+__all__ = [
+    "CriticalRegion",
+    "Strongest",
+    "Traced",
+    "Tracer",
+    "critical_region",
+    "strongest_stress",
+    "trace",
+]

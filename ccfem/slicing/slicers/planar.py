@@ -1,0 +1,224 @@
+"""Flat layers across the build direction."""
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.checks import check_choices
+from ccfem.base.errors import InputError, shown
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.machine.machine import Machine
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.level_cut import border_edges, chain, cut_at_zero, patch_edges
+from ccfem.slicing.layers.pitch import check_heights
+from ccfem.slicing.layers.plane import Plane, plane_frame
+from ccfem.slicing.layers.slicer import Vector
+
+__all__ = ["Planar", "slice_heights"]
+
+_TOP = 1e-3
+"""Share of the part's height below its top where a height that cuts nothing lies on it."""
+_SNAP = 2e-6
+"""Nodes nearer to the plane than this share of the part's size are taken to lie on it [Chen et al.
+2021, section 5]: a plane through mesh nodes would otherwise cut slivers."""
+
+_COUNT = 12
+"""Layers where nothing else is asked for: those of the Loop of Chen et al. 2021."""
+
+_MOST = 100_000
+"""Layers above which their number is taken for a mistake."""
+
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+@dataclass(frozen=True)
+class Planar:
+    """Flat layers across the build direction, at the middle of slabs or at given heights.
+
+    At most one of the three is given; without any there are 12 layers.
+
+    Attributes
+    ----------
+    count : int, optional
+        Number of layers, at the middle of equal slabs.
+    thickness : float, mm, optional
+        Height of a slab. As many slabs as fit are stacked from the bottom up. The rest at the top,
+        less than one slab, belongs to the last layer and is printed in matrix, without fibre.
+    heights : tuple of float, mm, optional
+        Heights ``points @ direction`` of the layers themselves.
+    axis : {"build", "x", "y", "z"}
+        What the layers lie across: the build direction of the part, or an axis of its mesh.
+    """
+
+    count: int | None = None
+    thickness: float | None = None
+    heights: tuple[float, ...] | None = None
+    axis: Literal["build", "x", "y", "z"] = "build"
+
+    shorthand: ClassVar[str] = "axis"
+
+    def __post_init__(self) -> None:
+        check_choices(self)
+        given = [n for n in ("count", "thickness", "heights") if getattr(self, n) is not None]
+        if len(given) > 1:
+            raise InputError(
+                "planar layers need one of count, thickness and heights; got "
+                f"{' and '.join(given)}: choose one"
+            )
+        if not given:
+            object.__setattr__(self, "count", _COUNT)
+        if self.count is not None and self.count < 1:
+            raise InputError(f"the number of layers must be at least 1; got {self.count}")
+        if self.count is not None and self.count > _MOST:
+            raise InputError(
+                f"the number of layers must be at most {_MOST:,}; got {shown(self.count)}: correct "
+                "it"
+            )
+        if self.heights is not None:
+            heights = tuple(sorted(float(height) for height in self.heights))
+            if not heights or not np.isfinite(heights).all():
+                raise InputError("give at least one layer height, a finite number in mm")
+            if (np.diff(heights) == 0.0).any():
+                again = heights[int(np.flatnonzero(np.diff(heights) == 0.0)[0])]
+                raise InputError(
+                    f"each layer height must be given once; got {again:g} mm more than once: a "
+                    "layer there has room for its fibre once"
+                )
+            object.__setattr__(self, "heights", heights)
+
+    def __call__(self, stress: PartStress, build: Vector, machine: Machine) -> tuple[Layer, ...]:
+        """Cut a part into flat layers; the stress has no influence.
+
+        Raises
+        ------
+        InputError
+            As of `cut`, and when layers are nearer than a strand of the machine is high.
+        """
+        self.check(stress.mesh, build, machine)  # before thousands of layers are cut
+        return self.cut(stress.mesh, build)
+
+    def check(self, mesh: TetMesh, build: Vector, machine: Machine) -> None:
+        """Refuse layers nearer to each other than a strand of a machine is high.
+
+        Raises
+        ------
+        InputError
+            Also for a slab that is higher than the part.
+        """
+        check_heights(self._stack(mesh, plane_frame(_AXES.get(self.axis, build))), machine)
+
+    def cut(self, mesh: TetMesh, build: Vector = (0.0, 0.0, 1.0)) -> tuple[Layer, ...]:
+        """Cut a mesh into flat layers.
+
+        Parameters
+        ----------
+        mesh : TetMesh
+        build : tuple of 3 floats, default z
+            Build direction.
+
+        Returns
+        -------
+        tuple of Layer
+            From the bottom to the top. Heights between two disconnected parts give no layer.
+
+        Raises
+        ------
+        InputError
+            When a height lies outside the part or on its top, or a slab is higher than the part.
+        """
+        frame = plane_frame(_AXES.get(self.axis, build))
+        level = mesh.points @ frame[2]
+        lowest, highest = float(level[mesh.corners].min()), float(level[mesh.corners].max())
+        stack = self._stack(mesh, frame)
+        if stack[0] < lowest or stack[-1] > highest:
+            outside = stack[0] if stack[0] < lowest else stack[-1]
+            raise InputError(
+                f"layer height {outside:g} mm lies outside the part, which reaches from "
+                f"{lowest:g} to {highest:g} mm along the build direction"
+            )
+        edges = np.concatenate([[lowest], 0.5 * (stack[1:] + stack[:-1]), [highest]])
+        layers = [
+            _cut(mesh, Plane(frame, float(h)), level, k, float(edges[k + 1] - edges[k]))
+            for k, h in enumerate(stack)
+        ]
+        if layers[-1] is None and highest - stack[-1] < _TOP * (highest - lowest):
+            raise InputError(
+                f"layer height {stack[-1]:g} mm lies on the top of the part, where nothing is cut: "
+                "lay it at least half a strand height lower"
+            )
+        return tuple(layer for layer in layers if layer is not None)
+
+    def _stack(self, mesh: TetMesh, frame: FloatArray) -> FloatArray:
+        """Heights of the layers along the build direction, rising, mm."""
+        if self.heights is not None:
+            return np.array(self.heights)
+        level = mesh.points[mesh.corners] @ frame[2]
+        return slice_heights(float(level.min()), float(level.max()), self.count, self.thickness)
+
+
+def slice_heights(
+    lowest: float, highest: float, count: int | None = None, thickness: float | None = None
+) -> FloatArray:
+    """Heights of layers at the middle of equal slabs, (count,), mm.
+
+    Parameters
+    ----------
+    lowest, highest : float, mm
+        Extent of the part along the build direction.
+    count : int, optional
+        Number of layers.
+    thickness : float, mm, optional
+        Height of a slab instead of their number: as many as fit, from the lowest up.
+    """
+    size = highest - lowest
+    if (count is None) == (thickness is None):
+        raise InputError("give either the number of layers or their thickness, not both or none")
+    if count is not None:
+        return lowest + (np.arange(count, dtype=np.float64) + 0.5) * size / count
+    assert thickness is not None
+    if not 0.0 < thickness <= size:
+        raise InputError(
+            f"layer thickness must be above 0 and at most the part's height {size:g} mm; got "
+            f"{thickness:g}"
+        )
+    slabs = int(np.floor(size / thickness + 1e-9))
+    return lowest + (np.arange(slabs, dtype=np.float64) + 0.5) * thickness
+
+
+def _cut(
+    mesh: TetMesh, plane: Plane, level: FloatArray, index: int, thickness: float
+) -> Layer | None:
+    frame, height = plane.frame, plane.height
+    snap = _SNAP * float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
+    signed = level - height
+    signed[np.abs(signed) < snap] = 0.0
+    cut = cut_at_zero(mesh, signed)
+    if cut is None:
+        return None
+    points = cut.points + (height - cut.points @ frame[2])[:, None] * frame[2]
+    triangles = _counter_clockwise(points @ frame[:2].T, cut.triangles)
+    border = border_edges(triangles, len(points))
+    return Layer(
+        points=points,
+        triangles=triangles,
+        cell=cut.cell,
+        nodes=cut.nodes,
+        weights=cut.weights,
+        loops=chain(border),
+        flat=plane,
+        index=index,
+        thickness=thickness,
+        patches=patch_edges(mesh, border, cut.nodes),
+    )
+
+
+def _counter_clockwise(plane: FloatArray, triangles: IntArray) -> IntArray:
+    a, b, c = np.moveaxis(plane[triangles], 1, 0)
+    u, v = b - a, c - a
+    clockwise = u[:, 0] * v[:, 1] < u[:, 1] * v[:, 0]
+    turned = triangles.copy()
+    turned[clockwise] = triangles[clockwise][:, [0, 2, 1]]
+    return turned

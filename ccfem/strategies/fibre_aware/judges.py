@@ -1,0 +1,262 @@
+"""Tests of paths under one or several load cases: their value, and the worth of their fibre."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from ccfem.base.arrays import FloatArray, freeze, in_brief
+from ccfem.base.checks import check_known
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.judging.virtual_testing.equilibrium import Equilibrium, equilibrium
+from ccfem.judging.virtual_testing.several_cases import cases_failure, virtual_tests
+from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.judging.virtual_testing.strands import Strands, cut_strands
+from ccfem.machine.machine import Machine
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
+from ccfem.strategies.fibre_aware.strain_worth import StrainWorth
+from ccfem.strategies.fibre_aware.strength_value import Worth, layer_normal
+from ccfem.strategies.fibre_aware.upper_bound import LEAST, OBJECTIVES, SUM, WORST
+
+__all__ = [
+    "Equilibria",
+    "Goal",
+    "Judge",
+    "Judged",
+    "equilibria",
+    "stiffest",
+    "stiffness_judge",
+    "strength_judge",
+]
+
+_POWERS = {WORST: 20.0, SUM: 1.0, LEAST: 20.0}
+
+_TOLERANCE = 1e-4
+"""Relative residual of the tests; the error of the stiffness is of its square."""
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What is wanted of a part under one or several load cases.
+
+    Attributes
+    ----------
+    parts : tuple of Specimen
+        The part without fibre under each case.
+    weights : (n,) array
+        Of the cases.
+    bounds : (n,) array
+        Stiffness ratio that each case is measured by, one that no paths exceed
+        (`ccfem.strategies.fibre_aware.upper_bound.measures`); of one case any number.
+    objective : {"worst", "sum", "least"}
+        What counts: the case that is farthest below what it is measured by, or the weighted mean.
+
+    Raises
+    ------
+    InputError
+        For an unknown objective.
+    """
+
+    parts: tuple[Specimen, ...]
+    weights: FloatArray
+    bounds: FloatArray
+    objective: str = WORST
+
+    __repr__ = in_brief
+
+    def __post_init__(self) -> None:
+        check_known("objective", self.objective, OBJECTIVES)
+        freeze(self, weights=float, bounds=float)
+
+    @classmethod
+    def of(cls, part: "StressField | Specimen | Goal") -> "Goal":
+        """Return the goal of one load case, the stiffness over that without fibre; or a goal."""
+        if isinstance(part, Goal):
+            return part
+        specimen = Specimen.of(part) if isinstance(part, StressField) else part
+        return cls((specimen,), np.ones(1), np.ones(1))
+
+    @property
+    def mesh(self) -> TetMesh:
+        """Mesh of the part."""
+        return self.parts[0].unreinforced.mesh
+
+    def counts(self, ratios: FloatArray) -> FloatArray:
+        """How much each case counts at stiffness ratios (n,): (n,), the sum is 1."""
+        terms = self.bounds / np.asarray(ratios)
+        counts = self.weights * (terms / terms.max()) ** _POWERS[self.objective]
+        return np.asarray(counts / counts.sum())
+
+    def merit(self, ratios: FloatArray) -> float:
+        """Mean of ratio over bound, weighted by `counts`.
+
+        With the objectives "worst" and "least" it is close to the value of the worst case.
+        """
+        power, shares = _POWERS[self.objective], self.weights / self.weights.sum()
+        return float(shares @ (self.bounds / np.asarray(ratios)) ** power) ** (-1.0 / power)
+
+
+@dataclass(frozen=True)
+class Equilibria:
+    """Equilibria of a part with its fibre under all load cases.
+
+    Attributes
+    ----------
+    found : tuple of Equilibrium
+    ratios : (n,) array
+        Stiffness over that of the part without fibre.
+    work : (n,) array, N mm
+        Of the forces, or of the supports that move: twice the strain energy.
+    """
+
+    found: tuple[Equilibrium, ...]
+    ratios: FloatArray
+    work: FloatArray
+
+    __repr__ = in_brief
+
+    def __post_init__(self) -> None:
+        freeze(self, ratios=float, work=float)
+
+    @property
+    def displacements(self) -> tuple[FloatArray, ...]:
+        """Displacement (n, 3), mm, under each case."""
+        return tuple(one.displacement for one in self.found)
+
+
+def equilibria(
+    goal: Goal,
+    strands: Strands,
+    strand: Strand | None = None,
+    known: Sequence[FloatArray] | None = None,
+    tolerance: float = _TOLERANCE,
+) -> Equilibria:
+    """Find the equilibrium under every load case, with fibres that carry tension only.
+
+    Parameters
+    ----------
+    goal : Goal
+    strands : Strands
+    strand : Strand, optional
+        Default rho = EA/E = 4 mm^2.
+    known : sequence of (n, 3) arrays, mm, optional
+        For each case a displacement near its solution, to start from.
+    tolerance : float, default 1e-4
+        Relative residual.
+    """
+    axial = (Strand() if strand is None else strand).stiffness(goal.parts[0].modulus)
+    found, ratios, works = [], [], []
+    for k, part in enumerate(goal.parts):
+        near = () if known is None else (known[k],)
+        with_fibre = equilibrium(part, strands, axial, known=near, tolerance=tolerance)
+        stiffness = part.stiffness(with_fibre.displacement, 0.5 * with_fibre.work)
+        bare = part.unreinforced
+        ratio = stiffness / part.stiffness(bare.displacement, bare.strain_energy)
+        before = 2.0 * bare.strain_energy
+        found.append(with_fibre)
+        ratios.append(ratio)
+        works.append(before / ratio if part.forced else before * ratio)
+    return Equilibria(tuple(found), np.array(ratios), np.array(works))
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Result of a test of paths.
+
+    Attributes
+    ----------
+    value : float
+        Value to be maximised.
+    strain_worths : callable
+        Returns the worth of fibre by its strain, for each load case. With strength this takes
+        further solves, so it is computed only when called.
+    """
+
+    value: float
+    strain_worths: Callable[[], tuple[StrainWorth, ...]]
+
+    __repr__ = in_brief
+
+
+Judge: TypeAlias = Callable[[Toolpaths], Judged]
+
+
+def stiffness_judge(
+    part: StressField | Specimen | Goal, machine: Machine, strand: Strand | None = None
+) -> Judge:
+    """Judge of paths by the stiffness in all load cases, with the room that strands need."""
+    goal = Goal.of(part)
+    known: list[FloatArray] = []
+
+    def judge(toolpaths: Toolpaths) -> Judged:
+        strands = cut_strands(toolpaths, goal.mesh, machine=machine)
+        tested = equilibria(goal, strands, strand, known or None)
+        known[:] = tested.displacements
+        counts = goal.counts(tested.ratios) / tested.work
+        worths = _stiff_worths(counts, tested.displacements)
+        return Judged(goal.merit(tested.ratios), lambda: worths)
+
+    return judge
+
+
+def strength_judge(
+    part: StressField | Specimen | Goal,
+    layers: Sequence[Layer],
+    machine: Machine,
+    strand: Strand,
+    strength: float,
+    for_both: bool = True,
+) -> Judge:
+    """Judge of paths by the stiffness in all load cases and the load at first failure.
+
+    The value is ``merit^(1 - strength) factor^strength``, the factor being the least load at first
+    failure over the load of its case: at a strength of one half, relative changes of both count
+    equally. Where supports move, the load of the case is the one that they take in the part without
+    fibre. With `for_both` the worth of fibre by its strain is that for both, else that for the
+    stiffness alone.
+    """
+    goal = Goal.of(part)
+    known: list[FloatArray] = []
+    worth = Worth.of(goal.parts, strand, strength)
+    bare = [one.force(one.unreinforced.reactions) for one in goal.parts]
+
+    def judge(toolpaths: Toolpaths) -> Judged:
+        near = known or None
+        tested = virtual_tests(toolpaths, goal.parts, strand, machine=machine, known=near)
+        known[:] = [one.solution.displacement for one in tested.tests]
+        loads = [one.load for one in cases_failure(tested, strand, layers=layers).each]
+        factor = min(load / size for load, size in zip(loads, bare, strict=True))
+        value = goal.merit(tested.ratios) ** (1.0 - strength) * factor**strength
+        strands, displaced = tested.tests[0].strands, tuple(known)
+        normal, counts = layer_normal(toolpaths), goal.counts(tested.ratios)
+
+        def strain_worths() -> tuple[StrainWorth, ...]:
+            if not for_both:
+                work = [2.0 * one.solution.strain_energy for one in tested.tests]
+                return _stiff_worths(counts / work, displaced)
+            found = equilibria(goal, strands, strand, displaced).found
+            return worth.strain_worths(strands, found, normal, counts)
+
+        return Judged(float(value), strain_worths)
+
+    return judge
+
+
+def stiffest(candidates: Sequence[Toolpaths], judge: Judge) -> Toolpaths:
+    """Return the toolpaths of highest value, the first of equal ones; one alone is not tested."""
+    laid = [one for one in candidates if len(one)]
+    if len(laid) < 2:
+        return laid[0] if laid else candidates[0]
+    return laid[int(np.argmax([judge(one).value for one in laid]))]
+
+
+def _stiff_worths(
+    counts: FloatArray, displacements: Sequence[FloatArray]
+) -> tuple[StrainWorth, ...]:
+    """Worth of fibre by its strain, where a squared strain counts so much in each load case."""
+    pairs = zip(counts.tolist(), displacements, strict=True)
+    return tuple(StrainWorth(count, displacement) for count, displacement in pairs)

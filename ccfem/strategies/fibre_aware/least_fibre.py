@@ -1,0 +1,175 @@
+"""How much fibre a wanted stiffness takes: the least length of a strategy that reaches it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ccfem.base.arrays import FloatArray, freeze, in_brief
+from ccfem.base.checks import check_number
+from ccfem.base.errors import InputError
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.judging.virtual_testing.several_cases import specimens, virtual_tests
+from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.machine.machine import Machine
+from ccfem.paths.planning.planned import Planned
+from ccfem.paths.planning.strategy import Strategy
+from ccfem.paths.planning.whole_part import full_length
+from ccfem.slicing.layers.layer import Layer
+from ccfem.strategies.fibre_aware.plan_cases import plan_cases
+from ccfem.strategies.fibre_aware.upper_bound import LEAST, WORST
+
+__all__ = ["LeastFibre", "for_every_case", "least_fibre"]
+
+_FIRST = 0.3
+"""Share of the layers that the first plan covers."""
+
+_MOST = 1.0
+"""Largest share that is asked for: strategies lay less where they cannot lay that much."""
+
+_PLANS = 10
+"""Plans after which the best is taken."""
+
+_CLOSE = 0.01
+"""Share of the wanted gain by which a plan may do better than asked."""
+
+_LEAP, _STEP = 4.0, 0.1
+"""Largest factor between two lengths that are tried one after the other, and the logarithm of the
+smallest as long as only too little or only enough is known."""
+
+
+@dataclass(frozen=True)
+class LeastFibre:
+    """The least fibre that was found to reach a stiffness.
+
+    Attributes
+    ----------
+    planned : Planned
+        The plan that reaches it, with its length per layer.
+    asked : float, mm
+        Length per layer that this plan was asked for: asked again, the strategy lays the same.
+    ratio : float
+        Its stiffness over that of the part without fibre, fibres in tension only; of several load
+        cases the least.
+    ratios : (n,) array
+        The same in each load case.
+    tried : tuple of (float, float)
+        Length per layer, mm, and stiffness ratio of every plan, in the order of the search.
+    """
+
+    planned: Planned
+    asked: float
+    ratio: float
+    ratios: FloatArray
+    tried: tuple[tuple[float, float], ...]
+
+    __repr__ = in_brief
+
+    def __post_init__(self) -> None:
+        freeze(self, ratios=float)
+
+
+def least_fibre(
+    strategy: Strategy,
+    layers: Sequence[Layer],
+    stress: StressField | WeightedCases,
+    machine: Machine,
+    ratio: float,
+    strand: Strand | None = None,
+) -> LeastFibre:
+    """Find the least fibre with which a strategy makes a part so and so stiff.
+
+    The gain in stiffness grows about as a power of the length; two plans say which, and the next
+    length follows. Every plan is tested virtually.
+
+    Several load cases are planned for at once, and every one of them is to be so stiff, over the
+    part without fibre in that case: what counts is the one that gains least (`for_every_case`).
+
+    Parameters
+    ----------
+    strategy : Strategy
+    layers : sequence of Layer
+        All layers of the part.
+    stress : StressField or WeightedCases
+        The part without fibre, under the load that counts, or under several.
+    machine : Machine
+    ratio : float
+        Wanted stiffness over that of the part without fibre, above 1.
+    strand : Strand, optional
+        Stiffness of a strand; default rho = EA/E = 4 mm^2.
+
+    Raises
+    ------
+    InputError
+        When the ratio is not above 1, or the most fibre that the strategy lays does not reach it.
+    """
+    check_number("stiffness over that without fibre", ratio, above=1.0)
+    cases = WeightedCases.of(stress)
+    if len(cases) > 1:
+        strategy = for_every_case(strategy)
+    parts, most = specimens(cases), _MOST * full_length(layers, machine)
+    found: dict[float, LeastFibre] = {}
+    tried: list[tuple[float, float]] = []
+    length = _FIRST * most
+    for _ in range(_PLANS):
+        planned = plan_cases(strategy, layers, cases, machine, length, strand)
+        ratios = virtual_tests(planned.toolpaths, parts, strand, machine=machine).ratios
+        reached = float(ratios.min())
+        laid = planned.length_per_layer
+        if laid in found:  # no other length lies between
+            break
+        found[laid] = LeastFibre(planned, length, reached, ratios, ())
+        tried.append((laid, reached))
+        if 0.0 <= reached - ratio <= _CLOSE * (ratio - 1.0):
+            break
+        if reached < ratio and not planned.reached and laid < length:  # its most
+            break
+        following = _next(tried, ratio)
+        if following is None:
+            break
+        length = min(following, most)
+    enough = [laid for laid, one in found.items() if one.ratio >= ratio]
+    if not enough:
+        best = max(found.values(), key=lambda one: one.ratio)
+        every, where = "", ""
+        if len(cases) > 1:
+            every = " in every load case"
+            where = f" in '{cases.names[int(np.argmin(best.ratios))]}'"
+        raise InputError(
+            f"{ratio:.4g} times the stiffness without fibre was asked for{every}; "
+            f"{best.ratio:.4g}{where} is the most of {len(tried)} plans, with "
+            f"{best.planned.length_per_layer:.0f} mm per layer: ask for less, or give the part "
+            "more layers"
+        )
+    return replace(found[min(enough)], tried=tuple(tried))
+
+
+def for_every_case(strategy: Strategy) -> Strategy:
+    """Let a strategy plan for the load case that gains least, where it knows that objective.
+
+    One that was told another objective than its default, "worst", keeps it.
+    """
+    changed: Any = strategy
+    told = getattr(strategy, "objective", None) == WORST
+    return replace(changed, objective=LEAST) if told else strategy
+
+
+def _next(tried: list[tuple[float, float]], ratio: float) -> float | None:
+    """Length at which the gain, a power of the length between two plans, is a little too large.
+
+    None where the shortest that is enough and the longest below it that is not are alike.
+    """
+    wanted = np.log((ratio - 1.0) * (1.0 + 0.5 * _CLOSE))
+    known = sorted((float(np.log(x)), float(np.log(max(r - 1.0, 1e-9)))) for x, r in tried)
+    above = min((one for one in known if one[1] >= np.log(ratio - 1.0)), default=None)
+    below = max((one for one in known if above is None or one < above), default=None)
+    if above is None or below is None:
+        x, y = known[-1] if above is None else known[0]
+        leap = float(np.clip(wanted - y, -np.log(_LEAP), np.log(_LEAP)))
+        return float(np.exp(x + (max(leap, _STEP) if above is None else min(leap, -_STEP))))
+    if above[0] - below[0] < _CLOSE:
+        return None
+    share = (wanted - below[1]) / max(above[1] - below[1], 1e-9)
+    return float(np.exp(below[0] + np.clip(share, 0.1, 0.9) * (above[0] - below[0])))

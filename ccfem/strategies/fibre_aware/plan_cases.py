@@ -1,0 +1,194 @@
+"""Planning a part by any strategy for one load case, or for several at once.
+
+A strategy that plans for all cases does so itself (`CasesStrategy`). Of any other that follows the
+stress, each layer is planned for one case, the layers of a case spread evenly over the height; more
+is planned than wanted, and tests under all cases say what to take off. What does not follow the
+stress is planned as it is.
+"""
+
+from collections.abc import Sequence
+
+from ccfem.base.errors import InputError
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.judging.virtual_testing.several_cases import specimens
+from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.machine.machine import Machine
+from ccfem.paths.planning.equal_fibre import (
+    TOLERANCE,
+    length_per_layer,
+    plan_to_length,
+    plan_to_lengths,
+)
+from ccfem.paths.planning.plan import check_layers, plan, plan_layers
+from ccfem.paths.planning.planned import Planned
+from ccfem.paths.planning.short_pieces import about_short_pieces
+from ccfem.paths.planning.strategy import CasesStrategy, LengthStrategy, Strategy
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
+from ccfem.strategies.fibre_aware.heights import layers_by_case
+from ccfem.strategies.fibre_aware.judges import Goal
+from ccfem.strategies.fibre_aware.prune import prune
+from ccfem.strategies.fibre_aware.upper_bound import WORST, measures
+
+__all__ = ["plan_by_layers", "plan_cases", "plan_cases_to_lengths"]
+
+_TOO_MUCH = 1.15
+"""Length that is planned over that kept."""
+
+_ROUNDS = 3
+"""Virtual tests under every case that say what is taken off."""
+
+_SLACK = 0.05
+"""Share by which less may be planned: it is found in fewer steps."""
+
+
+def plan_cases(
+    strategy: Strategy,
+    layers: Sequence[Layer],
+    stress: StressField | WeightedCases,
+    machine: Machine,
+    wanted: float | None = None,
+    strand: Strand | None = None,
+    objective: str = WORST,
+) -> Planned:
+    """Plan a part for one or several load cases.
+
+    Parameters
+    ----------
+    strategy : Strategy
+    layers : sequence of Layer
+        All layers of the part; flat ones for several load cases.
+    stress : StressField or WeightedCases
+    machine : Machine
+    wanted : float, mm, optional
+        Fibre per layer, mean over the stack; default what the strategy lays by itself, of which
+        nothing is taken off.
+    strand : Strand, optional
+        Of the tests; default rho = EA/E = 4 mm^2.
+    objective : {"worst", "sum", "least"}
+        What the fibre is cut for, by strategies that do not say it themselves.
+
+    Raises
+    ------
+    InputError
+        Whatever the strategy raises; for curved layers.
+    """
+    check_layers(strategy, layers, machine)
+    if wanted is None and isinstance(strategy, LengthStrategy):
+        wanted = strategy.natural_length(layers, machine)
+    cases = WeightedCases.of(stress)
+    if _is_of_one(strategy, cases):
+        field = cases.heaviest
+        if wanted is not None:
+            return plan_to_length(strategy, layers, field, machine, wanted)
+        paths = plan(strategy, layers, field, machine)
+        return Planned(strategy, paths, length_per_layer(paths, layers))
+    if isinstance(strategy, CasesStrategy) and wanted is not None:
+        return _by_itself(strategy, layers, cases, machine, (wanted,))[0]
+    curved = [layer.index for layer in layers if layer.flat is None]
+    if curved:
+        raise InputError(
+            f"several load cases are planned for on flat layers only; layer {curved[0]} is curved: "
+            "choose a planar slicing, or one load case"
+        )
+    if wanted is None:
+        return _told(strategy, plan_by_layers(strategy, layers, cases, machine), layers, machine)
+    too_much = plan_by_layers(strategy, layers, cases, machine, _TOO_MUCH * wanted)
+    in_all = wanted * len(layers)
+    bounds = measures(objective, cases, layers, in_all, machine, strand)
+    goal = Goal(specimens(cases), cases.weights, bounds, objective)
+    paths = prune(too_much, goal, in_all, machine, strand, _ROUNDS)
+    return _told(strategy, paths, layers, machine, wanted)
+
+
+def plan_cases_to_lengths(
+    strategy: Strategy,
+    layers: Sequence[Layer],
+    stress: StressField | WeightedCases,
+    machine: Machine,
+    lengths: Sequence[float],
+    strand: Strand | None = None,
+) -> list[Planned]:
+    """Plan for one or several load cases to several lengths of fibre, mm per layer.
+
+    For one case, and by a strategy that plans for all cases (`CasesStrategy`), all lengths are
+    planned together; by any other each length is planned on its own. Parameters and errors as in
+    `plan_cases`.
+    """
+    cases = WeightedCases.of(stress)
+    if _is_of_one(strategy, cases):
+        return plan_to_lengths(strategy, layers, cases.heaviest, machine, lengths)
+    if isinstance(strategy, CasesStrategy):
+        check_layers(strategy, layers, machine)
+        return _by_itself(strategy, layers, cases, machine, lengths)
+    return [plan_cases(strategy, layers, cases, machine, each, strand) for each in lengths]
+
+
+def _is_of_one(strategy: Strategy, cases: WeightedCases) -> bool:
+    """Whether one load case says all that a plan follows."""
+    return len(cases) == 1 or getattr(strategy, "ignores_stress", False)
+
+
+def _by_itself(
+    strategy: CasesStrategy,
+    layers: Sequence[Layer],
+    cases: WeightedCases,
+    machine: Machine,
+    lengths: Sequence[float],
+) -> list[Planned]:
+    """Plans of a strategy that plans for all cases, of several lengths per layer."""
+    found = []
+    planners = strategy.for_cases(cases, layers, machine, lengths)
+    for (told, planner), wanted in zip(planners, lengths, strict=True):
+        paths = plan_layers(planner, layers, layers, cases.fields[0], machine)
+        found.append(_told(told, paths, layers, machine, wanted))
+    return found
+
+
+def plan_by_layers(
+    strategy: Strategy,
+    layers: Sequence[Layer],
+    cases: WeightedCases,
+    machine: Machine,
+    length: float | None = None,
+) -> Toolpaths:
+    """Plan each layer for one case, by their weights, the cases taking turns over the height.
+
+    Parameters
+    ----------
+    strategy : Strategy
+    layers : sequence of Layer
+    cases : WeightedCases
+    machine : Machine
+    length : float, mm, optional
+        Per layer, met within 5 %; default the strategy's own.
+    """
+    case = layers_by_case(cases.weights, layers)
+    found = []
+    for k, field in enumerate(cases.fields):
+        own = [layer for layer, each in zip(layers, case, strict=True) if each == k]
+        if own and length is None:
+            found.append(plan(strategy, own, field, machine))
+        elif own and length is not None:
+            wanted = (1.0 + _SLACK) * length
+            planned = plan_to_length(strategy, own, field, machine, wanted, tolerance=_SLACK)
+            found.append(planned.toolpaths)
+    whole = Toolpaths.concatenate(found)
+    return Toolpaths.concatenate(whole.on_layer(layer.index) for layer in layers)
+
+
+def _told(
+    strategy: Strategy,
+    toolpaths: Toolpaths,
+    layers: Sequence[Layer],
+    machine: Machine,
+    wanted: float | None = None,
+) -> Planned:
+    """Plan with what has to be said of its length."""
+    length = length_per_layer(toolpaths, layers)
+    if wanted is None or length >= (1.0 - TOLERANCE) * wanted:
+        return Planned(strategy, toolpaths, length)
+    note = f"lays {length:.0f} of {wanted:.0f} mm per layer: its most for all load cases"
+    note += about_short_pieces(layers, machine)
+    return Planned(strategy, toolpaths, length, note, reached=False)

@@ -1,0 +1,231 @@
+"""Cutting fibre paths to the stretches that are worth most.
+
+All fibre has the same price, and each path keeps the stretches that are worth more. Where only a
+share of the fibre may turn more tightly than the machine allows, such turns have an extra price.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ccfem.base.arrays import BoolArray, FloatArray
+from ccfem.geometry.curvature_samples import curvature_samples
+from ccfem.geometry.polylines import along_line, points_along, runs
+from ccfem.geometry.tight_bends import tight_bends
+from ccfem.machine.machine import Machine
+from ccfem.paths.toolpaths import FIBRE, Toolpaths
+from ccfem.strategies.fibre_aware.path_profile import Profile, least_price
+
+__all__ = ["TIGHT_SHARES", "shorten", "shorten_bent", "tight_share"]
+
+TIGHT_SHARES = {"tight": 1.0, "cut": 0.0095}
+"""Share of the fibre that may turn too tightly, for each value of the parameter `turns`."""
+
+_LOWER_PRICES = (0.999, 0.99, 0.97, 0.93, 0.85)
+"""Shares of the price at which remaining room is used: a path may be worth all or nothing."""
+
+_PRICES = (1e-3, 300.0)
+"""Range of the extra price of a mm that turns too tightly, over the value of the best fibre."""
+
+_BISECTIONS = 14
+
+_TRIFLE = 1e-6
+"""Value of fibre that carries nothing, over that of the best: it stays only where there is room."""
+
+
+def shorten(
+    toolpaths: Toolpaths,
+    along: Sequence[Profile],
+    length: float,
+    minimum: float,
+    cut_cost: float = 20.0,
+) -> Toolpaths:
+    """Keep the most valuable stretches of fibre paths, at most a wanted length in total.
+
+    Parameters
+    ----------
+    toolpaths : Toolpaths
+    along : sequence of Profile
+        Of its fibre paths, from `profiles`.
+    length : float, mm
+    minimum : float, mm
+        Least length of a stretch.
+    cut_cost : float, mm, default 20
+        See `Profile.kept`.
+
+    Returns
+    -------
+    Toolpaths
+        The price is the same for all paths: the smallest at which the length is not exceeded. The
+        room it leaves is filled path by path with what slightly lower prices would keep, or with a
+        part of that where all of it is too long.
+    """
+    price = least_price(along, length, minimum, cut_cost)
+    chosen = {one.path: one.kept(price, minimum, cut_cost)[0] for one in along}
+    room = length - sum(one.step * float(chosen[one.path].sum()) for one in along)
+    for factor in _LOWER_PRICES if price > 0.0 else ():
+        for one in along:
+            before = chosen[one.path]
+            longer = one.kept(factor * price, minimum, cut_cost)[0]
+            if one.step * (longer.sum() - before.sum()) > room:
+                longer = _grown(before, longer, int(room / one.step))
+            more = one.step * float(longer.sum() - before.sum())
+            if 0.0 < more <= room:
+                chosen[one.path] = longer
+                room -= more
+    return _cut(toolpaths, along, chosen)
+
+
+def shorten_bent(
+    toolpaths: Toolpaths,
+    along: Sequence[Profile],
+    length: float,
+    machine: Machine,
+    tight: float,
+) -> Toolpaths:
+    """As `shorten`, with at most a share of the fibre in bends tighter than the machine's radius.
+
+    A mm of such a bend has an extra price, the smallest that meets the share.
+
+    Parameters
+    ----------
+    toolpaths, along, length
+        As of `shorten`.
+    machine : Machine
+        With its minimum length and radius.
+    tight : float in [0, 1]
+        Share of the fibre's length; 1 for no limit.
+    """
+    least = machine.minimum_length
+    if tight >= 1.0:
+        return shorten(toolpaths, along, length, least)
+    best = max((float(np.abs(one.value).max()) for one in along), default=0.0) or 1.0
+    along = [
+        replace(one, value=np.where(one.value < 0.0, one.value, one.value + _TRIFLE * best))
+        for one in along
+    ]
+    found = shorten(toolpaths, along, length, least)
+    if tight_share(found, machine) <= tight:
+        return found
+    shares = _tight_pieces(toolpaths, along, machine)
+    low, high = (np.log(price * best) for price in _PRICES)
+    found = toolpaths.select(toolpaths.kind != FIBRE)
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        price = float(np.exp(middle))
+        priced = [
+            replace(one, value=one.value - price * share)
+            for one, share in zip(along, shares, strict=True)
+        ]
+        trial = shorten(toolpaths, priced, length, least)
+        if tight_share(trial, machine) <= tight:
+            found, high = trial, middle
+        else:
+            low = middle
+    return found
+
+
+def tight_share(toolpaths: Toolpaths, machine: Machine) -> float:
+    """Share of the fibre that turns more tightly than the machine's radius; 0 without fibre.
+
+    Samples are a fibre width apart, as in the evaluator.
+    """
+    fibre = toolpaths.of_kind(FIBRE)
+    points, offsets, closed = fibre.points, fibre.offsets, fibre.closed
+    found = curvature_samples(points, offsets, closed, machine.fibre_width)
+    return float((found * machine.minimum_radius >= 1.0).mean()) if len(found) else 0.0
+
+
+def _bends(toolpaths: Toolpaths, k: int, machine: Machine) -> FloatArray:
+    """Start and end (n, 2), mm, of the tight bends of one path."""
+    line = toolpaths.points[toolpaths.offsets[k] : toolpaths.offsets[k + 1]]
+    closed, radius = bool(toolpaths.closed[k]), machine.minimum_radius
+    return tight_bends(line, along_line(line), closed, radius, machine.fibre_width)
+
+
+def _tight_pieces(
+    toolpaths: Toolpaths, along: Sequence[Profile], machine: Machine
+) -> list[FloatArray]:
+    """Share of each piece of the profiles that turns too tightly."""
+    found = []
+    for one in along:
+        edges = one.origin + one.step * np.arange(len(one.value) + 1)
+        size = one.step * len(one.value)
+        bent = np.zeros(len(one.value))
+        # The pieces of a ring may start anywhere, and a bend may extend over its start.
+        for start, end in _bends(toolpaths, one.path, machine):
+            for round_ in (-size, 0.0, size):
+                last = np.minimum(edges[1:], end + round_)
+                bent += np.maximum(last - np.maximum(edges[:-1], start + round_), 0.0)
+        found.append(np.minimum(bent / one.step, 1.0))
+    return found
+
+
+def _grown(kept: BoolArray, longer: BoolArray, count: int) -> BoolArray:
+    """Kept pieces (n,), and up to `count` adjoining pieces of a longer choice."""
+    grown = kept.copy()
+    while count > 0:
+        beside = np.concatenate([[False], grown[:-1]]) | np.concatenate([grown[1:], [False]])
+        fresh = np.flatnonzero(longer & ~grown & beside)[:count]
+        if not len(fresh):
+            break
+        grown[fresh] = True
+        count -= len(fresh)
+    return grown
+
+
+def _cut(toolpaths: Toolpaths, along: Sequence[Profile], chosen: dict[int, BoolArray]) -> Toolpaths:
+    """Toolpaths with each profiled path cut to its stretches."""
+    profile = {one.path: one for one in along}
+    parts: list[FloatArray] = []
+    source, closed = [], []
+    for k in range(len(toolpaths)):
+        own = slice(toolpaths.offsets[k], toolpaths.offsets[k + 1])
+        link = toolpaths.link[own, None]
+        line = np.hstack([toolpaths.points[own], toolpaths.normals[own], link])
+        whole = k not in chosen or bool(chosen[k].all())
+        found = [line] if whole else _stretches(line, profile[k], chosen[k], toolpaths.closed[k])
+        parts += found
+        source += len(found) * [k]
+        closed += len(found) * [bool(toolpaths.closed[k]) and whole]
+    if not parts:
+        return Toolpaths.empty()
+    columns = np.concatenate(parts)
+    normals = columns[:, 3:6] / np.linalg.norm(columns[:, 3:6], axis=1)[:, None]
+    return Toolpaths(
+        points=columns[:, :3],
+        normals=normals,
+        offsets=np.concatenate([[0], np.cumsum([len(part) for part in parts])]),
+        layer=toolpaths.layer[source],
+        kind=toolpaths.kind[source],
+        closed=np.array(closed),
+        link=columns[:, 6] > 0.0,
+    )
+
+
+def _stretches(
+    line: FloatArray, profile: Profile, keep: BoolArray, closed: bool
+) -> list[FloatArray]:
+    """Kept stretches of a line (n, 7); the two beside the seam of a ring are joined."""
+    spans = runs(keep)
+    if closed and len(spans) > 1 and keep[0] and keep[-1]:
+        spans = np.concatenate([spans[1:-1], [[spans[-1, 0], len(keep) + spans[0, 1]]]])
+    step, origin = profile.step, profile.origin
+    return [_between(line, origin + a * step, origin + b * step) for a, b in spans]
+
+
+def _between(line: FloatArray, start: float, end: float) -> FloatArray:
+    """Part of a line (n, 7) between two arc lengths, which may pass the end of a ring.
+
+    Columns are the point, its normal, and whether the step to the next point is a link.
+    """
+    along = along_line(line[:, :3])
+    if end > along[-1] * (1.0 + 1e-12):  # past the seam, at most once round
+        line = np.concatenate([line[:-1], line[:-1], line])
+        along = np.concatenate([along, along[-1] + along[1:], 2.0 * along[-1] + along[1:]])
+    inside = along[(along > start + 1e-9) & (along < end - 1e-9)]
+    wanted = np.concatenate([[start], inside, [end]])
+    step = np.searchsorted(along, 0.5 * (wanted[1:] + wanted[:-1]), side="right") - 1
+    link = np.append(line[step, 6], 0.0)
+    return np.column_stack([points_along(line[:, :6], along, wanted), link])

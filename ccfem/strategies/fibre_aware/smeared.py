@@ -1,0 +1,361 @@
+"""Equilibrium of a part with fibre smeared over its cells, without assembling the fibre.
+
+Fibre of density m (mm of strand per mm^3) along the unit vector t in a cell of volume V adds the
+energy ``EA V m eps^2 / 2``, with the strain eps along t. Fibre lies in the planes of the layers, so
+its stiffness acts on the three in-plane strains only.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from ccfem.base.arrays import FloatArray, IntArray, freeze, in_brief, read_only
+from ccfem.base.errors import SolveError
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.fem.elasticity.assembly import cell_gradients
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.solvers import preconditioned_cg
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.judging.virtual_testing.specimen import Specimen
+
+__all__ = ["SmearedPart", "SmearedSolution", "on_linear_cells", "smeared_cases"]
+
+_UPDATES = 40
+"""Updates of the displacement after which to give up."""
+
+_PROGRESS = 1e-3
+"""Factor by which one solve reduces the residual: the set of fibre in tension may then change."""
+
+_DIRECT_UNKNOWNS = 25_000
+"""Largest system that is factorised: solves are then as fast as with multigrid, and rotate with the
+part to the last digits."""
+
+_PACKED = (np.array([0, 0, 0, 1, 1, 2]), np.array([0, 1, 2, 1, 2, 2]))
+"""Rows and columns of the upper triangle of a symmetric 3 x 3 matrix."""
+
+
+@dataclass(frozen=True)
+class SmearedSolution:
+    """Equilibrium of a part with smeared fibre.
+
+    Attributes
+    ----------
+    displacement : (n, 3) array, mm
+    strain : (m, 3) array
+        Strains 11, 22 and 12 (engineering shear) in the plane of the layers.
+    work : float, N mm
+        Twice the strain energy of matrix and fibre: the compliance under forces.
+    residual : float
+        Relative, for the fibre that is in tension under this displacement.
+    iterations : int
+        Of conjugate gradients.
+    """
+
+    displacement: FloatArray
+    strain: FloatArray
+    work: float
+    residual: float
+    iterations: int
+
+    def __post_init__(self) -> None:
+        freeze(self, displacement=float, strain=float)
+
+
+Fibre = Callable[[FloatArray], FloatArray]
+"""Stiffness (m, 3, 3), MPa, of the fibre in each cell at strains (m, 3) in the plane."""
+
+
+@dataclass(frozen=True)
+class SmearedPart:
+    """A part without fibre, prepared for any number of solves with smeared fibre.
+
+    Attributes
+    ----------
+    specimen : Specimen
+        On linear cells.
+    frame : (3, 3) array
+        Of the layers: two unit vectors in their plane, and their normal.
+    """
+
+    specimen: Specimen
+    frame: FloatArray
+
+    __repr__ = in_brief
+
+    @classmethod
+    def of(
+        cls, stress: StressField, frame: FloatArray, backend: str | None = None
+    ) -> "SmearedPart":
+        """Part of a solved problem; quadratic cells are replaced by linear ones.
+
+        The field stores it, so that planning and bounds on the field share one factorisation.
+
+        Parameters
+        ----------
+        stress : StressField
+        frame : (3, 3) array
+        backend : str, optional
+            Preconditioner; default "superlu" for small systems, else "amg". Both are always
+            installed, so that paths do not depend on optional packages.
+        """
+        if backend is None:
+            backend = _backend(stress)
+        known = stress.__dict__.setdefault("smeared", {})
+        key = _key(backend, frame)
+        if key not in known:
+            linear = on_linear_cells(stress, backend)
+            known[key] = cls(Specimen.of(linear, backend), read_only(frame))
+        part: SmearedPart = known[key]
+        return part
+
+    @property
+    def mesh(self) -> TetMesh:
+        """Mesh of linear cells."""
+        return self.specimen.system.problem.mesh
+
+    @property
+    def modulus(self) -> float:
+        """Young's modulus of the matrix, MPa."""
+        return self.specimen.modulus
+
+    @cached_property
+    def centroids(self) -> FloatArray:
+        """Centroids of the cells, (m, 3), mm."""
+        return read_only(self.mesh.points[self.mesh.corners].mean(axis=1))
+
+    @cached_property
+    def unreinforced(self) -> SmearedSolution:
+        """Solution without fibre."""
+        field = self.specimen.unreinforced
+        strain = self.strain(field.displacement)
+        work = 2.0 * field.strain_energy
+        return SmearedSolution(field.displacement, strain, work, field.record.residual, 0)
+
+    @property
+    def forced(self) -> bool:
+        """Whether forces load the part; otherwise supports move."""
+        return self.specimen.forced
+
+    def ratio(self, work: float) -> float:
+        """Stiffness over that of the part without fibre, if the load does this work."""
+        before = self.unreinforced.work
+        return before / work if self.forced else work / before
+
+    def compliance(self, work: float) -> float:
+        """Work without fibre over the stiffness ratio, N mm: under forces the compliance."""
+        return self.unreinforced.work / self.ratio(work)
+
+    def pull(self, solution: SmearedSolution) -> tuple[float, float]:
+        """Return the factor and work that give the best bound ``C >= 2 w - e`` for a displacement.
+
+        Returns
+        -------
+        float
+            Factor s on the displacement u, so that ``e = s^2 u.K u`` with fibre.
+        float
+            Work w, N mm, of the load on that: f.u under forces, and s times the work W_0 without
+            fibre where supports move, since ``W_0^2 / W >= 2 s W_0 - s^2 W`` for any s.
+        """
+        if self.forced:
+            forces = self.specimen.forces
+            return 1.0, float(np.vdot(forces, solution.displacement))
+        before = self.unreinforced.work
+        factor = before / solution.work
+        return factor, factor * before
+
+    @cached_property
+    def _slopes(self) -> FloatArray:
+        """Gradients (m, 4, 2) of the barycentric coordinates in the plane, 1/mm."""
+        return np.ascontiguousarray(cell_gradients(self.mesh) @ self.frame[:2].T)
+
+    @cached_property
+    def _cells(self) -> IntArray:
+        return np.ascontiguousarray(self.mesh.corners)
+
+    @cached_property
+    def _reduced(self) -> Any:
+        return self.specimen.held.reduce(self.specimen.matrix)
+
+    def strain(self, displacement: FloatArray) -> FloatArray:
+        """Strains (m, 3) in the plane: 11, 22 and 12 (engineering shear)."""
+        plane = np.ascontiguousarray(displacement @ self.frame[:2].T)
+        result = np.empty((len(self._cells), 3))
+        _strains(self._cells, self._slopes, plane, result)
+        return result
+
+    def _force(self, packed: FloatArray, displacement: FloatArray) -> FloatArray:
+        """Nodal forces (n, 3) of fibre with packed stiffness (m, 6) times volume."""
+        plane = np.ascontiguousarray(displacement @ self.frame[:2].T)
+        result = np.zeros_like(plane)
+        _forces(self._cells, self._slopes, packed, plane, result)
+        return result @ self.frame[:2]
+
+    def pack(self, stiffness: FloatArray) -> FloatArray:
+        """Upper triangles (m, 6) of stiffnesses (m, 3, 3), times the volumes of the cells."""
+        return np.ascontiguousarray(stiffness[:, *_PACKED] * self.mesh.volumes[:, None])
+
+    def solve(
+        self, fibre: Fibre, start: SmearedSolution | None = None, tolerance: float = 1e-5
+    ) -> SmearedSolution:
+        """Find the equilibrium with fibre whose stiffness may depend on the strain.
+
+        Newton's method on the convex energy: with the fibre at the last strains, conjugate
+        gradients reduce the residual, until the residual with the fibre at the new strains meets
+        the tolerance.
+
+        Parameters
+        ----------
+        fibre : callable
+            Stiffness (m, 3, 3), MPa, at strains (m, 3).
+        start : SmearedSolution, optional
+            Where to start; default the part without fibre.
+        tolerance : float
+            Largest relative residual.
+
+        Raises
+        ------
+        SolveError
+            When the residual stays above the tolerance.
+        """
+        specimen, held = self.specimen, self.specimen.held
+        begin = self.unreinforced if start is None else start
+        u, strain = begin.displacement, begin.strain
+        matrix, solver = specimen.matrix, specimen.solver
+        # Size of the load. Where a support moves, it is the force that holds the part back.
+        size = self._load_size
+        iterations, residual = 0, np.inf
+        for _ in range(_UPDATES):
+            packed = self.pack(fibre(strain))
+            internal = (matrix @ u.reshape(-1)).reshape(-1, 3) + self._force(packed, u)
+            rest = held.project(specimen.forces - internal)
+            residual = float(np.linalg.norm(rest)) / size
+            if residual <= tolerance:
+                work = float(np.vdot(u, internal))
+                return SmearedSolution(u, strain, work, residual, iterations)
+            operator = _Operator(self, packed)
+            goal = max(0.5 * tolerance / residual, _PROGRESS)
+            step = preconditioned_cg(operator, rest, solver, tolerance=min(goal, 0.3))
+            iterations += step.iterations
+            u = u + operator.expand(step.values)
+            strain = self.strain(u)
+        raise SolveError(
+            f"smeared fibre: relative residual {residual:.1e} after {_UPDATES} updates of the "
+            f"fibre in tension, above the tolerance {tolerance:.1e}"
+        )
+
+    def respond(
+        self, stiffness: FloatArray, forces: FloatArray, tolerance: float = 1e-3
+    ) -> FloatArray:
+        """Strains (m, 3) under forces (n, 3), N, of the part with fibre of a stiffness (m, 3, 3).
+
+        This is the adjoint solve, with supports at rest, to a relative residual `tolerance`.
+        """
+        operator = _Operator(self, self.pack(stiffness))
+        held, solver = self.specimen.held, self.specimen.solver
+        found = preconditioned_cg(operator, held.project(forces), solver, tolerance=tolerance)
+        return self.strain(operator.expand(found.values))
+
+    @cached_property
+    def _load_size(self) -> float:
+        held = self.specimen.held
+        rhs = held.right_hand_side(self.specimen.matrix, self.specimen.forces)
+        return float(np.linalg.norm(rhs))
+
+
+@dataclass(frozen=True)
+class _Operator:
+    """Stiffness of part and fibre on the free components, applied by ``@`` only."""
+
+    part: SmearedPart
+    packed: FloatArray
+
+    def expand(self, x: FloatArray) -> FloatArray:
+        return self.part.specimen.held.motion(x)
+
+    def __matmul__(self, x: FloatArray) -> FloatArray:
+        held = self.part.specimen.held
+        fibre = self.part._force(self.packed, self.expand(x))
+        return np.asarray(self.part._reduced @ x) + held.project(fibre)
+
+
+def smeared_cases(fields: Sequence[StressField], frame: FloatArray) -> tuple[SmearedPart, ...]:
+    """Parts of several load cases; those of one problem share one factorisation.
+
+    Parameters
+    ----------
+    fields : sequence of StressField
+        Of one mesh.
+    frame : (3, 3) array
+        Of the layers.
+    """
+    leaders: dict[int, SmearedPart] = {}
+    for field in fields:
+        backend, leader = _backend(field), leaders.get(id(field.problem))
+        known = field.__dict__.setdefault("smeared", {})
+        if leader is not None and _key(backend, frame) not in known:
+            linear = on_linear_cells(field, backend)
+            specimen = leader.specimen.under(linear)
+            known[_key(backend, frame)] = SmearedPart(specimen, read_only(frame))
+        leaders.setdefault(id(field.problem), SmearedPart.of(field, frame, backend))
+    return tuple(SmearedPart.of(field, frame) for field in fields)
+
+
+def _backend(stress: StressField) -> str:
+    """Preconditioner by the size of the part."""
+    return "superlu" if 3 * len(stress.mesh.points) <= _DIRECT_UNKNOWNS else "amg"
+
+
+def _key(backend: str, frame: FloatArray) -> tuple[str, bytes]:
+    return backend, np.asarray(frame, dtype=np.float64).tobytes()
+
+
+def on_linear_cells(stress: StressField, backend: str = "auto") -> StressField:
+    """Solution of the same problem on linear cells; the given one if its cells are linear."""
+    problem = stress.problem
+    mesh = problem.mesh
+    if mesh.order == 1:
+        return stress
+    case = stress.case
+    loads = {name: problem.loads[name] for name in problem.factors(case)}
+    sums = {case: problem.factors(case)} if case in problem.combinations else {}
+    on_corners = replace(problem, mesh=mesh.linear(), order=1, loads=loads, combinations=sums)
+    return solve(on_corners, backend)[case]
+
+
+# One loop each, without slices, which would double the time.
+@njit(cache=True)
+def _strains(cells, slopes, plane, result):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Strain e11, e22 and twice e12 in the plane of each cell."""
+    for c in range(len(cells)):
+        e1, e2, e12 = 0.0, 0.0, 0.0
+        for a in range(4):
+            i = cells[c, a]
+            x, y = slopes[c, a, 0], slopes[c, a, 1]
+            e1 += plane[i, 0] * x
+            e2 += plane[i, 1] * y
+            e12 += plane[i, 0] * y + plane[i, 1] * x
+        result[c, 0], result[c, 1], result[c, 2] = e1, e2, e12
+
+
+@njit(cache=True)
+def _forces(cells, slopes, packed, plane, result):  # type: ignore[no-untyped-def]  # pragma: no cover
+    for c in range(len(cells)):
+        e1, e2, e12 = 0.0, 0.0, 0.0
+        for a in range(4):
+            i = cells[c, a]
+            x, y = slopes[c, a, 0], slopes[c, a, 1]
+            e1 += plane[i, 0] * x
+            e2 += plane[i, 1] * y
+            e12 += plane[i, 0] * y + plane[i, 1] * x
+        s1 = packed[c, 0] * e1 + packed[c, 1] * e2 + packed[c, 2] * e12
+        s2 = packed[c, 1] * e1 + packed[c, 3] * e2 + packed[c, 4] * e12
+        s12 = packed[c, 2] * e1 + packed[c, 4] * e2 + packed[c, 5] * e12
+        for a in range(4):
+            i = cells[c, a]
+            x, y = slopes[c, a, 0], slopes[c, a, 1]
+            result[i, 0] += s1 * x + s12 * y
+            result[i, 1] += s2 * y + s12 * x

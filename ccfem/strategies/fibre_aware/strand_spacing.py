@@ -1,0 +1,349 @@
+"""Strands moved apart until they keep a distance from each other and the border, and a radius.
+
+The smallest smooth slides that remove all violations are found. This is a sparse least-squares
+problem, which is solved again for the violations that remain, so that a whole pack of strands gives
+way at once.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+import shapely
+from numba import njit
+from scipy.sparse.linalg import splu
+from scipy.spatial import cKDTree
+
+from ccfem.base.arrays import FloatArray, IntArray, freeze, in_brief
+from ccfem.fem.elasticity.skyline import skyline_within
+from ccfem.slicing.layers.layer import Layer
+from ccfem.strategies.fibre_aware.strand_lines import StrandLines
+
+__all__ = ["Spacing", "spacing"]
+
+_REACH = 2.0
+"""Distance, in widths, within which points are compared."""
+
+_OWN = 5.0
+"""Arc length, in widths, beyond which a strand keeps its distance from itself."""
+
+_STIFF = 300.0
+"""Weight of a missing distance against a slide of the same size."""
+
+_STRAIGHT = 1000.0
+"""Weight of a bend that is too tight, by the offset of its middle, against a slide of that size."""
+
+_CHORD = 2
+"""Number of points from an end of a bend to its middle."""
+
+_SHARPEST = 0.6
+"""Turn, radians, above which a bend is a corner, which no slide rounds off."""
+
+_ROUNDS = 5
+"""Number of times that violations are searched for."""
+
+_NARROW = 2e9
+"""Multiplications up to which a band is eliminated directly, not in minimum-degree order."""
+
+_FACING = 0.35
+"""Least cosine of the angle between the normals of strand and border at which points slide off the
+border. Ends that run onto the border do not slide."""
+
+_BORDER_STEP = 0.5
+"""Longest piece of the border, in widths."""
+
+_NEAREST = 3
+"""Nearest pieces of the border that are checked for a point."""
+
+_FAR = 1e6
+"""Distance, mm, put between layers in the search for near points."""
+
+
+@dataclass(frozen=True)
+class Spacing:
+    """Distances that strands keep.
+
+    Attributes
+    ----------
+    lines : StrandLines
+    width : float, mm
+        Distance that strands keep from each other.
+    inset : (P,) array, mm
+        Least depth of each point inside the section; negative outside.
+    border : (b, 2, 2) array, mm
+        Pieces of the borders of all layers, the section on their left.
+    inward : (b, 3, 2) array
+        Vectors into the section at the start, along, and at the end of each piece.
+    tree : cKDTree
+        Of the middles of the pieces, with their layers.
+    roughness : csc_array (P, P)
+        What slides cost (`StrandLines.roughness`).
+    radius : float, mm
+        Radius of the tightest bends that are left as they are; 0 leaves all.
+    """
+
+    lines: StrandLines
+    width: float
+    inset: FloatArray
+    border: FloatArray
+    inward: FloatArray
+    tree: cKDTree
+    roughness: Any
+    radius: float
+
+    __repr__ = in_brief
+
+    def __post_init__(self) -> None:
+        freeze(self, inset=float, border=float, inward=float)
+
+    def spread(self, slide: FloatArray) -> FloatArray:
+        """Slides (P,), mm, close to the given ones, after which strands keep their distances."""
+        lines, count = self.lines, len(self.lines.path)
+        points = lines.points(slide)
+        pairs = self._pairs(points)
+        _, near = self.tree.query(_lifted(points, lines.layer), k=_NEAREST)
+        for _ in range(_ROUNDS):
+            points = lines.start + slide[:, None] * lines.normals
+            column, value, missing = _too_near(points, lines.normals, pairs, self.width)
+            off, wanted = _outside(
+                points, near, self.border, self.inward, self.inset, lines.normals
+            )
+            rows = np.repeat(np.arange(len(missing)), 3)
+            apart = sp.csr_array((value.ravel(), (rows, column.ravel())), (len(missing), count))
+            matrix = self.roughness + _STIFF * (apart.T @ apart + sp.diags_array(off * off))
+            right = _STIFF * (apart.T @ missing + off * wanted)
+            if self.radius:
+                column, value, over = _too_bent(points, lines.normals, lines.path, self.radius)
+                rows = np.repeat(np.arange(len(over)), 3)
+                bent = sp.csr_array((value.ravel(), (rows, column.ravel())), (len(over), count))
+                matrix = matrix + _STRAIGHT * (bent.T @ bent)
+                right = right + _STRAIGHT * (bent.T @ over)
+            slide = slide + _solve(matrix, right)
+        return slide
+
+    def _pairs(self, points: FloatArray) -> IntArray:
+        """Pairs (n, 2): points, and first points of segments that may come too near to them."""
+        lines, width = self.lines, self.width
+        paths, reach = lines.toolpaths, _REACH * width
+        low = points.min(axis=0)
+        shape = ((points.max(axis=0) - low) / reach).astype(np.int64) + 1
+        order, layer = np.unique(lines.layer, return_inverse=True)
+        heads = np.full((len(order), *shape), -1)
+        following = np.empty(len(points), dtype=np.int64)
+        place = ((points - low) / reach).astype(np.int64)
+        pairs = np.empty((0, 2), dtype=np.int64)
+        whole = np.where(paths.closed, paths.lengths, np.inf)
+        for _ in range(2):  # counted, then written
+            heads[:] = -1
+            found = _near(
+                points,
+                place,
+                layer,
+                lines.path,
+                lines.arc,
+                whole,
+                reach,
+                _OWN * width,
+                heads,
+                following,
+                pairs,
+            )
+            pairs = np.empty((found, 2), dtype=np.int64) if len(pairs) < found else pairs
+        return pairs
+
+
+def spacing(
+    lines: StrandLines,
+    layers: Sequence[Layer],
+    width: float,
+    inset: float,
+    come_in: bool = False,
+    radius: float = 0.0,
+) -> Spacing:
+    """Distances that strands keep on their layers.
+
+    Parameters
+    ----------
+    lines : StrandLines
+    layers : sequence of Layer
+        All on which there are strands.
+    width : float, mm
+        Distance that strands keep from each other.
+    inset : float, mm
+        Least distance from the border. Points that start nearer come no nearer.
+    come_in : bool, default False
+        Whether such points have to come in to the full distance.
+    radius : float, mm, default 0
+        Least radius that bends are corrected to; 0 for none. Corners stay: no small slide rounds
+        them off.
+    """
+    pieces, inward, owner = [], [], []
+    for layer in layers:
+        section = shapely.orient_polygons(layer.plane.polygon)
+        for ring in shapely.get_rings(shapely.get_parts(section)):
+            longest = _BORDER_STEP * width
+            line = shapely.get_coordinates(shapely.segmentize(ring, longest))
+            line = line[np.append(True, (np.diff(line, axis=0) != 0.0).any(axis=1))]
+            step = np.diff(line, axis=0)
+            left = np.stack([-step[:, 1], step[:, 0]], axis=1)
+            left /= np.linalg.norm(left, axis=1)[:, None]
+            corner = left + np.roll(left, 1, axis=0)
+            pieces.append(np.stack([line[:-1], line[1:]], axis=1))
+            inward.append(np.stack([corner, left, np.roll(corner, -1, axis=0)], axis=1))
+            owner.append(np.full(len(step), layer.index))
+    border, normals = np.concatenate(pieces), np.concatenate(inward)
+    tree = cKDTree(_lifted(border.mean(axis=1), np.concatenate(owner)))
+    _, near = tree.query(_lifted(lines.start, lines.layer), k=_NEAREST)
+    depth = np.full(len(lines.path), inset)
+    if not come_in:
+        depth = np.minimum(_depths(lines.start, near, border, normals), inset)
+    return Spacing(lines, width, depth, border, normals, tree, lines.roughness, radius)
+
+
+def _lifted(points: FloatArray, layer: IntArray) -> FloatArray:
+    """Points (n, 3) of which those on different layers are far from each other."""
+    return np.column_stack([points, _FAR * layer])
+
+
+def _solve(matrix: Any, right: FloatArray) -> FloatArray:
+    """Solve a sparse symmetric positive definite system: a narrow band along packs of strands."""
+    band = skyline_within(sp.bsr_array(matrix, blocksize=(1, 1)), _NARROW)
+    if band is not None:
+        return band(right)
+    options = {"SymmetricMode": True}
+    factor = splu(
+        matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options
+    )
+    return np.asarray(factor.solve(right))
+
+
+@njit(cache=True)
+def _near(points, place, layer, path, arc, whole, reach, own, heads, following, pairs):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Count, and write where there is room, points and segments whose starts are within reach."""
+    for p in range(len(points)):
+        following[p] = heads[layer[p], place[p, 0], place[p, 1]]
+        heads[layer[p], place[p, 0], place[p, 1]] = p
+    count, most = 0, reach * reach
+    for p in range(len(points)):
+        for i in range(max(place[p, 0] - 1, 0), min(place[p, 0] + 2, heads.shape[1])):
+            for j in range(max(place[p, 1] - 1, 0), min(place[p, 1] + 2, heads.shape[2])):
+                q = heads[layer[p], i, j]
+                while q >= 0:
+                    dx, dy = points[q, 0] - points[p, 0], points[q, 1] - points[p, 1]
+                    wanted = dx * dx + dy * dy < most
+                    wanted = wanted and q + 1 < len(points) and path[q + 1] == path[q]
+                    if wanted and path[q] == path[p]:
+                        apart = abs(arc[q] - arc[p])
+                        wanted = min(apart, whole[path[p]] - apart) > own
+                    if wanted:
+                        if count < len(pairs):
+                            pairs[count, 0], pairs[count, 1] = p, q
+                        count += 1
+                    q = following[q]
+    return count
+
+
+@njit(cache=True)
+def _too_near(points, normals, pairs, least):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Pairs that are too near: their points, how slides part them, and how much is missing."""
+    count = 0
+    for write in range(2):
+        if write:
+            column, value = np.zeros((count, 3), np.int64), np.zeros((count, 3))
+            missing = np.zeros(count)
+            count = 0
+        for k in range(len(pairs)):
+            p, q = pairs[k, 0], pairs[k, 1]
+            ex, ey = points[q + 1, 0] - points[q, 0], points[q + 1, 1] - points[q, 1]
+            rx, ry = points[p, 0] - points[q, 0], points[p, 1] - points[q, 1]
+            square = ex * ex + ey * ey
+            s = min(max((rx * ex + ry * ey) / square, 0.0), 1.0) if square > 0.0 else 0.0
+            gx, gy = rx - s * ex, ry - s * ey
+            distance = np.sqrt(gx * gx + gy * gy)
+            if distance >= least or distance < 1e-9:
+                continue
+            if write:
+                gx, gy = gx / distance, gy / distance
+                column[count, 0], column[count, 1], column[count, 2] = p, q, q + 1
+                value[count, 0] = gx * normals[p, 0] + gy * normals[p, 1]
+                value[count, 1] = -(1.0 - s) * (gx * normals[q, 0] + gy * normals[q, 1])
+                value[count, 2] = -s * (gx * normals[q + 1, 0] + gy * normals[q + 1, 1])
+                missing[count] = least - distance
+            count += 1
+    return column, value, missing
+
+
+@njit(cache=True)
+def _from_border(x, y, near, border, inward):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Signed depth of a point in the section, and the unit vector that leads farther in."""
+    best, gx, gy, nx, ny = np.inf, 0.0, 0.0, 0.0, 0.0
+    for b in near:
+        ex, ey = border[b, 1, 0] - border[b, 0, 0], border[b, 1, 1] - border[b, 0, 1]
+        rx, ry = x - border[b, 0, 0], y - border[b, 0, 1]
+        s = min(max((rx * ex + ry * ey) / (ex * ex + ey * ey), 0.0), 1.0)
+        hx, hy = rx - s * ex, ry - s * ey
+        if hx * hx + hy * hy < best:
+            best, gx, gy = hx * hx + hy * hy, hx, hy
+            side = 0 if s == 0.0 else (2 if s == 1.0 else 1)
+            nx, ny = inward[b, side, 0], inward[b, side, 1]
+    distance = np.sqrt(best)
+    if distance < 1e-9:
+        size = max(np.sqrt(nx * nx + ny * ny), 1e-9)
+        return 0.0, nx / size, ny / size
+    sign = 1.0 if gx * nx + gy * ny >= 0.0 else -1.0
+    return sign * distance, sign * gx / distance, sign * gy / distance
+
+
+@njit(cache=True)
+def _depths(points, near, border, inward):  # type: ignore[no-untyped-def]  # pragma: no cover
+    depth = np.empty(len(points))
+    for p in range(len(points)):
+        depth[p], _, _ = _from_border(points[p, 0], points[p, 1], near[p], border, inward)
+    return depth
+
+
+@njit(cache=True)
+def _outside(points, near, border, inward, inset, normals):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """How far in a unit slide leads, and how much farther in points should be; 0 if they are in."""
+    off, missing = np.zeros(len(points)), np.zeros(len(points))
+    for p in range(len(points)):
+        depth, x, y = _from_border(points[p, 0], points[p, 1], near[p], border, inward)
+        across = x * normals[p, 0] + y * normals[p, 1]
+        if depth < inset[p] and abs(across) > _FACING:
+            off[p], missing[p] = across, inset[p] - depth
+    return off, missing
+
+
+@njit(cache=True)
+def _too_bent(points, normals, path, radius):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Bends that are too tight: their three points, the effect of slides, and what is missing."""
+    count = 0
+    for write in range(2):
+        if write:
+            column, value = np.zeros((count, 3), np.int64), np.zeros((count, 3))
+            missing = np.zeros(count)
+            count = 0
+        for p in range(_CHORD, len(points) - _CHORD):
+            a, c = p - _CHORD, p + _CHORD
+            if path[a] != path[c]:
+                continue
+            ax, ay = points[p, 0] - points[a, 0], points[p, 1] - points[a, 1]
+            cx, cy = points[c, 0] - points[p, 0], points[c, 1] - points[p, 1]
+            into, out = np.sqrt(ax * ax + ay * ay), np.sqrt(cx * cx + cy * cy)
+            if into < 1e-9 or out < 1e-9:
+                continue
+            x, y = cx / out - ax / into, cy / out - ay / into
+            turn, step = np.sqrt(x * x + y * y), 0.5 * (into + out)
+            if turn * radius <= step or turn > _SHARPEST:
+                continue
+            if write:
+                x, y = step * x / turn, step * y / turn
+                column[count, 0], column[count, 1], column[count, 2] = a, p, c
+                value[count, 0] = (x * normals[a, 0] + y * normals[a, 1]) / into
+                value[count, 1] = -(x * normals[p, 0] + y * normals[p, 1]) * (1 / into + 1 / out)
+                value[count, 2] = (x * normals[c, 0] + y * normals[c, 1]) / out
+                missing[count] = step * (step / radius - turn)
+            count += 1
+    return column, value, missing

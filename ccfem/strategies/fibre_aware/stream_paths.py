@@ -1,0 +1,277 @@
+"""Paths along the levels of designed fields, of which the stretches worth most are kept."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+import shapely
+
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.geometry.isocontours import isocontours, triangle_edges
+from ccfem.judging.virtual_testing.bars import bars
+from ccfem.judging.virtual_testing.strands import cut_strands
+from ccfem.machine.machine import Machine
+from ccfem.paths.linking.clearance import trim_to_clearance
+from ccfem.paths.linking.finishing import linked_paths, long_enough
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
+from ccfem.strategies.fibre_aware.path_profile import Profile, least_price
+from ccfem.strategies.fibre_aware.prune import profiles
+from ccfem.strategies.fibre_aware.slide_in import lines_to_slide_in, slid_in
+from ccfem.strategies.fibre_aware.spline_grid import SplineGrid
+from ccfem.strategies.fibre_aware.worth_links import link_by_worth
+
+__all__ = ["CLEARANCE", "SHORTEST", "Extraction", "middle", "refined"]
+
+CLEARANCE = 0.95
+"""Least distance between strands before linking, in widths. They are designed 1 / 0.975 apart and
+slide apart later: what a cut for some hundredths of a width removes would be lost."""
+
+SHORTEST = 5.0
+"""Length, in strand widths, of the shortest pieces kept for linking."""
+
+_CUT_COST = 20.0
+"""Length, mm, of the least valuable fibre that another cut has to save to be made."""
+
+_NEAR = 0.06
+"""Share below the largest value up to which other positions of the levels are tried as well."""
+
+_REACHES = (0.5, 1.0)
+"""Shares of the longest link up to which the links worth most are searched for."""
+
+_BETTER = 0.003
+"""Share by which paths with such links have to be worth more to be tried."""
+
+_SAME = 0.5
+"""Distance, in strand widths, up to which the borders of two sections count as the same. The levels
+that are best for one layer are then used for the other."""
+
+
+def middle(numbers: IntArray) -> int:
+    """Return the middle one of the numbers."""
+    return int(numbers[len(numbers) // 2])
+
+
+@dataclass(frozen=True)
+class Extraction:
+    """Paths from designed fields.
+
+    Attributes
+    ----------
+    fields : tuple of (c,) arrays
+        Coefficients of the fields on the grid; unit levels are paths.
+    grid : SplineGrid
+    mesh : TetMesh
+        Of linear cells.
+    strains_of : sequence of (float, (n, 3) array)
+        Worth of a squared strain, and the displacement, mm, that strains the paths; one pair for
+        each load case.
+    machine : Machine
+    phases : int
+        Number of positions of the levels that are tried; layers of the same section share the best.
+        One position is at whole numbers of the field.
+    inset, link_limit : float
+        Least distance from the boundary, and largest distance of linked ends, in strand widths.
+    radius : float, mm, default 0
+        Least radius that bends are corrected to; 0 for none.
+    """
+
+    fields: tuple[FloatArray, ...]
+    grid: SplineGrid
+    mesh: TetMesh
+    strains_of: Sequence[tuple[float, FloatArray]]
+    machine: Machine
+    phases: int
+    inset: float
+    link_limit: float
+    radius: float = 0.0
+
+    def candidates(
+        self, layers: Sequence[Layer], group: IntArray, lengths: Sequence[float]
+    ) -> list[list[Toolpaths]]:
+        """Paths of all layers, uncut, at those positions of the levels that may be best.
+
+        The strains of the design say only roughly which positions are worth most. Others are given
+        too if they are worth hardly less, and so are whole numbers, which were drawn to the border.
+        The best position is given once more with the links that are worth most, if these paths are
+        worth more.
+
+        Parameters
+        ----------
+        layers : sequence of Layer
+        group : (layers,) int array
+            Number of the field of each layer.
+        lengths : sequence of float, mm
+            In all layers.
+
+        Returns
+        -------
+        list of list of Toolpaths
+            For each length; the paths worth most first.
+        """
+        alike = _alike(layers, group, self.machine.fibre_width)
+        cut: dict[tuple[int, int], list[FloatArray]] = {}
+        drawn: dict[tuple[int, int, float], Toolpaths] = {}
+
+        def paths(number: int, phase: int, reach: float = 0.0) -> Toolpaths:
+            key = number, phase, reach
+            if (number, phase) not in cut:
+                field = self.fields[group[number]]
+                cut[number, phase] = self.strands(layers[number], field, phase / self.phases)
+            if key not in drawn:
+                drawn[key] = self.linked(layers[number], cut[number, phase], reach)
+            return drawn[key]
+
+        tried = [
+            [self.profiles(paths(middle(numbers), phase)) for phase in range(self.phases)]
+            for numbers in alike
+        ]
+        counts = [len(numbers) for numbers in alike]
+
+        def ways(length: float) -> list[tuple[tuple[int, ...], float]]:
+            price = self._price(tried, counts, length)
+            found = [(phases, 0.0) for phases in self.best_phases(tried, counts, length)]
+            best = found[0][0]
+
+            def gain(phases: tuple[int, ...], r: float) -> float:
+                return sum(
+                    len(numbers)
+                    * self._gain(self.profiles(paths(middle(numbers), phase, r)), price)
+                    for numbers, phase in zip(alike, phases, strict=True)
+                )
+
+            whole = len(best) * (0,)  # drawn to the border: they may only lack such links
+            linked = [(phases, r) for phases in dict.fromkeys((best, whole)) for r in _REACHES]
+            gains = [gain(*way) for way in linked]
+            if max(gains) > (1.0 + _BETTER) * gain(best, 0.0):
+                found.append(linked[int(np.argmax(gains))])
+            return found
+
+        planned: dict[tuple[tuple[int, ...], float], Toolpaths] = {}
+        chosen = [ways(length) for length in lengths]
+        for phases, reach in {way for some in chosen for way in some}:
+            of = {k: p for some, p in zip(alike, phases, strict=True) for k in some.tolist()}
+            laid = [paths(k, of[k], reach) for k in range(len(layers))]
+            planned[phases, reach] = Toolpaths.concatenate(laid)
+        return [[planned[way] for way in some] for some in chosen]
+
+    def best_phases(
+        self, tried: list[list[list[Profile]]], counts: Sequence[int], length: float
+    ) -> list[tuple[int, ...]]:
+        """Position of the levels worth most for each kind of layer, and others close to it.
+
+        Parameters
+        ----------
+        tried : list of list of list of Profile
+            Of one layer of each kind at each position of the levels.
+        counts : sequence of int
+            Layers of each kind.
+        length : float, mm
+            Of all layers together.
+        """
+        price = self._price(tried, counts, length)
+        gains = np.array(
+            [[self._gain(along, price) for along in one] for one in tried], dtype=float
+        )
+        first, rows = gains.argmax(axis=1), np.arange(len(gains))
+        others = gains.copy()
+        others[rows, first] = -np.inf
+        second = others.argmax(axis=1)
+        near = others[rows, second] >= (1.0 - _NEAR) * gains[rows, first]
+        found = [first, np.zeros_like(first), np.where(near, second, first)]
+        if self.radius:  # only the test shows which bends can stay
+            found += [np.full_like(first, phase) for phase in range(self.phases)]
+        return list(dict.fromkeys(tuple(phases.tolist()) for phases in found))
+
+    def _price(
+        self, tried: list[list[list[Profile]]], counts: Sequence[int], length: float
+    ) -> float:
+        """Price of fibre at which a length is worth keeping, at the middle position of levels."""
+        central = [one[self.phases // 2] for one in tried]
+        along = [p for one, count in zip(central, counts, strict=True) for p in count * one]
+        return least_price(along, length, self.machine.minimum_length, _CUT_COST) if along else 0.0
+
+    def _gain(self, along: list[Profile], price: float) -> float:
+        """Return the worth of fibre beyond its price."""
+        minimum = self.machine.minimum_length
+        return sum(one.kept(price, minimum, _CUT_COST)[1] for one in along)
+
+    def layer_paths(self, layer: Layer, field: FloatArray, shift: float) -> Toolpaths:
+        """Paths of one layer along the levels `shift` above whole numbers."""
+        return self.linked(layer, self.strands(layer, field, shift))
+
+    def strands(self, layer: Layer, field: FloatArray, shift: float) -> list[FloatArray]:
+        """Trace the levels, and cut strands that can slide neither off the border nor apart."""
+        width = self.machine.fibre_width
+        lines = self.levels(layer, field, shift)
+        lines = lines_to_slide_in(lines, layer.plane.polygon, self.inset * width)
+        return trim_to_clearance(lines, CLEARANCE * width, SHORTEST * width)
+
+    def linked(self, layer: Layer, lines: list[FloatArray], reach: float = 0.0) -> Toolpaths:
+        """Link the strands of one layer, and slide the paths inwards.
+
+        Links are the shortest; with a `reach` they are those worth most (`worth_links`), up to that
+        share of the longest link.
+        """
+        width, section = self.machine.fibre_width, layer.plane.polygon
+        limit, least = self.link_limit * width, self.machine.minimum_length
+        radius = self.machine.minimum_radius
+        if reach:
+            worth = partial(self._worth, layer)
+            found = link_by_worth(lines, section, reach * limit, width, radius, least, worth)
+            found = long_enough(found, least)
+        else:
+            found = linked_paths(lines, section, width, limit, least, radius=radius)
+        paths = Toolpaths.from_plane(found.lines, layer, link=found.link)
+        return slid_in(paths, layer, self.machine, self.inset, self.radius)
+
+    def levels(self, layer: Layer, field: FloatArray, shift: float) -> list[FloatArray]:
+        """Trace the levels `shift` above whole numbers on a layer, (n, 2), mm."""
+        points, triangles = refined(layer)
+        values = self.grid.values(points) @ field
+        first = float(np.ceil(values.min() - shift)) + shift
+        return isocontours(points, triangles, values, first, 1.0).lines()
+
+    def _worth(self, layer: Layer, lines: Sequence[FloatArray]) -> list[Profile]:
+        """Profiles of lines on a layer, each starting at its first point."""
+        closed = len(lines) * [False]
+        return self.profiles(Toolpaths.from_plane(lines, layer, closed))
+
+    def profiles(self, toolpaths: Toolpaths) -> list[Profile]:
+        """Value of the paths at the strains of the designed part."""
+        if not len(toolpaths):
+            return []
+        strands = cut_strands(toolpaths, self.mesh)
+        pieces = bars(strands, self.mesh)
+        value = np.zeros(len(strands.length))
+        for worth, displacement in self.strains_of:
+            value += worth * np.maximum(pieces.strain(displacement), 0.0) ** 2
+        return profiles(toolpaths, strands, value)
+
+
+def _alike(layers: Sequence[Layer], group: IntArray, width: float) -> list[IntArray]:
+    """Numbers of the layers of each kind, which share a field and about the same section."""
+    kinds: list[list[int]] = []
+    borders = [shapely.boundary(layer.plane.polygon) for layer in layers]
+    for k, border in enumerate(borders):
+        for kind in kinds:
+            same = group[kind[0]] == group[k]
+            if same and shapely.hausdorff_distance(borders[kind[0]], border) < _SAME * width:
+                kind.append(k)
+                break
+        else:
+            kinds.append([k])
+    return [np.array(kind) for kind in kinds]
+
+
+def refined(layer: Layer) -> tuple[FloatArray, IntArray]:
+    """Points (n, 2) and triangles (t, 3) of a layer, each triangle cut in four."""
+    points, corners = layer.plane.points, layer.triangles
+    edges, opposite = triangle_edges(corners)
+    a, b, c = corners.T
+    x, y, z = opposite.T + len(points)
+    four = [np.stack(three, axis=1) for three in ((a, z, y), (z, b, x), (y, x, c), (x, y, z))]
+    middle = 0.5 * (points[edges[:, 0]] + points[edges[:, 1]])
+    return np.concatenate([points, middle]), np.concatenate(four)

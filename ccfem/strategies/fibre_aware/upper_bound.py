@@ -1,0 +1,499 @@
+"""The stiffness that no fibre paths can exceed, for a given length of fibre and number of layers.
+
+Paths are replaced by a density of fibre m in each cell and direction in the plane of the layers. It
+may jump from cell to cell and cross itself, with at most one strand a width in each layer. A search
+approaches the best density, until what it reaches and the bound are close. Any displacements u_i
+prove a bound by duality. The compliance C_i of a part with fibre under load case i is the largest
+value over all u of ``2 f_i.u - u.K u - EA int m (t.eps t)^2``, so for any factors v_i, with the
+best scale,
+
+    sum v_i C_i >= (sum v_i f_i.u_i)^2 / (sum v_i u_i.K u_i + EA S),
+
+where S is the largest sum that fibre of that length can collect: cells are filled in the order of
+``max_t sum v_i max(t.eps_i t, 0)^2``, largest first, until the length is used up. One strain has
+principal directions. Several have none in common, so 360 angles are tried, with a margin for those
+in between. A case in which supports move instead of forces has a compliance too: see
+`SmearedPart.pull`.
+
+Each of several cases counts by C_i over the least compliance that any paths can reach in it alone,
+or over the compliance of the part without fibre. The sharpest bound on the largest of these ratios
+is found by increasing the factors of the worst cases. The bound holds for any factors.
+
+The search: the compliances are convex in the densities, and their derivative is proportional to the
+squared strain along each direction. The optimality criterion multiplies each density by a power of
+the strain (mirror ascent) and then scales all densities so that the length is met. Each step
+continues the last one, as in Nesterov's method; this momentum restarts where the part gets softer.
+Without it hundreds of solves would be needed.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
+
+from ccfem.base.arrays import FloatArray, freeze, in_brief
+from ccfem.base.checks import check_known, check_number
+from ccfem.base.tensor import largest_in_plane
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.judging.virtual_testing.equilibrium import MODES, TENSION
+from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.machine.machine import Machine
+from ccfem.slicing.layers.layer import Layer
+from ccfem.strategies.fibre_aware.heights import fibre_capacity
+from ccfem.strategies.fibre_aware.smeared import SmearedPart, SmearedSolution, smeared_cases
+
+__all__ = [
+    "LARGEST_GAP",
+    "LEAST",
+    "LOOSE",
+    "OBJECTIVES",
+    "SUM",
+    "WORST",
+    "UpperBound",
+    "affordable_iterations",
+    "certificate",
+    "directions",
+    "largest_gathered",
+    "measures",
+    "upper_bound",
+]
+
+WORST, SUM, LEAST = OBJECTIVES = ("worst", "sum", "least")
+"""What is minimised: the largest of ``bound_i / ratio_i``, their weighted mean, or the largest of
+``1 / ratio_i``, so that the least ratio is made large."""
+
+LARGEST_GAP = 0.005
+"""Share by which the best density may fall short of the bound: the iterations stop there."""
+
+LOOSE = 0.01
+"""The same for several cases; and the share above which a remark is made."""
+
+_SINGLE_ITERATIONS = 30
+"""Most iterations for the bound of each of several cases alone."""
+
+_MEASURED = 7
+"""Iterations for a bound that only measures what a case has reached."""
+
+_ANGLES = 24
+_CERTIFIED_ANGLES = 360
+_CELL_ITERATIONS = 1_500_000
+
+_FULL_STEPS = 10
+"""Iterations after which the steps of the factors shrink."""
+
+_EXPONENT = 1.4
+"""Exponent of the strain in the optimality criterion. 1 is exact where the stress in the fibre is
+given; where its strain is given, larger ones converge faster. From 2 on densities oscillate."""
+
+_MOST_MOMENTUM = 0.9
+
+_TRACE = 1e-9
+"""Least density in each direction as a share of the largest: a density of 0 would stay 0."""
+
+_BISECTIONS = 60
+
+
+@dataclass(frozen=True)
+class UpperBound:
+    """How stiff a part can get with fibre of some length, under one or several load cases.
+
+    The bound holds if strands keep their width on average in every cell.
+
+    Attributes
+    ----------
+    objective : {"worst", "sum", "least"}
+        What is bounded: the largest of ``singles / ratios``, their weighted mean, or the largest of
+        ``1 / ratios``. These are the same for one case.
+    singles : (n,) array
+        For each case alone the stiffness ratio that no paths exceed; 1 with "least".
+    case_weights : (n,) array
+        Weights of the cases; their sum is 1.
+    least : float
+        Certified: no paths can bring the objective below this.
+    attained : float
+        Objective of the best density found. The sharpest bound lies between `least` and this.
+    factors : (n,) array
+        Factors of the cases in the certificate; their sum is 1.
+    density : (m, k) array, mm/mm^3
+        The best density found, in each cell and direction.
+    angles : (k,) array, radians
+        Directions, from the first axis of the layers' frame.
+    iterations : int
+        Of the search.
+    """
+
+    objective: str
+    singles: FloatArray
+    case_weights: FloatArray
+    least: float
+    attained: float
+    factors: FloatArray
+    density: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    angles: FloatArray = field(default_factory=lambda: np.zeros(0))
+    iterations: int = 0
+
+    __repr__ = in_brief
+
+    def __post_init__(self) -> None:
+        freeze(self, singles=float, case_weights=float, factors=float, density=float, angles=float)
+
+    @property
+    def ratio(self) -> float:
+        """Least stiffness ratio of all cases that no paths exceed; sharp for one, or "least"."""
+        return float(self.singles.max()) / self.least
+
+    @property
+    def reached(self) -> float:
+        """The same ratio of the best density found, for one case or with the objective "least"."""
+        return float(self.singles.max()) / self.attained
+
+    @property
+    def duality_gap(self) -> float:
+        """Share by which `attained` lies above what is certified."""
+        return self.attained / self.least - 1.0
+
+    @property
+    def tensor(self) -> FloatArray:
+        """Sum of ``m t t^T`` over the directions: 11, 22 and 12 in the plane, (m, 3), mm/mm^3.
+
+        Its trace is the density in all directions. Most of the fibre runs along its principal
+        direction of largest value.
+        """
+        return self.density @ directions(len(self.angles))[1]
+
+    def share(self, ratio: float) -> float:
+        """Share of the possible gain that a design reaches with this least stiffness ratio."""
+        return (ratio - 1.0) / (self.ratio - 1.0)
+
+    def value(self, ratios: ArrayLike) -> float:
+        """Objective of a design with these stiffness ratios (n,)."""
+        return _objective(self.singles / np.asarray(ratios), self.case_weights, self.objective)
+
+    def gap(self, ratios: ArrayLike) -> float:
+        """How far the objective of a design lies above what is certified; 0 is the best."""
+        return self.value(ratios) / self.least - 1.0
+
+    def shares(self, ratios: ArrayLike) -> FloatArray:
+        """Stiffness ratio of each case over its own bound."""
+        return np.asarray(ratios) / self.singles
+
+
+def _objective(terms: FloatArray, weights: FloatArray, objective: str) -> float:
+    """Largest of the terms of the cases, or their weighted mean."""
+    return float(weights @ terms) if objective == SUM else float(terms.max())
+
+
+def upper_bound(
+    stress: StressField | WeightedCases,
+    layers: Sequence[Layer],
+    length: float,
+    machine: Machine,
+    strand: Strand | None = None,
+    mode: str = TENSION,
+    iterations: int | None = None,
+    gap: float | None = None,
+    objective: str = WORST,
+) -> UpperBound:
+    """Bound the stiffness of a part with fibre under one or several load cases.
+
+    Parameters
+    ----------
+    stress : StressField or WeightedCases
+        The part without fibre, under the load that counts, or under several.
+    layers : sequence of Layer
+        All flat layers of the part; each carries at most one strand a width.
+    length : float, mm
+        Total length of fibre.
+    machine : Machine
+        Its strand width.
+    strand : Strand, optional
+        Stiffness of a strand; default rho = EA/E = 4 mm^2.
+    mode : str, default "tension"
+        "tension": fibres in compression carry nothing; "bonded": all fibres carry.
+    iterations : int, optional
+        Maximum number of iterations, with one solve for each case; at least 1. About 10 bring the
+        bound within 1 % of the sharpest, 15 to 40 reach the default gap. Default 60, and fewer for
+        more than 25,000 cells: `affordable_iterations`.
+    gap : float, optional
+        Iterations stop where the best density falls short of the bound by no more than this share.
+        Default 0.005 for one case, 0.01 for several.
+    objective : {"worst", "sum", "least"}
+        How several cases count.
+
+    Raises
+    ------
+    InputError
+        When the length is not positive, there is no layer, or for an unknown mode or objective.
+    """
+    cases = WeightedCases.of(stress)
+    check_number("length of fibre", length, above=0.0, unit="mm")
+    check_number("number of layers", len(layers), at_least=1)
+    if iterations is None:
+        iterations = affordable_iterations(len(cases.mesh.cells))
+    if gap is None:
+        gap = LARGEST_GAP if len(cases) == 1 else LOOSE
+    check_number("iterations", iterations, at_least=1)
+    check_number("gap", gap, at_least=0.0)
+    check_known("mode", mode, MODES)
+    check_known("objective", objective, OBJECTIVES)
+    parts = smeared_cases(cases.fields, layers[0].plane.frame)
+    alone = (layers, length, machine, strand, _SINGLE_ITERATIONS, mode)
+    singles = measures(objective, cases, *alone)
+    axial = (Strand() if strand is None else strand).stiffness(parts[0].modulus)
+    most = fibre_capacity(parts[0], layers, machine)
+    volume = parts[0].mesh.volumes
+    length = min(length, float(volume @ most))
+    scale = singles / np.array([part.unreinforced.work for part in parts])
+
+    angles, along = directions(_ANGLES)
+    outer = (along[:, :, None] * along[:, None, :]).reshape(_ANGLES, 9)
+    ascent = DensityAscent.even(volume, most, length, _ANGLES)
+    solutions = [part.unreinforced for part in parts]
+    factors = sharpest = cases.weights
+    least = certificate(parts, solutions, factors * scale, axial, most, length, mode)
+    best, attained = ascent.density, np.inf
+    for k in range(iterations):
+
+        def fibre(strain: FloatArray, density: FloatArray = ascent.density) -> FloatArray:
+            carried = density
+            if mode == TENSION:
+                carried = np.where(strain @ along.T > 0.0, density, 0.0)
+            return axial * (carried @ outer).reshape(-1, 3, 3)
+
+        solutions = [
+            part.solve(fibre, start, 1e-3) for part, start in zip(parts, solutions, strict=True)
+        ]
+        works = [one.work for one in solutions]
+        ratios = np.array([part.ratio(work) for part, work in zip(parts, works, strict=True)])
+        terms = singles / ratios
+        value = _objective(terms, cases.weights, objective)
+        if value < attained:
+            best, attained = ascent.density, value
+        certified = certificate(parts, solutions, factors * scale, axial, most, length, mode)
+        if certified >= least:
+            least, sharpest = certified, factors
+        if attained <= (1.0 + gap) * least:
+            break
+        merit = -float(factors @ terms)
+        if objective != SUM:
+            factors = factors * (terms / terms.max()) ** min(1.0, _FULL_STEPS / (k + 1))
+            factors = factors / factors.sum()
+        squares = np.zeros_like(ascent.density)
+        for v, part, one in zip(factors * scale, parts, solutions, strict=True):
+            strain = one.strain @ along.T
+            stretch = np.maximum(strain, 0.0) if mode == TENSION else strain
+            squares += v * (part.pull(one)[0] * stretch) ** 2
+        ascent = ascent.step(np.sqrt(squares), merit)
+    if len(cases) == 1 and objective != LEAST:  # it is measured by this bound itself
+        singles, least, attained = singles / least, 1.0, attained / least
+    found = (least, attained, sharpest, best, angles, k + 1)
+    return UpperBound(objective, singles, cases.weights, *found)
+
+
+def affordable_iterations(cells: int) -> int:
+    """Return how many iterations take about as long as 60 with 25,000 cells; at least 10."""
+    return max(10, min(60, _CELL_ITERATIONS // cells))
+
+
+def measures(
+    objective: str,
+    cases: WeightedCases,
+    layers: Sequence[Layer],
+    length: float,
+    machine: Machine,
+    strand: Strand | None = None,
+    iterations: int = _MEASURED,
+    mode: str = TENSION,
+) -> FloatArray:
+    """Stiffness ratio (n,) that each of several cases is measured by: the bound of it alone.
+
+    1 with the objective "least", and for one case, which is compared with no other. Parameters as
+    in `upper_bound`.
+    """
+    if objective == LEAST or len(cases) == 1:
+        return np.ones(len(cases))
+    smeared_cases(cases.fields, layers[0].plane.frame)  # one factorisation for all
+    return np.array(
+        [
+            upper_bound(case, layers, length, machine, strand, mode, iterations).ratio
+            for case in cases.fields
+        ]
+    )
+
+
+def directions(count: int) -> tuple[FloatArray, FloatArray]:
+    """Angles (k,), radians, evenly over half a turn, and coefficients of the strains along them.
+
+    The coefficients (k, 3) times strains 11, 22 and 12 (engineering shear) give the strain along
+    each angle.
+    """
+    angles = np.pi * np.arange(count) / count
+    cosine, sine = np.cos(angles), np.sin(angles)
+    return angles, np.stack([cosine**2, sine**2, cosine * sine], axis=1)
+
+
+def certificate(
+    parts: Sequence[SmearedPart],
+    solutions: Sequence[SmearedSolution],
+    factors: FloatArray,
+    axial_stiffness: float,
+    most: FloatArray,
+    length: float,
+    mode: str = TENSION,
+) -> float:
+    """Lower bound of ``sum of factor * compliance``, N mm, from any displacements.
+
+    Parameters
+    ----------
+    parts : sequence of SmearedPart
+        One for each case.
+    solutions : sequence of SmearedSolution
+        Any displacements that respect the supports, with their strains in the plane; where
+        supports move also the work.
+    factors : (n,) array
+        Not negative.
+    axial_stiffness : float, N
+        EA of a strand.
+    most : (m,) array, mm/mm^3
+        Largest density of fibre in each cell.
+    length : float, mm
+        Of fibre.
+    mode : str
+        "tension" or "bonded".
+    """
+    pulls = [part.pull(one) for part, one in zip(parts, solutions, strict=True)]
+    strains = np.stack([s * one.strain for (s, _), one in zip(pulls, solutions, strict=True)])
+    square = largest_gathered(strains, np.asarray(factors, dtype=np.float64), mode)
+    order = np.argsort(-square, kind="stable")
+    room = (parts[0].mesh.volumes * most)[order]
+    used = np.minimum(room, np.maximum(length - (np.cumsum(room) - room), 0.0))
+    energy, work = axial_stiffness * float(used @ square[order]), 0.0
+    for factor, part, one, (s, load_work) in zip(factors, parts, solutions, pulls, strict=True):
+        u = s * one.displacement.reshape(-1)
+        energy += factor * float(u @ (part.specimen.matrix @ u))
+        work += factor * load_work
+    return work**2 / energy
+
+
+def largest_gathered(strains: FloatArray, factors: FloatArray, mode: str = TENSION) -> FloatArray:
+    """Bound ``max over t of sum of factor * max(t.eps t, 0)^2`` from above in each cell, (m,).
+
+    For one case the maximum is along a principal direction. For several, at its maximum the sum has
+    slope zero: between two angles that are tried it exceeds the larger value by at most half its
+    largest curvature times the square of half their distance.
+
+    Parameters
+    ----------
+    strains : (n, m, 3) array
+        Strains 11, 22 and 12 (engineering shear) in the plane, of each case.
+    factors : (n,) array
+        Not negative.
+    mode : str
+        "tension", or "bonded" for ``(t.eps t)^2``.
+    """
+    bonded = mode != TENSION
+    if len(factors) == 1:
+        largest, smallest, _ = largest_in_plane(strains[0] * np.array([1.0, 1.0, 0.5]))
+        square = np.maximum(largest, 0.0) ** 2
+        return factors[0] * (np.maximum(square, smallest**2) if bonded else square)
+    _, along = directions(_CERTIFIED_ANGLES)
+    half = 0.5 * np.pi / _CERTIFIED_ANGLES
+    result = np.empty(strains.shape[1])
+    _gathered(np.ascontiguousarray(strains), factors, along, 0.5 * half**2, bonded, result)
+    return result
+
+
+# The strain along t is a + b cos(2 angle - phase): its square bends down by at most 8 b (|a| + b),
+# and by 8 b (a + b) where only tension counts.
+@njit(cache=True)
+def _gathered(strains, factors, along, margin, bonded, result):  # type: ignore[no-untyped-def]  # pragma: no cover
+    for c in range(strains.shape[1]):
+        bend = 0.0
+        for i in range(len(factors)):
+            e1, e2, e12 = strains[i, c, 0], strains[i, c, 1], strains[i, c, 2]
+            b = 0.5 * ((e1 - e2) ** 2 + e12 * e12) ** 0.5
+            a = abs(0.5 * (e1 + e2)) if bonded else 0.5 * (e1 + e2)
+            bend += factors[i] * 8.0 * b * max(a + b, 0.0)
+        largest = 0.0
+        for k in range(len(along)):
+            total = 0.0
+            for i in range(len(factors)):
+                e = strains[i, c, 0] * along[k, 0] + strains[i, c, 1] * along[k, 1]
+                e += strains[i, c, 2] * along[k, 2]
+                if e > 0.0 or bonded:
+                    total += factors[i] * e * e
+            largest = max(largest, total)
+        result[c] = largest + margin * bend
+
+
+@dataclass(frozen=True)
+class DensityAscent:
+    """Densities of fibre in cells and directions during the search for the optimum.
+
+    Attributes
+    ----------
+    volume : (m,) array, mm^3
+        Of the cells.
+    most : (m,) array, mm/mm^3
+        Largest density of each cell, all directions together.
+    length : float, mm
+        Of fibre, at most what the cells can hold.
+    density : (m, k) array, mm/mm^3
+    stepped : (m, k) array, optional
+        The density that the last step would have ended at without momentum.
+    steps : int
+        Number of steps since the momentum began.
+    merit : float
+        Merit of the last density; larger is better.
+    """
+
+    volume: FloatArray
+    most: FloatArray
+    length: float
+    density: FloatArray
+    stepped: FloatArray | None = None
+    steps: int = 0
+    merit: float = -np.inf
+
+    def __post_init__(self) -> None:
+        freeze(self, volume=float, most=float, density=float, stepped=float)
+
+    @classmethod
+    def even(
+        cls, volume: FloatArray, most: FloatArray, length: float, directions: int
+    ) -> "DensityAscent":
+        """Start with the same share of its room in every cell, equally in all directions."""
+        share = length / float(volume @ most) / directions
+        return cls(volume, most, length, np.repeat(share * most[:, None], directions, axis=1))
+
+    def step(self, stretch: FloatArray, merit: float) -> "DensityAscent":
+        """Return the densities after a step.
+
+        Parameters
+        ----------
+        stretch : (m, k) array
+            Strain along each direction at the present density, not negative.
+        merit : float
+        Merit of the present density, which grows with the stiffness.
+        """
+        steps = self.steps + 1 if merit >= self.merit else 1
+        power = (stretch / (float(stretch.max()) or 1.0)) ** _EXPONENT
+        stepped = self._fitted(self.density * power)
+        density, momentum = stepped, min((steps - 1.0) / (steps + 2.0), _MOST_MOMENTUM)
+        if self.stepped is not None and momentum > 0.0:
+            density = self._fitted(stepped * (stepped / self.stepped) ** momentum)
+        return DensityAscent(self.volume, self.most, self.length, density, stepped, steps, merit)
+
+    def _fitted(self, weight: FloatArray) -> FloatArray:
+        """Densities proportional to weights (m, k), with the given length and within the room."""
+        total = weight.sum(axis=1)
+        low, high = 1e-12, 1e12
+        for _ in range(_BISECTIONS):
+            middle = float(np.sqrt(low * high))
+            laid = float(self.volume @ np.minimum(self.most, total / middle))
+            low, high = (middle, high) if laid > self.length else (low, middle)
+        scale = np.minimum(self.most, total / high) / np.maximum(total, 1e-300)
+        return np.maximum(weight * scale[:, None], _TRACE * self.most[:, None])

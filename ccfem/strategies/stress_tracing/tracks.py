@@ -1,0 +1,198 @@
+"""Tracks of a main path: strands that fill the width of its band evenly.
+
+The paper shows tracks whose spacing follows the width of the member, and gives no formula.
+"""
+
+import numpy as np
+import shapely
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d
+
+from ccfem.base.arrays import BoolArray, FloatArray
+from ccfem.geometry.offsets import ring_from
+from ccfem.geometry.polylines import along_line, subdivide, turning_angles
+from ccfem.geometry.shapes import Region
+from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.strategies.stress_tracing.band import STEP, Band
+from ccfem.strategies.stress_tracing.counts import places
+from ccfem.strategies.stress_tracing.turning import relaxed
+
+__all__ = ["clipped", "eased", "tracks"]
+
+_BEYOND = 6
+"""Number of points by which a track is continued where it leaves its band sideways."""
+_OUTSIDE = 1.5
+"""Length outside the section, mm, after which a track has left it for good."""
+_INSET = 0.1
+"""Distance inside the border, mm, to which a track outside is pushed."""
+_SPREAD = 1.5
+"""Standard deviation, mm, of the Gaussian that spreads such a push to neighbouring points."""
+_EASING = 1.0
+_ROUNDS = 60
+"""Standard deviation, mm, of the Gaussian that eases sharp turns, and how often at most."""
+
+
+def tracks(
+    band: Band,
+    pitch: float,
+    section: Region,
+    radius: float = 0.0,
+    stress: LayerStress | None = None,
+) -> list[FloatArray]:
+    """Tracks of a band, evenly over its width, clipped to a section.
+
+    Parameters
+    ----------
+    band : Band
+    pitch : float, mm
+        Wanted distance between neighbouring tracks.
+    section : shapely (Multi)Polygon, mm
+    radius : float, mm, default 0
+        Tighter turns are smoothed, unless the border leaves no room for that.
+    stress : LayerStress, optional
+        Stress that the tracks turn to in joints and beside free ends.
+
+    Returns
+    -------
+    list of (n, 2) arrays, mm
+        From left to right. Closed tracks repeat their first point, which is the one nearest to the
+        middle of the section.
+    """
+    shapely.prepare(section)
+    inner = shapely.buffer(section, -_INSET)
+    seam = shapely.get_coordinates(shapely.centroid(section))[0]
+    share = places(band, pitch, section)
+    lines = band.middle + share[..., None] * band.half
+    if stress is not None:
+        lines = relaxed(lines, band, stress, section, share)
+    found = []
+    for line, place in zip(lines, share, strict=True):
+        line = eased(line, radius, band.closed)
+        whole = band.closed and bool((np.abs(place) <= 1.0).all())
+        if whole:
+            pieces = [ring_from(np.concatenate([line, line[:1]]), seam)]
+        elif band.closed:
+            # Open it where it lies farthest outside.
+            start = -int(np.argmax(np.abs(place)))
+            line, place = np.roll(line, start, axis=0), np.roll(place, start)
+            runs = _stretches(place, slice(0, len(line)))
+            pieces = [clipped(line[r], section, *2 * (slice(0, r.stop - r.start),)) for r in runs]
+        else:
+            pieces = [
+                clipped(line[run], section, *_parts_of(band, run))
+                for run in _stretches(place, band.core)
+            ]
+        found += [_held(each, section, inner, whole) for each in pieces if len(each) > 1]
+    return found
+
+
+def _stretches(place: FloatArray, core: slice) -> list[slice]:
+    """Stretches of a track that lie within its band, or on beyond its ends."""
+    within = np.abs(place) <= 1.0
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], within, [False]]).astype(np.int8)))
+    found = []
+    for a, b in ends.reshape(-1, 2):
+        # One point beyond the border at either side, so that the track is cut there.
+        run = slice(max(int(a) - _BEYOND, 0), min(int(b) + _BEYOND, len(place)))
+        if a < core.stop and b > core.start:
+            found.append(run)
+    return found
+
+
+def _parts_of(band: Band, run: slice) -> tuple[slice, slice]:
+    """Return the core of a band, and what is within it, in a stretch of it."""
+    core, within = (
+        slice(max(part.start, run.start) - run.start, min(part.stop, run.stop) - run.start)
+        for part in (band.core, band.within)
+    )
+    return core, within
+
+
+def eased(line: FloatArray, radius: float, closed: bool = False) -> FloatArray:
+    """Smooth a line (n, 2) in even steps wherever it turns more tightly than a radius, mm."""
+    mode = "wrap" if closed else "nearest"
+    reach = round(4.0 * _EASING / STEP) + 1
+    for _ in range(_ROUNDS):
+        ring = np.concatenate([line[-1:], line, line[:1]]) if closed else line
+        offsets = np.array([0, len(ring)])
+        turn = turning_angles(ring, offsets, np.zeros(1, dtype=bool))
+        step = np.linalg.norm(np.diff(ring, axis=0), axis=1)
+        beside = 0.5 * (np.append(step, step[-1]) + np.append(step[0], step))
+        sharp = 2.0 * np.sin(0.5 * turn) * radius > beside
+        sharp = sharp[1:-1] if closed else sharp
+        if not sharp.any():
+            break
+        near = maximum_filter1d(sharp.astype(np.float64), reach, mode=mode)
+        weight = gaussian_filter1d(near, _EASING / STEP, mode=mode)[:, None]
+        smooth = gaussian_filter1d(line, _EASING / STEP, axis=0, mode=mode)
+        line = line + weight * (smooth - line)
+    return line
+
+
+def clipped(line: FloatArray, section: Region, core: slice, within: slice) -> FloatArray:
+    """Part of a line round the middle of its core, up to where it leaves a section for good.
+
+    Excursions shorter than 1.5 mm do not end it: they would cut a track that grazes the border into
+    pieces. Its ends lie on the border. If an end does not leave the section, but would run along
+    the member behind a joint, the end of the points `within` is used.
+    """
+    inside = shapely.contains_xy(section, line)
+    own = np.flatnonzero(inside[core]) + core.start
+    if not len(own):
+        return line[:0]
+    middle = (core.start + core.stop) // 2
+    start = int(own[np.argmin(np.abs(own - middle))])
+    first = start - _last_inside(line[start::-1], inside[start::-1])
+    last = start + _last_inside(line[start:], inside[start:])
+    ahead = back = line[:0]
+    if first > 0:
+        back = _way_out(line[first], line[first - 1], section)
+    else:
+        first = min(within.start, start)
+    if last + 1 < len(line):
+        ahead = _way_out(line[last], line[last + 1], section)
+    else:
+        last = max(within.stop - 1, start)
+    return np.concatenate([back, line[first : last + 1], ahead])
+
+
+def _last_inside(line: FloatArray, inside: BoolArray) -> int:
+    """Index of the last point inside before a line leaves for good."""
+    along = along_line(line)
+    within = np.flatnonzero(inside)
+    left = np.flatnonzero(np.diff(along[within]) > _OUTSIDE + STEP)
+    return int(within[left[0]] if len(left) else within[-1])
+
+
+def _way_out(inner: FloatArray, outer: FloatArray, section: Region) -> FloatArray:
+    """Point (1, 2) where a step out of a section first crosses its border; none at its start."""
+    step = shapely.LineString([inner, outer])
+    border = shapely.get_coordinates(shapely.intersection(step, section.boundary))
+    away = np.linalg.norm(border - inner, axis=1)
+    border = border[away > 1e-6]
+    return border[[np.argmin(away[away > 1e-6])]] if len(border) else border
+
+
+def _held(line: FloatArray, section: Region, inner: Region, closed: bool) -> FloatArray:
+    """Push a line back where it leaves a section between its ends, and neighbouring points less."""
+    step = 0.2 * STEP
+    fine, _, _ = subdivide(line, np.array([0, len(line)]), step)
+    ends = 0 if closed else round(STEP / step)
+    between = np.arange(len(fine)) >= ends
+    between &= between[::-1]
+    outside = between & ~shapely.contains_xy(section, fine)
+    if not outside.any() or shapely.is_empty(inner):
+        return line
+    mode = "wrap" if closed else "nearest"
+    reach = 2 * round(2.0 * _SPREAD / step) + 1
+    beside = between & (maximum_filter1d(outside.astype(np.float64), reach, mode=mode) > 0.0)
+    push = np.zeros_like(fine)
+    for _ in range(_ROUNDS):
+        out = np.flatnonzero(beside)[~shapely.contains_xy(inner, fine[beside])]
+        push[:] = 0.0
+        if not len(out):
+            break
+        ways = shapely.shortest_line(inner, shapely.points(fine[out]))
+        push[out] = shapely.get_coordinates(ways)[::2] - fine[out]
+        spread = gaussian_filter1d(push, _SPREAD / step, axis=0, mode=mode)
+        fine = fine + np.where(beside[:, None], 2.0 * spread, 0.0)
+    return fine + push

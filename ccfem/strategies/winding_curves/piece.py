@@ -1,0 +1,103 @@
+"""A piece of a layer with joints, cut open along the curves that join them."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.paths.fields.layer_elements import Surface
+from ccfem.slicing.layers.layer import Layer
+from ccfem.strategies.winding_curves.joining_curves import border_tree, join
+from ccfem.strategies.winding_curves.joint_loops import joint_loops
+from ccfem.strategies.winding_curves.triangle_mesh import TriangleMesh
+
+__all__ = ["Piece", "pieces_with_joints"]
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A connected piece of a layer, with the borders of its joints.
+
+    Attributes
+    ----------
+    layer : Layer
+    mesh : TriangleMesh
+        Points of the layer keep their numbers.
+    loops : tuple of int arrays
+        Points of the border of each joint's hole.
+    outer : tuple of int arrays
+        All other loops of its border.
+    curves : tuple of int arrays
+        Points of each curve that joins holes; none before it is `joined`.
+    """
+
+    layer: Layer
+    mesh: TriangleMesh
+    loops: tuple[IntArray, ...]
+    outer: tuple[IntArray, ...]
+    curves: tuple[IntArray, ...] = ()
+
+    @property
+    def surface(self) -> Surface:
+        """Its triangles, for the field."""
+        return Surface(self.mesh.points, self.mesh.triangles)
+
+    def joined(self, repulsion: float) -> "Piece":
+        """Join its holes by curves that keep off the outer border: see `join`."""
+        mesh, curves = join(self.mesh, self.loops, self.outer, repulsion)
+        return Piece(self.layer, mesh, self.loops, self.outer, tuple(curves))
+
+    def inner_values(self, lift: float, rise: float, reach: float) -> tuple[IntArray, FloatArray]:
+        """Points of its holes and curves, and the values of the field there.
+
+        Parameters
+        ----------
+        lift : float
+            How far below 0 the holes are, and the curves near them.
+        rise : float
+            How far below 0 the curves are, per relative excess of their distance from the outer
+            border over that of the holes: strands there keep their distance round the holes.
+        reach : float, mm
+            Distance from the holes along the curves over which `lift` acts.
+        """
+        rim = np.unique(np.concatenate(self.loops))
+        if not self.curves:
+            return rim, np.full(len(rim), -lift)
+        rest = np.setdiff1d(np.concatenate(self.curves), rim)
+        points, tree = self.mesh.points, border_tree(self.mesh.points, self.outer)
+        if tree is None:
+            deep = np.zeros(len(rest))
+        else:
+            usual = float(np.median(tree.query(points[rim])[0]))
+            deep = rise * np.minimum(0.0, 1.0 - tree.query(points[rest])[0] / max(usual, 1e-9))
+        holes = border_tree(points, self.loops)
+        assert holes is not None
+        near = -lift * np.exp(-holes.query(points[rest])[0] / reach)
+        return (
+            np.concatenate([rim, rest]),
+            np.concatenate([np.full(len(rim), -lift), np.minimum(deep, near)]),
+        )
+
+
+def pieces_with_joints(layer: Layer, names: Sequence[str]) -> Iterator[Piece]:
+    """Yield each connected piece of a layer with a border round a joint and another border.
+
+    Parameters
+    ----------
+    layer : Layer
+    names : sequence of str
+        Patches of the joints.
+    """
+    loops = list(joint_loops(layer, names).values())
+    first = {int(loop[0]) for loop in loops}
+    others = [loop for loop in layer.loops if int(loop[0]) not in first]
+    for number in range(int(layer.component.max(initial=-1)) + 1):
+        rows = np.flatnonzero(layer.component == number)
+        inside = np.zeros(len(layer.points), dtype=bool)
+        inside[layer.triangles[rows]] = True
+        mine = tuple(loop for loop in loops if inside[loop[0]])
+        outer = tuple(loop for loop in others if inside[loop[0]])
+        if mine and outer:
+            mesh = TriangleMesh(layer.points, layer.triangles[rows], rows)
+            yield Piece(layer, mesh, mine, outer)

@@ -1,7 +1,0 @@
-"""Studies: parts x slicings x strategies x parameters, each run stored by what it depends on."""
-
-from ccfem.studies.definition import Study, read_study
-from ccfem.studies.running import study
-from ccfem.studies.study_result import StudyResult
-
-__all__ = ["Study", "StudyResult", "read_study", "study"]

@@ -1,0 +1,362 @@
+import os
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+import pyvista
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ccfem.base.errors import InputError
+from ccfem.body.files import read_mesh, whole_file, write_mesh
+from ccfem.body.mesh import TetMesh
+from ccfem.body.mesh.patches import Plane, match_boundary
+
+MIDDLE = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]]
+
+
+def facets_as_set(facets):
+    return {frozenset(f) for f in np.asarray(facets).tolist()}
+
+
+def same(found: TetMesh, mesh: TetMesh, exact=True):
+    close = np.array_equal if exact else np.allclose
+    assert close(found.points, mesh.points)
+    assert np.array_equal(found.cells, mesh.cells)
+    assert found.patches.keys() == mesh.patches.keys()
+    for name, facets in mesh.patches.items():
+        assert facets_as_set(found.patches[name]) == facets_as_set(facets)
+
+
+@pytest.mark.parametrize("suffix", [".tet", ".npz", ".vtu"])
+@settings(max_examples=6, deadline=None)
+@given(
+    st.integers(0, 2**32 - 1),
+    st.sampled_from([1, 2]),
+    st.text("abcXYZ _-:.é/", min_size=1, max_size=8),
+)
+def test_round_trip(tmp_path_factory, build_box, suffix, seed, order, name):
+    random = np.random.default_rng(seed)
+    mesh = build_box((1, 2, 1))
+    mesh = TetMesh(mesh.points + 0.1 * random.normal(size=mesh.points.shape), mesh.cells)
+    mesh = mesh.quadratic() if order == 2 else mesh
+    mesh = mesh.with_patches({name: mesh.boundary[random.choice(len(mesh.boundary), 3, False)]})
+    path = tmp_path_factory.mktemp("round") / f"part{suffix}"
+    if suffix == ".tet" and order == 2:
+        with pytest.raises(InputError, match="linear tetrahedra only"):
+            write_mesh(mesh, path)
+        assert list(path.parent.iterdir()) == []
+        return
+    write_mesh(mesh, path)
+    assert [p.name for p in path.parent.iterdir()] == [path.name]
+    found = read_mesh(path)
+    if suffix == ".tet":
+        mesh = TetMesh(mesh.points, mesh.cells)
+    same(found, mesh)
+
+
+def test_scale_and_raw_reading(box, tmp_path):
+    turned = TetMesh(box.points, box.cells[:, [1, 0, 2, 3]])
+    path = tmp_path / "part.npz"
+    write_mesh(turned, path)
+    assert (read_mesh(path, check=False).volumes < 0).all()
+    found = read_mesh(path, scale=1000.0)
+    assert np.allclose(found.volumes, -turned.volumes * 1e9)
+
+
+def test_equal_meshes_make_equal_archives(box, tmp_path):
+    for name in ("one.npz", "two.npz"):
+        write_mesh(box, tmp_path / name)
+    assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "two.npz").read_bytes()
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_other_programs_read_a_written_grid(tmp_path, box, order):
+    mesh = (box if order == 1 else box.quadratic()).with_patches({"Fläche <1>": box.boundary[:5]})
+    write_mesh(mesh, tmp_path / "part.vtu")
+    theirs, ours = meshio.read(tmp_path / "part.vtu"), pyvista.read(tmp_path / "part.vtu")
+    cells = ours.cells_dict[10 if order == 1 else 24]
+    for points, nodes in ((theirs.points, theirs.cells[0].data), (ours.points, cells)):
+        np.testing.assert_array_equal(points, mesh.points)
+        np.testing.assert_array_equal(nodes, mesh.cells)
+    for data in (theirs.field_data, ours.field_data):
+        np.testing.assert_array_equal(data["patch:Fläche <1>"], box.boundary[:5])
+    # Volume and facing of the cells, by VTK: quadratic ones need their nodes in its order.
+    volumes = ours.compute_cell_sizes().cell_data["Volume"]
+    np.testing.assert_allclose(volumes, mesh.volumes)
+    wrong = box.with_patches({"a\x01": box.boundary[:5]})
+    with pytest.raises(InputError, match="characters that a file of VTK cannot hold"):
+        write_mesh(wrong, tmp_path / "wrong.vtu")
+    assert os.listdir(tmp_path) == ["part.vtu"]
+
+
+@pytest.mark.parametrize("version", [2.2, 4.1])
+@pytest.mark.parametrize("binary", [0, 1])
+@pytest.mark.parametrize("order", [1, 2])
+def test_gmsh_files(tmp_path, version, binary, order):
+    """Files that Gmsh itself writes, with a group on two faces and one without a name."""
+    gmsh = pytest.importorskip("gmsh")
+    path = tmp_path / "part.msh"
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        volume = gmsh.model.occ.addBox(0, 0, 0, 2, 1, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(3, [volume], 7, "solid")
+        gmsh.model.addPhysicalGroup(2, [1], 1, "left end")
+        gmsh.model.addPhysicalGroup(2, [1, 2], 3, "both")
+        gmsh.model.addPhysicalGroup(2, [2], 42)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 0.6)
+        gmsh.model.mesh.generate(3)
+        gmsh.model.mesh.setOrder(order)
+        gmsh.option.setNumber("Mesh.MshFileVersion", version)
+        gmsh.option.setNumber("Mesh.Binary", binary)
+        gmsh.write(str(path))
+    finally:
+        gmsh.finalize()
+    mesh = read_mesh(path)
+    assert mesh.order == order
+    assert mesh.volumes.sum() == pytest.approx(2.0)
+    if order == 2:
+        middle = mesh.points[mesh.cells[:, MIDDLE]].mean(axis=2)
+        assert np.allclose(mesh.points[mesh.cells[:, 4:]], middle)
+        raw = read_mesh(path, check=False)
+        assert np.allclose(raw.points[raw.cells[:, 4:]], raw.points[raw.cells[:, MIDDLE]].mean(2))
+    left, right = Plane("x", "min")(mesh), Plane("x", "max")(mesh)
+    assert facets_as_set(mesh.patches["left end"]) == facets_as_set(left)
+    assert facets_as_set(mesh.patches["both"]) == facets_as_set(np.concatenate([left, right]))
+    if version == 2.2:
+        assert facets_as_set(mesh.patches["42"]) == facets_as_set(right)
+
+
+def test_gmsh_writes_abaqus(tmp_path):
+    gmsh = pytest.importorskip("gmsh")
+    path = tmp_path / "part.inp"
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        volume = gmsh.model.occ.addBox(0, 0, 0, 2, 1, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(3, [volume], 7, "solid")
+        gmsh.model.addPhysicalGroup(2, [1], 1, "Left")
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 0.6)
+        gmsh.model.mesh.generate(3)
+        gmsh.model.mesh.setOrder(2)
+        gmsh.write(str(path))
+    finally:
+        gmsh.finalize()
+    raw = read_mesh(path, check=False)
+    assert np.allclose(raw.points[raw.cells[:, 4:]], raw.points[raw.cells[:, MIDDLE]].mean(2))
+    mesh = read_mesh(path)
+    assert mesh.volumes.sum() == pytest.approx(2.0)
+    assert facets_as_set(mesh.patches["Left"]) == facets_as_set(Plane("x", "min")(mesh))
+
+
+DECK = """*Heading
+two tetrahedra on the triangle 20 30 40, nodes numbered with gaps
+** a comment
+*Part, name=PART-1
+*Node, nset=ALL
+10, -1., 0., 0.
+20,  0., 0., 0.
+30,  0., 1., 0.
+40,  0., 0., 1.
+50,  1.,
+0., 0.
+*Element, type=C3D4, elset=SOLID
+1, 20, 30, 40, 50
+2, 20, 40, 30, 10
+*Nset, nset="Slope", internal
+30, 40, 50
+*Nset, nset=Even, generate
+10, 40, 10
+*Elset, elset=_Front_S3, internal, instance=PART-1-1
+ 1,
+*Elset, elset=Pair
+ 1, 2
+*Elset, elset=Nested
+ Pair
+*Element, type=S3, elset=Skin
+7, 20, 30, 50
+*Surface, type=ELEMENT, name=Front
+_Front_S3, S3
+*Surface, type=ELEMENT, name=Direct
+1, S4
+Nested, S2
+*Surface, type=NODE, name=ByNode
+Slope,
+*End Part
+*Material, name=steel
+*Elastic
+210000., 0.3
+"""
+
+
+def test_abaqus_sets_and_surfaces(tmp_path):
+    """Faces by the Abaqus manual: S1 = 1 2 3, S2 = 1 4 2, S3 = 2 4 3, S4 = 3 4 1 of a cell."""
+    path = tmp_path / "part.inp"
+    path.write_text(DECK)
+    mesh = read_mesh(path)
+    label = {x: k for k, x in enumerate((10, 20, 30, 40, 50))}
+
+    def facets(*triples):
+        return {frozenset(label[x] for x in triple) for triple in triples}
+
+    expected = {
+        "Front": facets((30, 50, 40)),
+        "Direct": facets((40, 50, 20), (20, 50, 30), (20, 10, 40)),
+        "ByNode": facets((30, 40, 50)),
+        "Slope": facets((30, 40, 50)),
+        "Even": facets((10, 20, 30), (10, 20, 40), (10, 30, 40)),
+        "Skin": facets((20, 30, 50)),
+        "ALL": facets_as_set(mesh.boundary),
+    }
+    assert {name: facets_as_set(f) for name, f in mesh.patches.items()} == expected
+    assert mesh.volumes.sum() == pytest.approx(2 / 6)
+    assert mesh.points[label[50]].tolist() == [1, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("1, 20, 30, 40, 50", "1, 20, 30, 40, 60"), "names node 60, which"),
+        (("C3D4", "C3D8R"), "holds no tetrahedra; it has"),
+        (("C3D4", "B31"), "holds no tetrahedra"),
+        (("*Part, name=PART-1", "*Part, name=A\n*Part, name=B"), "holds 2 parts"),
+        (("20,  0., 0., 0.", "20,  0., 0."), "line 5: .NODE does not read"),
+        (("20,  0., 0., 0.", "20,  0., here, 0."), "line 5: .NODE does not read"),
+        (("20,  0., 0., 0.", "10,  0., 0., 0."), "gives a node twice"),
+        (("*Heading", "*Include, input=other.inp"), "not followed"),
+        (("20,  0., 0., 0.", "20,  0., nan, 0."), "NaN or infinity"),
+    ],
+)
+def test_bad_abaqus_decks(tmp_path, change, message):
+    path = tmp_path / "part.inp"
+    path.write_text(DECK.replace(*change))
+    with pytest.raises(InputError, match=message) as caught:
+        read_mesh(path)
+    assert "part.inp" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_vtu_of_other_programs(tmp_path, box):
+    """Triangles with a number in a cell array become patches; single precision is read."""
+    left, right = box.patches["left"], box.patches["right"]
+    grid = pyvista.UnstructuredGrid(
+        {5: np.concatenate([left, right[:, ::-1]]), 10: box.cells}, box.points.astype(np.float32)
+    )
+    numbers = np.zeros(grid.n_cells, dtype=np.int32)
+    numbers[np.flatnonzero(grid.celltypes == 5)] = np.repeat([1, 2], [len(left), len(right)])
+    grid.cell_data["gmsh:physical"] = numbers
+    grid.save(tmp_path / "part.vtu")
+    mesh = read_mesh(tmp_path / "part.vtu")
+    assert facets_as_set(mesh.patches["1"]) == facets_as_set(left)
+    assert facets_as_set(mesh.patches["2"]) == facets_as_set(right)
+    assert np.array_equal(match_boundary(mesh, right), mesh.patches["2"])
+
+
+GOOD_TET = "4 vertices\n1 tets\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n4 0 1 2 3\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.tet", "", "not a .tet mesh"),
+        ("a.tet", "solid of something", "not a .tet mesh"),
+        ("a.tet", GOOD_TET.replace("4 vertices", "5 vertices"), "19 numbers|in place of"),
+        ("a.tet", GOOD_TET.replace("1 0 0", "1 0 x"), "not a .tet mesh"),
+        ("a.tet", GOOD_TET.replace("1 0 0", "nan 0 0"), "NaN or infinity"),
+        ("a.tet", GOOD_TET.replace("1 0 0", "1e308 0 0"), "within 1e.09 mm; 1 nodes lie farther"),
+        ("a.tet", GOOD_TET.replace("4 0 1 2 3", "3 0 1 2 3"), "tetrahedron 0 does not read"),
+        ("a.tet", GOOD_TET.replace("4 0 1 2 3", "4 0 1 2 4"), "name nodes 0 to 3"),
+        ("a.tet", GOOD_TET.replace("0 0 1\n", "1 1 0\n"), "all 1 cells of the mesh are flat"),
+        ("a.tet", "0 vertices\n0 tets\n", "holds no tetrahedra"),
+        ("a.msh", "not a mesh at all", "must begin with .MeshFormat"),
+        ("a.msh", "$MeshFormat\n9.9 0 8\n$EndMeshFormat\n", "not a Gmsh mesh that can be read"),
+        ("a.msh", "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 2", "not a Gmsh mesh"),
+        ("a.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n", "it holds no nodes"),
+        ("a.vtu", "<xml/>", "not a VTK unstructured grid"),
+        ("a.vtu", "<VTKFile type='UnstructuredGrid'><Unstr", "grid that can be read|no tetra"),
+        ("a.inp", "something else", "no .NODE"),
+        ("a.npz", "PK nonsense", "not a mesh in a NumPy archive"),
+        ("a.step", "ISO-10303", "name must end in .inp, .msh, .npz, .tet, .vtu"),
+        ("a.stl", "solid a", "is a surface"),
+        ("none/a.tet", None, "does not exist"),
+    ],
+)
+def test_bad_files_are_one_line(tmp_path, name, content, message, capfd):
+    path = tmp_path / name
+    if content is not None:
+        path.write_text(content)
+    with pytest.raises(InputError, match=message) as caught:
+        read_mesh(path)
+    assert "\n" not in str(caught.value)
+    assert str(path) in str(caught.value)
+    assert capfd.readouterr().err == ""
+
+
+def test_good_tet_reads(tmp_path):
+    path = tmp_path / "a.tet"
+    path.write_text(GOOD_TET.replace("\n", "\r\n"))
+    assert read_mesh(path).volumes == pytest.approx([1 / 6])
+
+
+def test_folder_and_scale(tmp_path):
+    with pytest.raises(InputError, match="is a folder"):
+        read_mesh(tmp_path)
+    path = tmp_path / "a.tet"
+    path.write_text(GOOD_TET)
+    for scale in (0.0, -1.0, float("nan")):
+        with pytest.raises(InputError, match="mesh scale"):
+            read_mesh(path, scale=scale)
+
+
+def test_pickled_archives_are_not_opened(tmp_path):
+    path = tmp_path / "a.npz"
+    np.savez(path, points=np.array([{}], dtype=object), cells=np.zeros((1, 4), int))
+    with pytest.raises(InputError, match="not a mesh in a NumPy archive"):
+        read_mesh(path)
+    np.savez(path, points=np.zeros((4, 3)))
+    with pytest.raises(InputError, match="must hold the arrays points and cells"):
+        read_mesh(path)
+    np.savez(path, points=np.array([["a"] * 3] * 4), cells=np.zeros((1, 4), int))
+    with pytest.raises(InputError, match="must be numbers"):
+        read_mesh(path)
+
+
+def test_writing_whole_or_not_at_all(tmp_path, box):
+    path = tmp_path / "note.txt"
+    path.write_text("before")
+
+    def stop_half_way():
+        with whole_file(path) as temporary:
+            temporary.write_text("half")
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        stop_half_way()
+    assert path.read_text() == "before"
+    assert [p.name for p in tmp_path.iterdir()] == ["note.txt"]
+    with pytest.raises(InputError, match="there is no folder"):
+        write_mesh(box, tmp_path / "none" / "a.vtu")
+    with pytest.raises(InputError, match="name must end in"):
+        write_mesh(box, tmp_path / "a.stl")
+    (tmp_path / "b.npz").mkdir()
+    with pytest.raises(InputError, match="cannot write"):
+        write_mesh(box, tmp_path / "b.npz")
+    bad = TetMesh(np.full((4, 3), np.nan), [[0, 1, 2, 3]])
+    with pytest.raises(InputError, match="NaN"):
+        write_mesh(bad, tmp_path / "c.npz")
+
+
+@pytest.mark.skipif("CCFEM_CHEN2021" not in os.environ, reason="the authors' data is not here")
+def test_the_published_meshes_read():
+    """Sizes by paper 000, Table 1 (Loop: 32,473 cells, 140 mm) and the files' own headers."""
+    folder = Path(os.environ["CCFEM_CHEN2021"])
+    loop = read_mesh(folder / "Loop" / "Loop.tet")
+    assert (len(loop.points), len(loop.cells)) == (6677, 32473)
+    assert np.ptp(loop.bounds, axis=0) == pytest.approx([100, 10, 140])
+    assert (loop.volumes > 0).all()
+    bar = read_mesh(folder / "bar" / "Bar.tet")
+    assert (len(bar.points), len(bar.cells)) == (4182, 14722)

@@ -1,0 +1,361 @@
+"""Stress of other programs: what comes in is what was written, and nothing else is taken for it."""
+
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+import pyvista
+
+from benchmarks.fuzz.mutants import frd
+from ccfem.base.errors import InputError
+from ccfem.base.tensor import to_voigt
+from ccfem.body.files import read_mesh, read_stress
+from ccfem.body.mesh import TetMesh
+from ccfem.body.mesh.box import box_mesh
+from ccfem.cases.case import Case
+from ccfem.comparison import compare
+from ccfem.comparison.request import ForeignStress
+from ccfem.fem.elasticity import Force, GivenStress, Problem, Support, solve
+from ccfem.fem.elasticity.loads import nodal_forces
+from ccfem.fem.materials import isotropic
+from ccfem.machine import Machine
+from ccfem.paths.planning import plan
+from ccfem.printing.export.vtu_result import write_result
+from ccfem.slicing.slicers.planar import Planar
+from ccfem.strategies import create
+
+LOADS = {"pull": (Force("x_max", (300.0, 40.0, 20.0)),)}
+
+
+def part(order=1, size=(60.0, 24.0, 4.0), divisions=(20, 8, 2)):
+    held = (Support("x_min"),)
+    return Problem(box_mesh(size, divisions), isotropic(3500.0, 0.35), held, LOADS, order=order)
+
+
+@pytest.fixture(scope="module", params=[1, 2])
+def field(request):
+    return solve(part(request.param))["pull"]
+
+
+@pytest.fixture
+def written(field, tmp_path):
+    write_result(field, tmp_path / "result.vtu")
+    return tmp_path / "result.vtu"
+
+
+def test_paths_on_what_was_written_and_read_are_the_same(field, written):
+    given = read_stress(written, field.mesh, held_or_loaded=field.held_or_loaded)
+    np.testing.assert_array_equal(given.stress, field.stress)
+    np.testing.assert_array_equal(given.nodal, field.nodal)
+    machine = Machine(minimum_length=20.0)
+    for name in ("isocurve", "zigzag"):
+        one, other = (
+            plan(create(name), Planar(count=2).cut(field.mesh), stress, machine)
+            for stress in (field, given)
+        )
+        assert len(one)
+        np.testing.assert_array_equal(one.points, other.points)
+        np.testing.assert_array_equal(one.offsets, other.offsets)
+
+
+def test_a_result_holds_all_that_it_promises(field, written):
+    grid = pyvista.read(written)
+    np.testing.assert_array_equal(grid.point_data["displacement"], field.displacement)
+    np.testing.assert_array_equal(grid.point_data["reaction"], field.reactions)
+    np.testing.assert_array_equal(
+        grid.cell_data["error"], field.error.densities(field.mesh.volumes)
+    )
+    strain = grid.cell_data["strain"]  # tensors: xx, yy, zz, xy, yz, xz
+    np.testing.assert_array_equal(strain[:, 3], field.strain[:, 0, 1])
+    np.testing.assert_array_equal(grid.cell_data["stress"][:, 4], field.stress[:, 1, 2])
+    values = grid.cell_data["principal_stress"]
+    axes = np.stack([grid.cell_data[f"principal_direction_{k}"] for k in (1, 2, 3)], axis=2)
+    again = np.einsum("mik,mk,mjk->mij", axes, values, axes)
+    np.testing.assert_allclose(again, field.stress, atol=1e-9 * np.abs(field.stress).max())
+    text = {name: bytes(grid.field_data[name]).decode() for name in ("load case", "unit of stress")}
+    assert text == {"load case": "pull", "unit of stress": "MPa"}
+    mesh = read_mesh(written)
+    assert set(mesh.patches) == set(field.mesh.patches)
+    assert mesh.order == field.mesh.order
+
+
+def test_meshio_reads_the_same_result(field, written):
+    theirs, ours = meshio.read(written), pyvista.read(written)
+    assert [block.type for block in theirs.cells] == [
+        "tetra" if field.mesh.order == 1 else "tetra10"
+    ]
+    np.testing.assert_array_equal(theirs.points, field.mesh.points)
+    np.testing.assert_array_equal(theirs.cells[0].data, field.mesh.cells)
+    assert set(theirs.point_data) == set(ours.point_data.keys())
+    for name, values in theirs.point_data.items():
+        np.testing.assert_array_equal(values, ours.point_data[name])
+    assert set(theirs.cell_data) == set(ours.cell_data.keys())
+    for name, (values,) in theirs.cell_data.items():
+        np.testing.assert_array_equal(values, ours.cell_data[name])
+    np.testing.assert_array_equal(theirs.cell_data["stress"][0][:, 4], field.stress[:, 1, 2])
+    for name, facets in field.mesh.patches.items():
+        np.testing.assert_array_equal(theirs.field_data[f"patch:{name}"], facets)
+    assert bytes(theirs.field_data["unit of stress"]) == b"MPa"
+
+
+def test_a_node_that_is_nowhere_is_one_line(field, written):
+    grid = pyvista.read(written)
+    grid.points[3, 1] = np.nan
+    grid.save(written)
+    with pytest.raises(InputError, match="nodes must be finite; got NaN or infinity"):
+        read_stress(written, field.mesh, "MPa")
+
+
+def test_a_unit_as_a_string_is_read_too(field, written):
+    """As ccfem wrote it before, and as other programs may."""
+    grid = pyvista.read(written)
+    grid.field_data["unit of stress"] = ["Pa"]
+    grid.save(written)
+    given = read_stress(written, field.mesh)
+    np.testing.assert_allclose(given.stress, 1e-6 * field.stress, rtol=1e-15)
+
+
+def test_other_numbers_of_nodes_and_cells_are_mapped(field, tmp_path):
+    mesh, random = field.mesh, np.random.default_rng(4)
+    order, cells = random.permutation(len(mesh.points)), random.permutation(len(mesh.cells))
+    number = np.argsort(order)
+    points = np.array(mesh.points[order])
+    shuffled = TetMesh(points, number[mesh.cells][cells])
+    write_result(
+        replace(
+            field,
+            problem=replace(
+                field.problem,
+                mesh=shuffled.with_patches(
+                    {name: number[facets] for name, facets in mesh.patches.items()}
+                ),
+            ),
+            displacement=field.displacement[order],
+            stress=field.stress[cells],
+            nodal=field.nodal[order],
+            reactions=field.reactions[order],
+        ),
+        tmp_path / "shuffled.vtu",
+    )
+    given = read_stress(tmp_path / "shuffled.vtu", mesh)
+    np.testing.assert_array_equal(given.stress, field.stress)
+    np.testing.assert_array_equal(given.nodal, field.nodal)
+
+
+def test_arrays_of_other_programs(field, tmp_path):
+    mesh = field.mesh
+    grid = pyvista.UnstructuredGrid(
+        {10 if mesh.order == 1 else 24: mesh.cells}, np.array(mesh.points)
+    )
+    grid.cell_data["S"] = 1e6 * field.stress.reshape(-1, 9)
+    grid.save(tmp_path / "full.vtu")
+    given = read_stress(tmp_path / "full.vtu", mesh, "Pa", "S")
+    np.testing.assert_allclose(given.stress, field.stress, rtol=1e-12, atol=1e-12)
+    with pytest.raises(InputError, match="does not say the unit of its stress"):
+        read_stress(tmp_path / "full.vtu", mesh, array="S")
+    with pytest.raises(InputError, match=r"has no array 'stress'; there are: S"):
+        read_stress(tmp_path / "full.vtu", mesh, "MPa")
+    with pytest.raises(InputError, match="unit of stress must be"):
+        read_stress(tmp_path / "full.vtu", mesh, "psi", "S")
+    grid.cell_data["S"] = np.ones((len(mesh.cells), 6))
+    grid.save(tmp_path / "unnamed.vtu")
+    with pytest.raises(InputError, match="must name the components xx, yy"):
+        read_stress(tmp_path / "unnamed.vtu", mesh, "MPa", "S")
+
+
+def test_stress_on_another_mesh_is_refused(written, field):
+    size = (60.0, 24.0, 4.0)
+    other = box_mesh(size, (10, 4, 1))
+    with pytest.raises(InputError, match="has other cells than the part"):
+        read_stress(written, other)
+    with pytest.raises(InputError, match=r"has no node where .* corners of the part lie"):
+        read_stress(written, box_mesh((61.0, 24.0, 4.0), (20, 8, 2)))
+    with pytest.raises(InputError, match="holds stress in MPa; got the unit Pa"):
+        read_stress(written, field.mesh, "Pa")
+    with pytest.raises(InputError, match=r"read from \.vtu, \.frd or \.csv"):
+        read_stress(written.rename(written.with_suffix(".odb")), field.mesh)
+
+
+def table(kind, stress, first=1, unit=" [MPa]", order=None):
+    """CSV of a table of stress (k, 3, 3)."""
+    lines = [f"{kind};S11{unit};S22{unit};S33{unit};S12{unit};S13{unit};S23{unit};note"]
+    for k in range(len(stress)) if order is None else order:
+        s = stress[k]
+        parts = (s[0, 0], s[1, 1], s[2, 2], s[0, 1], s[0, 2], s[1, 2])
+        lines.append(";".join([str(k + first), *map(repr, map(float, parts)), "-"]))
+    return "\n".join(lines)
+
+
+def test_tables_by_element_and_by_node(field, tmp_path):
+    path, mesh = tmp_path / "stress.csv", field.mesh
+    order = np.random.default_rng(1).permutation(len(mesh.cells))
+    path.write_text(table("Element", field.stress, 1, order=order))
+    given = read_stress(path, mesh)
+    np.testing.assert_array_equal(given.stress, field.stress)
+    if mesh.order == 1:  # averaged as the solve does
+        np.testing.assert_allclose(given.nodal, field.nodal, atol=1e-9)
+    path.write_text(table("node", 1e6 * field.nodal, 0, " [Pa]"))
+    given = read_stress(path, mesh)
+    np.testing.assert_allclose(given.nodal, field.nodal, rtol=1e-12, atol=1e-12)
+    means = field.nodal[mesh.corners].mean(axis=1)
+    np.testing.assert_allclose(given.stress, means, rtol=1e-9, atol=1e-9)
+    path.write_text(table("node", field.nodal[:-3]))
+    with pytest.raises(InputError, match="and the part"):
+        read_stress(path, mesh)
+    path.write_text(table("element", field.stress, 7))
+    with pytest.raises(InputError, match="expected every element from 0 or from 1 on"):
+        read_stress(path, mesh)
+    path.write_text(table("element", field.stress).replace("S13", "S14"))
+    with pytest.raises(InputError, match="must name the components"):
+        read_stress(path, mesh)
+    path.write_text(table("element", field.stress, unit=""))
+    with pytest.raises(InputError, match="does not say the unit"):
+        read_stress(path, mesh)
+    path.write_text(table("element", field.stress).replace("S13 [MPa]", "S13 [Pa]"))
+    with pytest.raises(InputError, match="give them one"):
+        read_stress(path, mesh)
+    path.write_text(table("element", field.stress) + "\n5;1;2;x;4;5;6")
+    with pytest.raises(InputError, match=rf"line {len(mesh.cells) + 2}: expected .* '5;1;2;x;4"):
+        read_stress(path, mesh)
+    path.write_text("node,Sxx\n1," + "1" * 200_000)
+    with pytest.raises(InputError, match="field larger than field limit"):
+        read_stress(path, mesh)
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "said"),
+    [
+        (-1e300, "MPa", r"got -1e\+300 MPa as xz of element 8: correct it, or the unit of all"),
+        (2e7, "MPa", r"within 1e\+07 MPa; got 2e\+07 MPa as xz of element 8"),
+        (1e306, "GPa", r"got 1e\+306 GPa as xz of element 8"),
+        (np.nan, "MPa", "must be finite and .*; got nan MPa as xz of element 8"),
+        (-np.inf, "Pa", "got -inf Pa as xz of element 8"),
+        (2e7, "Pa", ""),
+    ],
+)
+def test_stress_that_no_solid_has_is_refused(tmp_path, value, unit, said):
+    mesh, path = box_mesh((6.0, 3.0, 2.0), (2, 1, 1)), tmp_path / "stress.csv"
+    stress = np.ones((len(mesh.cells), 3, 3))
+    stress[7, 0, 2] = stress[7, 2, 0] = value
+    path.write_text(table("element", stress, 1, f" [{unit}]"))
+    if not said:
+        assert read_stress(path, mesh).stress[7, 0, 2] == pytest.approx(20.0)
+        return
+    with pytest.raises(InputError, match=said):
+        read_stress(path, mesh)
+    with pytest.raises(InputError, match=r"at stress\[7, 0, 2\]: correct it, or its unit"):
+        GivenStress(mesh, 1e3 * stress, np.ones((len(mesh.points), 3, 3)))
+
+
+def calculix(problem: Problem, folder: Path) -> Path:
+    """Solve a problem with CalculiX on the same mesh; the result file."""
+    mesh = problem.mesh
+    forces = sum(nodal_forces(mesh, load) for load in problem.loads["pull"])
+    held = np.unique(mesh.facet_nodes(mesh.patch("x_min"))) + 1
+    modulus, poisson = 3500.0, 0.35
+    lines = ["*NODE, NSET=ALL"]
+    lines += [f"{k}, {x:.12e}, {y:.12e}, {z:.12e}" for k, (x, y, z) in enumerate(mesh.points, 1)]
+    lines.append(f"*ELEMENT, TYPE=C3D{4 if mesh.order == 1 else 10}, ELSET=E")
+    lines += [f"{k}, {', '.join(map(str, c + 1))}" for k, c in enumerate(mesh.cells, 1)]
+    lines += ["*MATERIAL, NAME=M", "*ELASTIC", f"{modulus}, {poisson}"]
+    lines += ["*SOLID SECTION, ELSET=E, MATERIAL=M", "*BOUNDARY"]
+    lines += [f"{k}, 1, 3" for k in held]
+    lines += ["*STEP", "*STATIC", "*CLOAD"]
+    lines += [
+        f"{node + 1}, {i + 1}, {forces[node, i]:.12e}"
+        for node, i in zip(*np.nonzero(forces), strict=True)
+    ]
+    lines += ["*NODE FILE", "U", "*EL FILE", "S", "*END STEP", ""]
+    (folder / "part.inp").write_text("\n".join(lines))
+    subprocess.run(["ccx", "part"], cwd=folder, check=True, capture_output=True, timeout=300)
+    return folder / "part.frd"
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
+def test_a_comparison_on_stress_of_calculix_is_that_on_ours(tmp_path):
+    # Quadratic cells of one volume, so that both programs average alike at the nodes; the file has
+    # six digits. Ours goes the same way, through the nodes alone.
+    problem = part(2, divisions=(10, 4, 1))
+    field = solve(problem)["pull"]
+    given = read_stress(calculix(field.problem, tmp_path), field.mesh, "MPa")
+    size = np.abs(field.nodal).max()
+    np.testing.assert_allclose(given.nodal, field.nodal, atol=2e-5 * size)
+    (tmp_path / "ours.csv").write_text(table("node", field.nodal))
+    case = Case("strip", "", problem, slicing=Planar(count=2), machine=Machine(minimum_length=20.0))
+    files = (ForeignStress(tmp_path / "part.frd", "MPa"), ForeignStress(tmp_path / "ours.csv"))
+    theirs, ours = (
+        compare(case, ("isocurve", "zigzag"), natural=True, stress=file) for file in files
+    )
+    for one, other in zip(theirs.runs, ours.runs, strict=True):
+        assert not one.failure
+        assert one.length_per_layer == pytest.approx(other.length_per_layer, rel=1e-4)
+        for name in ("efficiency", "fibre_length"):
+            found = one.evaluation.total[name], other.evaluation.total[name]
+            assert found[0] == pytest.approx(found[1], rel=1e-4)
+        tested = one.tested.bracket.tension.ratio, other.tested.bracket.tension.ratio
+        assert tested[0] == pytest.approx(tested[1], rel=1e-4)
+
+
+@pytest.fixture
+def results():
+    """Text of a result file of CalculiX, its mesh, and the stress in it (n, 6), Voigt."""
+    mesh = box_mesh((6.0, 3.0, 2.0), (2, 1, 1))
+    stress = np.random.default_rng(2).normal(size=(len(mesh.points), 6)).round(5)
+    return frd(mesh, stress[:, [0, 1, 2, 5, 3, 4]]), mesh, stress
+
+
+def test_results_of_calculix_are_in_mpa_as_the_mesh_is_in_mm(tmp_path, results):
+    text, mesh, stress = results
+    path = tmp_path / "part.frd"
+    path.write_text(text)
+    given = read_stress(path, mesh)
+    np.testing.assert_allclose(to_voigt(given.nodal), stress, rtol=1e-5)
+    assert given.assumed == "the stress of part.frd is taken for MPa, as its nodes are in mm"
+    given = read_stress(path, mesh, "kPa")
+    np.testing.assert_allclose(to_voigt(given.nodal), 1e-3 * stress, rtol=1e-5)
+    assert given.assumed == ""
+
+
+def test_a_node_of_a_large_number_takes_no_memory(tmp_path, results):
+    text, mesh, stress = results
+    text = text.replace(f" -1{1:10d}", " -19999999999")  # nodes and stress, and an element
+    text = re.sub(rf"^( -2.*?){1:10d}", r"\g<1>9999999999", text, flags=re.M)
+    (tmp_path / "part.frd").write_text(text)
+    given = read_stress(tmp_path / "part.frd", mesh)
+    np.testing.assert_allclose(to_voigt(given.nodal), stress, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (r"^( -2 .*).{10}$", r"\1", "element 1 has 3 nodes in place of 4"),
+        (r"^( -2 .*)1$", r"\g<1>1\n -2         1", "element 1 has 5 nodes in place of 4"),
+        (r"^( -2.{30}).{10}$", r"\g<1>9999999999", "names node 9999999999, which the block 2C"),
+        (r"^( -1.{34}).{12}$", r"\1", "the block 2C is not as CalculiX writes it"),
+        (r"^( -1.{70}).*$", r"\1", "the block STRESS is not as CalculiX writes it"),
+        (r"^( -1.{10}).{12}", r"\1         nan", "nan .* is not finite"),
+        (r"^ -4.*$", " -4", "has no stress: ask ccx"),
+        (r"(?s)\n -3\n 9999.*", "", "is cut off in its block STRESS: copy it again"),
+    ],
+)
+def test_spoiled_results_are_one_line(tmp_path, results, old, new, said):
+    text, count = re.subn(old, new, results[0], count=1, flags=re.M)
+    assert count == 1
+    (tmp_path / "part.frd").write_text(text)
+    with pytest.raises(InputError, match=said) as refused:
+        read_stress(tmp_path / "part.frd", results[1])
+    assert "\n" not in str(refused.value)
+
+
+def test_a_result_file_must_be_one(tmp_path):
+    mesh = box_mesh((1.0, 1.0, 1.0), (1, 1, 1))
+    (tmp_path / "empty.frd").write_text("    1C\n 9999\n")
+    with pytest.raises(InputError, match="has no mesh of tetrahedra"):
+        read_stress(tmp_path / "empty.frd", mesh, "MPa")
+    with pytest.raises(InputError, match="stress file"):
+        read_stress(tmp_path / "none.frd", mesh, "MPa")

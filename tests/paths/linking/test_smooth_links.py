@@ -1,0 +1,71 @@
+"""Links that keep a radius, and those with corners where a path would be too short without."""
+
+import numpy as np
+import shapely
+
+from ccfem.geometry.polylines import line_length
+from ccfem.paths.linking.joining import link_ends
+from ccfem.paths.linking.smooth_links import smooth_links
+
+RADIUS, WIDTH = 3.85, 1.0
+PLATE = shapely.box(-10.0, -30.0, 110.0, 30.0)
+
+
+def strand(start, end):
+    count = int(np.hypot(*np.subtract(end, start)) / 0.5) + 1
+    return np.linspace(start, end, count)
+
+
+def sharpest(line):
+    """Largest curvature, 1/mm, of circles through three points about a width apart [Menger]."""
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    even = np.arange(0.0, along[-1], 0.25)
+    x, y = (np.interp(even, along, line[:, d]) for d in range(2))
+    points = np.column_stack([x, y])
+    a, b, c = points[:-8], points[4:-4], points[8:]
+    (ux, uy), (vx, vy) = (b - a).T, (c - b).T
+    sides = np.hypot(ux, uy) * np.hypot(vx, vy) * np.hypot(*(c - a).T)
+    return float(np.max(2.0 * np.abs(ux * vy - uy * vx) / sides))
+
+
+def test_two_strands_that_go_on_beside_each_other_become_one_of_the_radius():
+    lines = [strand((0.0, 0.0), (50.0, 0.0)), strand((53.0, 1.5), (100.0, 1.5))]
+    found = link_ends(lines, PLATE, 7.0, WIDTH, radius=RADIUS, enough=20.0)
+    (path,), (link,) = found
+    assert path[0].tolist() == [0.0, 0.0]
+    assert path[-1].tolist() == [100.0, 1.5]
+    assert not link.any()
+    assert sharpest(path) <= 1.02 / RADIUS
+    corners = link_ends(lines, PLATE, 7.0, WIDTH).lines[0]
+    assert sharpest(corners) > 1.02 / RADIUS
+
+
+def test_the_shortest_link_of_a_shift_is_two_arcs():
+    """To go on 1 mm aside takes two arcs, whose length is that of the Dubins word LSR or RSL."""
+    lines = [strand((0.0, 0.0), (50.0, 0.0)), strand((55.0, 1.0), (100.0, 1.0))]
+    links = smooth_links(lines, np.array([1, 2]), 7.0, WIDTH, RADIUS)
+    (link,) = links
+    # d along, s aside: by symmetry each arc turns by a with 2 R (1 - cos a) = s where no straight
+    # part is left; a straight part makes it shorter, so this is the most that it can be.
+    angle = np.arccos(1.0 - 1.0 / (2.0 * RADIUS))
+    straight = 5.0 - 2.0 * RADIUS * np.sin(angle)
+    assert np.hypot(5.0, 1.0) < line_length(link.path) <= straight + 2.0 * RADIUS * angle + 0.01
+
+
+def test_neighbours_turn_with_corners_only_where_one_is_too_short_and_are_marked():
+    lines = [strand((0.0, 0.0), (30.0, 0.0)), strand((0.0, 1.0), (30.0, 1.0))]
+    apart = link_ends(lines, PLATE, 3.0, WIDTH, radius=RADIUS, enough=25.0)
+    assert len(apart.lines) == 2
+    assert not any(link.any() for link in apart.link)
+    (path,), (link,) = link_ends(lines, PLATE, 3.0, WIDTH, radius=RADIUS, enough=35.0)
+    steps = np.hypot(*np.diff(path, axis=0).T)
+    assert steps[link[:-1]].sum() == 1.0  # the step from one strand to the other
+    assert line_length(path) == 61.0
+
+
+def test_only_as_many_links_with_corners_as_are_needed():
+    """Strands of 20 mm and paths of at least 44 mm: three to a path, not all in one."""
+    lines = [strand((0.0, float(k)), (20.0, float(k))) for k in range(9)]
+    found = link_ends(lines, PLATE, 1.5, WIDTH, radius=RADIUS, enough=44.0)
+    assert [len(line) for line in found.lines] == 3 * [3 * len(lines[0])]
+    assert link_ends(lines, PLATE, 1.5, WIDTH).lines[0].shape[0] == sum(map(len, lines))

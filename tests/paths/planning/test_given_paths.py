@@ -1,0 +1,66 @@
+"""Given paths are judged as those of strategies: the same numbers, wherever the paths come from."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import ccfem
+from ccfem.base.errors import InputError
+from ccfem.paths.planning import GivenPaths
+from ccfem.strategies import create
+
+
+@pytest.fixture(scope="module")
+def bar():
+    return ccfem.read("bar", element_size=5.0)
+
+
+@pytest.fixture(scope="module")
+def planned(bar):
+    return ccfem.compare(bar, ["concentric", "zigzag"], layers=[1.0, 2.0, 4.0])
+
+
+def test_paths_read_back_have_the_numbers_of_the_strategy(bar, planned):
+    run = planned.runs[1]
+    given = GivenPaths(run.toolpaths, "zigzag of before")
+    judged = ccfem.compare(bar, {"given": given, "zigzag": create("zigzag")})
+    # no layers were asked for: they are those of the paths
+    assert [layer.plane.height for layer in judged.layers] == pytest.approx([1.0, 2.0, 4.0])
+    mine, again = judged.runs
+    assert mine.note == "given, so all are compared at this length"
+    assert mine.length_per_layer == pytest.approx(judged.fibre_per_layer)
+    assert again.length_per_layer == pytest.approx(mine.length_per_layer, rel=0.02)
+    for name, value in run.evaluation.total.items():
+        assert mine.evaluation.total[name] == pytest.approx(value, rel=1e-6, nan_ok=True), name
+    ratio = run.tested.bracket.tension.ratio
+    assert mine.tested.bracket.tension.ratio == pytest.approx(ratio, rel=1e-9)
+
+
+def test_given_paths_stay_as_they_are(bar, planned):
+    given = GivenPaths(planned.runs[1].toolpaths)
+    laid = planned.runs[1].length_per_layer
+    judged = ccfem.compare(
+        bar, {"given": given, "zigzag": create("zigzag")}, fibre_per_layer=0.5 * laid, strand=None
+    )
+    assert judged.runs[0].length_per_layer == pytest.approx(laid)
+    note = f"given paths stay as they are: lays {laid:.0f} of {0.5 * laid:.0f} mm per layer"
+    assert judged.runs[0].note == note
+    assert judged.ranking[-1].name == "given"
+
+
+def test_layers_are_found_by_height(planned):
+    paths, layers = planned.runs[1].toolpaths, planned.layers
+    shuffled = GivenPaths(replace(paths, layer=7 + 3 * paths.layer))
+    np.testing.assert_array_equal(shuffled.on(layers).toolpaths.layer, paths.layer)
+    np.testing.assert_allclose(shuffled.heights([0.0, 0.0, 1.0]), [1.0, 2.0, 4.0])
+
+
+def test_paths_off_the_layers_or_not_flat_are_one_line(planned):
+    paths = planned.runs[1].toolpaths
+    high = GivenPaths(replace(paths, points=paths.points + np.array([0.0, 0.0, 30.0])), "mine.csv")
+    with pytest.raises(InputError, match=r"mine.csv: path 0 lies at 31 mm .* on none of the 3"):
+        high.on(planned.layers)
+    turned = GivenPaths(replace(paths, points=paths.points[:, [2, 0, 1]]), "mine.csv")
+    with pytest.raises(InputError, match=r"mine.csv: path \d+ spans .* lies in no flat layer"):
+        turned.on(planned.layers)

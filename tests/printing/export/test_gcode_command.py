@@ -1,0 +1,101 @@
+"""``ccfem plan --gcode``: a part file in, a file to print out."""
+
+import json
+import re
+import sys
+
+import numpy as np
+import pytest
+
+from ccfem.cli.main import main
+from ccfem.printing.export.waypoints import read_waypoints
+
+PART = """
+layers = 2
+[planform]
+outline = [[0, 0], [60, 0], [60, 24], [0, 24]]
+height = 3.0
+edge_length = 4.0
+[material]
+modulus = 3500.0
+poisson = 0.35
+[patches.left]
+rule = "plane"
+normal = "x"
+offset = "min"
+[patches.right]
+rule = "plane"
+normal = "x"
+offset = "max"
+[[supports]]
+patch = "left"
+[[loads.pull]]
+kind = "force"
+patch = "right"
+vector = [100, 0, 0]
+[machine]
+cutter_distance = 42.0
+"""
+
+
+@pytest.fixture
+def ccfem(monkeypatch, capsys, tmp_path):
+    """Call the command line in a folder of its own: exit code, stderr, files in results."""
+
+    def call(part, *arguments):
+        monkeypatch.chdir(tmp_path)
+        (tmp_path / "part.toml").write_text(part)
+        words = ["plan", "part.toml", "--strategy", "zigzag", "--no-virtual-test", *arguments]
+        monkeypatch.setattr(sys, "argv", ["ccfem", *words])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        folder = tmp_path / "results" / "part-zigzag"
+        # Without the lines of progress.
+        err = re.sub(r"(?m)^ccfem: \d+ s, \d+ %.*\n", "", capsys.readouterr().err)
+        return ended.value.code, err, folder
+
+    return call
+
+
+def test_the_printed_fibre_is_the_planned_fibre(ccfem, follow):
+    # Without what the process adds: the evaluator counts the speeds of the table.
+    plain = "start_length = 0\nramp_length = 0\ncorner_angle = 180\nfinish_speed = 1000\n"
+    part = f"{PART}[machine.process]\n{plain}[machine.speeds]\n"
+    code, err, folder = ccfem(part, "--gcode", "--set-machine", "process.prime=none")
+    assert (code, err) == (0, "")
+    run = follow((folder / "zigzag.gcode").read_text())
+    waypoints = read_waypoints(folder / "zigzag_waypoints.txt", np.eye(3))
+    strands = run.lines(1)
+    assert len(strands) == len(waypoints) == run.events.count("cut") > 0
+    length = sorted(strand.length for strand in strands)
+    assert length == pytest.approx(sorted(waypoints.lengths), abs=0.05)
+    about = json.loads((folder / "results.json").read_text())
+    assert about["machine"]["speeds"]["speed"] == [7.0, 15.0, 35.0]
+    (total,) = [strategy["total"] for strategy in about["strategies"]]
+    assert total["cuts"] == len(strands)
+    laid = sum(move.seconds for strand in strands for move in strand.moves)
+    assert total["fibre_length"] / total["mean_speed"] == pytest.approx(laid, rel=1e-3)
+
+
+def test_no_file_without_the_option(ccfem):
+    code, _, folder = ccfem(PART)
+    assert code == 0
+    assert not list(folder.glob("*.gcode"))
+
+
+@pytest.mark.parametrize(
+    ("machine", "message"),
+    [
+        ("minimum_length = 20.0", "machine.minimum_length is 20 mm, but the cutter lies 42 mm"),
+        ("fibre_speed = 0", "machine.fibre_speed must be above 0 to print"),
+        ("[machine.gcode]\nbed = [50, 50, 50]", "the part needs 59.2 x 23.2 x 4 mm, but the print"),
+        ("[machine.gcode]\ncut = ['{pin}']", "gcode.cut has no field '{pin}'"),
+    ],
+)
+def test_what_cannot_be_printed_ends_in_one_line(ccfem, machine, message):
+    code, err, folder = ccfem(PART + machine, "--gcode")
+    assert code == 2
+    assert err.startswith("ccfem: error: ")
+    assert err.count("\n") == 1
+    assert message in err
+    assert not folder.exists()

@@ -1,0 +1,67 @@
+"""Levels of a field, and what of a part lies away from its border, against what is known."""
+
+import numpy as np
+import pytest
+
+from benchmarks.studies.strand_losses import share_inside
+from ccfem.machine import Machine
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.strategies.fibre_aware.smeared import SmearedPart
+from ccfem.strategies.fibre_aware.spline_grid import SplineGrid
+from ccfem.strategies.fibre_aware.stream_paths import Extraction, refined
+
+SIDE, HEIGHT = 24.0, 4.0
+"""Of the plate, mm."""
+
+
+def test_levels_of_a_linear_field_are_straight_and_a_unit_apart(two_pulls):
+    mesh, layer = two_pulls[0].fields[0].mesh, two_pulls[1][0]
+    points = refined(layer)[0]
+    grid = SplineGrid.over(points, points.mean(axis=0), np.eye(2), 2.0)
+    # Splines of degree two hold a linear field whose coefficients are its values at their middles.
+    field = 0.8 * (grid.centre[1] + grid.size * (grid.used[:, 1] + 0.5))
+    extraction = Extraction((field,), grid, mesh, (), Machine(), 5, 0.5, 10.0)
+    low = points[:, 1].min()
+    field = field - 0.8 * low - 0.2  # at the side 0.2 below a whole number
+    lines = extraction.levels(layer, field, 0.3)
+    assert len(lines) == 19  # 24 mm at 0.8 levels a mm, the first one 0.5 levels from the side
+    for k, line in enumerate(sorted(lines, key=lambda line: line[0, 1])):
+        np.testing.assert_allclose(line[:, 1], low + (0.5 + k) / 0.8, atol=1e-9)
+        assert np.ptp(line[:, 0]) == pytest.approx(SIDE, abs=1e-9)
+
+
+@pytest.mark.parametrize("inset", [3.0, 6.0])
+def test_inside_is_what_is_left_of_a_plate_without_its_outer_cells(two_pulls, inset):
+    cases, layers = two_pulls
+    part = SmearedPart.of(cases.fields[0], layers[0].plane.frame)
+    share = share_inside(part, layers, inset)
+    # Insets of whole cells, 3 mm wide: every cell lies on one side.
+    assert set(np.unique(share)) == {0.0, 1.0}
+    left = (SIDE - 2.0 * inset) ** 2 * HEIGHT
+    assert part.mesh.volumes @ share == pytest.approx(left, rel=1e-9)
+
+
+def test_links_by_worth_are_tried_at_whole_numbers_too(two_pulls, monkeypatch):
+    mesh, layers = two_pulls[0].fields[0].mesh, two_pulls[1][:1]
+    points = refined(layers[0])[0]
+    grid = SplineGrid.over(points, points.mean(axis=0), np.eye(2), 2.0)
+    extraction = Extraction((np.zeros(len(grid)),), grid, mesh, (), Machine(), 5, 0.5, 10.0)
+    gains = {(0.2, 0.0): 1.0, (0.2, 0.5): 1.1, (0.0, 1.0): 1.3}  # by levels and reach of links
+
+    def linked(self, layer, lines, reach=0.0):
+        line = [[lines[0], reach], [lines[0] + 50.0, reach]]
+        return Toolpaths.from_plane([np.array(line)], layer, [False])
+
+    def placed(self, paths):
+        return tuple(np.round(paths.points[0] @ layers[0].plane.frame[:2].T, 6).tolist())
+
+    def gain(self, along, price):
+        return gains.get(along, 0.5)
+
+    monkeypatch.setattr(Extraction, "strands", lambda self, layer, field, shift: [shift])
+    monkeypatch.setattr(Extraction, "linked", linked)
+    monkeypatch.setattr(Extraction, "profiles", placed)
+    monkeypatch.setattr(Extraction, "_price", lambda self, *_: 0.0)
+    monkeypatch.setattr(Extraction, "_gain", gain)
+    ((_, *_, best),) = extraction.candidates(layers, np.zeros(1, dtype=int), [100.0])
+    assert placed(extraction, best) == (0.0, 1.0)
