@@ -366,7 +366,7 @@ def _headline_table(runs: Sequence[Run], best: Mapping[str, float], details: boo
     values = [headline_values(run) for run in runs]
     heads = [head for head in HEADLINE if any(head.column in found for found in values)]
     if not details:
-        heads = [head for head in heads if head.column in SHORT]
+        heads = [dataclasses.replace(h, title=SHORT[h.column]) for h in heads if h.column in SHORT]
     table.add_column("", min_width=_longest_word(head.title for head in heads))
     for run in runs:
         table.add_column(run.name, justify="right", no_wrap=True)

@@ -213,16 +213,16 @@ HEADLINE = (
 )
 """The columns of the headline table; those that no run has are left out."""
 
-SHORT = (
-    "printable",
-    "stiffness_ratio_tension",
-    "share_of_gain",
-    "first_failure_load",
-    "fibre_per_layer",
-    "fibre_length",
-    "print_time_nearest",
-)
-"""Columns of the table that a terminal shows first."""
+SHORT = {
+    "printable": "printable",
+    "stiffness_ratio_tension": "stiffness ratio",
+    "share_of_gain": "share of gain",
+    "first_failure_load": "first failure, N",
+    "fibre_per_layer": "fibre, mm a layer",
+    "fibre_length": "fibre, mm",
+    "print_time_nearest": "laying fibre, min",
+}
+"""Columns of the table that a terminal shows first, and what stands beside them."""
 
 _OVER_SLICINGS = (
     "printable",

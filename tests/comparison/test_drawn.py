@@ -17,7 +17,7 @@ from ccfem.cases.case import Case
 from ccfem.comparison import pictures
 from ccfem.comparison.engine import compare
 from ccfem.comparison.files import write_results
-from ccfem.comparison.report.html_report import html_report as report
+from ccfem.comparison.report import html_report as report
 from ccfem.fem.elasticity.problem import Force, Problem, Support
 from ccfem.fem.materials import isotropic
 from ccfem.judging.evaluation import FibreSamples
@@ -28,12 +28,9 @@ from ccfem.slicing.slicers import Planar
 
 ROOT = Path(ccfem.__file__).parent
 DRAWN = [
-    *sorted((ROOT / "plot").glob("*.py")),
-    *(
-        ROOT / "comparison" / f"{name}.py"
-        for name in ("pictures", "report", "record", "files", "charts", "shown")
-    ),
-    *(ROOT / "comparison" / f"{name}_view.py" for name in ("layer", "part", "path")),
+    *sorted((ROOT / "comparison" / "plot").glob("*.py")),
+    *sorted((ROOT / "comparison" / "report").glob("*.py")),
+    *(ROOT / "comparison" / f"{name}.py" for name in ("pictures", "record", "files", "shown")),
 ]
 COMPUTED = ("sample_", "evaluate", "plan_", "plan", "matching_rate", "virtual_test", "plane_paths")
 
