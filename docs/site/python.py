@@ -15,16 +15,16 @@ are mm, N and MPa; angles are degrees.
 """
 
 _PACKAGES = {
-    "elasticity": "Problems, supports, loads and stress",
-    "mesh": "Meshes and patches",
-    "materials": "Materials",
-    "layers": "Layers",
+    "fem.elasticity": "Problems, supports, loads and stress",
+    "body.mesh": "Meshes and patches",
+    "fem.materials": "Materials",
+    "slicing.layers": "Layers",
     "machine": "Machine",
-    "toolpaths": "Paths",
-    "topopt": "Topology optimisation",
-    "export.gcode": "G-code",
-    "export.waypoints": "Waypoints",
-    "export.vtk": "Files for ParaView",
+    "paths.toolpaths": "Paths",
+    "fem.topopt": "Topology optimisation",
+    "printing.export.gcode": "G-code",
+    "printing.export.waypoints": "Waypoints",
+    "printing.export.vtk": "Files for ParaView",
 }
 
 
