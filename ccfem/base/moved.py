@@ -4,6 +4,7 @@ import importlib
 import sys
 import warnings
 from collections.abc import Sequence
+from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any
@@ -64,7 +65,7 @@ MOVED = {
 """New name of each package and module by its old one, both below ``ccfem``."""
 
 
-class _Finder:
+class _Finder(MetaPathFinder):
     """Finds a module under its old name."""
 
     def find_spec(
@@ -81,7 +82,7 @@ class _Finder:
         return ModuleSpec(name, _Loader(f"ccfem.{MOVED[old]}{rest}")) if old else None
 
 
-class _Loader:
+class _Loader(Loader):
     """Yields a module that has another name."""
 
     def __init__(self, name: str) -> None:
@@ -104,4 +105,4 @@ class _Loader:
 def find_moved() -> None:
     """Let imports find modules under their old names."""
     if not any(type(finder).__name__ == "_Finder" for finder in sys.meta_path):
-        sys.meta_path.insert(0, _Finder())  # type: ignore[arg-type]
+        sys.meta_path.insert(0, _Finder())
