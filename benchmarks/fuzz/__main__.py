@@ -22,11 +22,12 @@ import numpy as np
 
 from benchmarks.fuzz.mutants import MESH, good_files, mutants, part_of_sizes
 from ccfem.base.errors import InputError
-from ccfem.body.files import read_mesh, read_stress, read_surface
+from ccfem.body.files import read_mesh, read_surface
 from ccfem.body.files.surface import is_surface
 from ccfem.cases.part_file import read_part
 from ccfem.fem.elasticity import solve
 from ccfem.fem.elasticity.system import prepare
+from ccfem.fem.stress_files import read_stress
 from ccfem.printing.export.path_table import read_paths
 
 SECONDS, MEMORY = 20.0, 2e9

@@ -67,7 +67,7 @@ _FLAT = (
 
 @dataclass(frozen=True)
 class ForeignStress:
-    """Stress of another program in a file: see `ccfem.body.files.read_stress`.
+    """Stress of another program in a file: see `ccfem.fem.stress_files.read_stress`.
 
     Attributes
     ----------

@@ -9,10 +9,10 @@ import pyvista
 
 from benchmarks.fuzz.mutants import frd
 from ccfem.base.tensor import to_voigt
-from ccfem.body.files import read_stress
 from ccfem.body.mesh import TetMesh, box_mesh
 from ccfem.cases.part_file import read_part
 from ccfem.fem.elasticity import solve
+from ccfem.fem.stress_files import read_stress
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "how_to" / "foreign_stress.md").read_text()

@@ -3,8 +3,8 @@
 import pytest
 
 from ccfem.comparison import ranking
+from ccfem.comparison.report import charts
 from ccfem.comparison.report.charts import fronts, wide_enough
-from ccfem.comparison.report.html_report import charts
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 
 from ccfem.body.mesh.box import box_mesh
 from ccfem.comparison.citations import METHODS, bibtex, cited, methods_of, sentence
-from ccfem.comparison.report.html_report import charts
+from ccfem.comparison.report import charts
 from ccfem.comparison.report.part_view import _coarser
 from ccfem.comparison.report.path_view import _nearest, angle_on_layer, drawn_paths, in_layer
 from ccfem.comparison.runs import Run

@@ -14,7 +14,7 @@ import pyvista
 from benchmarks.fuzz.mutants import frd
 from ccfem.base.errors import InputError
 from ccfem.base.tensor import to_voigt
-from ccfem.body.files import read_mesh, read_stress
+from ccfem.body.files import read_mesh
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
@@ -23,6 +23,7 @@ from ccfem.comparison.request import ForeignStress
 from ccfem.fem.elasticity import Force, GivenStress, Problem, Support, solve
 from ccfem.fem.elasticity.loads import nodal_forces
 from ccfem.fem.materials import isotropic
+from ccfem.fem.stress_files import read_stress
 from ccfem.machine import Machine
 from ccfem.paths.planning import plan
 from ccfem.printing.export.vtu_result import write_result
