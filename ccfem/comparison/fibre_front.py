@@ -120,7 +120,7 @@ def front_of(
         _check_counts(counts)
     basis = solved(request) if known is None else known
     if counts is None:
-        counts = counts_to_try(basis.cut())
+        counts = counts_to_try(request.case, basis.planned_on)
     slicings = {f"{count} layers": Slicing(Planar(count=count)) for count in sorted(set(counts))}
     request = replace(request, strategies=kinds, slicings=slicings, amount=spread, curve=False)
     return _front(name, answer(request, progress, basis))
@@ -152,12 +152,13 @@ def _kinds(name: str, strategy: Strategy, strengths: Sequence[float]) -> dict[st
 
 def _front(name: str, comparison: Comparison) -> FibreFront:
     """Show a comparison of several lengths as a front."""
-    refused = {}
-    for slicing, layers in comparison.stacks.items():
+    counts = _counts(comparison.request)
+    refused = {counts[slicing]: reason for slicing, reason in comparison.refused.items()}
+    for slicing in comparison.stacks:
         runs = [run for run in comparison.runs if run.slicing == slicing]
         if not any(run.tested for run in runs):
             reasons = (text for run in runs for text in (run.failure, run.untested) if text)
-            refused[len(layers)] = next(reasons, "no fibre")
+            refused[counts[slicing]] = next(reasons, "no fibre")
     case = comparison.case.name
     tested = [run for run in comparison.runs if run.tested is not None]
     if not tested:
@@ -178,6 +179,12 @@ def _front(name: str, comparison: Comparison) -> FibreFront:
     together = tuple(comparison.bounds.items())
     factor = min(_bare(field) / Specimen.of(field).force(field.reactions) for field in fields)
     return FibreFront(case, name, points, refused, factor, (), together, findings)
+
+
+def _counts(request: Request) -> dict[str, int]:
+    """Count the flat layers of each slicing, those without fibre included."""
+    slicers: dict[str, Any] = {name: slicing.slicer for name, slicing in request.slicings.items()}
+    return {name: int(slicer.count) for name, slicer in slicers.items()}
 
 
 def _bare(stress: StressField) -> float:
@@ -201,7 +208,7 @@ def _point(run: Run, comparison: Comparison) -> FrontPoint:
         every = tested.cases.failure
         failure = None if every is None else every.each[int(np.argmin(every.factors))]
     return FrontPoint(
-        layers=len(comparison.stacks[run.slicing]),
+        layers=_counts(comparison.request)[run.slicing],
         asked=run.asked,
         length=run.length,
         ratio=ratio,
@@ -212,4 +219,5 @@ def _point(run: Run, comparison: Comparison) -> FrontPoint:
         toolpaths=run.toolpaths,
         strength=getattr(run.strategy, "strength", 0.0),
         cases=cases,
+        with_fibre=len(comparison.stacks[run.slicing]),
     )
