@@ -412,7 +412,7 @@ def _curve(
         return None
     if request.curve is None and not _misses(runs, wanted):
         return None
-    part, held = parts[""], wanted if isinstance(wanted, float) else None
+    part, held = parts[""], None if isinstance(wanted, InAll) else wanted
     with timed(seconds, "curve"):
         unchanged = [
             replace(run, strategy=before.strategy)

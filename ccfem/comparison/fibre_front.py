@@ -118,6 +118,8 @@ def front_of(
     spread, kinds = Spread(points), _kinds(name, strategy, strengths)
     if counts is not None:
         _check_counts(counts)
+    # A front shows the supports of the part alone.
+    request = replace(request, case=replace(request.case, alternative_supports=()))
     basis = solved(request) if known is None else known
     if counts is None:
         counts = counts_to_try(request.case, basis.planned_on)

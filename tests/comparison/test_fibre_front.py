@@ -9,9 +9,10 @@ import pytest
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
-from ccfem.comparison.fibre_front import fibre_front
+from ccfem.comparison.fibre_front import fibre_front, front_of
 from ccfem.comparison.front_points import FibreFront, FrontPoint
 from ccfem.comparison.plan_to_stiffness import counts_to_try
+from ccfem.comparison.request import Request
 from ccfem.fem.elasticity import Force, Problem, Support, solve
 from ccfem.fem.materials import isotropic
 from ccfem.judging.virtual_testing.strand import RHO
@@ -111,6 +112,18 @@ def test_twice_as_many_layers_where_strands_have_room(bar):
     thick = Machine(filament_area=1.2)  # 1.2 mm high: no room in layers of 1 mm
     case = Case("bar", "", case.problem, slicing=Planar(count=2), machine=thick)
     assert counts_to_try(case, stress) == (2,)
+
+
+def test_a_front_is_tested_under_the_supports_of_the_part_alone(bar, monkeypatch):
+    case, _ = bar
+    other = replace(case, alternative_supports=(Support("x_min"), Support("x_max", "y")))
+    asked = []
+    module = front_of.__globals__
+    monkeypatch.setitem(module, "answer", lambda *given: asked.append(given))
+    monkeypatch.setitem(module, "_front", lambda name, found: found)
+    front_of(Request(other, {"zigzag": create("zigzag", ALONG)}), (2,))
+    ((_, _, basis),) = asked
+    assert len(basis.tests.models) == 1
 
 
 def test_layers_of_matrix_count_but_take_no_fibre(bar):
