@@ -8,7 +8,7 @@ from ccfem.base.errors import InputError
 from ccfem.cases.case import Case
 from ccfem.comparison.request import Request, Stiffness
 from ccfem.comparison.runs import Run
-from ccfem.comparison.stages import Part, Tell, with_plan
+from ccfem.comparison.stages import Part, Tell, timed, with_plan
 from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.fem.elasticity.weighted_cases import WeightedCases
 from ccfem.judging.virtual_testing.specimen import Specimen
@@ -91,8 +91,11 @@ def plan_to_stiffness(
     if part.several_cases:
         strategy = for_every_case(strategy)
     tell(f"planning {name} to {ratio:.4g} times the stiffness")
-    chosen, least = _least_of(candidates, strategy, ratio)
-    run = with_plan(Run(name, strategy, Toolpaths.empty(), None), least.planned)
+    seconds: dict[str, float] = {}
+    with timed(seconds, "plan"):
+        chosen, least = _least_of(candidates, strategy, ratio)
+    run = Run(name, strategy, Toolpaths.empty(), None, seconds=seconds)
+    run = with_plan(run, least.planned)
     notes = (_said(ratio, chosen, least), least.planned.note)
     return chosen, replace(run, note="; ".join(filter(None, notes))), least.asked
 
