@@ -92,7 +92,10 @@ class _Finder:
         while old and old not in MOVED:
             old, _, last = old.rpartition(".")
             rest = f".{last}{rest}"
-        return ModuleSpec(name, _Loader(f"ccfem.{MOVED[old]}{rest}")) if old else None
+        if not old:
+            return None
+        loader: Any = _Loader(f"ccfem.{MOVED[old]}{rest}")
+        return ModuleSpec(name, loader)
 
 
 class _Loader:
@@ -118,4 +121,4 @@ class _Loader:
 def find_moved() -> None:
     """Let imports find modules under their old names."""
     if not any(type(finder).__name__ == "_Finder" for finder in sys.meta_path):
-        sys.meta_path.insert(0, _Finder())  # type: ignore[arg-type]
+        sys.meta_path.insert(0, _Finder())
