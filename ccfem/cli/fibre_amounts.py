@@ -69,7 +69,7 @@ def front(
 
     parameters = parameters_by_strategy(set_ or (), strategy)
     counts = None if layers is None else numbers_of(layers)
-    if counts is not None and any(count != int(count) for count in counts):
+    if counts is not None and not all(count.is_integer() for count in counts):
         raise InputError(f"--layers expects whole numbers as 6,12; got '{layers}'")
     strengths = () if strength is None else numbers_of(strength)
     if strength is not None and not strengths:

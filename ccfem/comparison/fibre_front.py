@@ -10,7 +10,7 @@ from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
 from ccfem.base.progress import Progress, silent
 from ccfem.cases.case import Case
-from ccfem.comparison.engine import Solved, answer, solved
+from ccfem.comparison.engine import Solved, answer, presses, solved
 from ccfem.comparison.front_cases import PointCases
 from ccfem.comparison.front_points import FibreFront, FrontPoint
 from ccfem.comparison.plan_to_stiffness import counts_to_try
@@ -121,6 +121,11 @@ def front_of(
     # A front shows the supports of the part alone.
     request = replace(request, case=replace(request.case, alternative_supports=()))
     basis = solved(request) if known is None else known
+    if len(basis.cases) > 1 and presses(basis.cases):
+        raise InputError(
+            "a front over several load cases measures each by its bound, and supports that only "
+            "press have none: hold the part otherwise, or name one load case"
+        )
     if counts is None:
         counts = counts_to_try(request.case, basis.planned_on)
     slicings = {f"{count} layers": Slicing(Planar(count=count)) for count in sorted(set(counts))}
@@ -169,11 +174,6 @@ def _front(name: str, comparison: Comparison) -> FibreFront:
     points = tuple(_point(run, comparison) for run in tested)
     fields = comparison.cases.fields
     findings = (*comparison.case.findings, *comparison.stress.findings)
-    if comparison.several_cases and not comparison.bounds:
-        raise InputError(
-            "a front over several load cases measures each by its bound, and supports that only "
-            "press have none: hold the part otherwise, or name one load case"
-        )
     if not comparison.several_cases:
         alone = ((length, bound.ratio) for length, bound in comparison.bounds.items())
         bare = _bare(fields[0])
