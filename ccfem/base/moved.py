@@ -11,13 +11,25 @@ from typing import Any
 
 __all__ = ["MOVED", "find_moved"]
 
+_INDICES = (
+    *("alignment", "containment", "coverage", "crossings", "curvature", "head", "links"),
+    *("manufacture", "matching", "room", "sinuosity", "skin", "space", "spacing"),
+    *("stiffness_alignment", "tension_across"),
+)
+
 MOVED = {
     "arrays": "base.arrays",
     "checks": "base.checks",
+    "comparison.charts": "comparison.report.charts",
+    "comparison.layer_view": "comparison.report.layer_view",
+    "comparison.part_view": "comparison.report.part_view",
+    "comparison.path_view": "comparison.report.path_view",
+    "comparison.report_tables": "comparison.report.report_tables",
     "display": "base.display",
     "elasticity": "fem.elasticity",
     "errors": "base.errors",
     "evaluation": "judging.evaluation",
+    **{f"evaluation.{name}": f"judging.evaluation.indices.{name}" for name in _INDICES},
     "export": "printing.export",
     "fibre_aware": "strategies.fibre_aware",
     "fields": "paths.fields",
@@ -60,6 +72,8 @@ MOVED = {
     "toolpaths": "paths.toolpaths",
     "topopt": "fem.topopt",
     "virtual_testing": "judging.virtual_testing",
+    "virtual_testing.ball": "fem.elasticity.ball",
+    "virtual_testing.zone": "fem.elasticity.zone",
     "winding": "strategies.winding_curves",
 }
 """New name of each package and module by its old one, both below ``ccfem``."""
@@ -79,7 +93,10 @@ class _Finder(MetaPathFinder):
         while old and old not in MOVED:
             old, _, last = old.rpartition(".")
             rest = f".{last}{rest}"
-        return ModuleSpec(name, _Loader(f"ccfem.{MOVED[old]}{rest}")) if old else None
+        if not old:
+            return None
+        loader: Any = _Loader(f"ccfem.{MOVED[old]}{rest}")
+        return ModuleSpec(name, loader)
 
 
 class _Loader(Loader):

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
+from ccfem.base.errors import InputError
 from ccfem.cli.arguments import drawings_of, names_of, parameters_by_strategy, path_of
 from ccfem.cli.fibre_amounts import front
 from ccfem.cli.fibre_choice import SetFibre, fibre_choice
@@ -250,24 +251,29 @@ def compare(
     def ask() -> Any:
         from ccfem.comparison.request import STRATEGIES, Request, named_strategies
 
-        printer, placed = machine_choice(machine, set_machine), fibre_choice(set_fibre)
-        part = load(case, set_case, refine, printer, placed)
-        part, strand = calibrated(part, virtual_test, calibration)
         names = STRATEGIES if strategies is None else names_of(strategies)
         files = () if paths is None else names_of(paths)
         parameters = parameters_by_strategy(set_ or ())
+        cut = layers_of(layers, heights, slicing)
+        several = None if slicings is None else slicings_of(slicings)
+        given = foreign_stress(stress, stress_unit, refine)
+        if drawings is not None and slicings is not None:
+            raise InputError("--drawings works with one slicing only; got --slicings: drop one")
+        printer, placed = machine_choice(machine, set_machine), fibre_choice(set_fibre)
+        part = load(case, set_case, refine, printer, placed)
+        part, strand = calibrated(part, virtual_test, calibration)
         chosen = named_strategies(part, names, parameters) if names or not files else {}
         return Request.of(
             part,
             with_given_paths(part, chosen, files, paths_frame),
-            layers_of(layers, heights, slicing),
-            None if slicings is None else slicings_of(slicings),
+            cut,
+            several,
             fibre_per_layer,
             fibre,
             natural,
             load_case=load_case,
             strand=strand,
-            stress=foreign_stress(stress, stress_unit, refine),
+            stress=given,
             backend=backend,
             curve=curve,
         )
@@ -317,20 +323,22 @@ def plan(
     def ask() -> Any:
         from ccfem.comparison.request import Request, named_strategies
 
+        parameters = parameters_by_strategy(set_ or (), strategy)
+        cut = layers_of(layers, heights, slicing)
+        given = foreign_stress(stress, stress_unit, refine)
         printer, placed = machine_choice(machine, set_machine), fibre_choice(set_fibre)
         part = load(case, set_case, refine, printer, placed)
         part, strand = calibrated(part, virtual_test, calibration)
-        parameters = parameters_by_strategy(set_ or (), strategy)
         return Request.of(
             part,
             named_strategies(part, (strategy,), parameters),
-            layers_of(layers, heights, slicing),
+            cut,
             fibre_per_layer=fibre_per_layer,
             natural=fibre_per_layer is None and stiffness is None,
             stiffness=stiffness,
             load_case=load_case,
             strand=strand,
-            stress=foreign_stress(stress, stress_unit, refine),
+            stress=given,
             backend=backend,
             print_plans=gcode,
             support=support,

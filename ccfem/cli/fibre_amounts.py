@@ -69,7 +69,7 @@ def front(
 
     parameters = parameters_by_strategy(set_ or (), strategy)
     counts = None if layers is None else numbers_of(layers)
-    if counts is not None and any(count != int(count) for count in counts):
+    if counts is not None and not all(count.is_integer() for count in counts):
         raise InputError(f"--layers expects whole numbers as 6,12; got '{layers}'")
     strengths = () if strength is None else numbers_of(strength)
     if strength is not None and not strengths:
@@ -94,8 +94,8 @@ def front(
     _say(found)
     for line in dict.fromkeys(found.findings):
         print(f"warning: {line}")
-    trade = "trade.png, " if len(strengths) > 1 else ""
-    print(f"\n{where}: front.png, {trade}front.csv")
+    drawn = [f"{name}, " for name in ("front.png", "trade.png") if (where / name).exists()]
+    print(f"\n{where}: {''.join(drawn)}front.csv")
 
 
 def _say(found: "FibreFront") -> None:
@@ -121,7 +121,7 @@ def _say(found: "FibreFront") -> None:
         f"ccfem plan ...{loads} --strategy {found.strategy} --layers {best.layers} "
         f"--fibre-per-layer {best.asked:.0f}{weight}"
     )
-    laid = best.length / best.layers
+    laid = best.length_per_layer
     if laid < (1.0 - TOLERANCE) * best.asked:
         print(
             f"of which it lays {laid:.0f} mm a layer, its most, as that plan will say; asked for "

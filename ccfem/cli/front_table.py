@@ -1,5 +1,6 @@
 """The table of a front on the screen: a line a plan, for one load case or for several."""
 
+from math import isnan
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -37,7 +38,8 @@ def _of_one(found: "FibreFront") -> tuple[str, str]:
 
 def _row(point: "FrontPoint", stiffest: str, strongest: str) -> str:
     failure = _newtons(point.failure)
-    return f"{point.ratio:>10.3f}{stiffest}{point.bound:>8.3f}{failure:>15}{strongest}"
+    bound = "-" if isnan(point.bound) else f"{point.bound:.3f}"
+    return f"{point.ratio:>10.3f}{stiffest}{bound:>8}{failure:>15}{strongest}"
 
 
 def _of_cases(found: "FibreFront", names: tuple[str, ...]) -> tuple[str, str]:

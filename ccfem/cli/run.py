@@ -188,8 +188,6 @@ def run(name: str, ask: "Callable[[], Request]", output: Output) -> None:
 
     imported = time.perf_counter()
     request = ask()
-    if output.drawings and request.named:
-        raise InputError("--drawings works with one slicing only; got --slicings: drop one")
     seconds = {"start": imported - _STARTED, "mesh": time.perf_counter() - imported}
     where = output.folder(request.case)
     with (

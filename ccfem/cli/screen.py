@@ -208,9 +208,10 @@ def print_comparison(
         console.print(said, style="bold", markup=False)
     if any(run.tested is not None for run in runs):
         console.print(HONEST_PROMISE if details else IN_SHORT, style="dim", markup=False)
-    if len(shown) < len(lines):
-        more = f"{len(lines) - len(shown)} more remarks"
-        console.print(f"--details or the report: {more}, every index", style="dim", markup=False)
+    if not details:
+        left = len(lines) - len(shown)
+        more = f"{left} more remark{'s' if left > 1 else ''}, " if left else ""
+        console.print(f"--details or the report: {more}every index", style="dim", markup=False)
     _print_where(console, where, seconds)
 
 

@@ -70,7 +70,7 @@ from ccfem.slicing.layers.slicer import Slicer, slicer_remarks
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies.fibre_aware.upper_bound import UpperBound, upper_bound
 
-__all__ = ["Solved", "answer", "compare", "otherwise_held", "solved"]
+__all__ = ["Solved", "answer", "compare", "otherwise_held", "presses", "solved"]
 
 _REPLACED = {
     "slicing": "layers, a slicer or its name",
@@ -412,7 +412,7 @@ def _curve(
         return None
     if request.curve is None and not _misses(runs, wanted):
         return None
-    part, held = parts[""], wanted if isinstance(wanted, float) else None
+    part, held = parts[""], None if isinstance(wanted, InAll) else wanted
     with timed(seconds, "curve"):
         unchanged = [
             replace(run, strategy=before.strategy)
@@ -448,14 +448,12 @@ def _bounds(
     layers alone, as those of several lengths do, are bounded on the most layers.
     """
     equal = [run for run in runs if run.tested is not None and not off_length(run, wanted)]
-    supports = [support for field in basis.cases.fields for support in field.problem.supports]
-    pressing = any(isinstance(support, PressingSupport) for support in supports)
     several_lengths = isinstance(request.amount, Spread)
     if request.named and not several_lengths:
         return {}
     part = max(parts.values(), key=lambda part: len(part.layers))
     curved = any(layer.flat is None for layer in part.layers)
-    if not request.bound or basis.tests is None or not equal or pressing or curved:
+    if not request.bound or basis.tests is None or not equal or curved or presses(basis.cases):
         return {}
     several, strand = len(basis.cases) > 1, basis.tests.strand
     laid = [float(run.toolpaths.lengths.sum()) for run in equal]
@@ -470,6 +468,12 @@ def _bounds(
             about = (part.layers, length, part.machine, strand)
             bounds[length] = upper_bound(basis.cases, *about)
     return bounds
+
+
+def presses(cases: WeightedCases) -> bool:
+    """Whether a support holds in one sense only, so that nothing is bounded."""
+    supports = [support for field in cases.fields for support in field.problem.supports]
+    return any(isinstance(support, PressingSupport) for support in supports)
 
 
 def _lengths_to_bound(laid: Sequence[float], alike: float) -> list[float]:

@@ -10,7 +10,7 @@ from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
 from ccfem.base.progress import Progress, silent
 from ccfem.cases.case import Case
-from ccfem.comparison.engine import Solved, answer, solved
+from ccfem.comparison.engine import Solved, answer, presses, solved
 from ccfem.comparison.front_cases import PointCases
 from ccfem.comparison.front_points import FibreFront, FrontPoint
 from ccfem.comparison.plan_to_stiffness import counts_to_try
@@ -118,9 +118,16 @@ def front_of(
     spread, kinds = Spread(points), _kinds(name, strategy, strengths)
     if counts is not None:
         _check_counts(counts)
+    # A front shows the supports of the part alone.
+    request = replace(request, case=replace(request.case, alternative_supports=()))
     basis = solved(request) if known is None else known
+    if len(basis.cases) > 1 and presses(basis.cases):
+        raise InputError(
+            "a front over several load cases measures each by its bound, and supports that only "
+            "press have none: hold the part otherwise, or name one load case"
+        )
     if counts is None:
-        counts = counts_to_try(basis.cut())
+        counts = counts_to_try(request.case, basis.planned_on)
     slicings = {f"{count} layers": Slicing(Planar(count=count)) for count in sorted(set(counts))}
     request = replace(request, strategies=kinds, slicings=slicings, amount=spread, curve=False)
     return _front(name, answer(request, progress, basis))
@@ -152,12 +159,13 @@ def _kinds(name: str, strategy: Strategy, strengths: Sequence[float]) -> dict[st
 
 def _front(name: str, comparison: Comparison) -> FibreFront:
     """Show a comparison of several lengths as a front."""
-    refused = {}
-    for slicing, layers in comparison.stacks.items():
+    counts = _counts(comparison.request)
+    refused = {counts[slicing]: reason for slicing, reason in comparison.refused.items()}
+    for slicing in comparison.stacks:
         runs = [run for run in comparison.runs if run.slicing == slicing]
         if not any(run.tested for run in runs):
             reasons = (text for run in runs for text in (run.failure, run.untested) if text)
-            refused[len(layers)] = next(reasons, "no fibre")
+            refused[counts[slicing]] = next(reasons, "no fibre")
     case = comparison.case.name
     tested = [run for run in comparison.runs if run.tested is not None]
     if not tested:
@@ -166,11 +174,6 @@ def _front(name: str, comparison: Comparison) -> FibreFront:
     points = tuple(_point(run, comparison) for run in tested)
     fields = comparison.cases.fields
     findings = (*comparison.case.findings, *comparison.stress.findings)
-    if comparison.several_cases and not comparison.bounds:
-        raise InputError(
-            "a front over several load cases measures each by its bound, and supports that only "
-            "press have none: hold the part otherwise, or name one load case"
-        )
     if not comparison.several_cases:
         alone = ((length, bound.ratio) for length, bound in comparison.bounds.items())
         bare = _bare(fields[0])
@@ -178,6 +181,12 @@ def _front(name: str, comparison: Comparison) -> FibreFront:
     together = tuple(comparison.bounds.items())
     factor = min(_bare(field) / Specimen.of(field).force(field.reactions) for field in fields)
     return FibreFront(case, name, points, refused, factor, (), together, findings)
+
+
+def _counts(request: Request) -> dict[str, int]:
+    """Count the flat layers of each slicing, those without fibre included."""
+    slicers: dict[str, Any] = {name: slicing.slicer for name, slicing in request.slicings.items()}
+    return {name: int(slicer.count) for name, slicer in slicers.items()}
 
 
 def _bare(stress: StressField) -> float:
@@ -201,7 +210,7 @@ def _point(run: Run, comparison: Comparison) -> FrontPoint:
         every = tested.cases.failure
         failure = None if every is None else every.each[int(np.argmin(every.factors))]
     return FrontPoint(
-        layers=len(comparison.stacks[run.slicing]),
+        layers=_counts(comparison.request)[run.slicing],
         asked=run.asked,
         length=run.length,
         ratio=ratio,
@@ -212,4 +221,5 @@ def _point(run: Run, comparison: Comparison) -> FrontPoint:
         toolpaths=run.toolpaths,
         strength=getattr(run.strategy, "strength", 0.0),
         cases=cases,
+        with_fibre=len(comparison.stacks[run.slicing]),
     )

@@ -166,7 +166,8 @@ def _draw(comparison: Comparison, folder: Path, progress: Progress, left_out: li
         with spared("pictures", left_out):
             _write_pictures(draw_pictures(comparison, progress), folder)
     for k, (name, alone) in enumerate(comparison.slicings.items()):
-        progress(f"drawing {name}", k / len(comparison.slicings))
+        if name:
+            progress(f"drawing {name}", k / len(comparison.slicings))
         curved = any(layer.flat is None for layer in alone.layers)
         with spared(f"pictures of {name}" if name else "pictures in space", left_out):
             if comparison.over_slicings and alone.succeeded:

@@ -36,7 +36,7 @@ class FrontPoint:
     Attributes
     ----------
     layers : int
-        Number of layers.
+        Number of layers that the part is cut into.
     asked : float, mm
         Length per layer that the strategy was asked for: asked again, it lays the same.
     length : float, mm
@@ -59,6 +59,8 @@ class FrontPoint:
         How much the load at first failure counted when it was planned.
     cases : PointCases, optional
         What it does in every load case, where it is planned for several.
+    with_fibre : int, optional
+        Number of layers that get fibre; default all.
     """
 
     layers: int
@@ -72,6 +74,21 @@ class FrontPoint:
     toolpaths: Toolpaths
     strength: float = 0.0
     cases: PointCases | None = None
+    with_fibre: int | None = None
+
+    @property
+    def _stack(self) -> int:
+        return self.layers if self.with_fibre is None else self.with_fibre
+
+    @property
+    def asked_in_all(self) -> float:
+        """Length in all layers that was asked for, mm."""
+        return self.asked * self._stack
+
+    @property
+    def length_per_layer(self) -> float:
+        """Length that it lays, mm, as a mean over the layers with fibre."""
+        return self.length / self._stack
 
     @property
     def kind(self) -> str:
@@ -157,7 +174,7 @@ class FibreFront:
     def _front(self, bare: float, values: Sequence[float]) -> BoolArray:
         # Plans to one length differ by what the shortest strand leaves: these count as equal.
         laid = np.array([each.length for each in self.points])
-        asked = np.array([each.asked * each.layers for each in self.points])
+        asked = np.array([each.asked_in_all for each in self.points])
         lengths = np.where(np.abs(laid - asked) <= TOLERANCE * asked, asked, laid)
         printable = np.array([not each.why_not for each in self.points])
         across = np.append(0.0, np.where(printable, lengths, np.nan))

@@ -5,9 +5,11 @@ from dataclasses import replace
 
 from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
+from ccfem.cases.case import Case
 from ccfem.comparison.request import Request, Stiffness
 from ccfem.comparison.runs import Run
-from ccfem.comparison.stages import Part, Tell, with_plan
+from ccfem.comparison.stages import Part, Tell, timed, with_plan
+from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.fem.elasticity.weighted_cases import WeightedCases
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.paths.planning.strategy import Strategy
@@ -21,21 +23,24 @@ from ccfem.strategies.fibre_aware.upper_bound import LEAST, upper_bound
 __all__ = ["counts_to_try", "plan_to_stiffness"]
 
 
-def counts_to_try(part: Part) -> tuple[int, ...]:
+def counts_to_try(case: Case, stress: PartStress) -> tuple[int, ...]:
     """Numbers of flat layers worth trying: those of the part, and twice as many if they have room.
 
-    A layer has to be as high as a strand is (`Machine.strand_height`).
+    All layers count, those without fibre too. A layer has to be as high as a strand is
+    (`Machine.strand_height`).
 
     Raises
     ------
     InputError
         For curved layers.
     """
-    layers = part.layers
+    layers = case.slicing(stress, case.build, case.machine)
     if any(layer.flat is None for layer in layers):
-        raise InputError("a front is of flat layers, those of the part are curved: give --layers")
+        raise InputError(
+            f"a front is of flat layers, those of '{case.name}' are curved: give --layers"
+        )
     least = min(layer.thickness for layer in layers)
-    room = 0.5 * least >= part.machine.strand_height
+    room = 0.5 * least >= case.machine.strand_height
     return (len(layers), 2 * len(layers)) if room else (len(layers),)
 
 
@@ -81,12 +86,16 @@ def plan_to_stiffness(
     candidates = [part]
     flat = all(layer.flat is not None for layer in part.layers)
     if request.slicings[""].slicer is None and flat:
-        candidates += [cut(Planar(count=count)) for count in counts_to_try(part)[1:]]
+        counts = counts_to_try(request.case, part.stress)
+        candidates += [cut(Planar(count=count)) for count in counts[1:]]
     if part.several_cases:
         strategy = for_every_case(strategy)
     tell(f"planning {name} to {ratio:.4g} times the stiffness")
-    chosen, least = _least_of(candidates, strategy, ratio)
-    run = with_plan(Run(name, strategy, Toolpaths.empty(), None), least.planned)
+    seconds: dict[str, float] = {}
+    with timed(seconds, "plan"):
+        chosen, least = _least_of(candidates, strategy, ratio)
+    run = Run(name, strategy, Toolpaths.empty(), None, seconds=seconds)
+    run = with_plan(run, least.planned)
     notes = (_said(ratio, chosen, least), least.planned.note)
     return chosen, replace(run, note="; ".join(filter(None, notes))), least.asked
 

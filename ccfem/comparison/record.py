@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,10 +17,7 @@ from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.fem.elasticity.stress_field import StressField
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-__all__ = ["record", "results_frame", "results_rows", "write_table"]
+__all__ = ["record", "results_rows", "write_table"]
 
 _FIRST = ("slicing", "strategy", "layer", "failure", "printable", "why_not")
 
@@ -60,14 +57,6 @@ def _columns(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """Columns of rows: who, where and why not first, then in the order in which they occur."""
     names = [name for row in rows for name in row]
     return list(dict.fromkeys([*(n for n in _FIRST if n in names or n != "slicing"), *names]))
-
-
-def results_frame(comparison: Comparison) -> "pd.DataFrame":
-    """Return `results_rows` as a table; what a row has no value for is NaN."""
-    import pandas as pd
-
-    rows = results_rows(comparison)
-    return pd.DataFrame(rows, columns=_columns(rows))
 
 
 def write_table(rows: Sequence[Mapping[str, Any]], file: Path) -> None:

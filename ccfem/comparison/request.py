@@ -250,6 +250,8 @@ class Request:
             check_instance("strategy", strategy)
         if self.curve and self.strand is None:
             raise InputError("the curve is one of stiffness: leave the virtual test in, or it out")
+        if self.curve and isinstance(self.amount, Spread):
+            raise InputError("several lengths are planned for already: leave the curve out")
         if self.named:
             self._check_named()
         if isinstance(self.amount, Stiffness):

@@ -49,7 +49,6 @@ __all__ = [
     "attempted",
     "counted",
     "evaluated",
-    "levelled",
     "natural",
     "planned",
     "planned_to_lengths",
@@ -200,22 +199,6 @@ def _as_given(laid: float, wanted: float | None) -> str:
     if wanted is None or abs(laid / wanted - 1.0) <= TOLERANCE:
         return ""
     return f"given paths stay as they are: lays {laid:.0f} of {wanted:.0f} mm per layer"
-
-
-def levelled(runs: Sequence[Run], part: Part, tell: Tell) -> tuple[list[Run], float | None]:
-    """Plan all runs to the smallest of their natural amounts.
-
-    Strategies that take the length itself are planned once it is known.
-
-    Returns
-    -------
-    list of Run
-    float, mm, or None
-        The length per layer; None if no run lays fibre.
-    """
-    own, setter = natural(runs, part, tell)
-    length = None if setter is None else own[setter].length_per_layer
-    return to_length(own, setter, length, part, tell), length
 
 
 def natural(runs: Sequence[Run], part: Part, tell: Tell) -> tuple[dict[str, Run], str | None]:

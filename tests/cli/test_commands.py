@@ -415,6 +415,11 @@ def test_bad_parts_end_in_one_line(ccfem, folder, text, message):
         (["part.toml", "--heights", "1,2,9"], "height 9 mm lies outside the part.* from 0 to 4 mm"),
         (["part.toml", "--heights", "1,x"], "expected numbers"),
         (["part.toml", "--layers", "2", "--heights", "1"], "got --layers and --heights"),
+        # Words that make no sense are refused before a part is read, which may take minutes.
+        (["gone.toml", "--layers", "2", "--heights", "1"], "got --layers and --heights"),
+        (["gone.toml", "--stress-unit", "MPa"], "got no file: name it"),
+        (["gone.toml", "--set", "zigzag.spacing"], "expected NAME=VALUE"),
+        (["gone.toml", "--slicings", "planar:z", "--drawings", "svg"], "one slicing only"),
         (
             ["bar", "--slicings", "planar:z", "--layers", "3"],
             "over several slicings there are no lay",

@@ -1,5 +1,6 @@
 """``ccfem front`` with words that make no sense: one line, exit code 2."""
 
+import numpy as np
 import pytest
 
 from ccfem.cli import fibre_amounts
@@ -14,6 +15,8 @@ QUICK = ["bar", "--set-case", "element_size=4.0", "--strategy", "zigzag", "--lay
 @pytest.mark.parametrize(
     ("words", "answer"),
     [
+        (["--layers", "nan"], "--layers expects whole numbers as 6,12; got 'nan'"),
+        (["--layers", "2.5"], "--layers expects whole numbers"),
         (["--strength", "much"], "expected numbers separated by commas"),
         (["--strength", ","], "--strength expects numbers from 0 to 1"),
         (["--strength", "0,0.5"], "'zigzag' does not plan for strength"),
@@ -38,8 +41,15 @@ def test_a_plan_that_lays_less_than_asked_is_said_to(capsys, asked, said):
     fibre_amounts._say(FibreFront("bar", "stream_function", (point,), {}, 1999.0))
     lines = capsys.readouterr().out.splitlines()
     command = f"ccfem plan ... --strategy stream_function --layers 3 --fibre-per-layer {asked:.0f}"
+    assert lines[2].split()[3:5] == ["3.070*", "3.290"]
     after = lines[lines.index(command) + 1 :]
     assert after[0].startswith(said) if said else not after
+
+
+def test_a_plan_without_a_bound_has_a_dash(capsys):
+    point = FrontPoint(3, 9.0, 27.0, 3.07, 2788.0, "fibre", np.nan, "", Toolpaths.empty())
+    fibre_amounts._say(FibreFront("bar", "zigzag", (point,), {}, 1999.0))
+    assert capsys.readouterr().out.splitlines()[2].split()[4] == "-"
 
 
 def test_the_table_of_several_load_cases_says_every_ratio_with_its_bound(capsys):

@@ -20,7 +20,7 @@ from ccfem.comparison.headline import HEADLINE, cell_text, headline_values
 from ccfem.comparison.pictures import caption
 from ccfem.comparison.ranking import best_values
 from ccfem.comparison.remarks import bound_remark
-from ccfem.comparison.request import STRATEGIES, named_strategies
+from ccfem.comparison.request import STRATEGIES, Request, Spread, named_strategies
 from ccfem.fem.elasticity.problem import Force, Problem, Support
 from ccfem.fem.elasticity.support_kinds import PressingSupport
 from ccfem.fem.elasticity.system import System
@@ -261,6 +261,13 @@ def test_a_curve_can_be_asked_for_and_left_out(along):
     assert compare(strip(), rings, layers=1, fibre_per_layer=50.0, curve=False).curve is None
     with pytest.raises(InputError, match="the curve is one of stiffness"):
         compare(strip(), two, strand=None, curve=True)
+    with pytest.raises(InputError, match="several lengths are planned for already"):
+        Request(strip(), rings, amount=Spread(), curve=True)
+
+
+def test_a_curve_runs_through_a_length_that_is_a_whole_number():
+    asked = {"layers": 1, "fibre_per_layer": 300, "curve": True}
+    assert 300 in compare(strip(), ["zigzag"], **asked).curve.common
 
 
 def test_more_fibre_than_wanted_comes_last():

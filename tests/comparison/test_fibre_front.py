@@ -9,15 +9,15 @@ import pytest
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
-from ccfem.comparison.engine import Solved
-from ccfem.comparison.fibre_front import fibre_front
+from ccfem.comparison.fibre_front import fibre_front, front_of
 from ccfem.comparison.front_points import FibreFront, FrontPoint
 from ccfem.comparison.plan_to_stiffness import counts_to_try
+from ccfem.comparison.request import Request
 from ccfem.fem.elasticity import Force, Problem, Support, solve
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
 from ccfem.fem.materials import isotropic
 from ccfem.judging.virtual_testing.strand import RHO
 from ccfem.machine import Machine
+from ccfem.paths.placement.fibre_places import FibrePlaces
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
@@ -106,11 +106,38 @@ def test_table_and_picture_show_every_plan(front, tmp_path):
 
 def test_twice_as_many_layers_where_strands_have_room(bar):
     case, stress = bar
-    cases = WeightedCases.of({"pull": stress})
-    assert counts_to_try(Solved(case, cases).cut()) == (2, 4)
+    assert counts_to_try(case, stress) == (2, 4)
+    sparse = replace(case, fibre=FibrePlaces(every=2, covered=False))
+    assert counts_to_try(sparse, stress) == (2, 4)  # layers of matrix count
     thick = Machine(filament_area=1.2)  # 1.2 mm high: no room in layers of 1 mm
     case = Case("bar", "", case.problem, slicing=Planar(count=2), machine=thick)
-    assert counts_to_try(Solved(case, cases).cut()) == (2,)
+    assert counts_to_try(case, stress) == (2,)
+
+
+def test_a_front_is_tested_under_the_supports_of_the_part_alone(bar, monkeypatch):
+    case, _ = bar
+    other = replace(case, alternative_supports=(Support("x_min"), Support("x_max", "y")))
+    asked = []
+    module = front_of.__globals__
+    monkeypatch.setitem(module, "answer", lambda *given: asked.append(given))
+    monkeypatch.setitem(module, "_front", lambda name, found: found)
+    front_of(Request(other, {"zigzag": create("zigzag", ALONG)}), (2,))
+    ((_, _, basis),) = asked
+    assert len(basis.tests.models) == 1
+
+
+def test_layers_of_matrix_count_but_take_no_fibre(bar):
+    """Of 2 layers one has fibre; of 1 none is left, which is said."""
+    case, stress = bar
+    sparse = replace(case, fibre=FibrePlaces(layers="1:", covered=False))
+    front = fibre_front(sparse, stress, "zigzag", create("zigzag", ALONG), (2, 1), points=2)
+    assert {each.layers for each in front.points} == {2}
+    assert list(front.refused) == [1]
+    assert "none is left for fibre" in front.refused[1]
+    for each in front.points:
+        assert set(each.toolpaths.layer) == {1}
+        assert each.length_per_layer == pytest.approx(each.toolpaths.lengths.sum())
+        assert each.asked_in_all == each.asked
 
 
 def test_front_begins_with_the_part_without_fibre_and_bounds_lie_above_all_between(front):

@@ -6,12 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
 from ccfem.comparison.fibre_front import fibre_front
 from ccfem.comparison.front_cases import PointCases
 from ccfem.comparison.front_points import FibreFront, FrontPoint
 from ccfem.fem.elasticity import Force, Problem, Support, solve
+from ccfem.fem.elasticity.support_kinds import PressingSupport
 from ccfem.fem.elasticity.weighted_cases import WeightedCases
 from ccfem.fem.materials import printed_pla
 from ccfem.judging.virtual_testing.virtual_test import virtual_test
@@ -55,6 +57,16 @@ def test_every_plan_is_tested_in_every_case_by_itself(part, front):
         assert each.cases.share == pytest.approx(shares.min(), rel=1e-5)
         assert each.ratio == pytest.approx(alone[shares.argmin()], rel=1e-5)
         assert each.bound == each.cases.bound.singles[shares.argmin()]
+
+
+def test_supports_that_only_press_are_refused_before_anything_is_planned(part, monkeypatch):
+    case, cases = part
+    supports = (*case.problem.supports, PressingSupport("z_min"))
+    case = replace(case, problem=replace(case.problem, supports=supports))
+    fields = {field.case: replace(field, problem=case.problem) for field in cases.fields}
+    monkeypatch.setitem(fibre_front.__globals__, "answer", lambda *_: pytest.fail("was planned"))
+    with pytest.raises(InputError, match="supports that only press have none"):
+        fibre_front(case, WeightedCases.of(fields, {"pull": 1.0, "side": 2.0}), "x", STREAM, (4,))
 
 
 def test_no_plan_exceeds_a_bound(front):

@@ -158,6 +158,16 @@ def test_files_hold_every_run_and_one_report(compared, tmp_path):
         assert (tmp_path / f"{name}_overview.png").stat().st_size > 1000
 
 
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_the_short_table_says_where_the_rest_is(compared, monkeypatch, capsys, count):
+    lines = [f"remark {k}" for k in range(3 + count)]
+    monkeypatch.setattr(type(compared), "remarks", lines)
+    monkeypatch.setattr("ccfem.cli.screen._findings", lambda *_: [])
+    print_comparison(compared, Path("somewhere"), 1.0)
+    more = {0: "", 1: "1 more remark, ", 2: "2 more remarks, "}[count]
+    assert f"--details or the report: {more}every index" in capsys.readouterr().out.splitlines()
+
+
 @pytest.mark.parametrize("width", ["200", "90"])
 def test_screen_shows_every_run_its_figures_and_the_verdict(
     compared, width, capsys, monkeypatch, tmp_path

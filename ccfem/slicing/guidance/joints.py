@@ -42,8 +42,9 @@ class Joint:
         Cells all of whose nodes are within a number of edges of the wall.
     direction : (3,) array or None
         Unit vector normal to the wanted layers: as the user specifies, else the axis that the rule
-        of the patch states, else that of the cylinder nearest to the wall. Its sign is arbitrary.
-        None where the wall is no cylinder and nothing is specified.
+        of the patch states and the wall does not contradict, else that of the cylinder nearest to
+        the wall. Its sign is arbitrary. None where the wall is no cylinder and nothing is
+        specified.
     radius : float, mm
         Of the hole; 0 where the patch is no cylinder.
     dropped : bool

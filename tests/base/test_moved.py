@@ -1,0 +1,47 @@
+"""Old names of packages and modules: the same modules under them, with a warning."""
+
+import importlib
+import pickle
+import sys
+import warnings
+
+import pytest
+
+import ccfem
+from ccfem.base.moved import MOVED
+from ccfem.slicing.slicers.planar import Planar
+
+
+@pytest.mark.parametrize("old", sorted(MOVED))
+def test_an_old_name_is_the_same_module(old):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        module = importlib.import_module(f"ccfem.{old}")
+    assert module is importlib.import_module(f"ccfem.{MOVED[old]}")
+    assert module.__name__ == module.__spec__.name == f"ccfem.{MOVED[old]}"
+
+
+def test_an_old_name_warns_of_the_new_one_where_it_is_imported():
+    sys.modules.pop("ccfem.layers.slicing.planar", None)
+    with pytest.warns(DeprecationWarning, match=r"called ccfem\.slicing\.slicers\.planar") as told:
+        import ccfem.layers.slicing.planar as old
+    assert old.Planar is Planar
+    assert any(warning.filename == __file__ for warning in told)
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_what_was_pickled_under_an_old_name_is_read():
+    new = pickle.dumps(Planar(count=3), protocol=0)
+    assert b"ccfem.slicing.slicers.planar" in new
+    old = new.replace(b"ccfem.slicing.slicers.planar", b"ccfem.layers.slicing.planar")
+    assert isinstance(pickle.loads(old), Planar)
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_names_that_never_were_are_not_found():
+    with pytest.raises(ModuleNotFoundError, match="nothing"):
+        importlib.import_module("ccfem.elasticity.nothing")
+    with pytest.raises(AttributeError, match="nothing"):
+        _ = ccfem.elasticity.nothing
+    with pytest.raises(ModuleNotFoundError, match="elastic'"):
+        importlib.import_module("ccfem.elastic")
