@@ -216,7 +216,7 @@ def sweep(
     """Remove what killed programs of this user on this machine left in a folder.
 
     That is files with the temporary name of a process that is no more, and private folders that
-    hold nothing but files of known names, in themselves or in their folders `PARTS`.
+    hold nothing but such files and ones of known names, in themselves or in their folders `PARTS`.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ def sweep(
         if entry is None or (hasattr(os, "getuid") and entry.st_uid != os.getuid()):
             continue
         if stat.S_ISREG(entry.st_mode):
-            if len(known["rest"]) == 2 * _RANDOM:
+            if _is_temporary_file(name):
                 folder.remove(name)
         elif stat.S_ISDIR(entry.st_mode) and (os.name != "posix" or not entry.st_mode & 0o077):
             with folder.inner(name) as private:
@@ -249,9 +249,15 @@ def _empty(folder: Folder, name: str, names: Sequence[str]) -> None:
     """Remove files of known names from an inner folder, and the folder if it is then empty."""
     with folder.inner(name) as inner:
         for file in filter(inner.is_file, inner.names()):
-            if any(fnmatchcase(file, pattern) for pattern in names):
+            if _is_temporary_file(file) or any(fnmatchcase(file, known) for known in names):
                 inner.remove(file)
     folder.remove_empty(name)
+
+
+def _is_temporary_file(name: str) -> bool:
+    """Whether `Folder.write` gives a file this name until it is whole."""
+    known = _TEMPORARY.fullmatch(name)
+    return known is not None and len(known["rest"]) == 2 * _RANDOM
 
 
 def _is_running(pid: int) -> bool:

@@ -157,7 +157,9 @@ def test_what_a_killed_run_left_is_removed_and_nothing_else(tmp_path, ended):
     where = tmp_path / "results"
     write(where, report_html="first")
     for parent in (tmp_path, where):
-        killed_folder(parent, ended)
+        left = killed_folder(parent, ended)
+        half_written = left.name.replace("abcdefgh", "0a" * 8)
+        (left / "new" / half_written).write_text("half")
     kept = [killed_folder(where, os.getpid()), killed_folder(where, ended, "elsewhere")]
     public = killed_folder(tmp_path, ended, mode=0o755, rest="publics_")  # as none of ccfem's
     mine = killed_folder(where, ended, rest="has_mine") / "new" / "thesis.docx"
