@@ -1,8 +1,6 @@
 """The public face: what ``import ccfem`` gives, and how values show themselves."""
 
 import dataclasses
-import importlib
-import re
 import subprocess
 import sys
 
@@ -10,7 +8,6 @@ import pytest
 
 import ccfem
 from ccfem.base.errors import InputError
-from ccfem.base.moved import MOVED
 
 
 @pytest.fixture(scope="module")
@@ -138,11 +135,3 @@ def test_wrong_names_are_one_line():
         ccfem.read("hook.toml", element_size=2.0)
     with pytest.raises(InputError, match=r"part file .*hook.toml.* does not exist"):
         ccfem.read("hook.toml")
-
-
-@pytest.mark.parametrize(("old", "new"), sorted(MOVED.items()))
-def test_names_of_before_release_0_2_are_the_same_modules_and_say_so(old, new):
-    known = importlib.import_module(f"ccfem.{new}")
-    sys.modules.pop(f"ccfem.{old}", None)
-    with pytest.warns(DeprecationWarning, match=re.escape(f"ccfem.{new} now")):
-        assert importlib.import_module(f"ccfem.{old}") is known

@@ -23,10 +23,12 @@ def test_an_old_name_is_the_same_module(old):
 
 def test_an_old_name_warns_of_the_new_one_where_it_is_imported():
     sys.modules.pop("ccfem.layers.slicing.planar", None)
-    with pytest.warns(DeprecationWarning, match=r"called ccfem\.slicing\.slicers\.planar") as told:
+    with pytest.warns(
+        DeprecationWarning, match=r"called ccfem\.slicing\.slicers\.planar"
+    ) as warnings_seen:
         import ccfem.layers.slicing.planar as old
     assert old.Planar is Planar
-    assert any(warning.filename == __file__ for warning in told)
+    assert any(warning.filename == __file__ for warning in warnings_seen)
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
