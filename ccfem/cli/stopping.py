@@ -54,9 +54,10 @@ def unwind() -> None:
 
 
 def _end(number: int, frame: FrameType | None) -> None:
-    folder = sys.modules.get("ccfem.base.folder")
-    if folder is not None:
-        folder.remove_private_folders()
+    # The module may not be imported yet, or only in part: then it has made no folder.
+    remove = getattr(sys.modules.get("ccfem.base.folder"), "remove_private_folders", None)
+    if remove is not None:
+        remove()
     os._exit(say(number))
 
 

@@ -18,6 +18,13 @@ sys.meta_path.insert(0, Finder())
 from ccfem.cli.start import start
 start()
 """
+IMPORTED_IN_PART = """
+import os, signal, sys, types
+from ccfem.cli import stopping
+sys.modules["ccfem.base.folder"] = types.ModuleType("ccfem.base.folder")
+stopping.end_at_once()
+os.kill(os.getpid(), signal.SIGTERM)
+"""
 RUNNING = """
 import os, signal, time
 from pathlib import Path
@@ -107,6 +114,11 @@ def check(code, name, tmp_path):
 def test_a_stop_while_importing(name, tmp_path):
     """The signal comes from within the import of the commands."""
     check(IMPORTING.format(name=name), name, tmp_path)
+
+
+def test_a_stop_while_the_module_of_folders_is_imported(tmp_path):
+    """It stands among the modules, but cannot remove folders yet."""
+    check(IMPORTED_IN_PART, "SIGTERM", tmp_path)
 
 
 @pytest.mark.parametrize("moment", MOMENTS)
