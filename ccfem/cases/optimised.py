@@ -280,7 +280,8 @@ def _laminate(given: Sequence[float] | None, own: FloatArray) -> FloatArray:
         ):
             raise InputError(
                 "a laminate is E1,E2,NU12,G12, moduli above 0 MPa; got "
-                f"{','.join(f'{value:g}' for value in given)}: correct it"
+                f"{','.join(f'{value:g}' for value in given)}: give these four numbers, or none "
+                "for those of the part"
             )
         return plane_stress(*given)
     isotropic = np.isclose(own[0, 0], own[1, 1], rtol=1e-6) and np.isclose(

@@ -29,7 +29,8 @@ def check_places(what: str, places: Sequence[Place]) -> None:
         if not right or not np.isfinite(place).all():
             raise InputError(
                 f"a {what} place is X,Y,RADIUS, or the corners X,Y,X,Y of a rectangle or "
-                f"X,Y,Z,X,Y,Z of a box, the lower one first, mm; got {list(place)}: correct it"
+                f"X,Y,Z,X,Y,Z of a box, the lower one first, mm; got {list(place)}: give one of "
+                "these three"
             )
 
 

@@ -192,4 +192,4 @@ def _cure(value: float, allowed: Range) -> str:
         if value and _within(value * factor, allowed):
             meant = f"{value * factor:.4g} {allowed.unit}".strip()
             return f"{value:g} {unit} would be {meant}: write {value * factor:.4g}"
-    return "correct it"
+    return "give less" if value > allowed.most else "give more"

@@ -53,7 +53,8 @@ class SpeedTable:
                 good &= name != "angle" or rising[-1] <= 180.0
             if not good:
                 raise InputError(
-                    f"the speed table needs {size} {order} as {name}; got {list(given)}: correct it"
+                    f"the speed table needs {size} {order} as {name}; got {list(given)}: "
+                    "sort them, one a row of the table"
                 )
         check_ranges(self)
 

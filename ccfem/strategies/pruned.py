@@ -93,7 +93,10 @@ class Pruned:
 
     def __post_init__(self) -> None:
         if self.of in ("pruned", "stream_function"):
-            raise InputError(f"pruned.of must be another strategy; got {self.of!r}: correct it")
+            raise InputError(
+                f"pruned.of must be another strategy; got {self.of!r}: take "
+                "concentric or zigzag, for example"
+            )
         freeze(self, base=dict)
         self._planner()
         check_choices(self)

@@ -59,7 +59,7 @@ def test_machines_that_come_with_ccfem_are_in_range():
         ({"travel_speed": 4800}, "got 4800: 4800 mm/min would be 80 mm/s: write 80"),
         ({"head_angle": 0.61}, "0.61 radians would be 34.95 degrees: write 34.95"),
         ({"coextrusion": 95}, "from 0 to 1; got 95: 95 percent would be 0.95: write 0.95"),
-        ({"fibre_width": -1}, "machine.fibre_width must be from 0.05 to 50 mm; got -1: correct it"),
+        ({"fibre_width": -1}, "machine.fibre_width must be from 0.05 to 50 mm; got -1: give more"),
         ({"gcode": {"longest_feed": 1e-6}}, "longest_feed must be from 1 to 100000 mm; got 1e-06"),
         ({"gcode": {"bed": [0.3, 0.3, 0.3]}}, "0.3 metres would be 300 mm: write 300"),
         (

@@ -173,7 +173,7 @@ def test_the_table_is_for_fibre_and_the_print_time_goes_by_it():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"speed": (7.0, 35.0, 15.0)}, "3 rising numbers above 0 as speed; got .*: correct it"),
+        ({"speed": (7.0, 35.0, 15.0)}, "3 rising numbers above 0 as speed; got .*: sort them"),
         ({"speed": (0.0, 15.0, 35.0)}, "3 rising numbers above 0 as speed"),
         ({"curvature": (0.05, 0.2)}, "2 falling numbers >= 0 as curvature"),
         ({"length": (15.0, np.nan)}, "2 rising numbers >= 0 as length"),

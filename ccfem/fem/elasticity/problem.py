@@ -170,7 +170,7 @@ class Problem(Shown):
             if cells.ndim != 1 or not len(cells) or cells.min() < 0 or cells.max() >= m:
                 raise InputError(
                     f"problem.regions[{k}] must name cells 0 to {m - 1}, at least one; got "
-                    f"{cells.size} of them: correct it"
+                    f"{cells.size} of them: number cells from 0, in one row"
                 )
             if seen[cells].any() or len(np.unique(cells)) < len(cells):
                 raise InputError(
@@ -191,9 +191,10 @@ class Problem(Shown):
             unknown = sorted(set(factors) - set(self.loads))
             if name in self.loads or unknown or not factors:
                 known = ", ".join(self.loads) or "none"
+                cure = "rename it" if name in self.loads else f"give a factor to {known}"
                 raise InputError(
                     f"combination '{name}' must have a name of its own and name load cases "
-                    f"({known}); got {dict(factors)}: correct it"
+                    f"({known}); got {dict(factors)}: {cure}"
                 )
             if not np.isfinite(list(factors.values())).all():
                 raise InputError(f"factors of combination '{name}' must be finite; got {factors}")

@@ -58,5 +58,7 @@ class CellGroups:
             )
         found = values[self.first]
         if (found[self.member] != values).any():
-            raise InputError(f"{name} must be the same in all cells of a group: correct it")
+            raise InputError(
+                f"{name} must be the same in all cells of a group: give each group one value"
+            )
         return found
