@@ -20,10 +20,11 @@ _IMPORTANT = (
     ("failed: ", "cannot cut the part: ", "cannot be printed as planned"),
     ("not printable as planned: ",),
     ("no virtual test: ", "undecided against", "no difference to"),
+    ("linear theory", " are usual", "held nodes"),
     ("no paths of", "trust neither number", "bring the worst case above"),
     ("planned for ", "takes ", "the stress of another program"),
     ("strands cross", "no fibre on", "so it is placed below", "links lie"),
-    ("estimated error", "lock"),
+    ("estimated error", "lock", "tensile strength"),
 )
 """Words of remarks, those first that a reader has to know first."""
 
