@@ -19,13 +19,13 @@ class Range:
     zero: bool = False
 
 
-_LENGTH = Range(0.01, 10000.0, "mm", zero=True)
+_LENGTH = Range(0.1, 10000.0, "mm", zero=True)
 _MOVE = Range(0.01, 1000.0, "mm", zero=True)
 _HEIGHT = Range(0.01, 20.0, "mm", zero=True)
 _WIDTH = Range(0.05, 50.0, "mm")
 _PLACE = Range(-10000.0, 10000.0, "mm")
-_SPEED = Range(0.01, 2000.0, "mm/s")
-_SPEED_OR_NONE = Range(0.01, 2000.0, "mm/s", zero=True)
+_SPEED = Range(0.5, 2000.0, "mm/s")
+_SPEED_OR_NONE = Range(0.5, 2000.0, "mm/s", zero=True)
 _WAIT = Range(0.0, 600.0, "s")
 _HEAT = Range(0.0, 450.0, "degrees Celsius")
 _HEATING = Range(0.001, 10000.0, "K/s")

@@ -71,5 +71,5 @@ def test_three_axes_stay_upright():
 def test_kinematics_that_make_no_sense():
     with pytest.raises(InputError, match=r"kinematics\.kind must be one of 'three_axes'"):
         Kinematics("hexapod")
-    with pytest.raises(InputError, match=r"kinematics\.pivot must be 0 or from 0.01 to 10000 mm"):
+    with pytest.raises(InputError, match=r"kinematics\.pivot must be 0 or from 0.1 to 10000 mm"):
         Kinematics("head_head", pivot=-1.0)

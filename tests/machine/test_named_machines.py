@@ -94,7 +94,7 @@ def test_the_later_one_wins(tmp_path):
         (
             None,
             ["process.start_speed=0"],
-            "start_speed must be from 0.01 to 2000 mm/s; got 0",
+            "start_speed must be from 0.5 to 2000 mm/s; got 0",
         ),
         (None, ["process=3"], "machine.process must be a table; got 3"),
         (None, ["gcode.axes.fibre=X"], "axes.fibre must be one capital letter .* got 'X'"),
