@@ -19,7 +19,7 @@ from ccfem.base.checks import check_known
 from ccfem.base.errors import InputError, known_names
 from ccfem.base.toml import from_table
 
-__all__ = ["by_class", "class_name", "create", "entries", "found"]
+__all__ = ["by_class", "class_name", "create", "discovered", "entries"]
 
 
 def class_name(module: str) -> str:
@@ -33,7 +33,7 @@ def entries(group: str) -> tuple[EntryPoint, ...]:
     return tuple(entry_points(group=group))
 
 
-def found(package: str, group: str) -> dict[str, Any]:
+def discovered(package: str, group: str) -> dict[str, Any]:
     """Every member by name: modules of a package, and entry points of a group."""
     members: dict[str, Any] = {}
     for info in pkgutil.iter_modules(importlib.import_module(package).__path__):

@@ -69,12 +69,12 @@ def progress_bar(lines: bool = False) -> Iterator[Progress]:
 
     console, start = Console(stderr=True), time.perf_counter()
     if not (console.is_terminal or console.is_jupyter):
-        yield _each_step(_line if lines else None)
+        yield _log_steps(_line if lines else None)
         return
     columns = (BarColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("", total=1.0)
-        log = _each_step(None)
+        log = _log_steps(None)
 
         def tell(what: str, share: float) -> None:
             log(what, share)
@@ -89,7 +89,7 @@ def _line(text: str) -> None:
     print(f"ccfem: {text}", file=sys.stderr, flush=True)
 
 
-def _each_step(write: Callable[[str], None] | None) -> Progress:
+def _log_steps(write: Callable[[str], None] | None) -> Progress:
     """Progress that logs the name of each step once, and writes it."""
     start, last = time.perf_counter(), ""
     logger = logging.getLogger("ccfem")

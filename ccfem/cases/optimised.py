@@ -221,7 +221,7 @@ def _of_sheet(
     planform = sheet_outline(design, flat, size, full, empty)
     part = sheet_part(problem, flat, planform, min(size, _edge(problem)))
     share = planform.area / flat.planform.area
-    return _found(wanted.case, part, design, size, planform, share)
+    return _result(wanted.case, part, design, size, planform, share)
 
 
 def _of_solid(wanted: _Wanted) -> Optimised:
@@ -242,10 +242,10 @@ def _of_solid(wanted: _Wanted) -> Optimised:
     part = as_problem(design, problem.material)
     part = replace(part, axes=None, order=problem.order, combinations=problem.combinations)
     share = float(part.mesh.volumes.sum() / mesh.volumes.sum())
-    return _found(wanted.case, part, design, size, None, share)
+    return _result(wanted.case, part, design, size, None, share)
 
 
-def _found(
+def _result(
     case: Case, part: Problem, design: Design, size: float, planform: Any, share: float
 ) -> Optimised:
     """Gather the results, with remarks on them."""

@@ -22,7 +22,7 @@ from ccfem.comparison.said_of_cases import cases_remarks, cases_verdict
 from ccfem.comparison.summary import SUMMARY, SUMMARY_OF_SLICINGS, summary_html, summary_text
 from ccfem.comparison.table import frame
 from ccfem.comparison.verdict import verdict
-from ccfem.comparison.views import front_picture, layer_view, shown_layer, told
+from ccfem.comparison.views import front_picture, layer_view, paragraphs, shown_layer
 from ccfem.fem.elasticity.part_stress import GivenStress, PartStress
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.fem.elasticity.weighted_cases import WeightedCases
@@ -103,7 +103,7 @@ class Comparison:
 
     def _repr_html_(self) -> str:
         page = summary_html(self.ranking, " ".join(self.verdicts), self._columns)
-        page += told(self.remarks)
+        page += paragraphs(self.remarks)
         return page + image(self.plot()) if self.succeeded else page
 
     @property

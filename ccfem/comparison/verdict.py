@@ -70,7 +70,7 @@ def left_out(runs: Sequence[Run], wanted: Wanted, best: Run | None = None) -> st
     said = {
         "Not tested": [run.name for run in comparable(runs, wanted) if best and not is_tested(run)],
         "Not at that length": [
-            f"{run.name} (lays {_laid(run, wanted)}{', stiffer' if _stiffer(run, best) else ''})"
+            f"{run.name} (lays {_fibre(run, wanted)}{', stiffer' if _stiffer(run, best) else ''})"
             for run in order
             if run.printable and off_length(run, wanted)
         ],
@@ -156,7 +156,7 @@ def _under_other(runs: Sequence[Run]) -> str:
     )
 
 
-def _laid(run: Run, wanted: Wanted) -> str:
+def _fibre(run: Run, wanted: Wanted) -> str:
     """Say how much fibre a run lays, in the terms of what was wanted."""
     if isinstance(wanted, InAll):
         return f"{1e-3 * run.length:.2f} m"

@@ -20,7 +20,7 @@ from ccfem.slicing.layers.layer_stress import stress_on
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["FRONTS", "front_picture", "layer_view", "shown_layer", "told"]
+__all__ = ["FRONTS", "front_picture", "layer_view", "paragraphs", "shown_layer"]
 
 FRONTS: Mapping[str, tuple[str, str]] = {
     "fibre_length": ("fibre, mm", "low"),
@@ -103,6 +103,6 @@ def front_picture(runs: Sequence[Run], over: str) -> "Figure":
     return front_figure({"": points}, title, "stiffness, N/mm")
 
 
-def told(remarks: Sequence[str]) -> str:
+def paragraphs(remarks: Sequence[str]) -> str:
     """Remarks as HTML, a paragraph each."""
     return "".join(f"<p>{escape(line)}</p>" for line in remarks)

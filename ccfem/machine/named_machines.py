@@ -82,7 +82,7 @@ def _whole_table(table: Mapping[str, Any]) -> dict[str, Any]:
             f"machine.profile must be one of {', '.join(machine_names())}; got {shown(name)}: "
             "name one of them"
         )
-    return _laid_over(machine_table(name), rest)
+    return _merged(machine_table(name), rest)
 
 
 def machine_from(table: object, where: str = "machine") -> Machine:
@@ -119,16 +119,16 @@ def updated(machine: Machine, *tables: Mapping[str, Any], where: str = "machine"
     """
     found = _as_table(machine)
     for table in tables:
-        found = _laid_over(found, _whole_table(table))
+        found = _merged(found, _whole_table(table))
     return from_table(Machine, found, where)
 
 
-def _laid_over(under: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+def _merged(under: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     """Merge two tables; the second one wins, and tables in both are merged in turn."""
     found = dict(under)
     for key, value in over.items():
         both = isinstance(value, Mapping) and isinstance(found.get(key), Mapping)
-        found[key] = _laid_over(found[key], value) if both else value
+        found[key] = _merged(found[key], value) if both else value
     return found
 
 

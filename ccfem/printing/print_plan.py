@@ -171,7 +171,7 @@ def plan_print(
         for number, slab in enumerate(slabs)
         if slab.fibre is not None
     ]
-    done = _laid(slabs, fills, strands, borders, float(lowest[2]), machine)
+    done = _layers(slabs, fills, strands, borders, float(lowest[2]), machine)
     paths = Toolpaths.concatenate(each.paths for each in done)
     plan = PrintPlan(
         paths,
@@ -240,7 +240,7 @@ def _on_slabs(
     return _Strands(found, ended, tuple(warnings))
 
 
-def _laid(
+def _layers(
     slabs: Sequence[Slab],
     fills: Sequence[MatrixFill | None],
     strands: _Strands,

@@ -11,7 +11,7 @@ __all__ = ["create", "named"]
 
 def named() -> Mapping[str, type[Strategy]]:
     """Every strategy by name: modules of this package and entry points ``ccfem.strategies``."""
-    return plugins.found(__name__, "ccfem.strategies")
+    return plugins.discovered(__name__, "ccfem.strategies")
 
 
 def create(name: str, parameters: Mapping[str, Any] | None = None) -> Strategy:

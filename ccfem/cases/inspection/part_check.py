@@ -206,7 +206,7 @@ def _facts(case: Case) -> tuple[str, ...]:
     costs = " or, if their error is too large, ".join(
         cost.about for cost in solve_costs(case.problem)
     )
-    told = tuple(line for line in case.findings if _only_told(line))
+    told = tuple(line for line in case.findings if _is_information(line))
     return (
         f"{size} mm, {mesh.volumes.sum() / 1e3:.4g} cm^3, {case.problem.material.name}",
         f"{len(mesh.cells):,} {kind} cells, {len(mesh.points):,} nodes, {pieces} "
@@ -241,7 +241,7 @@ def _about_fibre(case: Case, layers: Sequence[Layer]) -> tuple[str, ...]:
     )
 
 
-def _only_told(finding: str) -> bool:
+def _is_information(finding: str) -> bool:
     """Whether a finding only tells how the mesh was made, and needs no action."""
     return finding.startswith("meshed by") and ": shorten" not in finding
 
@@ -267,7 +267,7 @@ def _carried(case: Case) -> dict[str, list[str]]:
 def _warnings(case: Case, rows: Sequence[LoadRow], doubts: Sequence[str]) -> list[str]:
     """List what may be unintended."""
     problem = case.problem
-    lines = [line for line in case.findings if not _only_told(line)] + [*doubts]
+    lines = [line for line in case.findings if not _is_information(line)] + [*doubts]
     sliver = about_slivers(problem.mesh)
     if sliver:
         lines.append(sliver)

@@ -50,7 +50,7 @@ def why_not(total: Mapping[str, float], machine: Machine) -> tuple[str, ...]:
         Each names what was found and what the machine tolerates. An index that is NaN, as without
         fibre, breaks no limit.
     """
-    found = _found(total)
+    found = _bounded_values(total)
     broken = []
     for rule in _RULES:
         value, limit = found[rule.limit], getattr(machine.limits, rule.limit)
@@ -72,7 +72,7 @@ def why_not(total: Mapping[str, float], machine: Machine) -> tuple[str, ...]:
     return tuple(said for _, said in sorted(broken))
 
 
-def _found(total: Mapping[str, float]) -> dict[str, float]:
+def _bounded_values(total: Mapping[str, float]) -> dict[str, float]:
     """Value that each limit bounds."""
     links = total["link_inside"] + total["link_over_void"] + total["link_outside"]
     length = total["fibre_length"]

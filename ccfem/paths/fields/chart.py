@@ -135,7 +135,7 @@ def chart_of(layer: Layer) -> Chart:
     """
     known = vars(layer)
     if _CHART not in known:
-        known[_CHART] = _laid_flat(layer)
+        known[_CHART] = _flattened(layer)
     found: Chart = known[_CHART]
     return found
 
@@ -156,7 +156,7 @@ def in_charts(paths: Toolpaths, layers: Sequence[Layer]) -> Toolpaths:
     return Toolpaths.concatenate(parts)
 
 
-def _laid_flat(layer: Layer) -> Chart:
+def _flattened(layer: Layer) -> Chart:
     surface = Surface(layer.points, layer.triangles)
     image = np.zeros((len(layer.points), 2))
     rotation = np.zeros((len(layer.triangles), 2, 2))

@@ -155,7 +155,7 @@ def plan_to_lengths(
         check_layers(strategy, layers, machine)
         found = strategy.to_lengths(stress, layers, machine, lengths)
         return [
-            _told(
+            _planned(
                 told,
                 plan_layers(planner, layers, layers, stress, machine),
                 layers,
@@ -189,7 +189,7 @@ def _length(planned: Planned) -> float:
     return planned.length_per_layer
 
 
-def _told(
+def _planned(
     strategy: Strategy,
     toolpaths: Toolpaths,
     layers: Sequence[Layer],

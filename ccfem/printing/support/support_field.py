@@ -112,7 +112,7 @@ def support_field(
         bed = origin + step * round((best - origin) / step)
     boundary = held + bed * on_bed
 
-    def found(aim: FloatArray) -> SupportField:
+    def field_of(aim: FloatArray) -> SupportField:
         values = solved(aim, boundary)
         gradient = (difference @ values).reshape(m, 3)
         down = gradient @ columns.up < 0.0
@@ -120,4 +120,4 @@ def support_field(
         return SupportField(values, gradient, bed, inverted)
 
     bounds = Bounds(_RANGE[0] * slope, _RANGE[1] * slope, columns.up)
-    return bounded(target, bounds, found, lambda each: each.inverted <= most_inverted)
+    return bounded(target, bounds, field_of, lambda each: each.inverted <= most_inverted)

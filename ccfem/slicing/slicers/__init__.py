@@ -18,7 +18,7 @@ __all__ = ["as_slicer", "create", "from_text", "named", "slice", "split"]
 
 def named() -> Mapping[str, type[Slicer]]:
     """Every slicer by name: modules of this package and entry points ``ccfem.slicers``."""
-    return plugins.found(__name__, "ccfem.slicers")
+    return plugins.discovered(__name__, "ccfem.slicers")
 
 
 def create(name: str, parameters: Mapping[str, Any] | None = None) -> Slicer:

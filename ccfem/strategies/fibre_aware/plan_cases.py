@@ -93,13 +93,13 @@ def plan_cases(
             "choose a planar slicing, or one load case"
         )
     if wanted is None:
-        return _told(strategy, plan_by_layers(strategy, layers, cases, machine), layers, machine)
+        return _planned(strategy, plan_by_layers(strategy, layers, cases, machine), layers, machine)
     too_much = plan_by_layers(strategy, layers, cases, machine, _TOO_MUCH * wanted)
     in_all = wanted * len(layers)
     bounds = measures(objective, cases, layers, in_all, machine, strand)
     goal = Goal(specimens(cases), cases.weights, bounds, objective)
     paths = prune(too_much, goal, in_all, machine, strand, _ROUNDS)
-    return _told(strategy, paths, layers, machine, wanted)
+    return _planned(strategy, paths, layers, machine, wanted)
 
 
 def plan_cases_to_lengths(
@@ -142,7 +142,7 @@ def _by_itself(
     planners = strategy.for_cases(cases, layers, machine, lengths)
     for (told, planner), wanted in zip(planners, lengths, strict=True):
         paths = plan_layers(planner, layers, layers, cases.fields[0], machine)
-        found.append(_told(told, paths, layers, machine, wanted))
+        found.append(_planned(told, paths, layers, machine, wanted))
     return found
 
 
@@ -178,7 +178,7 @@ def plan_by_layers(
     return Toolpaths.concatenate(whole.on_layer(layer.index) for layer in layers)
 
 
-def _told(
+def _planned(
     strategy: Strategy,
     toolpaths: Toolpaths,
     layers: Sequence[Layer],

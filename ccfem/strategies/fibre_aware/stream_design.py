@@ -28,9 +28,9 @@ __all__ = [
     "DESIGN_POWERS",
     "OVER_BUDGET",
     "SLACK",
-    "Laid",
     "Objective",
     "Pull",
+    "SmearedFibre",
     "StreamDesign",
     "StreamModel",
     "StreamProblem",
@@ -80,7 +80,7 @@ Pull: TypeAlias = tuple[FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)
-class Laid:
+class SmearedFibre:
     """The fibre that one field lays in the cells.
 
     Attributes
@@ -189,31 +189,33 @@ class StreamModel:
         """Fibre length (m,), mm, of each cell at one strand a width."""
         return self.part.mesh.volumes * self.capacity
 
-    def penalties(self, field: FloatArray, laid: Laid) -> tuple[float, float, float]:
+    def penalties(self, field: FloatArray, smeared: SmearedFibre) -> tuple[float, float, float]:
         """Penalties of too dense fibre, of a rough field (c,), and of bends."""
-        excess, rough = np.maximum(laid.size - DENSEST, 0.0), self.laplacian @ field
+        excess, rough = np.maximum(smeared.size - DENSEST, 0.0), self.laplacian @ field
         bends = _BENDS * self.bends.cost(field) if self.bends else 0.0
         steep = _STEEP * float(self.mean @ excess**2)
         return steep, _ROUGH * float(rough @ rough) / len(rough), bends
 
-    def gradient(self, field: FloatArray, laid: Laid, pull: Pull, over: float) -> FloatArray:
+    def gradient(
+        self, field: FloatArray, smeared: SmearedFibre, pull: Pull, over: float
+    ) -> FloatArray:
         """Gradient (c,) by the coefficients, with penalties.
 
         Parameters
         ----------
         field : (c,) array
-        laid : Laid
+        smeared : SmearedFibre
             Its fibre.
         pull : two (m,) arrays
             Derivatives of all terms but the penalties by the components of g.
         over : float
             Share of the budget by which the length exceeds it.
         """
-        excess, rough = np.maximum(laid.size - DENSEST, 0.0), self.laplacian @ field
+        excess, rough = np.maximum(smeared.size - DENSEST, 0.0), self.laplacian @ field
         push = 2.0 * (OVER_BUDGET * over / self.budget * self.room + _STEEP * self.mean * excess)
         x, y = self._transposed
-        gradient = x @ (pull[0] + push * laid.gx / laid.size)
-        gradient = gradient + y @ (pull[1] + push * laid.gy / laid.size)
+        gradient = x @ (pull[0] + push * smeared.gx / smeared.size)
+        gradient = gradient + y @ (pull[1] + push * smeared.gy / smeared.size)
         gradient += 2.0 * _ROUGH / len(rough) * (self.laplacian @ rough)
         if self.bends:
             gradient += _BENDS * self.bends.slope(field)
@@ -226,14 +228,17 @@ class StreamModel:
         gradient changes it by ``energy / |g|^2``. A tenth of the energy is assumed evenly over the
         part. Where strands are too dense, that penalty counts across them.
         """
-        laid = self.laid(field)
-        stretch = np.maximum(np.einsum("ci,ci->c", laid.along, solution.strain), 0.0)
-        energy = self.axial_stiffness * self.room * stretch**2 / (laid.size**3 * solution.work)
-        weight = energy / laid.size**2
+        smeared = self.smeared(field)
+        stretch = np.maximum(np.einsum("ci,ci->c", smeared.along, solution.strain), 0.0)
+        energy = self.axial_stiffness * self.room * stretch**2 / (smeared.size**3 * solution.work)
+        weight = energy / smeared.size**2
         weight = weight + _SPREAD * max(float(weight.sum()), _LEAST_ENERGY) * self.mean
-        dense = 2.0 * _STEEP * self.mean * (laid.size > DENSEST)
+        dense = 2.0 * _STEEP * self.mean * (smeared.size > DENSEST)
         x, y = self.slopes
-        across = sp.diags_array(laid.gx / laid.size) @ x + sp.diags_array(laid.gy / laid.size) @ y
+        across = (
+            sp.diags_array(smeared.gx / smeared.size) @ x
+            + sp.diags_array(smeared.gy / smeared.size) @ y
+        )
         even = (x.T * weight) @ x + (y.T * weight) @ y + (across.T * dense) @ across
         size, square = even.diagonal().mean(), self.laplacian.T @ self.laplacian
         return even + size * (_BENT * square + _HELD * sp.eye_array(len(field)))
@@ -252,31 +257,31 @@ class StreamModel:
         values = values - weight @ values / weight.sum()
         return field if weight @ values**3 >= 0.0 else -field
 
-    def length(self, laid: Laid) -> float:
+    def length(self, smeared: SmearedFibre) -> float:
         """Length of fibre, mm."""
-        return float(self.room @ (laid.size - _SMALLEST))
+        return float(self.room @ (smeared.size - _SMALLEST))
 
     @cached_property
     def mean(self) -> FloatArray:
         """Share of each cell in the volume, (m,)."""
         return self.part.mesh.volumes / self.part.mesh.volumes.sum()
 
-    def laid(self, field: FloatArray) -> Laid:
+    def smeared(self, field: FloatArray) -> SmearedFibre:
         """Fibre that a field (c,) lays."""
         gx, gy = (slope @ field for slope in self.slopes)
         size = np.sqrt(gx * gx + gy * gy + _SMALLEST**2)
         along = np.stack([gy * gy, gx * gx, -gx * gy], axis=1)
         strength = self.axial_stiffness * self.capacity / size**3
-        return Laid(
+        return SmearedFibre(
             gx, gy, size, along, strength[:, None, None] * along[:, :, None] * along[:, None, :]
         )
 
-    def pull(self, laid: Laid, solution: SmearedSolution) -> Pull:
+    def pull(self, smeared: SmearedFibre, solution: SmearedSolution) -> Pull:
         """Return the derivatives (m,) of -log(stiffness) by the components of g."""
-        stretch = np.einsum("ci,ci->c", laid.along, solution.strain)
+        stretch = np.einsum("ci,ci->c", smeared.along, solution.strain)
         share = np.where(stretch > 0.0, 1.0, SLACK)
         e1, e2, e12 = solution.strain.T
-        gx, gy, size = laid.gx, laid.gy, laid.size
+        gx, gy, size = smeared.gx, smeared.gy, smeared.size
         # Fibre energy is stretch^2 / size^3 a cell.
         factor = -self.axial_stiffness * self.room * share * stretch / (solution.work * size**3)
         fall = 3.0 * stretch / size**2
@@ -371,32 +376,32 @@ class StreamProblem:
         tolerance : float
             Relative residual of the solves.
         """
-        laid = self.laid(field)
-        found = self.solve(laid, start, tolerance)
+        smeared = self.smeared(field)
+        found = self.solve(smeared, start, tolerance)
         value, counts = self.worth(self.ratios(found))
-        return self.objective(field, laid, found, value, self.pulls(laid, found, counts))
+        return self.objective(field, smeared, found, value, self.pulls(smeared, found, counts))
 
-    def laid(self, field: FloatArray) -> tuple[Laid, ...]:
+    def smeared(self, field: FloatArray) -> tuple[SmearedFibre, ...]:
         """Fibre that each field lays."""
-        return tuple(self.model.laid(one) for one in field.reshape(len(self.shares), -1))
+        return tuple(self.model.smeared(one) for one in field.reshape(len(self.shares), -1))
 
-    def stiffness(self, laid: Sequence[Laid], strain: FloatArray) -> FloatArray:
+    def stiffness(self, smeared: Sequence[SmearedFibre], strain: FloatArray) -> FloatArray:
         """Stiffness (m, 3, 3), MPa, of the fibre of all fields at strains (m, 3)."""
-        found = self.shares[0] * laid[0].stiffness(strain)
-        for share, one in zip(self.shares[1:], laid[1:], strict=True):
+        found = self.shares[0] * smeared[0].stiffness(strain)
+        for share, one in zip(self.shares[1:], smeared[1:], strict=True):
             found += share * one.stiffness(strain)
         return found
 
     def solve(
         self,
-        laid: Sequence[Laid],
+        smeared: Sequence[SmearedFibre],
         start: tuple[SmearedSolution, ...] | None = None,
         tolerance: float = 1e-5,
     ) -> tuple[SmearedSolution, ...]:
         """Solve each case; parameters as in `evaluate`."""
         starts = start if start is not None else (None,) * len(self.parts)
         return tuple(
-            part.solve(lambda strain: self.stiffness(laid, strain), one, tolerance)
+            part.solve(lambda strain: self.stiffness(smeared, strain), one, tolerance)
             for part, one in zip(self.parts, starts, strict=True)
         )
 
@@ -413,11 +418,14 @@ class StreamProblem:
         return float(value), powers / powers.sum()
 
     def pulls(
-        self, laid: Sequence[Laid], solutions: Sequence[SmearedSolution], counts: FloatArray
+        self,
+        smeared: Sequence[SmearedFibre],
+        solutions: Sequence[SmearedSolution],
+        counts: FloatArray,
     ) -> list[Pull]:
         """Derive -log(stiffness), the cases weighted (n,), by each field if in all layers."""
         found = []
-        for one in laid:
+        for one in smeared:
             x, y = zip(*(self.model.pull(one, each) for each in solutions), strict=True)
             found.append((counts @ np.stack(x), counts @ np.stack(y)))
         return found
@@ -425,7 +433,7 @@ class StreamProblem:
     def objective(
         self,
         field: FloatArray,
-        laid: Sequence[Laid],
+        smeared: Sequence[SmearedFibre],
         solutions: tuple[SmearedSolution, ...],
         value: float,
         pulls: Sequence[Pull],
@@ -435,17 +443,17 @@ class StreamProblem:
         Parameters
         ----------
         field : (n * c,) array
-        laid, solutions
+        smeared, solutions
             Fibre of the field, and the solution of each case with it.
         value : float
         pulls : sequence of two (m,) arrays
             Derivatives of the value by the gradient of each field, if it were in all layers.
         """
         model, fields, shares = self.model, field.reshape(len(self.shares), -1), self.shares
-        length = sum(share * model.length(one) for share, one in zip(shares, laid, strict=True))
+        length = sum(share * model.length(one) for share, one in zip(shares, smeared, strict=True))
         over = max(length / model.budget - 1.0, 0.0)
         value, gradient = value + OVER_BUDGET * over**2, []
-        for share, one, coefficients, pull in zip(shares, laid, fields, pulls, strict=True):
+        for share, one, coefficients, pull in zip(shares, smeared, fields, pulls, strict=True):
             for penalty in model.penalties(coefficients, one):
                 value += share * penalty
             gradient.append(share * model.gradient(coefficients, one, pull, over))

@@ -29,9 +29,9 @@ from ccfem.strategies.fibre_aware.field_descent import drawn_to_borders
 from ccfem.strategies.fibre_aware.smeared import SmearedSolution
 from ccfem.strategies.fibre_aware.stream_design import (
     SLACK,
-    Laid,
     Objective,
     Pull,
+    SmearedFibre,
     StreamDesign,
     StreamProblem,
 )
@@ -102,7 +102,7 @@ class StrengthProblem:
         """
         judges = tuple(MatrixPeaks(part.specimen.unreinforced) for part in problem.parts)
         bare = cls(problem, limits, strength, judges, {})
-        found = bare._peaks(problem.laid(field), solutions)
+        found = bare._peaks(problem.smeared(field), solutions)
         check_stretched([one.stretch for one in found])
         factors = {
             (k, name): peak.index / peak.norm
@@ -124,16 +124,16 @@ class StrengthProblem:
     ) -> Objective:
         """Evaluate the objective and its gradient; parameters as in `StreamProblem.evaluate`."""
         problem, w = self.problem, self.strength
-        laid = problem.laid(field)
-        solutions = problem.solve(laid, start, tolerance)
-        near, nearer = self._near(laid, solutions)
+        smeared = problem.smeared(field)
+        solutions = problem.solve(smeared, start, tolerance)
+        near, nearer = self._near(smeared, solutions)
         soft, counts = problem.worth(problem.ratios(solutions))
-        softer = problem.pulls(laid, solutions, counts)
+        softer = problem.pulls(smeared, solutions, counts)
         pulls = [
             (w * a[0] + (1.0 - w) * b[0], w * a[1] + (1.0 - w) * b[1])
             for a, b in zip(nearer, softer, strict=True)
         ]
-        return problem.objective(field, laid, solutions, w * near + (1.0 - w) * soft, pulls)
+        return problem.objective(field, smeared, solutions, w * near + (1.0 - w) * soft, pulls)
 
     def curvature(self, field: FloatArray, solutions: tuple[SmearedSolution, ...]) -> Any:
         """Curvature of the stiffness alone."""
@@ -144,23 +144,25 @@ class StrengthProblem:
         return self.problem.levels(field, solutions)
 
     def _peaks(
-        self, laid: tuple[Laid, ...], solutions: tuple[SmearedSolution, ...]
+        self, smeared: tuple[SmearedFibre, ...], solutions: tuple[SmearedSolution, ...]
     ) -> list[_CasePeaks]:
         """Find the indices under each load case, for the load on the part without fibre."""
         problem, alone = self.problem, self.problem.model
         limit = self.limits.fibre / alone.axial_stiffness
-        size = np.stack([one.size for one in laid])
+        size = np.stack([one.size for one in smeared])
         length = (problem.shares[:, None] * alone.room * size).ravel()
         found = []
         for part, judge, solution in zip(problem.parts, self.judges, solutions, strict=True):
-            stretch = np.stack([np.einsum("ci,ci->c", one.along, solution.strain) for one in laid])
+            stretch = np.stack(
+                [np.einsum("ci,ci->c", one.along, solution.strain) for one in smeared]
+            )
             fibre, counted = None, np.zeros_like(stretch)
             if stretch.max() > 0.0:
                 strain = (stretch / size**2).ravel()
                 index, norm, share = stretched_index(strain, length, limit)
                 counted = share.reshape(stretch.shape)
                 by_stretch = counted / np.where(stretch > 0.0, stretch, 1.0)
-                along = np.stack([one.along for one in laid])
+                along = np.stack([one.along for one in smeared])
                 forces = self._forces(np.einsum("fc,fci->ci", by_stretch, along))
                 fibre = Peak(index, norm, forces)
             normal = part.frame[2]
@@ -180,23 +182,23 @@ class StrengthProblem:
         return strain_forces(part.mesh, to_voigt(tensor))
 
     def _near(
-        self, laid: tuple[Laid, ...], solutions: tuple[SmearedSolution, ...]
+        self, smeared: tuple[SmearedFibre, ...], solutions: tuple[SmearedSolution, ...]
     ) -> tuple[float, list[Pull]]:
         """Logarithm of the index that fails first, and its derivatives by each field's slope."""
         problem = self.problem
-        found = self._peaks(laid, solutions)
+        found = self._peaks(smeared, solutions)
         peaks = {(k, name): p for k, one in enumerate(found) for name, p in one.peaks.items()}
         near, counts = nearness(peaks, self.factors)
-        pulls = [(np.zeros(len(one.size)), np.zeros(len(one.size))) for one in laid]
+        pulls = [(np.zeros(len(one.size)), np.zeros(len(one.size))) for one in smeared]
         cases = zip(problem.parts, found, solutions, strict=True)
         for k, (part, one, solution) in enumerate(cases):
             failing = {name: counts[k, name] for name in one.peaks}
             load = sum(count * one.peaks[name].by_displacement for name, count in failing.items())
-            stiffness = problem.stiffness(laid, solution.strain)
+            stiffness = problem.stiffness(smeared, solution.strain)
             adjoint = part.respond(stiffness, np.asarray(load), _TOLERANCE)
             own = failing.get("fibre", 0.0) * one.counted
             moved = 0.0 if part.forced else sum(failing.values())
-            for f, fibre in enumerate(laid):
+            for f, fibre in enumerate(smeared):
                 share = max(float(problem.shares[f]), _NONE)
                 dx, dy = self._nearer(fibre, solution.strain, adjoint, own[f] / share)
                 if moved:
@@ -205,12 +207,14 @@ class StrengthProblem:
                 pulls[f] = (pulls[f][0] + dx, pulls[f][1] + dy)
         return near, pulls
 
-    def _nearer(self, laid: Laid, strain: FloatArray, adjoint: FloatArray, own: FloatArray) -> Pull:
+    def _nearer(
+        self, smeared: SmearedFibre, strain: FloatArray, adjoint: FloatArray, own: FloatArray
+    ) -> Pull:
         """Derive the logarithm of the indices of one case by the slope of one field.
 
         Parameters
         ----------
-        laid : Laid
+        smeared : SmearedFibre
             Its fibre, in all layers.
         strain, adjoint : (m, 3) array
             Of the part with its fibre, and of the adjoint solution.
@@ -218,8 +222,8 @@ class StrengthProblem:
             Weight of the fibre of each cell in the index of the fibre itself.
         """
         alone = self.problem.model
-        stretch, other = (np.einsum("ci,ci->c", laid.along, one) for one in (strain, adjoint))
-        gx, gy, size = laid.gx, laid.gy, laid.size
+        stretch, other = (np.einsum("ci,ci->c", smeared.along, one) for one in (strain, adjoint))
+        gx, gy, size = smeared.gx, smeared.gy, smeared.size
         share = np.where(stretch > 0.0, 1.0, SLACK)
         # The work of fibre between both displacements is stretch * other / size^3.
         factor = -alone.axial_stiffness * alone.room * share / size**3
@@ -227,16 +231,16 @@ class StrengthProblem:
         # The fibre norm to its power is room * stretch^p / size^(2 p - 1) a cell.
         power = own / np.where(stretch > 0.0, stretch, 1.0)
         thin = (2.0 - 1.0 / POWER) * own / size**2
-        (ux, uy), (ax, ay) = _turned(laid, strain), _turned(laid, adjoint)
+        (ux, uy), (ax, ay) = _turned(smeared, strain), _turned(smeared, adjoint)
         dx = factor * (ux * other + ax * stretch - fall * gx) + power * ux - thin * gx
         dy = factor * (uy * other + ay * stretch - fall * gy) + power * uy - thin * gy
         return dx, dy
 
 
-def _turned(laid: Laid, strain: FloatArray) -> Pull:
+def _turned(smeared: SmearedFibre, strain: FloatArray) -> Pull:
     """Derive the stretch by the components of g: (m,) each."""
     e1, e2, e12 = strain.T
-    return 2.0 * laid.gx * e2 - laid.gy * e12, 2.0 * laid.gy * e1 - laid.gx * e12
+    return 2.0 * smeared.gx * e2 - smeared.gy * e12, 2.0 * smeared.gy * e1 - smeared.gx * e12
 
 
 def design_for_strength(

@@ -445,7 +445,10 @@ def test_the_printer_s_own_commands(plate):
         ({"start": ["G28\nM112"]}, r"machine\.gcode: start must be a list of single lines"),
         ({"tool": "T0"}, r"machine\.gcode\.tool must be a list, each item a string; got 'T0'"),
         ({"bed": [200, 0, 50]}, r"machine\.gcode: .*bed must be from 10 to 100000 mm; got 0"),
-        ({"lift": -1}, r"machine\.gcode: .*lift must be 0 or from 0.01 to 1000 mm; got .*: give more"),
+        (
+            {"lift": -1},
+            r"machine\.gcode: .*lift must be 0 or from 0.01 to 1000 mm; got .*: give more",
+        ),
         ({"feed_speed": 0}, r"machine\.gcode: .*feed_speed must be from 0.5 to 2000 mm/s"),
         ({"nozzle": 1}, r"machine\.gcode has no key 'nozzle'"),
     ],

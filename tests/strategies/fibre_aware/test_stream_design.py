@@ -239,7 +239,7 @@ def test_large_power_takes_the_worst_case(two_bends):
     field = 0.5 * start_fields(problem, cases.fields, layers[:1], 90.0, 0.75)
     found = problem.evaluate(field)
     penalties = sum(
-        0.5 * sum(problem.model.penalties(one, problem.model.laid(one)))
+        0.5 * sum(problem.model.penalties(one, problem.model.smeared(one)))
         for one in field.reshape(2, -1)
     )
     worst = np.log((problem.bounds / found.ratio).max())
