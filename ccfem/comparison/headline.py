@@ -198,7 +198,7 @@ HEADLINE = (
     Headline("displacement", "displacement, mm", "low", "{:.3g}"),
     Headline("first_failure_load", "first failure, N", "high", "{:.0f}"),
     Headline("first_failure_load_alternative", "first failure, other supports, N", "", "{:.0f}"),
-    Headline("interlayer_load", "layers come apart, N", "", "{:.0f}"),
+    Headline("interlayer_load", "delamination load, N", "", "{:.0f}"),
     Headline("fibre_per_layer", "fibre, mm a layer", "", "{:.0f}"),
     Headline("fibre_mass", "fibre, g", "", "{:.3g}"),
     Headline("print_time_nearest", "laying fibre, min", "low", "{:.0f}"),
@@ -237,7 +237,7 @@ _OVER_SLICINGS = (
 
 HEADLINE_OF_SLICINGS = (
     *(head for head in HEADLINE if head.column in _OVER_SLICINGS),
-    Headline("interlayer_load_alternative", "layers come apart, other supports, N", "", "{:.0f}"),
+    Headline("interlayer_load_alternative", "delamination load, other supports, N", "", "{:.0f}"),
     Headline("joints_linked", "joints linked", "high", "{:.2f}"),
     Headline("fibre_length", "fibre, mm", "", "{:.0f}"),
     Headline("space_angle_stress", "angle to stress, degrees", "low", "{:.1f}"),

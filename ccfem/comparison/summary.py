@@ -20,7 +20,7 @@ SUMMARY = (
 
 SUMMARY_OF_SLICINGS = (
     *SUMMARY[:4],
-    Headline("interlayer_load", "layers come apart, N", "high", "{:.0f}"),
+    Headline("interlayer_load", "delamination load, N", "high", "{:.0f}"),
     Headline("fibre_length", "fibre, mm", "", "{:.0f}"),
     Headline("joints_linked", "joints linked", "high", "{:.2f}"),
 )

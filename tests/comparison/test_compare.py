@@ -164,7 +164,7 @@ def test_the_bond_between_layers_is_judged_where_its_strength_is_known(compared,
     total = pd.read_csv(tmp_path / "results.csv").iloc[-1]
     assert total["fails_in"] == "interlayer"
     assert total["interlayer_load"] == pytest.approx(failure.load)
-    assert "layers come apart, N" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "delamination load, N" in (tmp_path / "report.html").read_text(encoding="utf-8")
     # Layers along the pull do not open; without a strength nothing is judged, and that is said.
     assert compared.frame["interlayer_load"].min() > 5.0 * failure.load
     assert not any("bond between layers" in line for line in compared.remarks)

@@ -151,7 +151,7 @@ def test_files_hold_every_run_and_one_report(compared, tmp_path):
     report = (tmp_path / "report.html").read_text(encoding="utf-8")
     for run in compared.runs:
         assert f'data-value="{run.name}">' in report
-    for word in (compared.verdict, "joints linked", "layers come apart, N", "first failure, N"):
+    for word in (compared.verdict, "joints linked", "delamination load, N", "first failure, N"):
         assert word in report
     for name in compared.slicings:
         assert (tmp_path / f"{name}_zigzag_space.html").exists()
