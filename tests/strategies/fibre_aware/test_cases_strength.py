@@ -159,8 +159,9 @@ def test_the_judge_weighs_what_each_test_alone_says(strong_plate):
         assert judge(paths).value == pytest.approx(expected, rel=1e-5)
 
 
-@pytest.mark.parametrize("weight", [0.25, 0.6])
-@pytest.mark.parametrize("strategy", [StreamFunction(evaluations=4, overfill=1.3), Pruned()])
+@pytest.mark.parametrize(
+    ("strategy", "weight"), [(StreamFunction(evaluations=4, overfill=1.3), 0.6), (Pruned(), 0.25)]
+)
 def test_planning_for_strength_is_worth_no_less_than_for_stiffness(strong_bends, strategy, weight):
     cases, layers = strong_bends
     parts, worth = specimens(cases), []

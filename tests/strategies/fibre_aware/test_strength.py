@@ -187,8 +187,9 @@ def test_a_plan_for_strength_keeps_its_length_and_says_what_it_overfilled(strong
     assert 0.9 * 800.0 < laid <= 800.0
 
 
-@pytest.mark.parametrize("weight", [0.2, 0.6])
-@pytest.mark.parametrize("strategy", [StreamFunction(evaluations=4, overfill=1.3), Pruned()])
+@pytest.mark.parametrize(
+    ("strategy", "weight"), [(StreamFunction(evaluations=4, overfill=1.3), 0.2), (Pruned(), 0.6)]
+)
 def test_planning_for_strength_is_worth_no_less_than_for_stiffness(strong_beam, strategy, weight):
     stress, layers = strong_beam
     worth = []
