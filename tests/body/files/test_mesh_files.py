@@ -279,6 +279,7 @@ GOOD_TET = "4 vertices\n1 tets\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n4 0 1 2 3\n"
         ("a.vtu", "<xml/>", "not a VTK unstructured grid"),
         ("a.vtu", "<VTKFile type='UnstructuredGrid'><Unstr", "grid that can be read|no tetra"),
         ("a.inp", "something else", "no .NODE"),
+        ("a.inp", "*NODE\n*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n", "no .NODE with nodes"),
         ("a.npz", "PK nonsense", "not a mesh in a NumPy archive"),
         ("a.step", "ISO-10303", "name must end in .inp, .msh, .npz, .tet, .vtu"),
         ("a.stl", "solid a", "is a surface"),

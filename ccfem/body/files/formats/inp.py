@@ -85,8 +85,8 @@ def read(path: Path) -> TetMesh:
             f"{path} holds {deck.parts} parts; one is expected: write the model flat, without "
             "parts and assemblies"
         )
-    if not deck.nodes:
-        raise InputError(f"{path} is not an Abaqus deck: it has no *NODE")
+    if not any(map(len, deck.nodes)):
+        raise InputError(f"{path} is not an Abaqus deck: it has no *NODE with nodes")
     table = np.concatenate(deck.nodes)
     labels = table[:, 0].astype(np.int64)
     order = np.argsort(labels, kind="stable")
