@@ -182,7 +182,8 @@ def _nodes(points: FloatArray, mesh: TetMesh, corners: IntArray, path: Path) -> 
     n = len(mesh.points)
     if len(points) >= len(corners) and len(points) <= n:
         # In the same order, as ccfem writes them; this tells nodes on one spot apart.
-        same = np.linalg.norm(points - mesh.points[: len(points)], axis=1) <= near
+        with np.errstate(over="ignore"):  # what overflows lies elsewhere
+            same = np.linalg.norm(points - mesh.points[: len(points)], axis=1) <= near
         if same.all() and corners.max() < len(points):
             return np.concatenate([np.arange(len(points)), np.full(n - len(points), -1)])
     tree = cKDTree(points)

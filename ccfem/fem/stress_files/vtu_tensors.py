@@ -69,6 +69,6 @@ def _tensors(grid: Grid, where: str, name: str, path: Path) -> FloatArray | None
         )
     if values.shape[1] == 9:
         full = values.reshape(-1, 3, 3)
-        return to_voigt(0.5 * (full + full.swapaxes(1, 2)))
+        return to_voigt(0.5 * full + 0.5 * full.swapaxes(1, 2))
     names = grid.components.get((where, name), [""] * 6)
     return values[:, component_order(names, f"{path}: array '{name}'")]

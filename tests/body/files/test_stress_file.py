@@ -169,6 +169,20 @@ def test_arrays_of_other_programs(field, tmp_path):
         read_stress(tmp_path / "unnamed.vtu", mesh, "MPa", "S")
 
 
+@pytest.mark.filterwarnings("error")
+def test_numbers_that_overflow_are_one_line(field, tmp_path):
+    path = tmp_path / "far.vtu"
+    good = field.stress.reshape(-1, 9)
+    bad = good.copy()
+    bad[3, 1] = bad[3, 3] = 1.7e308
+    cells = [("tetra", field.mesh.cells[:, :4])]
+    for factor, stress, said in ((1.0, bad, "of element 3"), (1e300, good, "has no node where")):
+        values = {"stress": [stress]}
+        meshio.Mesh(factor * field.mesh.points, cells, cell_data=values).write(path)
+        with pytest.raises(InputError, match=said):
+            read_stress(path, field.mesh, "MPa")
+
+
 def test_stress_on_another_mesh_is_refused(written, field):
     size = (60.0, 24.0, 4.0)
     other = box_mesh(size, (10, 4, 1))
