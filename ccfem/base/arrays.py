@@ -8,17 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-__all__ = [
-    "BoolArray",
-    "FloatArray",
-    "IntArray",
-    "freeze",
-    "in_brief",
-    "read_only",
-    "repeated",
-    "seen_only",
-]
-
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]

@@ -9,29 +9,6 @@ from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from ccfem.base.errors import InputError, known_names, shown
 
-__all__ = [
-    "ACCELERATION",
-    "BED",
-    "EXPANSION",
-    "FARTHEST",
-    "FORCE",
-    "MASS_DENSITY",
-    "MODULUS",
-    "SPRING",
-    "STRENGTH",
-    "TRACTION",
-    "WARMTH",
-    "KnownNames",
-    "Range",
-    "check_choices",
-    "check_fields",
-    "check_instance",
-    "check_known",
-    "check_number",
-    "member_name",
-    "refuse_keywords",
-]
-
 V = TypeVar("V")
 
 FARTHEST = 1e9

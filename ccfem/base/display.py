@@ -7,8 +7,6 @@ imported when the first value is asked to show itself.
 import importlib
 from typing import Any, Protocol, cast
 
-__all__ = ["Shown", "drawn_by"]
-
 
 class _Drawing(Protocol):
     """What draws values."""

@@ -6,8 +6,6 @@ import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
-__all__ = ["InputError", "Mistakes", "SolveError", "known_names", "shown", "spared"]
-
 
 class InputError(ValueError):
     """Invalid input.

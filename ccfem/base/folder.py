@@ -19,16 +19,6 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-__all__ = [
-    "PARTS",
-    "READY",
-    "UNREADY",
-    "Folder",
-    "private_folder",
-    "remove_private_folders",
-    "sweep",
-]
-
 _RELATIVE = {os.open, os.stat, os.unlink, os.rename, os.mkdir, os.rmdir} <= os.supports_dir_fd
 _REAL = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 """How files are opened: no link is followed, and no pipe waited for."""

@@ -9,8 +9,6 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any
 
-__all__ = ["MOVED", "find_moved"]
-
 _INDICES = (
     *("alignment", "containment", "coverage", "crossings", "curvature", "head", "links"),
     *("manufacture", "matching", "room", "sinuosity", "skin", "space", "spacing"),

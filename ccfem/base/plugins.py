@@ -19,8 +19,6 @@ from ccfem.base.checks import check_known
 from ccfem.base.errors import InputError, known_names
 from ccfem.base.toml import from_table
 
-__all__ = ["by_class", "class_name", "create", "discovered", "entries"]
-
 
 def class_name(module: str) -> str:
     """Name of the class that a module of this name holds."""

@@ -6,8 +6,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-__all__ = ["Progress", "progress_bar", "silent", "time_left"]
-
 Progress = Callable[[str, float], None]
 """Called with the name of the current step and the share of all work, in [0, 1], that is done."""
 

@@ -17,8 +17,6 @@ from ccfem.base.errors import InputError
 from ccfem.base.folder import READY, UNREADY, Folder, private_folder, sweep
 from ccfem.base.whole import reason_and_cure
 
-__all__ = ["RESERVED", "refuse_foreign", "whole_folder"]
-
 _MARKER = ".ccfem.json"
 """File in a folder of results: the files that ccfem wrote there, each with its SHA-256."""
 RESERVED = (_MARKER, ".lock")

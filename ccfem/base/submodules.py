@@ -4,8 +4,6 @@ import importlib
 from collections.abc import Callable
 from types import ModuleType
 
-__all__ = ["submodules"]
-
 
 def submodules(package: str) -> Callable[[str], ModuleType]:
     """Return the ``__getattr__`` of a package: ``ccfem.fem.elasticity`` needs no import of its own.

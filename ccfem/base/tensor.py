@@ -8,22 +8,6 @@ import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray
 
-__all__ = [
-    "bond_matrix",
-    "from_voigt",
-    "in_axes",
-    "in_plane",
-    "largest_in_plane",
-    "principal",
-    "rotate_stiffness",
-    "strain_from_voigt",
-    "strain_to_voigt",
-    "strongest",
-    "strongest_in_plane",
-    "to_voigt",
-    "von_mises",
-]
-
 _ROWS = np.array([0, 1, 2, 1, 0, 0])
 _COLUMNS = np.array([0, 1, 2, 2, 2, 1])
 _SQUARE = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])

@@ -5,8 +5,6 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
-__all__ = ["in_threads"]
-
 _MOST = 4
 """Threads at a time; much of the work waits for the interpreter's lock."""
 

@@ -14,8 +14,6 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 from ccfem.base.errors import InputError, Mistakes, known_names, shown
 from ccfem.base.whole import text_of
 
-__all__ = ["assignment", "cure_of", "described", "from_table", "read_toml"]
-
 T = TypeVar("T")
 
 _POINTED = re.compile(r"[+-]?(\.\d+|\d+\.)([eE][+-]?\d+)?")

@@ -10,8 +10,6 @@ from pathlib import Path
 from ccfem.base.errors import InputError
 from ccfem.base.folder import Folder, private_folder
 
-__all__ = ["check_writable", "existing_file", "reason_and_cure", "text_of", "whole_file"]
-
 
 @contextmanager
 def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:

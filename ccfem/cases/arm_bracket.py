@@ -13,8 +13,6 @@ from ccfem.fem.materials import printed_pla
 from ccfem.machine.machine import Machine
 from ccfem.slicing.slicers.load_oriented import LoadOriented
 
-__all__ = ["arm_bracket", "arm_bracket_mesh", "arm_bracket_outlines"]
-
 ELEMENT_SIZE = 2.0
 LENGTH, WIDTH, HEIGHT = 80.0, 20.0, 28.0
 _THICK, _FILLET = 6.0, 4.0

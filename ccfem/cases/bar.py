@@ -10,8 +10,6 @@ from ccfem.cases.stored import mesh_of_case
 from ccfem.fem.elasticity.problem import Order
 from ccfem.slicing.slicers.planar import Planar
 
-__all__ = ["bar", "bar_mesh", "bar_outline"]
-
 ELEMENT_SIZE = 1.5
 LENGTH, WIDTH, THICKNESS = 125.0, 25.0, 5.0
 GAUGE_LENGTH, GAUGE_WIDTH = 40.0, 8.0

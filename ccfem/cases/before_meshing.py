@@ -19,8 +19,6 @@ from ccfem.fem.elasticity.loads import nodal_forces
 from ccfem.fem.elasticity.support_kinds import AnySupport
 from ccfem.fem.elasticity.supports import held
 
-__all__ = ["check_before_meshing"]
-
 
 @dataclass(frozen=True)
 class _Outline:

@@ -17,8 +17,6 @@ from ccfem.fem.materials import printed_pla
 from ccfem.fem.topopt import Design, as_problem
 from ccfem.fem.topopt.solid_design import solid_design
 
-__all__ = ["bracket", "bracket_design", "bracket_domain", "bracket_mesh", "bracket_outline"]
-
 ELEMENT_SIZE = 1.75
 HOLES = {
     "hole_1": (5.5, 45.0),

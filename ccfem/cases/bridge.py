@@ -4,8 +4,6 @@ import shapely
 
 from ccfem.cases.designed import DesignPlate, Stretch, case_of
 
-__all__ = ["bridge", "bridge_plate"]
-
 
 def bridge_plate(volume_fraction: float = 0.4, force: float = 100.0) -> DesignPlate:
     """Plate 185 x 50 mm on two supports of 5 mm, pressed on 5 mm in the middle of its top.

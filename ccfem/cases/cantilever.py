@@ -4,8 +4,6 @@ import shapely
 
 from ccfem.cases.designed import DesignPlate, Stretch, case_of
 
-__all__ = ["cantilever", "cantilever_plate"]
-
 
 def cantilever_plate(volume_fraction: float = 0.5, force: float = 100.0) -> DesignPlate:
     """Plate 120 x 60 mm, fixed on the left, loaded on 4 mm in the middle of the right side."""

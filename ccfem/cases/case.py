@@ -21,8 +21,6 @@ from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.slicer import Slicer
 from ccfem.slicing.slicers.planar import Planar
 
-__all__ = ["Case", "check_name", "pulled"]
-
 
 def pulled(mesh: TetMesh, force: tuple[float, float, float], order: Order) -> Problem:
     """Make a part of printed PLA, held at patch ``support``; a force, N, pulls at ``load``."""

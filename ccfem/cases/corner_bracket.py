@@ -19,14 +19,6 @@ from ccfem.fem.topopt.solid_design import solid_design
 from ccfem.machine.machine import Machine
 from ccfem.slicing.slicers.load_oriented import LoadOriented
 
-__all__ = [
-    "corner_bracket",
-    "corner_bracket_design",
-    "corner_bracket_domain",
-    "corner_bracket_mesh",
-    "corner_bracket_outlines",
-]
-
 ELEMENT_SIZE = 1.5
 VOLUME_FRACTION = 0.25
 _HALF, _FOOT, HEIGHT = 26.0, 6.0, 27.0

@@ -17,8 +17,6 @@ from ccfem.body.mesh.patches import PatchRule, patches_from_rules
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.body.meshing import extrude
 
-__all__ = ["arc", "crossed_mesh"]
-
 _TOLERANCE = 5e-4
 """Of the mesher, in the diagonal of the part."""
 _BEYOND = 4.0

@@ -4,8 +4,6 @@ import shapely
 
 from ccfem.cases.designed import DesignPlate, Stretch, case_of
 
-__all__ = ["l_shape", "l_shape_plate"]
-
 
 def l_shape_plate(volume_fraction: float = 0.4, force: float = 100.0) -> DesignPlate:
     """L of 100 x 100 mm, 40 mm wide, fixed at its top, loaded on 4 mm of its right side."""

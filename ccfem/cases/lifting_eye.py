@@ -12,8 +12,6 @@ from ccfem.fem.elasticity.problem import Bearing, Order, Problem, Support
 from ccfem.fem.materials import printed_pla
 from ccfem.slicing.slicers.spatial import Spatial
 
-__all__ = ["lifting_eye", "lifting_eye_front", "lifting_eye_mesh", "lifting_eye_top"]
-
 ELEMENT_SIZE = 3.0
 BOLT_RADIUS, EYE_RADIUS = 4.5, 9.0
 _BOLTS, _EYE = 36.0, 44.0

@@ -7,8 +7,6 @@ from ccfem.cases.case import Case
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.fem.elasticity.weighted_cases import WeightedCases
 
-__all__ = ["ALL_CASES", "asks_for_all", "weighted_cases"]
-
 ALL_CASES = "all"
 """Text that asks for all load cases instead of one."""
 

@@ -11,8 +11,6 @@ from ccfem.cases.case import Case, pulled
 from ccfem.cases.stored import mesh_of_case
 from ccfem.fem.elasticity.problem import Order
 
-__all__ = ["loop", "loop_mesh", "loop_outline"]
-
 ELEMENT_SIZE = 2.4
 HOLE = 50.0
 """Distance of the holes' centres from the middle of the ring, mm."""

@@ -7,8 +7,6 @@ import shapely
 
 from ccfem.cases.designed import DesignPlate, Stretch, case_of
 
-__all__ = ["m_shape", "m_shape_plate"]
-
 
 def m_shape_plate(volume_fraction: float = 0.3, force: float = 100.0) -> DesignPlate:
     """Plate 120 x 60 mm, fixed on 5 mm at both lower corners, pulled down on 4 mm between them."""

@@ -8,8 +8,6 @@ from typing import Any, get_type_hints
 from ccfem.base import plugins
 from ccfem.cases.case import Case
 
-__all__ = ["create_case", "named_cases"]
-
 _PACKAGE = "ccfem.cases"
 
 

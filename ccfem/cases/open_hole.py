@@ -10,8 +10,6 @@ from ccfem.cases.stored import mesh_of_case
 from ccfem.fem.elasticity.problem import Order
 from ccfem.slicing.slicers.planar import Planar
 
-__all__ = ["open_hole", "open_hole_mesh", "open_hole_outline"]
-
 ELEMENT_SIZE = 2.0
 LENGTH, WIDTH, THICKNESS = 200.0, 36.0, 4.0
 RADIUS = 6.0

@@ -22,8 +22,6 @@ from ccfem.fem.topopt import Design, Simp, Somp, as_problem
 from ccfem.fem.topopt.flat_part import FlatPart, flat_part
 from ccfem.fem.topopt.sheet_part import plane_stiffness, sheet_outline, sheet_part, sheet_problem
 
-__all__ = ["Optimised", "optimise"]
-
 _CELLS = 4000.0
 """Number of squares of the element size into which a sheet is divided."""
 _RIM = 2.0

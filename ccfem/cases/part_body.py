@@ -21,8 +21,6 @@ from ccfem.body.meshing import extrude, faces_of_body, mesh_body
 from ccfem.body.meshing.volume import Mesher
 from ccfem.fem.elasticity.problem import Order
 
-__all__ = ["Body"]
-
 _SMALLEST, _LARGEST = 0.1, 1e5
 """Diagonals, mm, beyond which a unit is wrong."""
 

@@ -13,8 +13,6 @@ from ccfem.cases.part_tables import named_table
 from ccfem.paths.placement.fibre_places import FibrePlaces, FibreRegion
 from ccfem.paths.placement.region_shapes import InBody, InBox, InCylinder, NearPatch, Shape
 
-__all__ = ["FIBRE_REGIONS", "fibre_of", "fibre_table", "patches_of_fibre"]
-
 FIBRE_REGIONS: dict[str, Callable[..., Shape]] = {
     "patch": NearPatch,
     "box": InBox,

@@ -270,9 +270,6 @@ from ccfem.machine.named_machines import machine_from
 from ccfem.paths.placement.fibre_places import FibrePlaces
 from ccfem.slicing.layers.slicer import Slicer
 
-__all__ = ["faces_of_part", "read_part"]
-
-
 T = TypeVar("T")
 
 

@@ -6,8 +6,6 @@ from typing import Any
 from ccfem.body.mesh.patches import Vector
 from ccfem.cases.part_body import Body
 
-__all__ = ["Part"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Part(Body):

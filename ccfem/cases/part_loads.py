@@ -33,16 +33,6 @@ from ccfem.fem.elasticity.support_kinds import (
     Support,
 )
 
-__all__ = [
-    "LOADS",
-    "SUPPORTS",
-    "alternative_supports_of",
-    "combinations_of",
-    "loads_of",
-    "supports_of",
-    "weights_of",
-]
-
 LOADS: dict[str, Callable[..., Load]] = {
     "force": Force,
     "traction": Traction,

@@ -13,8 +13,6 @@ from ccfem.cases.part_tables import material_of, named_table
 from ccfem.fem.elasticity.problem import Region
 from ccfem.fem.materials import Material
 
-__all__ = ["REGIONS", "region_rules_of", "regions_of"]
-
 REGIONS: dict[str, Callable[..., CellRule]] = {"box": CellBox, "cylinder": CellCylinder}
 """Rules that choose cells."""
 

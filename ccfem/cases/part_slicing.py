@@ -7,8 +7,6 @@ from ccfem.slicing import slicers as slicers
 from ccfem.slicing.layers.slicer import Slicer
 from ccfem.slicing.slicers.planar import Planar
 
-__all__ = ["slicing_of"]
-
 
 def slicing_of(part: Part) -> Slicer:
     """Slicer of a part file: of its number of layers, their heights, or the table slicing.

@@ -15,14 +15,6 @@ from ccfem.fem.materials import (
     transversely_isotropic,
 )
 
-__all__ = [
-    "RULES",
-    "check_strategies",
-    "material_of",
-    "named_table",
-    "rules_of",
-]
-
 RULES: dict[str, Callable[..., PatchRule]] = {
     "plane": Plane,
     "box": Box,

@@ -17,8 +17,6 @@ from ccfem.fem.materials import Material
 from ccfem.machine.machine import Machine
 from ccfem.slicing.slicers.planar import Planar
 
-__all__ = ["part_text"]
-
 
 def part_text(case: Case, mesh: str, comment: str = "") -> str:
     """Text of the part file of a case.

@@ -9,8 +9,6 @@ import shapely
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.errors import InputError
 
-__all__ = ["area_of", "cells_in", "check_places"]
-
 Place = Sequence[float]
 """3 numbers: x, y and radius of a disc; 4: corners of a rectangle; 6: corners of a box; mm."""
 

@@ -9,8 +9,6 @@ from ccfem.cases.case import Case
 from ccfem.cases.named import create_case
 from ccfem.cases.part_file import read_part
 
-__all__ = ["read"]
-
 
 def read(part: str | os.PathLike[str] | Case, **parameters: Any) -> Case:
     """Read a part file, or make a case that comes with ccfem.

@@ -4,8 +4,6 @@ import shapely
 
 from ccfem.cases.designed import DesignPlate, Hole, Stretch, case_of
 
-__all__ = ["suspension", "suspension_plate"]
-
 
 def suspension_plate(volume_fraction: float = 0.4, force: float = 100.0) -> DesignPlate:
     """Column 60 mm wide with an arm at its top, 175 x 126 mm, pressed on the end of the arm.

@@ -14,8 +14,6 @@ from ccfem.fem.elasticity.support_kinds import PressingSupport
 from ccfem.fem.materials import printed_pla
 from ccfem.slicing.slicers.spatial import Spatial
 
-__all__ = ["bolt_heads", "t_bracket", "t_bracket_front", "t_bracket_mesh", "t_bracket_top"]
-
 ELEMENT_SIZE = 3.0
 HOLE_RADIUS = 5.5
 _DEPTH = 15.0

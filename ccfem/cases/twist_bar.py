@@ -14,8 +14,6 @@ from ccfem.fem.materials import printed_pla
 from ccfem.machine.machine import Machine
 from ccfem.slicing.slicers.spatial import Spatial
 
-__all__ = ["twist_bar", "twist_bar_front", "twist_bar_mesh", "twist_bar_top"]
-
 ELEMENT_SIZE = 8.0
 HOLE_RADIUS = 9.75
 _HALF = 30.0

@@ -11,8 +11,6 @@ from ccfem.fem.elasticity.problem import Bearing, Order, Problem, Support
 from ccfem.fem.materials import printed_pla
 from ccfem.slicing.slicers.planar import Planar
 
-__all__ = ["two_angle_bracket", "two_angle_bracket_mesh"]
-
 ELEMENT_SIZE = 2.0
 BOLTS, PIN = ((0.0, 0.0), (0.0, 56.0)), (95.0, 22.0)
 HOLE_RADIUS, RIM, THICKNESS = 4.0, 10.0, 6.0

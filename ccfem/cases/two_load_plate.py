@@ -6,11 +6,10 @@ from ccfem.body.mesh.patches import PatchRule, Plane, patches_from_rules
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.body.meshing import extrude
 from ccfem.cases.case import Case
-from ccfem.fem.elasticity.problem import Force, Load, Order, Problem, Support
+from ccfem.fem.elasticity.load_kinds import Load
+from ccfem.fem.elasticity.problem import Force, Order, Problem, Support
 from ccfem.fem.materials import printed_pla
 from ccfem.slicing.slicers.planar import Planar
-
-__all__ = ["two_load_plate", "two_load_plate_mesh"]
 
 ELEMENT_SIZE = 1.5
 LENGTH, WIDTH, THICKNESS = 120.0, 36.0, 4.0

@@ -9,8 +9,6 @@ from ccfem.cases.loop import ELEMENT_SIZE, RING_RADIUS, loop
 from ccfem.fem.elasticity.problem import Force, Order
 from ccfem.slicing.slicers.planar import Planar
 
-__all__ = ["two_pull_loop"]
-
 SIDE = 12.0
 """Half of the length, mm, of the sides of the ring that are pulled apart."""
 

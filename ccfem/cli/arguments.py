@@ -13,14 +13,6 @@ from ccfem.base.checks import check_known
 from ccfem.base.errors import InputError
 from ccfem.base.toml import assignment
 
-__all__ = [
-    "drawings_of",
-    "names_of",
-    "numbers_of",
-    "parameters_by_strategy",
-    "path_of",
-]
-
 
 def path_of(text: str | Path) -> Path:
     """Path of an option; an empty text would be the current folder."""

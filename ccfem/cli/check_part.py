@@ -11,8 +11,6 @@ from ccfem.comparison.plot.part_picture import part_page, part_picture
 from ccfem.machine.machine import Machine
 from ccfem.paths.placement.fibre_places import FibrePlaces
 
-__all__ = ["check_part"]
-
 
 def check_part(
     part: str,

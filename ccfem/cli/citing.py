@@ -8,8 +8,6 @@ from ccfem.base.checks import check_known
 from ccfem.base.errors import InputError
 from ccfem.comparison.citations import METHODS, bibtex, cited, methods_of
 
-__all__ = ["cite"]
-
 
 def cite(whats: Sequence[str]) -> None:
     """Print BibTeX of ccfem and of the methods behind results.

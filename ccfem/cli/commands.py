@@ -57,8 +57,6 @@ from ccfem.cli.run import (
 from ccfem.cli.study_file import study
 from ccfem.cli.supporting import support
 
-__all__ = ["app"]
-
 app = typer.Typer(
     name="ccfem",
     help="Finite elements and stress-driven toolpaths for printing continuous fibre. "

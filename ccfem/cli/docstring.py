@@ -5,8 +5,6 @@ import re
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-__all__ = ["Attribute", "about", "attributes"]
-
 _SECTION = re.compile(r"^(\w[\w ]*)\n-+\n", flags=re.MULTILINE)
 
 

@@ -13,8 +13,6 @@ from ccfem.cases.inspection.body_faces import faces as faces_of
 from ccfem.comparison.plot.canvas import check_picture
 from ccfem.comparison.plot.part_views import Label, draw_part
 
-__all__ = ["list_faces"]
-
 _COLOURS = ("#9ec1e3", "#f3c98b", "#a8d5a2", "#e3a9c0", "#c9b8e0", "#e8e08a", "#9fd6d2", "#d9b89c")
 _NAMED = 60
 """Faces that are named in the picture; the rest are smaller."""

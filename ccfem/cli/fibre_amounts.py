@@ -15,8 +15,6 @@ from ccfem.cli.options import Backend, CasePath, Force, LoadCase, Out, SetCase
 if TYPE_CHECKING:
     from ccfem.comparison.front_points import FibreFront
 
-__all__ = ["front"]
-
 _FILES = ("front.csv", "front.png", "trade.png", "command.txt")
 """All files that the command writes."""
 

@@ -11,8 +11,6 @@ from ccfem.base.toml import assignment
 if TYPE_CHECKING:
     from ccfem.paths.placement.fibre_places import FibrePlaces
 
-__all__ = ["SetFibre", "fibre_choice"]
-
 SetFibre = Annotated[
     list[str] | None,
     typer.Option(

@@ -13,8 +13,6 @@ from ccfem.fem.elasticity.plausibility import about_problem
 from ccfem.judging.virtual_testing.calibration import calibrate
 from ccfem.judging.virtual_testing.force_displacement import read_curve
 
-__all__ = ["fit_material"]
-
 
 def fit_material(
     read: Callable[[], Case],

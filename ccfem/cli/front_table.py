@@ -7,8 +7,6 @@ if TYPE_CHECKING:
     from ccfem.comparison.front_cases import PointCases
     from ccfem.comparison.front_points import FibreFront, FrontPoint
 
-__all__ = ["front_table"]
-
 
 def front_table(found: "FibreFront") -> list[str]:
     """Lines of the table: the part without fibre, then the plans; marked are those of the fronts.

@@ -2,8 +2,6 @@
 
 import typer
 
-__all__ = ["CALLS", "say_in_python"]
-
 CALLS = {
     "cases": "ccfem.cases.named_cases()",
     "strategies": "ccfem.strategies.named()",

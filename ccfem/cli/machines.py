@@ -14,8 +14,6 @@ from ccfem.cli.docstring import attributes
 if TYPE_CHECKING:
     from ccfem.machine.machine import Machine
 
-__all__ = ["MachineName", "SetMachine", "machine_choice", "machine_file", "machines"]
-
 MachineName = Annotated[
     str | None,
     typer.Option(

@@ -14,8 +14,6 @@ from ccfem.cli.commands import app
 from ccfem.cli.run import complain
 from ccfem.cli.stopping import Stopped, asked, say
 
-__all__ = ["main"]
-
 
 def main() -> None:
     """Run the command line; bad input and failed solves end in one line and exit code 2."""

@@ -11,8 +11,6 @@ from ccfem.body.mesh.in_metres import in_metres
 from ccfem.body.meshing.cad import is_cad
 from ccfem.body.meshing.meshed_body import mesh_body
 
-__all__ = ["mesh_file"]
-
 
 def mesh_file(body: Path, size: float, out: Path, scale: float, mesher: Any) -> None:
     """Mesh a file, write the mesh, and say what it is."""

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from ccfem.base.progress import Progress
     from ccfem.cases.optimised import Optimised
 
-__all__ = ["optimise"]
-
 _TENTH = 0.1
 """Share of the iterations after which the next one is named."""
 

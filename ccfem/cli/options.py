@@ -7,30 +7,6 @@ import typer
 
 from ccfem.cli.arguments import path_of
 
-__all__ = [
-    "Backend",
-    "Calibration",
-    "CasePath",
-    "Details",
-    "Drawings",
-    "Fibre",
-    "FibreInAll",
-    "Heights",
-    "Layers",
-    "LoadCase",
-    "OneLoadCase",
-    "Out",
-    "Pictures",
-    "PrintedSupport",
-    "SetCase",
-    "Slicing",
-    "Slicings",
-    "Stiffness",
-    "StressFile",
-    "StressUnit",
-    "VirtualTest",
-]
-
 CasePath = Annotated[
     str, typer.Argument(metavar="CASE_OR_PART.toml", help="Name of a case, or a part file.")
 ]

@@ -7,8 +7,6 @@ import typer
 
 from ccfem.cli.arguments import path_of
 
-__all__ = ["reproduce"]
-
 
 def reproduce(
     paper: Annotated[

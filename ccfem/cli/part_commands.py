@@ -9,8 +9,6 @@ import typer
 from ccfem.cli.arguments import path_of
 from ccfem.cli.options import Backend, CasePath, Refine, SetCase
 
-__all__ = ["add_part_commands"]
-
 _Out = Annotated[
     Path | None,
     typer.Option("--out", metavar="PART.toml", parser=path_of, help="File that is written."),

@@ -25,18 +25,6 @@ if TYPE_CHECKING:
     from ccfem.paths.placement.fibre_places import FibrePlaces
     from ccfem.paths.planning.strategy import Strategy
 
-__all__ = [
-    "Output",
-    "calibrated",
-    "complain",
-    "foreign_stress",
-    "layers_of",
-    "load",
-    "run",
-    "slicings_of",
-    "with_given_paths",
-]
-
 _STARTED = time.perf_counter()
 
 _SOLVED = 0.75

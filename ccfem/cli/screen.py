@@ -34,14 +34,6 @@ from ccfem.comparison.said_of_cases import cases_rows
 from ccfem.fem.elasticity.stress_field import StressField, about_cells
 from ccfem.judging.virtual_testing.stiffer import HONEST_PROMISE, IN_SHORT
 
-__all__ = [
-    "print_cases",
-    "print_comparison",
-    "print_member",
-    "print_members",
-    "print_solution",
-]
-
 Item = typing.TypeVar("Item")
 
 _REMARKS = 3

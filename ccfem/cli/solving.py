@@ -9,8 +9,6 @@ from ccfem.cli.screen import print_solution
 from ccfem.fem.elasticity.solve import solve
 from ccfem.printing.export.vtu_result import result_path, write_result
 
-__all__ = ["solve_part"]
-
 
 def solve_part(case: Case, out: Path, load_case: str | None, backend: str) -> None:
     """Solve a part in one load case or all, write the results, and print what was found."""

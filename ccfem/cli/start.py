@@ -2,8 +2,6 @@
 
 from ccfem.cli import stopping
 
-__all__ = ["start"]
-
 
 def start() -> None:
     """Run the command line."""

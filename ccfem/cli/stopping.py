@@ -10,8 +10,6 @@ import sys
 from types import FrameType, TracebackType
 from typing import Any
 
-__all__ = ["Stopped", "asked", "end_at_once", "say", "unwind"]
-
 _HEEDED = [
     each
     for name in ("SIGINT", "SIGTERM", "SIGHUP")

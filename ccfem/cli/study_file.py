@@ -9,8 +9,6 @@ import typer
 from ccfem.base.progress import progress_bar
 from ccfem.cli.options import Force, Out
 
-__all__ = ["study"]
-
 
 def study(
     file: Annotated[

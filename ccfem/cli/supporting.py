@@ -8,8 +8,6 @@ import typer
 from ccfem.cli.arguments import path_of
 from ccfem.cli.options import Backend, CasePath, Layers, OneLoadCase, SetCase, Slicing
 
-__all__ = ["support"]
-
 
 def support(
     case: CasePath,

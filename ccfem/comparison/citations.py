@@ -6,8 +6,6 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-__all__ = ["METHODS", "bibtex", "cited", "methods_of", "sentence"]
-
 METHODS: dict[str, tuple[str, ...]] = {
     "concentric": (),
     "contour_zigzag": (),

@@ -15,8 +15,6 @@ from ccfem.comparison.verdict import verdict
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Curve"]
-
 _COLUMNS = (
     "fibre_per_layer",
     "stiffness",

@@ -10,11 +10,10 @@ import numpy as np
 from ccfem.comparison.curve import Curve
 from ccfem.comparison.runs import Run
 from ccfem.comparison.stages import Part, Tell, attempted, evaluated, planned_to_lengths
-from ccfem.paths.planning.equal_fibre import Planned, extremes
+from ccfem.paths.planning.equal_fibre import extremes
 from ccfem.paths.planning.given_paths import GivenPaths
+from ccfem.paths.planning.planned import Planned
 from ccfem.paths.planning.strategy import LengthStrategy
-
-__all__ = ["along_curve"]
 
 _COMMON = 3
 """Number of lengths that all strategies are held to."""

@@ -70,8 +70,6 @@ from ccfem.slicing.layers.slicer import Slicer, slicer_remarks
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies.fibre_aware.upper_bound import UpperBound, upper_bound
 
-__all__ = ["Solved", "answer", "compare", "otherwise_held", "presses", "solved"]
-
 _REPLACED = {
     "slicing": "layers, a slicer or its name",
     "heights": "layers, a list of heights in mm",

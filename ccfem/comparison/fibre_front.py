@@ -27,8 +27,6 @@ from ccfem.judging.virtual_testing.strength import matrix_peak
 from ccfem.paths.planning.strategy import Strategy
 from ccfem.slicing.slicers.planar import Planar
 
-__all__ = ["fibre_front", "front_of"]
-
 
 def fibre_front(
     case: Case,

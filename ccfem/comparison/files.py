@@ -23,8 +23,6 @@ from ccfem.printing.print_plan import PrintPlan
 if TYPE_CHECKING:
     from ccfem.comparison.pictures import Pictures
 
-__all__ = ["RESULT_FILES", "save", "write_results"]
-
 RESULT_FILES = (
     *("results.csv", "results.json", "report.html", "paths.vtp", "curve.csv", "curve.png"),
     *("tension.png", "overview.png", "part.png", "part.html"),

@@ -4,8 +4,6 @@ import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray
 
-__all__ = ["on_front"]
-
 
 def on_front(across: FloatArray, up: FloatArray, better: str = "low") -> BoolArray:
     """Mask of points that no other point dominates, as good in both values and better in one.

@@ -10,8 +10,6 @@ from ccfem.base.arrays import FloatArray, freeze
 from ccfem.comparison.tested_cases import TestedCases
 from ccfem.strategies.fibre_aware.upper_bound import UpperBound
 
-__all__ = ["WORST", "PointCases", "stiffness_panels"]
-
 WORST = "worst case, share of its bound"
 """What counts of several load cases, on an axis."""
 

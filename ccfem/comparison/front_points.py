@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-__all__ = ["FibreFront", "FrontPoint"]
-
 _STIFFNESS, _FAILURE = "times unreinforced stiffness", "first failure, kN"
 _FACTOR = "first failure, times the load"
 

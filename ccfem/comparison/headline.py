@@ -9,17 +9,6 @@ from ccfem.comparison.runs import Run, Tested
 from ccfem.judging.evaluation.column import Column
 from ccfem.judging.virtual_testing.strength import FirstFailure
 
-__all__ = [
-    "HEADLINE",
-    "HEADLINE_OF_SLICINGS",
-    "SHORT",
-    "TEST_COLUMNS",
-    "Headline",
-    "cell_text",
-    "headline_values",
-]
-
-
 _RATIO = "stiffness of the part with its fibres over that without"
 
 TEST_COLUMNS = (

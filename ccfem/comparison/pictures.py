@@ -38,8 +38,6 @@ from ccfem.slicing.layers.layer_stress import LayerStress, stress_on
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Pictures", "draw_pictures", "overview_picture"]
-
 
 @dataclass(frozen=True)
 class Pictures:

@@ -20,8 +20,6 @@ from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies.fibre_aware.least_fibre import LeastFibre, for_every_case, least_fibre
 from ccfem.strategies.fibre_aware.upper_bound import LEAST, upper_bound
 
-__all__ = ["counts_to_try", "plan_to_stiffness"]
-
 
 def counts_to_try(case: Case, stress: PartStress) -> tuple[int, ...]:
     """Numbers of flat layers worth trying: those of the part, and twice as many if they have room.

@@ -10,17 +10,6 @@ from ccfem.comparison.runs import Run
 from ccfem.judging.virtual_testing.stiffer import FIRST, RESOLUTION, SAME, SECOND, UNDECIDED
 from ccfem.paths.planning.equal_fibre import TOLERANCE
 
-__all__ = [
-    "best_values",
-    "is_tested",
-    "merit",
-    "off_length",
-    "order_of",
-    "ranking",
-    "stiffness_ratio",
-    "stiffness_ratios",
-]
-
 _SAME = TOLERANCE * (1.0 + 1e-9)
 """Share of the wanted length by which a run may differ and still count as equal."""
 

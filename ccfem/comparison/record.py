@@ -17,8 +17,6 @@ from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.fem.elasticity.stress_field import StressField
 
-__all__ = ["record", "results_rows", "write_table"]
-
 _FIRST = ("slicing", "strategy", "layer", "failure", "printable", "why_not")
 
 _PACKAGES = ("numpy", "scipy", "numba", "pyamg", "shapely", "pypardiso")

@@ -14,8 +14,6 @@ from ccfem.judging.virtual_testing.stiffer import RESOLUTION, SAME, UNDECIDED
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.upper_bound import LOOSE, UpperBound
 
-__all__ = ["bound_remark", "by_importance", "open_remarks", "remarks", "why_above"]
-
 _IMPORTANT = (
     ("failed: ", "cannot cut the part: ", "cannot be printed as planned"),
     ("not printable as planned: ",),

@@ -28,26 +28,6 @@ from ccfem.slicing.slicers import as_slicer, from_text
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
 
-__all__ = [
-    "DEFAULT_STRAND",
-    "SHORTEST",
-    "STRATEGIES",
-    "Amount",
-    "ForeignStress",
-    "InAll",
-    "Natural",
-    "PerLayer",
-    "Request",
-    "Shortest",
-    "Slicing",
-    "Spread",
-    "Stiffness",
-    "Wanted",
-    "check_propped",
-    "named_slicings",
-    "named_strategies",
-]
-
 STRATEGIES = ("stream_function", "isocurve", "contour_zigzag", "zigzag")
 """The strategies that are compared when none are named."""
 

@@ -15,8 +15,6 @@ from ccfem.paths.planning.strategy import Strategy
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.print_plan import PrintPlan
 
-__all__ = ["Run", "Tested"]
-
 
 @dataclass(frozen=True)
 class Tested:

@@ -13,8 +13,6 @@ from ccfem.fem.elasticity.weighted_cases import WeightedCases
 from ccfem.judging.virtual_testing.stiffer import FIRST, RESOLUTION
 from ccfem.strategies.fibre_aware.upper_bound import LEAST, LOOSE, UpperBound
 
-__all__ = ["cases_remarks", "cases_rows", "cases_verdict"]
-
 
 def cases_verdict(runs: Sequence[Run], wanted: Wanted, bound: UpperBound | None) -> str:
     """Say in one sentence which strategy serves all load cases best; empty for fewer than two.

@@ -8,8 +8,6 @@ from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["caption", "drawn_layers", "file_stem", "middle_layer"]
-
 
 def drawn_layers(comparison: Comparison) -> list[Layer]:
     """Layers that are drawn: all flat ones, and of curved ones those that have fibre."""

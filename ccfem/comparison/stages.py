@@ -25,7 +25,6 @@ from ccfem.judging.virtual_testing.virtual_test import Bracket, virtual_test
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.equal_fibre import (
     TOLERANCE,
-    Planned,
     length_per_layer,
     plan_to_length,
     plan_to_lengths,
@@ -33,6 +32,7 @@ from ccfem.paths.planning.equal_fibre import (
 )
 from ccfem.paths.planning.given_paths import GivenPaths
 from ccfem.paths.planning.plan import plan
+from ccfem.paths.planning.planned import Planned
 from ccfem.paths.planning.strategy import LengthStrategy
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.curved_plan import curved_plan
@@ -40,23 +40,6 @@ from ccfem.printing.print_plan import plan_print
 from ccfem.printing.support import SupportLayers
 from ccfem.slicing.layers import Layer
 from ccfem.strategies.fibre_aware.plan_cases import plan_cases, plan_cases_to_lengths
-
-__all__ = [
-    "Part",
-    "Tell",
-    "Tests",
-    "all_tested",
-    "attempted",
-    "counted",
-    "evaluated",
-    "natural",
-    "planned",
-    "planned_to_lengths",
-    "timed",
-    "to_length",
-    "with_plan",
-    "with_print",
-]
 
 Tell = Callable[[str], None]
 """Receives what is done next."""

@@ -6,8 +6,6 @@ from html import escape
 from ccfem.comparison.headline import Headline, cell_text, headline_values
 from ccfem.comparison.runs import Run
 
-__all__ = ["SUMMARY", "SUMMARY_OF_SLICINGS", "summary_html", "summary_text"]
-
 SUMMARY = (
     Headline("printable", "printable", "", "{}"),
     Headline("stiffness", "stiffness, N/mm", "high", "{:.4g}"),

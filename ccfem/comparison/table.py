@@ -11,8 +11,6 @@ from ccfem.comparison.runs import Run
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["frame"]
-
 
 def frame(ranking: Sequence[Run]) -> "pd.DataFrame":
     """Table of all numbers of runs.

@@ -19,8 +19,6 @@ from ccfem.judging.virtual_testing.strands import Strands
 from ccfem.slicing.layers import Layer
 from ccfem.strategies.fibre_aware.upper_bound import UpperBound
 
-__all__ = ["TestedCases", "in_all_cases"]
-
 _TOLERANCE = 1e-6
 """Relative residual of the tests: the error of the stiffness is of its square."""
 

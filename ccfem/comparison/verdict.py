@@ -18,8 +18,6 @@ from ccfem.comparison.request import InAll, Wanted
 from ccfem.comparison.runs import Run
 from ccfem.judging.virtual_testing.stiffer import FIRST, RESOLUTION, SAME
 
-__all__ = ["all_same", "comparable", "left_out", "verdict"]
-
 
 def verdict(runs: Sequence[Run], wanted: Wanted) -> str:
     """Say in one sentence which strategy is best, in what respect, and at how much fibre.

@@ -20,8 +20,6 @@ from ccfem.slicing.layers.layer_stress import stress_on
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["FRONTS", "front_picture", "layer_view", "paragraphs", "shown_layer"]
-
 FRONTS: Mapping[str, tuple[str, str]] = {
     "fibre_length": ("fibre, mm", "low"),
     "print_time_nearest": ("time to lay the fibre, s", "low"),

@@ -18,16 +18,6 @@ from ccfem.base.checks import (
 )
 from ccfem.base.errors import InputError
 
-__all__ = [
-    "Material",
-    "isotropic",
-    "material_names",
-    "named_material",
-    "plane_stress",
-    "printed_pla",
-    "transversely_isotropic",
-]
-
 
 @dataclass(frozen=True)
 class Material:

@@ -14,8 +14,6 @@ from ccfem.geometry.polylines import (
     straight_pieces,
 )
 
-__all__ = ["clear_ends"]
-
 _MOST = 1.25
 """Largest length cut off an end, in distances: a strand that meets another at less than about 25
 degrees runs along it, not into it."""

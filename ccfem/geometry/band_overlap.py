@@ -6,8 +6,6 @@ from numba import njit
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.geometry.buckets import Buckets
 
-__all__ = ["share_room"]
-
 _SLIVER = 1e-9
 """Share of a width below which an overlap counts as rounding error."""
 

@@ -26,8 +26,6 @@ from ccfem.geometry.band_overlap import share_room
 from ccfem.geometry.buckets import bucket
 from ccfem.geometry.polylines import lengths, resample, starts_segment
 
-__all__ = ["SAME_DIRECTION", "Beads", "beads"]
-
 SAME_DIRECTION = np.radians(30.0)
 """Largest angle, radians, between strands that lie side by side and do not cross."""
 

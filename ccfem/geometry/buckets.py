@@ -7,8 +7,6 @@ from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray
 
-__all__ = ["Buckets", "bucket"]
-
 _MOST_CELLS = 4_000_000
 
 

@@ -5,8 +5,6 @@ from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, seen_only
 
-__all__ = ["earlier_in_cones", "groups_in_cones"]
-
 _BLOCK = 32
 """Number of consecutive points with a common bounding sphere, which is checked first."""
 

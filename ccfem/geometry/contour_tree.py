@@ -19,8 +19,6 @@ from ccfem.geometry.offsets import ring_from, rings
 from ccfem.geometry.polylines import line_length, resample
 from ccfem.geometry.shapes import Region
 
-__all__ = ["SAMPLES", "ContourTree", "contour_trees"]
-
 SAMPLES = 3
 """Samples of a contour per spacing of length."""
 _QUARTER = 16

@@ -5,8 +5,6 @@ import numpy as np
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.polylines import inner_points, lengths, resample, turning_angles
 
-__all__ = ["curvature_samples"]
-
 
 def curvature_samples(
     points: FloatArray, offsets: IntArray, closed: BoolArray, step: float

@@ -13,8 +13,6 @@ from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray
 
-__all__ = ["WORDS", "advance", "curve_points", "shortest_curve", "word_sizes"]
-
 WORDS: IntArray = np.array(
     [[1, 0, 1], [-1, 0, -1], [1, 0, -1], [-1, 0, 1], [1, -1, 1], [-1, 1, -1]], dtype=np.int64
 )

@@ -6,8 +6,6 @@ from numba import njit
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.polylines import merge_repeated, subdivide
 
-__all__ = ["OFF", "even_steps"]
-
 OFF = 0.005
 """Largest deviation of final paths from planned ones, in steps."""
 

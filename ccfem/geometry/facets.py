@@ -5,8 +5,6 @@ from numba import njit
 
 from ccfem.base.arrays import BoolArray, IntArray
 
-__all__ = ["are_among", "facet_keys", "paired", "positions", "unique_edges"]
-
 _FEW = 16
 """Node numbers to a pair of nodes, up to which all of them are counted."""
 

@@ -11,8 +11,6 @@ from ccfem.geometry.offsets import rings
 from ccfem.geometry.polylines import is_closed, line_length, straight_pieces
 from ccfem.geometry.shapes import Region
 
-__all__ = ["extend_free_ends", "strips"]
-
 _STEEPEST = 25.0
 """Least angle, degrees, at which an extended strand may meet what is ahead. A strip between strands
 that run side by side gets another strand along its middle instead."""

@@ -16,8 +16,6 @@ from ccfem.geometry.own_way import until_itself
 from ccfem.geometry.polylines import line_length, pack, sample_midpoints, straight_pieces
 from ccfem.geometry.shapes import Region, open_lines
 
-__all__ = ["fitted_guides", "spaced_guides"]
-
 _SHIFTS = np.array([0.0, 0.5, 0.25, -0.25, 0.125, -0.125, 0.375, -0.375])
 """Sideways shifts that are tried, in pitches, preferred ones first."""
 _BETTER = 0.01

@@ -9,8 +9,6 @@ from ccfem.base.arrays import FloatArray, IntArray, repeated
 from ccfem.geometry.offsets import inset, rings
 from ccfem.geometry.shapes import Region
 
-__all__ = ["Hatch", "hatch", "link_hatch", "zigzag"]
-
 
 @dataclass(frozen=True)
 class Hatch:

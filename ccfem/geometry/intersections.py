@@ -7,8 +7,6 @@ from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.buckets import bucket
 from ccfem.geometry.polylines import lengths, starts_segment, subdivide
 
-__all__ = ["find_crossings"]
-
 _TOUCH = 1e-9
 """Distance, mm, within which a point lies on a segment."""
 

@@ -10,8 +10,6 @@ from ccfem.geometry.buckets import bucket
 from ccfem.geometry.facets import unique_edges
 from ccfem.geometry.polylines import starts_segment
 
-__all__ = ["Isocontours", "isocontours", "least_distance", "triangle_edges"]
-
 
 @dataclass(frozen=True)
 class Isocontours:

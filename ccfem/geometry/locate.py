@@ -8,8 +8,6 @@ from numba import njit
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.geometry.buckets import bucket
 
-__all__ = ["locate"]
-
 
 def locate(
     points: FloatArray, simplices: IntArray, queries: FloatArray, reach: float = 0.0

@@ -6,8 +6,6 @@ from scipy.sparse.csgraph import connected_components
 
 from ccfem.base.arrays import FloatArray, IntArray
 
-__all__ = ["connected", "signed_areas", "signed_volumes"]
-
 
 def signed_areas(points: FloatArray, triangles: IntArray) -> FloatArray:
     """Area of triangles (t, 3) of points (n, 2), (t,), mm^2; negative where clockwise."""

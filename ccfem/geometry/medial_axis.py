@@ -22,8 +22,6 @@ from ccfem.geometry.offsets import rings
 from ccfem.geometry.polylines import is_closed, line_length
 from ccfem.geometry.shapes import Region
 
-__all__ = ["MedialAxis", "MedialSegment", "medial_axis"]
-
 _SAME = 1e-4
 """Distance, as a share of the sampling step, below which points of the axis are the same."""
 _NEARER = 1e-3

@@ -10,8 +10,6 @@ from ccfem.geometry.parallel_strands import grow
 from ccfem.geometry.shapes import Region
 from ccfem.geometry.shells import concentric
 
-__all__ = ["medial_fill"]
-
 _SHORTEST = 4.0
 """Segments of the medial axis shorter than this many pitches are left out."""
 _BETTER = 0.05

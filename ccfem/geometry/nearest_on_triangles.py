@@ -8,8 +8,6 @@ from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import FloatArray, IntArray, seen_only
 
-__all__ = ["Nearest", "nearest_on_triangles"]
-
 _FIRST = (40,)
 _ROUNDS = (1, *(8 * 4**k for k in range(14)))
 """Numbers of triangles that are checked: of all sizes first, then of one size after another."""

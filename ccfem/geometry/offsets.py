@@ -10,8 +10,6 @@ from ccfem.base.arrays import FloatArray
 from ccfem.geometry.polylines import along_line, line_length
 from ccfem.geometry.shapes import Region
 
-__all__ = ["inset", "join_rings", "offset_rings", "ring_from", "rings"]
-
 _QUARTER = 8
 """Segments per quarter turn where an opened corner is rounded."""
 

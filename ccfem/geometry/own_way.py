@@ -6,8 +6,6 @@ from numba import njit
 from ccfem.base.arrays import FloatArray
 from ccfem.geometry.polylines import is_closed
 
-__all__ = ["until_itself"]
-
 _OWN = 3.0
 """Length along the seed line, in fibre widths, within which it may be near itself."""
 

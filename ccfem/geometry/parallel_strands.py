@@ -12,8 +12,6 @@ from ccfem.geometry.polylines import is_closed, line_length, straight_pieces
 from ccfem.geometry.shapes import Region, open_lines, strings
 from ccfem.geometry.shells import concentric
 
-__all__ = ["grow", "lengthened"]
-
 _ARC = 16
 """Segments per quarter turn round an end or a corner of a curve."""
 _LEAST_REST = 1.0

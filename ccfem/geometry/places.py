@@ -8,8 +8,6 @@ import shapely
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.geometry.shapes import Region
 
-__all__ = ["INSIDE", "OUTSIDE", "TOLERANCE", "VOID", "Pieces", "cut_at_section", "section_places"]
-
 INSIDE, VOID, OUTSIDE = range(3)
 """In the section; in a hole of it, or anywhere else within its outer rings; beyond those."""
 

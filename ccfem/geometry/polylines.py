@@ -11,30 +11,6 @@ import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, repeated
 
-__all__ = [
-    "along_line",
-    "angles_between",
-    "arc_lengths",
-    "between",
-    "inner_points",
-    "is_closed",
-    "lengths",
-    "line_length",
-    "merge_repeated",
-    "middle_of_longest_run",
-    "pack",
-    "point_at",
-    "points_along",
-    "resample",
-    "runs",
-    "sample_at",
-    "sample_midpoints",
-    "starts_segment",
-    "straight_pieces",
-    "subdivide",
-    "turning_angles",
-]
-
 
 def pack(lines: Sequence[FloatArray]) -> tuple[FloatArray, IntArray]:
     """Points (P, d) and offsets (K + 1,) of a list of (n_i, d) polylines."""

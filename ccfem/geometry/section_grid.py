@@ -11,8 +11,6 @@ from ccfem.base.arrays import BoolArray, FloatArray, IntArray, repeated
 from ccfem.geometry.places import INSIDE, OUTSIDE, VOID
 from ccfem.geometry.shapes import Region
 
-__all__ = ["SectionGrid", "contains", "place", "place_and_room", "section_grid"]
-
 _CELL = 0.5
 """Minimum size of a cell, mm."""
 _MOST_CELLS = 1_000_000

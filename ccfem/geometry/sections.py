@@ -6,8 +6,6 @@ import shapely
 from ccfem.base.arrays import FloatArray
 from ccfem.geometry.shapes import Region
 
-__all__ = ["corners_only"]
-
 _STRAIGHT = 1e-6
 """Turn of the border, radians, below which a point lies on a straight side."""
 _DECIMALS = 11

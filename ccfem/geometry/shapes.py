@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 from ccfem.base.arrays import FloatArray
 from ccfem.geometry.polylines import pack
 
-__all__ = ["Region", "Shapes", "open_lines", "strings"]
-
 Region = shapely.Polygon | shapely.MultiPolygon
 """An area in a plane, mm: the section of a layer or a part of it; it may be empty."""
 

@@ -10,8 +10,6 @@ from ccfem.geometry.polylines import is_closed, line_length, runs, straight_piec
 from ccfem.geometry.sections import corners_only
 from ccfem.geometry.shapes import Region
 
-__all__ = ["concentric", "shells"]
-
 _LEAST_GAP = 0.5
 """Narrowest strip, in pitches, that gets a strand, which then overlaps its neighbours: the sum of
 gap and overlap is then smallest."""

@@ -8,8 +8,6 @@ import shapely
 from ccfem.base.arrays import FloatArray
 from ccfem.geometry.shapes import Region
 
-__all__ = ["Mirror", "mirror_image", "mirror_lines", "mirrors_of", "reflected"]
-
 _ALIKE = 1e-3
 """Share of its area by which a symmetric region may differ from its mirror image."""
 _EQUAL = 1e-3

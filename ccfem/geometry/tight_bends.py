@@ -13,8 +13,6 @@ from ccfem.geometry.polylines import (
     turning_angles,
 )
 
-__all__ = ["tight_bends", "tight_samples"]
-
 _SAMPLES = 8
 """Number of samples of the curvature a width."""
 

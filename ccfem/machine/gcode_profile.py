@@ -9,8 +9,6 @@ from ccfem.base.checks import check_choices
 from ccfem.base.errors import InputError
 from ccfem.machine.ranges import check_ranges
 
-__all__ = ["FeedAxes", "GcodeProfile"]
-
 _ALWAYS = (
     *("bed_temperature", "matrix_temperature", "fibre_temperature"),
     *("matrix_standby", "fibre_standby", "tool", "wait"),

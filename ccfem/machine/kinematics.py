@@ -9,8 +9,6 @@ from ccfem.base.arrays import FloatArray
 from ccfem.base.checks import check_choices
 from ccfem.machine.ranges import check_ranges
 
-__all__ = ["Kinematics", "axis_values", "head_pose"]
-
 _UPRIGHT = 1e-6
 """Sine of the tilt below which the second rotation is undefined, and is kept."""
 

@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 from ccfem.machine.ranges import check_ranges
 
-__all__ = ["Limits"]
-
 
 @dataclass(frozen=True)
 class Limits:

@@ -10,8 +10,6 @@ from ccfem.machine.print_process import Process
 from ccfem.machine.ranges import check_ranges
 from ccfem.machine.speed_table import SpeedTable
 
-__all__ = ["Machine"]
-
 _CUTTER_DISTANCE = 42.0
 """Chen et al. 2021, section 5.2, mm."""
 

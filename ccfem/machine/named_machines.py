@@ -17,8 +17,6 @@ from ccfem.base.errors import InputError, shown
 from ccfem.base.toml import from_table, read_toml
 from ccfem.machine.machine import Machine
 
-__all__ = ["machine_about", "machine_from", "machine_names", "machine_table", "updated"]
-
 _FOLDER = resources.files("ccfem.machine") / "built_in"
 
 

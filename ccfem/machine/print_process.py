@@ -6,8 +6,6 @@ from typing import Literal
 from ccfem.base.checks import check_choices
 from ccfem.machine.ranges import check_ranges
 
-__all__ = ["Process"]
-
 
 @dataclass(frozen=True)
 class Process:

@@ -6,8 +6,6 @@ from typing import Any, get_args, get_type_hints
 from ccfem.base.checks import check_number, member_name
 from ccfem.base.errors import InputError
 
-__all__ = ["RANGES", "Range", "check_ranges"]
-
 
 @dataclass(frozen=True)
 class Range:

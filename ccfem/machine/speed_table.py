@@ -9,8 +9,6 @@ from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError
 from ccfem.machine.ranges import check_ranges
 
-__all__ = ["SpeedTable"]
-
 
 @dataclass(frozen=True)
 class SpeedTable:

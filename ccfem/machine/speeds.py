@@ -14,8 +14,6 @@ from ccfem.geometry.polylines import (
 )
 from ccfem.machine.speed_table import SpeedTable
 
-__all__ = ["step_curvatures", "table_speeds"]
-
 _DIGITS = 9
 """Decimals that curvature and length are rounded to."""
 _ANGLE_DIGITS = 0

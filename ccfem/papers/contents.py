@@ -10,8 +10,6 @@ from ccfem.base.progress import Progress, silent
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Contents", "WhenAsked", "drawn_of"]
-
 K = TypeVar("K")
 V = TypeVar("V")
 

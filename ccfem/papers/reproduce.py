@@ -19,8 +19,6 @@ from ccfem.base.result_folder import whole_folder
 from ccfem.base.whole import whole_file
 from ccfem.papers.contents import Contents
 
-__all__ = ["KEPT", "named_papers", "reproduce"]
-
 KEPT = "kept.json"
 """File beside the tables and figures of a paper that says what they were made of."""
 _DATA = ("CCFEM_CHEN2021", "CCFEM_FANG2024")

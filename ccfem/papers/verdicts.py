@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Check", "claim_table", "judged"]
-
 
 @dataclass(frozen=True)
 class Check:

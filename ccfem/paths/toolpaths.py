@@ -9,8 +9,6 @@ from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.base.display import Shown
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["FIBRE", "KINDS", "MATRIX", "SUPPORT", "TRAVEL", "Toolpaths"]
-
 KINDS = ("fibre", "matrix", "support", "travel")
 FIBRE, MATRIX, SUPPORT, TRAVEL = range(4)
 

@@ -9,10 +9,9 @@ from ccfem.base.arrays import FloatArray
 from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import FIBRE
+from ccfem.printing.laid_layer import COORDINATE_DIGITS
 from ccfem.printing.poses import poses
-from ccfem.printing.print_plan import COORDINATE_DIGITS, PrintPlan
-
-__all__ = ["Beside", "beside"]
+from ccfem.printing.print_plan import PrintPlan
 
 _GAP = 4.0
 """Distance from the part to the block and the bar, mm, with an upright head. Our choice."""

@@ -15,8 +15,6 @@ from ccfem.printing.layer_matrix import layer_matrix
 from ccfem.printing.support import SupportLayers, support_paths
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["FilledLayer", "filled_layers", "in_order"]
-
 _LEAST = 0.2
 """Least share of a layer's height that matrix fills, however much its fibre takes. Our choice."""
 _UNEVEN = 0.1

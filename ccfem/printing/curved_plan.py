@@ -13,15 +13,14 @@ from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.printing.curved_layers import FilledLayer, filled_layers, in_order
 from ccfem.printing.head_lean import Matter, cleared, touched_length
 from ccfem.printing.islands import Islands, clashes, island_order, islands_of, rests_on, steps_of
+from ccfem.printing.laid_layer import COORDINATE_DIGITS
 from ccfem.printing.poses import poses
-from ccfem.printing.print_plan import COORDINATE_DIGITS, PrintPlan
+from ccfem.printing.print_plan import PrintPlan
 from ccfem.printing.support import SupportLayers
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.plane import plane_frame
 from ccfem.slicing.layers.slicer import Vector
 from ccfem.slicing.layers.standing import standing
-
-__all__ = ["curved_plan"]
 
 _MISSING = 0.01
 """Share of the part's volume that may be missing without a warning."""

@@ -8,8 +8,6 @@ from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.machine.machine import Machine
 from ccfem.printing.moves import CUT, FEED, LAY, PREHEAT, STANDBY, TRAVEL, WAIT, WORK, Moves
 
-__all__ = ["durations", "waits"]
-
 
 def durations(moves: Moves, machine: Machine, heating: bool = True) -> FloatArray:
     """Seconds that each row takes.

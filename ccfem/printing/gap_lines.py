@@ -9,8 +9,6 @@ from scipy.spatial import Voronoi
 from ccfem.base.arrays import FloatArray
 from ccfem.geometry.shapes import Region, open_lines, strings
 
-__all__ = ["gap_lines"]
-
 _NARROW = 0.3
 """Least width of a gap that gets a line, in line widths. Our choice."""
 _SMALL = 1.0

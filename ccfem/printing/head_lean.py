@@ -11,8 +11,6 @@ from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.poses import under_bed
 
-__all__ = ["Cleared", "Matter", "cleared", "touched_length"]
-
 _LEANS = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0)
 """Angles, degrees, by which a head may lean from the normal of its layer. Our choice: about half
 the angle at which its own side touches the layer (90 degrees less `Machine.head_angle`)."""

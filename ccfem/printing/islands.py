@@ -18,8 +18,6 @@ from ccfem.machine.machine import Machine
 from ccfem.printing.poses import poses
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["Islands", "clashes", "island_order", "islands_of", "rests_on", "steps_of"]
-
 _COARSE = 2.0
 """Side, mm, of the cubes in which an island is represented by one point."""
 _PATCH = 6

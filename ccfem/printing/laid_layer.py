@@ -17,8 +17,6 @@ from ccfem.printing.matrix_flow import pad_flow, with_flow
 from ccfem.printing.matrix_lines import MatrixFill
 from ccfem.printing.slabs import LOW
 
-__all__ = ["COORDINATE_DIGITS", "SHORT", "Below", "LaidLayer", "fibre_layer", "matrix_layer"]
-
 COORDINATE_DIGITS = 3
 """Decimals of coordinates, mm."""
 

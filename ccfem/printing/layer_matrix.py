@@ -12,8 +12,6 @@ from ccfem.paths.fields.chart import chart_of, flat_view
 from ccfem.paths.toolpaths import MATRIX, Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["layer_matrix"]
-
 _HALF_WIDTHS = 0.5
 """Distance of the outermost ring from the border, in widths."""
 

@@ -10,8 +10,6 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["MOST_LINES", "MOST_STRANDS", "check_matrix_lines", "check_strands"]
-
 MOST_LINES = 1e6
 """Lines of matrix: some minutes, and about 3 GB."""
 MOST_STRANDS = 1e5

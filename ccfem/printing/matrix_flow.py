@@ -24,8 +24,6 @@ from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.strand_density import StrandDensity
 
-__all__ = ["THIN", "pad_flow", "with_flow"]
-
 _PIECE = 2.0
 """Longest piece, mm, over which the height is constant."""
 _STEP = 0.05

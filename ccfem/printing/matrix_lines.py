@@ -18,8 +18,6 @@ from ccfem.printing.slabs import Slab
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.planar import Planar
 
-__all__ = ["MatrixFill", "matrix_fills"]
-
 _OVERLAP = 0.25
 """Overlap of the ends of the zigzag with the contour, in line widths. Our choice."""
 

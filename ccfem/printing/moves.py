@@ -6,12 +6,6 @@ import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, in_brief
 
-__all__ = [
-    *("CUT", "EVENTS", "FAN", "FEED", "HEAT", "HEAT_BED", "LAY", "LAYER", "PATH_END"),
-    *("PATH_START", "PREHEAT", "ROLES", "STANDBY", "TOOL", "TRAVEL", "WAIT", "WORK"),
-    *("Moves", "role"),
-]
-
 EVENTS = (
     *("travel", "lay", "feed", "cut", "tool", "standby", "preheat", "heat", "work"),
     *("heat bed", "fan", "wait", "layer", "start", "end"),

@@ -12,8 +12,6 @@ from ccfem.geometry.polylines import line_length
 from ccfem.geometry.shapes import Region, open_lines, strings
 from ccfem.machine.machine import Machine
 
-__all__ = ["border_crossings", "cut_at_border", "pad_lines", "pad_regions"]
-
 _MORE = 1.0
 """Width by which a pad extends beyond the strands on it, mm. Our choice."""
 _CLEAR = 0.7

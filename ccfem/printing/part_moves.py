@@ -9,13 +9,12 @@ from ccfem.base.errors import InputError
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import FIBRE, SUPPORT
 from ccfem.printing.beside import Beside, beside
+from ccfem.printing.laid_layer import COORDINATE_DIGITS
 from ccfem.printing.moves import FEED, LAY, TRAVEL, Moves
 from ccfem.printing.preheating import preheated
-from ccfem.printing.print_plan import COORDINATE_DIGITS, PrintPlan
+from ccfem.printing.print_plan import PrintPlan
 from ccfem.printing.recorder import Recorder
 from ccfem.printing.tools import begin_layer, change_tool, lay_matrix, lay_strand
-
-__all__ = ["part_moves"]
 
 _UP = np.array([0.0, 0.0, 1.0])
 

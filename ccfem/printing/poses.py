@@ -5,9 +5,6 @@ import numpy as np
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.machine.machine import Machine
 
-__all__ = ["limited_tilt", "poses", "under_bed"]
-
-
 _UP = np.array([0.0, 0.0, 1.0])
 
 

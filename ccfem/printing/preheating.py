@@ -8,8 +8,6 @@ from ccfem.machine.machine import Machine
 from ccfem.printing.duration import durations
 from ccfem.printing.moves import PREHEAT, STANDBY, WORK, Moves
 
-__all__ = ["preheated"]
-
 
 def preheated(moves: Moves, machine: Machine) -> Moves:
     """Insert a row PREHEAT before each change back to a tool that was set to standby.

@@ -31,8 +31,6 @@ from ccfem.slicing.layers import Layer
 from ccfem.slicing.layers.plane import Plane
 from ccfem.slicing.slicers.planar import Planar
 
-__all__ = ["COORDINATE_DIGITS", "PrintPlan", "check_machine", "plan_print"]
-
 
 @dataclass(frozen=True)
 class PrintPlan:

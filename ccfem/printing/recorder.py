@@ -5,10 +5,8 @@ import numpy as np
 from ccfem.base.arrays import FloatArray
 from ccfem.geometry.polylines import subdivide
 from ccfem.machine.machine import Machine
+from ccfem.printing.laid_layer import COORDINATE_DIGITS
 from ccfem.printing.moves import FEED, LAY, TRAVEL, Moves, role
-from ccfem.printing.print_plan import COORDINATE_DIGITS
-
-__all__ = ["Recorder"]
 
 _FEED_DIGITS = 5
 """Decimals of what is fed, mm."""

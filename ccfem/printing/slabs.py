@@ -10,8 +10,6 @@ from ccfem.base.errors import InputError
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers import Layer
 
-__all__ = ["LOW", "Slab", "check_cover", "slabs_of"]
-
 LOW = 0.1
 """Least height of a line of matrix, mm. Our choice."""
 _SAME = 1e-6

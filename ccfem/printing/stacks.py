@@ -20,8 +20,6 @@ from ccfem.machine.machine import Machine
 from ccfem.printing.matrix_flow import THIN
 from ccfem.printing.strand_density import StrandDensity
 
-__all__ = ["Ended", "ended_in_stacks", "height_over"]
-
 _STEP = 0.5
 """Distance of the places on a strand where the stack is looked at, in fibre widths."""
 _ROUNDS = 40

@@ -9,8 +9,6 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.geometry.polylines import pack, sample_midpoints
 
-__all__ = ["StrandDensity"]
-
 _CELL = 0.25
 _SPREAD = 0.5
 """Cell of the grid on which fibre is counted, and standard deviation of the bell curve that spreads

@@ -7,8 +7,6 @@ from ccfem.geometry.polylines import along_line, points_along, turning_angles
 from ccfem.machine.machine import Machine
 from ccfem.machine.speeds import step_curvatures, table_speeds
 
-__all__ = ["strand_speeds"]
-
 _REACH = 2.0
 """Least length over which curvature is taken, in fibre widths; that of `ccfem.paths.linking`."""
 _PIECES = 5

@@ -5,6 +5,7 @@ import numpy as np
 from ccfem.base.arrays import FloatArray
 from ccfem.geometry.polylines import along_line, line_length, points_along
 from ccfem.machine.machine import Machine
+from ccfem.printing.laid_layer import COORDINATE_DIGITS
 from ccfem.printing.moves import (
     CUT,
     FAN,
@@ -18,11 +19,8 @@ from ccfem.printing.moves import (
     WAIT,
     WORK,
 )
-from ccfem.printing.print_plan import COORDINATE_DIGITS
 from ccfem.printing.recorder import Recorder
 from ccfem.printing.strand_speed import strand_speeds
-
-__all__ = ["begin_layer", "change_tool", "lay_matrix", "lay_strand", "matrix_area"]
 
 
 def matrix_area(machine: Machine) -> float:

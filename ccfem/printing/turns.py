@@ -8,8 +8,6 @@ from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
 from ccfem.printing.pads import border_crossings, cut_at_border
 
-__all__ = ["turned"]
-
 
 def turned(
     lines: list[FloatArray], border: Region, layer: int, machine: Machine

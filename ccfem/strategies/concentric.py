@@ -18,8 +18,6 @@ from ccfem.paths.raster.patterns import Regions, concentric_regions
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress
 
-__all__ = ["Concentric"]
-
 _CLOSEST = 0.6
 """Least distance between filled rings, in spacings [Plocher et al. 2022]."""
 

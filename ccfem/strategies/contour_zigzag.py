@@ -16,8 +16,6 @@ from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress
 from ccfem.strategies.concentric import Concentric
 
-__all__ = ["ContourZigzag"]
-
 
 @dataclass(frozen=True)
 class ContourZigzag:

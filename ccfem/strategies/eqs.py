@@ -27,8 +27,6 @@ from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress
 from ccfem.strategies.stress_tracing.stress_lines import misalignment, plane_stress_at, stress_lines
 
-__all__ = ["Eqs"]
-
 _STEP = 0.25
 """Step along the seed line, in fibre widths."""
 _CANDIDATES = 20

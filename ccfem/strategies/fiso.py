@@ -22,8 +22,6 @@ from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress
 
-__all__ = ["Fiso"]
-
 _NARROW = 0.5
 """Least distance between opposite sides of a contour, in spacings, where laps keep a radius."""
 

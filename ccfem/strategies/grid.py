@@ -26,8 +26,6 @@ from ccfem.paths.raster.patterns import Regions, grid_regions
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress
 
-__all__ = ["Grid"]
-
 
 @dataclass(frozen=True)
 class Grid(Infill):

@@ -40,8 +40,6 @@ from ccfem.slicing.layers.holes import holes_on
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress, stress_on
 
-__all__ = ["Isocurve"]
-
 Field = Literal["layer", "mesh"]
 Source = Literal["nodal", "cell"]
 Sense = Literal["tensile", "absolute"]

@@ -20,8 +20,6 @@ from ccfem.paths.raster.patterns import Regions, medial_regions
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress
 
-__all__ = ["Mat"]
-
 
 @dataclass(frozen=True)
 class Mat(Infill):

@@ -32,8 +32,6 @@ from ccfem.paths.raster.patterns import Regions, inside_shells, stress_regions
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress
 
-__all__ = ["Mps"]
-
 _STEP = 0.5
 _APART = 2.0
 _SHORTEST = 6.0

@@ -21,8 +21,6 @@ from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress
 
-__all__ = ["Offset"]
-
 _QUARTER = 16
 """Segments per quarter turn round a re-entrant corner."""
 

@@ -27,8 +27,6 @@ from ccfem.strategies.fibre_aware.plan_cases import plan_by_layers
 from ccfem.strategies.fibre_aware.shortening import TIGHT_SHARES
 from ccfem.strategies.fibre_aware.upper_bound import measures
 
-__all__ = ["Pruned"]
-
 _BASES: Mapping[str, Mapping[str, Any]] = {"isocurve": {"link_limit": 10.0}}
 """Base parameters with which a strategy plans better when its fibre is pruned afterwards."""
 

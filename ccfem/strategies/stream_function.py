@@ -53,8 +53,6 @@ from ccfem.strategies.fibre_aware.stream_start import plane_axes, start_fields
 from ccfem.strategies.fibre_aware.strength_design import design_for_strength
 from ccfem.strategies.fibre_aware.upper_bound import measures
 
-__all__ = ["StreamFunction"]
-
 _ALIKE = 0.8
 """Share of the stress common to all heights above which all layers get one field."""
 

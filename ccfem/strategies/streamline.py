@@ -22,8 +22,6 @@ from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress
 
-__all__ = ["Streamline"]
-
 _LEAST = 0.995
 """Least distance between lines, in fibre widths. At exactly one width rounding would end lines that
 run side by side."""

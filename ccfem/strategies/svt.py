@@ -38,8 +38,6 @@ from ccfem.strategies.stress_tracing.tails import tail_turns
 from ccfem.strategies.stress_tracing.tracks import tracks
 from ccfem.strategies.stress_tracing.walk import walk
 
-__all__ = ["Svt"]
-
 _SAMPLING = 0.5
 """Distance between the border samples for the medial axis, in fibre widths."""
 _LEAST = 20.0

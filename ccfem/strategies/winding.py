@@ -39,8 +39,6 @@ from ccfem.strategies.winding_curves.paper_field import PaperWeights, paper_fiel
 from ccfem.strategies.winding_curves.piece import Piece, pieces_with_joints
 from ccfem.strategies.winding_curves.spaced import CLOSEST, kept_apart
 
-__all__ = ["Winding"]
-
 _CLIP = 5.0
 """Largest weight of a triangle, in mean weights of its layer."""
 _REACH = 4.0

@@ -15,8 +15,6 @@ from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress
 
-__all__ = ["Zigzag"]
-
 
 @dataclass(frozen=True)
 class Zigzag:

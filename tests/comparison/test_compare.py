@@ -17,10 +17,10 @@ from ccfem.cli import commands
 from ccfem.comparison.engine import compare
 from ccfem.comparison.files import write_results
 from ccfem.comparison.headline import HEADLINE, cell_text, headline_values
-from ccfem.comparison.pictures import caption
 from ccfem.comparison.ranking import best_values
 from ccfem.comparison.remarks import bound_remark
 from ccfem.comparison.request import STRATEGIES, Request, Spread, named_strategies
+from ccfem.comparison.shown import caption
 from ccfem.fem.elasticity.problem import Force, Problem, Support
 from ccfem.fem.elasticity.support_kinds import PressingSupport
 from ccfem.fem.elasticity.system import System

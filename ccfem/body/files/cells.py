@@ -8,8 +8,6 @@ import numpy as np
 from ccfem.base.arrays import IntArray
 from ccfem.base.errors import InputError
 
-__all__ = ["tetrahedra"]
-
 _SOLIDS = ("tetra", "hexahedron", "wedge", "pyramid", "polyhedron", "voxel")
 
 

@@ -13,8 +13,6 @@ from ccfem.body.files.formats import format_of, suffixes
 from ccfem.body.mesh.check import check_mesh
 from ccfem.body.mesh.tet_mesh import TetMesh
 
-__all__ = ["check_mesh_name", "read_mesh", "write_mesh"]
-
 _SURFACES = (".stl", ".obj", ".ply")
 
 

@@ -13,8 +13,6 @@ from ccfem.base.whole import existing_file
 from ccfem.body.isolated.limited import read_isolated
 from ccfem.body.isolated.process import ChildError
 
-__all__ = ["Surface", "is_surface", "read_surface", "write_stl"]
-
 _SUFFIXES = (".obj", ".ply", ".stl")
 _NOTHING = 1e-12
 """Volume over area and diagonal that counts as none."""

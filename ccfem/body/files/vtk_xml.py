@@ -16,8 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ccfem.base.errors import InputError, shown
 
-__all__ = ["as_bytes", "write_vtk_xml"]
-
 _EFFORT = 4
 """Compression level of zlib, 1 to 9; higher ones make the files of the loop no smaller."""
 _TYPES = {"f": ("f8", "Float64"), "b": ("u1", "UInt8")}

@@ -5,8 +5,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["fill"]
-
 
 def fill(points: NDArray[Any], triangles: NDArray[Any], size: float) -> dict[str, Any]:
     """Tetrahedra in a surface; ``points`` and ``cells``."""

@@ -4,8 +4,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["read"]
-
 
 def read(path: str) -> dict[str, Any]:
     """Points, cells and groups of triangles of a .msh file.

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from ccfem.base.errors import InputError
 
-__all__ = ["cad_surface", "cad_volume", "fill"]
-
 _ROUND = 12
 """Edges on a full turn of a round wall, where the size that is asked for would give fewer."""
 _FINEST = 0.15

@@ -5,8 +5,6 @@ from typing import Any
 
 from ccfem.body.isolated.process import in_own_process
 
-__all__ = ["read_isolated"]
-
 _SECONDS, _PER_SECOND = 15.0, 2e6
 """Time of the processor for any file, and bytes that are given a second more."""
 _BUSY = 4.0

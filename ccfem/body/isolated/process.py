@@ -12,8 +12,6 @@ import numpy as np
 
 from ccfem.base.errors import InputError
 
-__all__ = ["NOT_WRITTEN", "ChildError", "in_own_process"]
-
 NOT_WRITTEN = 74
 """Exit code of a child that cannot write what it found, as on a full disk."""
 

@@ -5,8 +5,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["read_grid", "read_surface"]
-
 _NODES = {5: 3, 10: 4, 22: 6, 24: 10}
 """Nodes of the cells whose nodes are wanted, by VTK's number of their type."""
 

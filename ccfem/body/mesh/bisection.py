@@ -13,8 +13,6 @@ from ccfem.base.arrays import BoolArray, IntArray
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.facets import unique_edges
 
-__all__ = ["bisected"]
-
 
 def bisected(mesh: TetMesh, chosen: BoolArray) -> tuple[TetMesh, IntArray]:
     """Halve chosen cells at their longest edges, and what of their neighbours has to follow.

@@ -8,8 +8,6 @@ from ccfem.base.arrays import IntArray
 from ccfem.base.checks import check_number
 from ccfem.body.mesh.tet_mesh import TetMesh
 
-__all__ = ["box_mesh"]
-
 _SIDES = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
 
 

@@ -14,8 +14,6 @@ from ccfem.base.checks import check_known
 from ccfem.base.errors import InputError
 from ccfem.geometry.facets import paired
 
-__all__ = ["CellMesh"]
-
 _NONE: Mapping[str, FloatArray] = MappingProxyType({})
 
 

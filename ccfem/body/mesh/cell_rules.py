@@ -14,8 +14,6 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.patches import Vector, unit_vector
 from ccfem.body.mesh.tet_mesh import TetMesh
 
-__all__ = ["CellBox", "CellCylinder", "CellRule", "check_box"]
-
 
 class CellRule(Protocol):
     """Chooses cells of a mesh."""

@@ -16,8 +16,6 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.facets import are_among, facet_keys
 from ccfem.geometry.measures import connected, signed_volumes
 
-__all__ = ["MeshReport", "about_slivers", "check_mesh"]
-
 _FLAT = 1e-12
 """Volume over the cube of the longest edge, at and below which a cell counts as flat."""
 _SLIVER = 100.0

@@ -4,8 +4,6 @@ import re
 
 from ccfem.base.errors import InputError
 
-__all__ = ["check_free", "face_name", "number_of_face"]
-
 _NAME = re.compile("face_([0-9]+)")
 
 

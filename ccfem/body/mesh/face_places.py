@@ -14,8 +14,6 @@ from ccfem.body.mesh.smooth_faces import Face, direction_text, place_text
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["BodyFaces"]
-
 _REACH = 5e-3
 """Default distance of a face from its place, in diagonals: a mesh of it may be coarser."""
 _WALL = 0.05

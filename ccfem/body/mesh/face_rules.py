@@ -15,8 +15,6 @@ from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE, Face, given_faces, smoot
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.facets import are_among
 
-__all__ = ["Faces", "Holes", "OnBody", "numbered_faces", "without_faces"]
-
 _GROUPS = 2
 """Groups of faces that a mesh made of a body has at least: one may be a group of another sort."""
 _PARALLEL = 0.02

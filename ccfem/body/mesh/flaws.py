@@ -5,8 +5,6 @@ import numpy as np
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.body.mesh.pairing import CROWDED, FOLDED
 
-__all__ = ["STRAIGHT", "first_flaw"]
-
 STRAIGHT = 1e-6
 """Distance of a mid-side node from the middle of its edge, over the edge, that counts as none."""
 

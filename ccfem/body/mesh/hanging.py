@@ -6,8 +6,6 @@ from scipy.spatial import cKDTree
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.body.mesh.tet_mesh import TetMesh
 
-__all__ = ["hanging_nodes"]
-
 _TOUCH = 1e-6
 """Distance from a facet, over its longest side, within which a node lies on it."""
 

@@ -4,8 +4,6 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray
 
-__all__ = ["about_size", "in_metres"]
-
 _SMALL = 1.0
 """Diagonal, mm, below which lengths look like metres: a strand is about as wide."""
 _INCHES = 10.0

@@ -5,8 +5,6 @@ from numba import njit
 
 from ccfem.base.arrays import IntArray
 
-__all__ = ["reverse_cuthill_mckee"]
-
 
 def reverse_cuthill_mckee(start: IntArray, neighbour: IntArray) -> IntArray:
     """Order of nodes in which neighbours are close.

@@ -5,8 +5,6 @@ from numba import njit
 
 from ccfem.base.arrays import IntArray, seen_only
 
-__all__ = ["CROWDED", "FOLDED", "FREE", "pair_facets"]
-
 FREE, CROWDED, FOLDED = -1, -2, -3
 """A facet without a partner; one that more than two cells have; one with both cells on one side."""
 

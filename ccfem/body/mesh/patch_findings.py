@@ -11,8 +11,6 @@ from ccfem.body.mesh.smooth_faces import Face
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.facets import are_among
 
-__all__ = ["about_patches"]
-
 _ALL = 0.98
 """Share of the area of a wall from which it counts as taken whole."""
 _SOME = 0.01

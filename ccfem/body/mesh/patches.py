@@ -17,20 +17,6 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.face_names import check_free
 from ccfem.geometry.facets import are_among
 
-__all__ = [
-    "Bounded",
-    "Box",
-    "Cylinder",
-    "Group",
-    "Nearest",
-    "PatchRule",
-    "Plane",
-    "match_boundary",
-    "patches_from_rules",
-    "unit_vector",
-    "with_groups",
-]
-
 Vector = tuple[float, float, float]
 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}

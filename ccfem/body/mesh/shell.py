@@ -8,8 +8,6 @@ from numpy.typing import ArrayLike
 from ccfem.base.arrays import FloatArray, IntArray, read_only
 from ccfem.body.mesh.cell_mesh import CellMesh
 
-__all__ = ["Shell", "refined"]
-
 _MOST = 400_000
 """Triangles at which a surface is fine enough."""
 _SIDES = np.array([[0, 1], [1, 2], [2, 0]])

@@ -13,16 +13,6 @@ from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.base.checks import check_number
 from ccfem.geometry.facets import facet_keys
 
-__all__ = [
-    "FEATURE_ANGLE",
-    "Face",
-    "direction_text",
-    "fitted_cylinder",
-    "given_faces",
-    "place_text",
-    "smooth_faces",
-]
-
 FEATURE_ANGLE = 30.0
 """Angle between facets, degrees, from which an edge separates two faces."""
 _FLAT = 1.0

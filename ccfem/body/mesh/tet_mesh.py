@@ -14,8 +14,6 @@ from ccfem.body.mesh.pairing import FREE, pair_facets
 from ccfem.geometry.facets import positions, unique_edges
 from ccfem.geometry.measures import signed_volumes
 
-__all__ = ["TetMesh"]
-
 _FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 """Corner nodes of the face opposite to each corner, outward for a positive cell."""
 

@@ -7,8 +7,6 @@ import numpy as np
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.body.mesh.tet_mesh import TetMesh
 
-__all__ = ["CoarseWall", "coarse_wall"]
-
 _STEPS = 12
 """Cells that a ray is followed through: more than three are not those of one layer."""
 _MIDDLE = 0.15

@@ -17,8 +17,6 @@ from ccfem.base.errors import InputError
 from ccfem.base.whole import whole_file
 from ccfem.body.mesh.tet_mesh import TetMesh
 
-__all__ = ["cache_folder", "kept"]
-
 _FORMAT = 2
 """Raised when meshing changes, or what is said of it: meshes of before are made anew."""
 _MOST = 100

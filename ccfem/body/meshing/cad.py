@@ -20,8 +20,6 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.body.meshing.fidelity import fidelity
 from ccfem.body.meshing.volume import check_edge_length
 
-__all__ = ["CadSurface", "is_cad", "mesh_cad", "read_cad"]
-
 _SUFFIXES = (".brep", ".iges", ".igs", ".step", ".stp")
 
 

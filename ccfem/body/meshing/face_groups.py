@@ -12,8 +12,6 @@ from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE, given_faces, smooth_face
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.body.meshing.cad import is_cad, read_cad
 
-__all__ = ["faces_of_body", "with_faces_of"]
-
 
 def faces_of_body(
     path: str | os.PathLike[str], scale: float = 1.0, angle: float = FEATURE_ANGLE

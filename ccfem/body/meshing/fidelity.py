@@ -9,8 +9,6 @@ from ccfem.body.files.surface import Surface
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
 
-__all__ = ["Fidelity", "fidelity"]
-
 _VOLUME = 0.02
 """Share of the volume that may be lost or gained."""
 _FINEST = 0.001

@@ -14,8 +14,6 @@ from ccfem.body.meshing.cad import is_cad, mesh_cad
 from ccfem.body.meshing.face_groups import with_faces_of
 from ccfem.body.meshing.volume import Mesher, fill
 
-__all__ = ["mesh_body"]
-
 
 def mesh_body(
     path: str | os.PathLike[str],

@@ -21,8 +21,6 @@ from ccfem.geometry.facets import are_among
 from ccfem.geometry.measures import signed_areas
 from ccfem.geometry.shapes import Region
 
-__all__ = ["triangulate"]
-
 _CORNER = np.radians(25.0)
 """Turn of the outline above which a vertex is a corner, kept as a point of the mesh."""
 _PER_TURN = 24

@@ -11,8 +11,6 @@ from ccfem.body.mesh.numbering import reverse_cuthill_mckee
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.body.meshing.planform import triangulate
 
-__all__ = ["extrude"]
-
 _MOST = 2e7
 """Number of cells above which a length is taken for a mistake of units."""
 

@@ -17,8 +17,6 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.body.meshing.fidelity import Fidelity, fidelity
 from ccfem.geometry.measures import connected
 
-__all__ = ["Mesher", "check_edge_length", "fill", "tetrahedralise"]
-
 Mesher = Literal["auto", "gmsh", "ftetwild"]
 
 _MOST = 2e7

@@ -11,8 +11,6 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.patches import Bounded
 from ccfem.fem.plates import PlaneMesh
 
-__all__ = ["NEAR", "Hole", "Stretch"]
-
 NEAR = 1e-6
 """How far a node may lie from the line that it is on, mm."""
 

@@ -22,8 +22,6 @@ from ccfem.fem.materials import plane_stress
 from ccfem.fem.plates import PlaneProblem, raster_mesh
 from ccfem.fem.topopt import Design, Somp, part_shape
 
-__all__ = ["LAMINATE", "DesignPlate"]
-
 LAMINATE = plane_stress(18300.0, 19800.0, 0.17, 5150.0)
 """Stiffness of the laminate of Wang et al. 2021, MPa; Poisson's ratio 21 follows from the moduli.
 """

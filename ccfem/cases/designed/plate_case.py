@@ -12,8 +12,6 @@ from ccfem.machine.machine import Machine
 from ccfem.machine.speed_table import SpeedTable
 from ccfem.slicing.slicers.planar import Planar
 
-__all__ = ["ELEMENT_SIZE", "THICKNESS", "case_of", "designed_case", "prepreg_printer"]
-
 ELEMENT_SIZE = 1.2
 THICKNESS = 1.0
 """Of the plates, mm; that of the printed parts is not stated."""

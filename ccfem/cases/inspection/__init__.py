@@ -1,7 +1,8 @@
 """A part seen before it is solved: its mesh, patches, loads and supports, and what is doubtful."""
 
+from ccfem.body.mesh.face_places import BodyFaces
 from ccfem.cases.inspection.beginning import examples, new_part, write_example
-from ccfem.cases.inspection.body_faces import BodyFaces, faces
+from ccfem.cases.inspection.body_faces import faces
 from ccfem.cases.inspection.load_row import LoadRow
 from ccfem.cases.inspection.part_check import Check, check
 from ccfem.cases.inspection.patch_row import PatchRow

@@ -16,8 +16,6 @@ from ccfem.body.mesh.smooth_faces import Face, direction_text, place_text
 from ccfem.body.meshing.cad import is_cad
 from ccfem.cases.inspection.body_faces import faces as faces_of
 
-__all__ = ["examples", "new_part", "write_example"]
-
 _PARALLEL = np.cos(np.radians(5.0))
 """Cosine of the angle up to which planes face the same way."""
 _LISTED = 40

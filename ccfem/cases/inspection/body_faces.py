@@ -15,8 +15,6 @@ from ccfem.cases.case import Case
 from ccfem.cases.part_file import faces_of_part
 from ccfem.cases.reading import read
 
-__all__ = ["BodyFaces", "faces"]
-
 
 def faces(
     body: str | os.PathLike[str] | Case, angle: float = FEATURE_ANGLE, scale: float = 1.0

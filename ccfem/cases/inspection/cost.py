@@ -7,8 +7,6 @@ import numpy as np
 from ccfem.fem.elasticity.order import MOST_CELLS
 from ccfem.fem.elasticity.problem import Problem
 
-__all__ = ["Cost", "solve_costs"]
-
 _SECONDS = {1: 40e-6, 2: 30e-6}
 """CPU time for each unknown of linear and quadratic cells (benchmarks/speed/solve_cost.py)."""
 _BYTES = {1: 2.8e3, 2: 2.5e3}

@@ -20,8 +20,6 @@ from ccfem.fem.elasticity.plausibility import held_share
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.volume_loads import volume_forces
 
-__all__ = ["LoadRow", "load_row"]
-
 _NONE = 1e-9
 """Resultant over the sum of the sizes of the nodal forces that counts as none."""
 

@@ -30,8 +30,6 @@ from ccfem.slicing.slicers.planar import Planar
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Check", "check"]
-
 
 @dataclass(frozen=True)
 class Check(Shown):

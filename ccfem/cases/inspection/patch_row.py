@@ -9,8 +9,6 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.facets import facet_keys
 from ccfem.geometry.measures import connected
 
-__all__ = ["PatchRow", "patch_rows"]
-
 
 @dataclass(frozen=True)
 class PatchRow:

@@ -11,8 +11,6 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases.designed import ELEMENT_SIZE, THICKNESS
 from ccfem.cases.stored.stored_files import COMMAND, data_folder, write_outline
 
-__all__ = ["CASES", "DESIGNED", "build"]
-
 CASES = (
     *("bar", "loop", "open_hole", "bracket", "t_bracket", "twist_bar", "lifting_eye"),
     *("arm_bracket", "corner_bracket"),

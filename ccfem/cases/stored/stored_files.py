@@ -17,16 +17,6 @@ from ccfem.body.files import read_mesh
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.problem import Order
 
-__all__ = [
-    "COMMAND",
-    "data_folder",
-    "manifest",
-    "mesh_of_case",
-    "stored_mesh",
-    "stored_outline",
-    "write_outline",
-]
-
 COMMAND = "python -m ccfem.cases.stored.build"
 """The command that makes the files."""
 

@@ -11,9 +11,6 @@ from ccfem.comparison.plot.curves import style_axes
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["AmountPoint", "TradePoint", "amount_curves", "trade_curves"]
-
-
 _ABREAST = 3
 """Panels side by side at most."""
 

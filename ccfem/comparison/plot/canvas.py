@@ -18,19 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = [
-    "check_picture",
-    "colour_bar",
-    "extents_of",
-    "inches_per_mm",
-    "new_figure",
-    "png",
-    "png_series",
-    "save",
-    "scale_bar",
-    "title",
-]
-
 _HEAD, _FOOT = 0.50, 0.34
 """Space for title and scale bar, inches."""
 _WIDTH = 4.0

@@ -7,8 +7,6 @@ in one hue from light to dark.
 from collections.abc import Iterable
 from typing import Any
 
-__all__ = ["INK", "LINK", "OUTLINE", "SECTION", "palette", "scale"]
-
 INK = "#1d2430"
 """Text, and fibre over a stress map."""
 LINK = "#4a8fd4"

@@ -13,8 +13,6 @@ from ccfem.comparison.plot.colours import INK, OUTLINE, palette
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["axes_below", "curvature_curves", "legend_below", "matching_curves", "style_axes"]
-
 _LEAST, _MOST = 0.01, 10.0
 """Ends, 1/mm, of the scale of curvature; what is straighter counts at its left end."""
 

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
     from ccfem.body.mesh.tet_mesh import TetMesh
 
-__all__ = ["design_picture"]
-
 _OUTLINE = "#c0392b"
 _SURFACE = "#9ec1e3"
 

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["error_picture", "tension_picture"]
-
 _STROKES = 45
 """Strokes across the larger extent of a section."""
 

@@ -9,8 +9,6 @@ from ccfem.comparison.plot.curves import style_axes
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["FrontPoint", "front_figure"]
-
 
 class FrontPoint(NamedTuple):
     """One run.

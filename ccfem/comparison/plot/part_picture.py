@@ -16,15 +16,6 @@ from ccfem.geometry.facets import are_among
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = [
-    "coloured",
-    "fibre_outlines",
-    "load_arrows",
-    "part_page",
-    "part_picture",
-    "support_marks",
-]
-
 _COLOURS = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#8c7a00", "#d9a58c", "#9ec1e3", "#b9dccb")
 _LOAD = "#b3261e"
 _MARKS = 12

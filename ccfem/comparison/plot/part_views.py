@@ -14,8 +14,6 @@ from ccfem.comparison.plot.colours import INK
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Arrow", "Label", "draw_part", "part_figure"]
-
 _VIEWS = ((-60.0, 28.0), (120.0, -28.0))
 """Azimuth and elevation of the two views, degrees."""
 _SIZE = 6.0

@@ -28,19 +28,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = [
-    "Coloured",
-    "compare_layer",
-    "draw_section",
-    "draw_stress",
-    "force_on_paths",
-    "layer_picture",
-    "layer_pictures",
-    "mark_failure",
-    "picture_extents",
-    "tension_limit",
-]
-
 _LINE = 0.45
 """Width of a drawn strand over the fibre width, so that neighbours stay apart in the picture."""
 

@@ -24,8 +24,6 @@ from ccfem.judging.virtual_testing.virtual_test import VirtualTest
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["View", "add", "show"]
-
 _PATCHES = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#8c7a00", "#d9a58c", "#9ec1e3", "#b9dccb")
 _SHARE = 0.05
 """Largest displacement in a view, as a share of the part's size."""

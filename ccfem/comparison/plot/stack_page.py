@@ -15,8 +15,6 @@ from ccfem.slicing.layers.layer import Layer
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["space_picture", "turning_page"]
-
 _VIEWS = ((25.0, -35.0), (5.0, 0.0), (70.0, 0.0))
 """Elevation and azimuth, degrees, of each view."""
 _STEP = 1.5

@@ -9,8 +9,6 @@ from ccfem.comparison.plot.curves import axes_below, legend_below
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["StiffnessPoint", "stiffness_curves"]
-
 
 class StiffnessPoint(NamedTuple):
     """One point of a curve.

@@ -23,7 +23,7 @@ from ccfem.comparison.plot.fields import tension_picture
 from ccfem.comparison.plot.part_picture import part_picture
 from ccfem.comparison.plot.part_views import part_figure
 from ccfem.comparison.plot.paths import draw_section
-from ccfem.comparison.plot.scenes import show
+from ccfem.comparison.plot.scenes import show as show
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.judging.evaluation.evaluation import Evaluation
@@ -35,8 +35,6 @@ from ccfem.slicing.layers.layer_stress import LayerStress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-__all__ = ["figure", "image", "page", "show"]
 
 _SMALL = 80.0
 """Resolution of the picture in a notebook, dots per inch."""

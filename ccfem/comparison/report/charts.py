@@ -14,8 +14,6 @@ from ccfem.judging.evaluation.indices.matching import THRESHOLDS, along_fibre, m
 from ccfem.judging.evaluation.plane_paths import pool
 from ccfem.judging.virtual_testing.stiffer import RESOLUTION
 
-__all__ = ["curve_charts", "front", "fronts", "spreads", "wide_enough"]
-
 _LEAST, _MOST = 0.01, 10.0
 """Ends, 1/mm, of the scale of curvature; what is straighter counts at its left end."""
 _QUANTILES = np.linspace(0.0, 1.0, 101)

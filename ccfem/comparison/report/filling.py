@@ -7,8 +7,6 @@ from typing import Any
 
 from ccfem.comparison.report.packing import compressed, pack
 
-__all__ = ["filled_page"]
-
 
 def filled_page(context: Mapping[str, Any], data: Mapping[str, Any]) -> str:
     """Fill the template of the report.

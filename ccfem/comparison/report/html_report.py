@@ -26,8 +26,6 @@ from ccfem.fem.elasticity.stress_field import about_cells
 from ccfem.judging.evaluation import COLUMNS
 from ccfem.judging.virtual_testing.stiffer import HONEST_PROMISE
 
-__all__ = ["report_html"]
-
 
 def report_html(
     comparison: Comparison,

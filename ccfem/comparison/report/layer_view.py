@@ -19,8 +19,6 @@ from ccfem.paths.fields.chart import flat_view
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress, stress_on
 
-__all__ = ["layer_views"]
-
 _POINTS = 150_000
 """Points of all paths together: about a megabyte."""
 _STEPS = (1.5, 3.0)

@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 
 from ccfem.base.arrays import FloatArray
 
-__all__ = ["Rounded", "as_bytes", "compressed", "pack", "unpack"]
-
 _STEPS = 65535
 """Largest whole number of 16 bits."""
 

@@ -11,8 +11,6 @@ from ccfem.comparison.plot.part_picture import coloured, load_arrows, support_ma
 from ccfem.comparison.report.packing import Rounded, as_bytes
 from ccfem.fem.elasticity.stress_field import StressField
 
-__all__ = ["part_view"]
-
 _FACETS = 16_000
 """Facets that are drawn; a part with more is drawn coarser."""
 _SHOWN = 0.06

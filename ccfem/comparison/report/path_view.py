@@ -14,8 +14,6 @@ from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress
 
-__all__ = ["DrawnPaths", "angle_on_layer", "drawn_paths", "in_layer"]
-
 _TURN = np.radians(6.0)
 """Points at which a path turns by more than this always stay."""
 _REACH = 0.05

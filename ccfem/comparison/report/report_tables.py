@@ -21,18 +21,6 @@ from ccfem.comparison.runs import Run
 from ccfem.comparison.said_of_cases import cases_rows
 from ccfem.judging.evaluation import COLUMNS
 
-__all__ = [
-    "Cell",
-    "Head",
-    "Table",
-    "against_each_other",
-    "all_indices",
-    "curve_table",
-    "headline_table",
-    "load_cases_table",
-    "stage_seconds",
-]
-
 _OWN = {
     "printable": "Whether the paths keep all limits of the machine, and why not.",
     "fibre_per_layer": "Length of fibre over the number of layers.",

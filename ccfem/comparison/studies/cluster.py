@@ -8,8 +8,6 @@ from ccfem.base.errors import InputError
 from ccfem.comparison.studies.jobs import Job
 from ccfem.comparison.studies.work import crashed, job_bytes, run_job, solve_part
 
-__all__ = ["on_cluster"]
-
 _PATIENCE = 30.0
 """Seconds to wait for a scheduler."""
 

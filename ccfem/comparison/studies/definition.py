@@ -14,8 +14,6 @@ from ccfem.cases.case import check_name
 from ccfem.comparison.request import DEFAULT_STRAND
 from ccfem.judging.virtual_testing.strand import Strand
 
-__all__ = ["Study", "read_study"]
-
 
 @dataclass(frozen=True)
 class Study:

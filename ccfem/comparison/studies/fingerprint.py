@@ -11,8 +11,6 @@ import numpy as np
 
 from ccfem.base.errors import InputError
 
-__all__ = ["fingerprint"]
-
 
 def fingerprint(*values: Any) -> str:
     """Hash of values by what they hold: arrays, numbers, words, dataclasses, mappings, sequences.

@@ -19,8 +19,6 @@ from ccfem.slicing import slicers as slicing
 from ccfem.slicing.layers.slicer import Slicer
 from ccfem.strategies import create
 
-__all__ = ["Job", "Jobs", "Part", "jobs_of"]
-
 
 @dataclass(frozen=True)
 class Part:

@@ -8,8 +8,6 @@ from ccfem.comparison.studies.study_fronts import COST
 from ccfem.comparison.studies.study_result import StudyResult
 from ccfem.comparison.studies.study_table import shown_table
 
-__all__ = ["study_page"]
-
 _HEADINGS = {
     "fibre_length": "Stiffness over fibre",
     "print_time_nearest": "Stiffness over the time to lay the fibre",

@@ -18,8 +18,6 @@ from ccfem.comparison.studies.transport import packed, unpacked
 from ccfem.comparison.studies.work import crashed, job_bytes
 from ccfem.comparison.studies.worker import receive, send
 
-__all__ = ["in_processes"]
-
 _PACKAGES = Path(__file__).resolve().parents[3]
 """Folder from which ccfem is imported."""
 

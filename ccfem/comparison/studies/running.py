@@ -25,8 +25,6 @@ from ccfem.comparison.studies.store import TABLES, opened
 from ccfem.comparison.studies.study_result import StudyResult
 from ccfem.comparison.studies.work import job_bytes, part_bytes, run_job, solve_part
 
-__all__ = ["study"]
-
 
 def study(
     what: str | os.PathLike[str] | Study,

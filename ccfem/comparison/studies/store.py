@@ -11,8 +11,6 @@ from ccfem.base.errors import InputError
 from ccfem.base.folder import Folder, sweep
 from ccfem.base.result_folder import refuse_foreign, whole_folder
 
-__all__ = ["TABLES", "Store", "opened"]
-
 _LOCK = ".lock"
 _RUNS = "runs"
 TABLES = ("results.csv", "results.parquet", "times.csv", "study.html")

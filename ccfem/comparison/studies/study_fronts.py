@@ -7,8 +7,6 @@ from ccfem.comparison.front import on_front
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["COST", "GAIN", "with_fronts"]
-
 GAIN = "stiffness"
 COST = {"fibre_length": "low", "print_time_nearest": "low", "first_failure_load": "high"}
 """What stiffness is drawn over, and which end of it is better."""

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-__all__ = ["NOT_RUN", "StudyResult"]
-
 NOT_RUN = "not run yet: start the study again"
 
 _OWNERS = ("part", "load_case", "slicing", "study", "strategy")

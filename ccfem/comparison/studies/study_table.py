@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["shown_table"]
-
 _COLUMNS = {
     "printable": "printable",
     "stiffness": "stiffness, N/mm",

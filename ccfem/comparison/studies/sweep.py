@@ -6,8 +6,6 @@ from typing import Any, NamedTuple
 
 from ccfem.base.errors import InputError, shown
 
-__all__ = ["Variant", "variants"]
-
 
 class Variant(NamedTuple):
     """A name with parameters.

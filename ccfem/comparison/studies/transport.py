@@ -15,8 +15,6 @@ from typing import Any
 import cloudpickle
 import numpy as np
 
-__all__ = ["Parted", "packed", "parted", "unpacked"]
-
 Parted = tuple[bytes, Mapping[str, Any]]
 """A value as bytes without its arrays, and the arrays by name: for `unpacked`."""
 

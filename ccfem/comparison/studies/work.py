@@ -25,8 +25,6 @@ from ccfem.paths.planning.strategy import Strategy
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.slicer import Slicer
 
-__all__ = ["crashed", "job_bytes", "part_bytes", "run_job", "solve_part"]
-
 _HELD = 2
 """Parts that a worker keeps: the one that it works on, and the one before."""
 

@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 if TYPE_CHECKING:
     from ccfem.comparison.studies.transport import Parted
 
-__all__ = ["main", "receive", "send"]
-
 
 def send(stream: BinaryIO, data: bytes) -> None:
     """Write one message."""

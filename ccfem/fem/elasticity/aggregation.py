@@ -11,8 +11,6 @@ from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray
 
-__all__ = ["Aggregates", "aggregates"]
-
 _DEPENDENT = 1e-10
 """Relative length below which an orthogonalised motion counts as dependent on those before it."""
 

@@ -16,8 +16,6 @@ from ccfem.base.arrays import FloatArray, IntArray, freeze, seen_only
 from ccfem.body.mesh.cell_mesh import CellMesh
 from ccfem.body.mesh.tet_mesh import TetMesh
 
-__all__ = ["Pattern", "add_blocks", "assemble", "cell_gradients", "pattern"]
-
 
 @dataclass(frozen=True)
 class Pattern:

@@ -7,8 +7,6 @@ from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray
 
-__all__ = ["BALL", "ball_averages", "ball_shares"]
-
 BALL = 2.0
 """Radius, mm, of the ball over which stress is averaged."""
 

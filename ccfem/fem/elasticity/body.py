@@ -8,8 +8,6 @@ from ccfem.body.mesh.cell_mesh import CellMesh
 from ccfem.fem.elasticity.load_kinds import Load
 from ccfem.fem.elasticity.support_kinds import AnySupport
 
-__all__ = ["LoadedBody", "SupportedProblem"]
-
 
 class LoadedBody(Protocol):
     """A mesh whose boundary facets have areas and outward normals, so that loads act on it."""

@@ -6,8 +6,6 @@ from ccfem.base.arrays import FloatArray
 from ccfem.body.mesh.check import about_slivers
 from ccfem.fem.elasticity.problem import Problem
 
-__all__ = ["about_conditioning", "incompressibility", "stiffness_contrast"]
-
 _NEARLY_INCOMPRESSIBLE = 500.0
 """Bulk over shear modulus above which there is a remark: Poisson's ratio 0.499."""
 _CONTRAST = 1e5

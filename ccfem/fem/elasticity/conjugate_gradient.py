@@ -9,8 +9,6 @@ from scipy.linalg import eigvalsh_tridiagonal
 from ccfem.base.arrays import FloatArray
 from ccfem.fem.elasticity.solution import product
 
-__all__ = ["conjugate_gradient", "highest_eigenvalue"]
-
 _LANCZOS = 6
 """Steps after which the highest eigenvalue is accurate to about six per cent."""
 

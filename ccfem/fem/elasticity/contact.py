@@ -11,8 +11,6 @@ from ccfem.fem.elasticity.held import Held
 from ccfem.fem.elasticity.solution import Solution
 from ccfem.fem.elasticity.solvers import Solver
 
-__all__ = ["EXPECTED", "Contact", "check_pressed", "find_contact"]
-
 EXPECTED = 8
 """Number of solves expected until a contact has converged."""
 

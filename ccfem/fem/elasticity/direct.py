@@ -13,8 +13,6 @@ from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import SolveError
 from ccfem.fem.elasticity.supernodes import supernodes
 
-__all__ = ["Pardiso", "cholmod", "superlu"]
-
 Apply = Callable[[FloatArray], FloatArray]
 
 _SMALL = 300_000

@@ -16,8 +16,6 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.assembly import cell_gradients
 from ccfem.fem.elasticity.patch_recovery import SAMPLES, fitted, stress_patches
 
-__all__ = ["ErrorEstimate", "estimate_error"]
-
 
 @dataclass(frozen=True)
 class ErrorEstimate:

@@ -7,8 +7,6 @@ import numpy as np
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.errors import InputError
 
-__all__ = ["node_frames"]
-
 _PARALLEL = 1e-6
 """Sine of the angle below which held directions count as the same."""
 

@@ -9,8 +9,6 @@ from numba import njit
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.fem.elasticity.aggregation import Aggregates
 
-__all__ = ["Prolongation", "galerkin", "smoothed"]
-
 _CONTRACT = {"contract"}
 
 

@@ -13,8 +13,6 @@ from numba import njit
 
 from ccfem.base.arrays import FloatArray
 
-__all__ = ["GaussSeidel"]
-
 _CONTRACT = {"contract"}
 """Products and sums may be fused."""
 

@@ -9,8 +9,6 @@ import scipy.sparse as sp
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.fem.elasticity.ties import Ties
 
-__all__ = ["Held", "rigid_modes"]
-
 _BED = 1e-11
 """Stiffness, over the mean of the diagonal, that a lifted-off component keeps, so that a part that
 nothing presses any more has a solution; the force it carries is checked."""

@@ -7,26 +7,6 @@ from typing import Any
 
 from ccfem.base.checks import ACCELERATION, FORCE, MASS_DENSITY, TRACTION, WARMTH, Range
 
-__all__ = [
-    "Bearing",
-    "BodyForce",
-    "Displacement",
-    "Force",
-    "Gravity",
-    "Load",
-    "PointForce",
-    "Pressure",
-    "SurfaceLoad",
-    "Temperature",
-    "Traction",
-    "in_words",
-    "kind_of",
-    "patches_in_use",
-    "patches_of",
-    "points_of",
-    "sizes_of",
-]
-
 Vector = tuple[float, float, float]
 
 

@@ -27,8 +27,6 @@ from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.volume_loads import heat_forces, volume_forces
 from ccfem.geometry.facets import positions
 
-__all__ = ["check_load", "load_case", "load_cases", "nodal_forces"]
-
 _SMALLEST, _LARGEST = 1e-12, 1e12
 """Magnitude of a load below which it is zero, and above which it is a mistake."""
 _ALONG = 1e-3

@@ -12,8 +12,6 @@ from ccfem.fem.elasticity.gauss_seidel import GaussSeidel
 from ccfem.fem.elasticity.held import rigid_modes
 from ccfem.fem.elasticity.quick_aggregation import quick_aggregation
 
-__all__ = ["Coarse", "smoothed_aggregation", "two_level"]
-
 _COARSEST = 50
 """Number of aggregates below which a level is inverted."""
 

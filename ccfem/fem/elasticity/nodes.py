@@ -10,15 +10,6 @@ from ccfem.body.mesh.cell_mesh import CellMesh
 from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE, smooth_faces
 from ccfem.fem.elasticity.body import LoadedBody
 
-__all__ = [
-    "edge_nodes",
-    "facet_normals",
-    "nearest_node",
-    "patch_facets",
-    "patch_nodes",
-    "patch_normals",
-]
-
 _COARSE = 50.0
 """Feature angle, degrees, at which a bore of 8 facets is a round wall, and a hexagon is none."""
 

@@ -10,8 +10,6 @@ from dataclasses import replace
 from ccfem.fem.elasticity.conditioning import incompressibility
 from ccfem.fem.elasticity.problem import Problem
 
-__all__ = ["LARGEST_ERROR", "MOST_CELLS", "about_error", "linear_locks", "on_quadratic"]
-
 LARGEST_ERROR = 0.1
 """Estimated error, in energy norm, up to which cells are fine enough: 1 % of the displacement."""
 

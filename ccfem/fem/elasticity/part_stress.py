@@ -10,8 +10,6 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.materials import Material
 
-__all__ = ["LARGEST_STRESS", "GivenStress", "PartStress", "impossible_stress"]
-
 LARGEST_STRESS = 1e7
 """Largest stress that is taken for meant, MPa: ten times the modulus of diamond."""
 

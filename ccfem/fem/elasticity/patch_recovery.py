@@ -14,8 +14,6 @@ from numba import njit
 from ccfem.base.arrays import FloatArray, IntArray, seen_only
 from ccfem.body.mesh.tet_mesh import TetMesh
 
-__all__ = ["SAMPLES", "Patches", "fitted", "stress_patches"]
-
 _A, _B = 0.5854101966249685, 0.1381966011250105
 SAMPLES = {1: np.full((1, 4), 0.25), 2: np.full((4, 4), _B) + (_A - _B) * np.eye(4)}
 """Barycentric coordinates of the points where the stress of a cell is most accurate, by its order:

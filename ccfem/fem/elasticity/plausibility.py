@@ -46,16 +46,6 @@ from ccfem.fem.elasticity.zone import averaged_mises
 from ccfem.fem.materials import Material
 from ccfem.geometry.facets import are_among
 
-__all__ = [
-    "about_held_share",
-    "about_problem",
-    "about_solution",
-    "check_balance",
-    "check_effect",
-    "check_size_of_motion",
-    "held_share",
-]
-
 _LINEAR = 0.05
 """Displacement over the size of the part, and strain, up to which linear theory holds: the tip of a
 cantilever that moves by a twentieth of its length is off by less than 1 %."""

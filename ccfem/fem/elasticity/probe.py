@@ -18,8 +18,6 @@ from ccfem.fem.elasticity.support_kinds import (
 )
 from ccfem.geometry.locate import locate
 
-__all__ = ["Probe", "displacement_at", "located", "support_forces"]
-
 
 @dataclass(frozen=True)
 class Probe:

@@ -13,31 +13,28 @@ from ccfem.base.errors import InputError
 from ccfem.base.tensor import rotate_stiffness
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.load_kinds import (
-    Bearing,
-    Force,
+    Bearing as Bearing,
+)
+from ccfem.fem.elasticity.load_kinds import (
+    Force as Force,
+)
+from ccfem.fem.elasticity.load_kinds import (
     Load,
-    PointForce,
-    Pressure,
-    Traction,
     patches_in_use,
     patches_of,
 )
-from ccfem.fem.elasticity.support_kinds import AnySupport, Support
+from ccfem.fem.elasticity.load_kinds import (
+    PointForce as PointForce,
+)
+from ccfem.fem.elasticity.load_kinds import (
+    Pressure as Pressure,
+)
+from ccfem.fem.elasticity.load_kinds import (
+    Traction as Traction,
+)
+from ccfem.fem.elasticity.support_kinds import AnySupport
+from ccfem.fem.elasticity.support_kinds import Support as Support
 from ccfem.fem.materials import Material
-
-__all__ = [
-    "Bearing",
-    "Force",
-    "Load",
-    "Order",
-    "PointForce",
-    "Pressure",
-    "Problem",
-    "Region",
-    "Support",
-    "Traction",
-    "patches_in_use",
-]
 
 Order = Literal["auto", 1, 2]
 

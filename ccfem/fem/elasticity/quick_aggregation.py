@@ -10,8 +10,6 @@ from ccfem.fem.elasticity.direct import Apply
 from ccfem.fem.elasticity.galerkin import Prolongation, galerkin, smoothed
 from ccfem.fem.elasticity.gauss_seidel import GaussSeidel
 
-__all__ = ["quick_aggregation"]
-
 _STRENGTH = 0.02
 """Size of a block above which it is a strong connection."""
 

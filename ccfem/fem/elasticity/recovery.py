@@ -8,16 +8,6 @@ from ccfem.base.tensor import from_voigt
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.assembly import cell_gradients
 
-__all__ = [
-    "cell_strain",
-    "cell_stress",
-    "nodal_stress",
-    "shape_gradients",
-    "strain_at_nodes",
-    "times",
-    "voigt_strain",
-]
-
 
 def voigt_strain(gradient: FloatArray) -> FloatArray:
     """Voigt strain (..., 6) of displacement gradients (..., 3, 3) with entries du_p / dx_r."""

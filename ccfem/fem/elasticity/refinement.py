@@ -13,8 +13,6 @@ from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.stress_field import StressField
 
-__all__ = ["refine"]
-
 _SHARE = 0.7
 """Share of the squared error in the cells that a round refines (Doerfler 1996)."""
 

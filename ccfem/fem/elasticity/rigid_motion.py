@@ -18,8 +18,6 @@ from ccfem.body.mesh.cell_mesh import CellMesh
 from ccfem.fem.elasticity.held import rigid_modes
 from ccfem.geometry.measures import connected
 
-__all__ = ["Holds", "check_motion"]
-
 _DENSE = 100
 """Number of bodies up to which motions are found by a dense eigenvalue problem."""
 _FREE = 1e-10

@@ -14,8 +14,6 @@ from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import SolveError
 from ccfem.body.mesh.numbering import reverse_cuthill_mckee
 
-__all__ = ["skyline", "skyline_operations", "skyline_within"]
-
 _TOGETHER = 4
 """Rows that are eliminated together, two columns at a time; they share their first column."""
 

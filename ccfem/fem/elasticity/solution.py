@@ -16,8 +16,6 @@ import numpy as np
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import SolveError
 
-__all__ = ["ROUNDING", "Solution", "checked", "judged", "norm", "product", "reached"]
-
 ROUNDING = 1e-14
 """Backward error that counts as rounding: Cholesky leaves 1e-17 to 1e-16 (measured)."""
 

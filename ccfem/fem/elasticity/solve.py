@@ -23,8 +23,6 @@ from ccfem.fem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.fem.elasticity.support_sets import support_sets
 from ccfem.fem.elasticity.system import prepare
 
-__all__ = ["solve", "solve_system"]
-
 FieldT = TypeVar("FieldT", covariant=True)
 
 _ENERGY = 1e-4

@@ -17,8 +17,6 @@ from ccfem.fem.elasticity.conjugate_gradient import conjugate_gradient
 from ccfem.fem.elasticity.skyline import skyline, skyline_operations
 from ccfem.fem.elasticity.solution import Solution, checked, judged, product, reached
 
-__all__ = ["BACKENDS", "DIRECT", "Choice", "Solution", "Solver", "factorise", "preconditioned_cg"]
-
 DIRECT = ("pypardiso", "cholmod", "superlu", "skyline")
 BACKENDS = (*DIRECT, "amg", "two-level")
 

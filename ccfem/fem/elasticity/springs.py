@@ -10,8 +10,6 @@ from ccfem.fem.elasticity.body import LoadedBody, SupportedProblem
 from ccfem.fem.elasticity.nodes import facet_normals, nearest_node, patch_facets, patch_nodes
 from ccfem.fem.elasticity.support_kinds import Foundation, PointSpring, Spring
 
-__all__ = ["Soft", "add_springs", "soft_holds", "soft_supports", "spring_forces"]
-
 Soft = Spring | PointSpring | Foundation
 
 _LINEAR = (np.ones((3, 3)) + np.eye(3)) / 12.0

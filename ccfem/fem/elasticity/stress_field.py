@@ -13,17 +13,16 @@ from ccfem.base.errors import InputError
 from ccfem.base.tensor import strain_from_voigt, to_voigt
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.error_estimate import ErrorEstimate, estimate_error
+from ccfem.fem.elasticity.load_kinds import patches_in_use
 from ccfem.fem.elasticity.nodes import patch_nodes
 from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.fem.elasticity.plausibility import about_problem, about_solution
 from ccfem.fem.elasticity.probe import Probe, displacement_at, located, support_forces
-from ccfem.fem.elasticity.problem import Problem, patches_in_use
+from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.recovery import cell_strain, nodal_stress
 from ccfem.fem.elasticity.supports import held
 from ccfem.fem.elasticity.volume_loads import free_strain
 from ccfem.fem.materials import Material
-
-__all__ = ["SolveRecord", "StressField", "about_cells", "solved"]
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,6 @@ from scipy.sparse.linalg import SuperLU
 
 from ccfem.base.arrays import FloatArray, IntArray
 
-__all__ = ["Supernodes", "supernodes"]
-
 
 class Supernodes(NamedTuple):
     """Factor ``P A P^T = L D L^T`` of a symmetric matrix (n, n).

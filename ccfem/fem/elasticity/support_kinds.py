@@ -10,20 +10,6 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.patches import unit_vector
 from ccfem.fem.elasticity.load_kinds import Vector
 
-__all__ = [
-    "AnySupport",
-    "EdgeSupport",
-    "Foundation",
-    "Pin",
-    "PointSpring",
-    "PointSupport",
-    "PressingSupport",
-    "RigidPatch",
-    "SlidingSupport",
-    "Spring",
-    "Support",
-]
-
 _ZERO = (0.0, 0.0, 0.0)
 _LARGEST_ANGLE = 25.0
 """Rotation, degrees, above which linear theory lengthens a part that turns by a tenth:

@@ -5,8 +5,6 @@ from dataclasses import replace
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.support_kinds import AnySupport
 
-__all__ = ["support_sets"]
-
 
 def support_sets(problem: Problem) -> tuple[Problem, ...]:
     """Split a problem into problems of one set of supports each, which share out its load cases.

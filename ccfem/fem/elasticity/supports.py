@@ -37,8 +37,6 @@ from ccfem.fem.elasticity.support_kinds import (
 )
 from ccfem.fem.elasticity.ties import Body, Ties
 
-__all__ = ["check_support", "held", "held_in"]
-
 
 def held(problem: SupportedProblem) -> Held:
     """Collect the supports of a problem and check that they hold the part.

@@ -24,8 +24,6 @@ from ccfem.fem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.fem.elasticity.supports import held, held_in
 from ccfem.fem.elasticity.volume_loads import free_strain, strain_forces
 
-__all__ = ["System", "prepare"]
-
 
 @dataclass(frozen=True)
 class System:

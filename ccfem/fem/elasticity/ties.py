@@ -15,8 +15,6 @@ import scipy.sparse as sp
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["Body", "Ties"]
-
 
 @dataclass(frozen=True)
 class Body:

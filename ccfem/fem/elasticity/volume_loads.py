@@ -11,8 +11,6 @@ from ccfem.fem.elasticity.load_kinds import BodyForce, Gravity, Temperature
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.recovery import times
 
-__all__ = ["free_strain", "heat_forces", "strain_forces", "volume_forces"]
-
 _TONNES = 1e-9
 """Tonnes per mm^3 in a gram per cm^3; a tonne times a mm/s^2 is a newton."""
 

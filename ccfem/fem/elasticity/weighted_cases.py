@@ -11,8 +11,6 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.stress_field import StressField
 
-__all__ = ["WeightedCases"]
-
 
 @dataclass(frozen=True)
 class WeightedCases:

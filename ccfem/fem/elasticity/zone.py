@@ -15,8 +15,6 @@ from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.support_kinds import AnySupport, EdgeSupport, Support
 from ccfem.geometry.facets import are_among
 
-__all__ = ["ZONE", "averaged_mises", "distance_from_patches"]
-
 ZONE = 3.0
 """Distance, mm, from patches of loads and supports within which stress is not judged."""
 

@@ -10,8 +10,6 @@ from ccfem.base.arrays import FloatArray, IntArray, read_only
 from ccfem.fem.elasticity.assembly import Pattern, pattern
 from ccfem.fem.plates.mesh import PlaneMesh
 
-__all__ = ["PlaneElements"]
-
 _GAUSS = 1.0 / np.sqrt(3.0)
 _CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 _PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))

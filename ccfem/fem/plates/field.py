@@ -10,8 +10,6 @@ from ccfem.fem.plates.mesh import PlaneMesh
 from ccfem.fem.plates.problem import PlaneProblem
 from ccfem.fem.plates.stiffness import strain_in_axes, stress_in_axes
 
-__all__ = ["PlaneField"]
-
 
 @dataclass(frozen=True)
 class PlaneField:

@@ -11,8 +11,6 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.cell_mesh import CellMesh
 from ccfem.geometry.facets import positions
 
-__all__ = ["PlaneMesh", "Sheet"]
-
 
 @dataclass(frozen=True, repr=False)
 class PlaneMesh(CellMesh):

@@ -12,8 +12,6 @@ from ccfem.fem.elasticity.load_kinds import Pressure, SurfaceLoad, patches_in_us
 from ccfem.fem.elasticity.support_kinds import Support
 from ccfem.fem.plates.mesh import PlaneMesh, Sheet
 
-__all__ = ["PlaneProblem"]
-
 
 @dataclass(frozen=True)
 class PlaneProblem:

@@ -8,8 +8,6 @@ from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.errors import InputError
 from ccfem.fem.plates.mesh import PlaneMesh
 
-__all__ = ["Raster", "raster_image", "raster_mesh"]
-
 
 def raster_mesh(
     mask: BoolArray, size: float = 1.0, origin: tuple[float, float] = (0.0, 0.0)

@@ -20,8 +20,6 @@ from ccfem.fem.plates.field import PlaneField
 from ccfem.fem.plates.mesh import PlaneMesh
 from ccfem.fem.plates.problem import PlaneProblem
 
-__all__ = ["PlaneSystem", "prepare", "solve_plane"]
-
 
 @dataclass(frozen=True)
 class PlaneSystem:

@@ -8,15 +8,6 @@ from numpy.typing import ArrayLike
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
 
-__all__ = [
-    "fitted_harmonics",
-    "rotate_plane",
-    "stack_plane",
-    "strain_in_axes",
-    "stress_in_axes",
-    "turned_by",
-]
-
 
 def _stress_matrix(angle: ArrayLike) -> FloatArray:
     """T (..., 3, 3) with ``stress_global = T @ stress_local`` for axes turned by an angle."""

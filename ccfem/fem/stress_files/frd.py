@@ -9,8 +9,6 @@ import numpy as np
 from ccfem.base.errors import InputError, shown
 from ccfem.fem.stress_files.stress_data import StressData, component_order
 
-__all__ = ["frd_stress"]
-
 _TETRAHEDRA = {3: 4, 6: 10}
 """Nodes of the tetrahedra among the element types (CalculiX 2.20 user's manual, section 11)."""
 _STARTS = (13, 25, 37, 49, 61, 73)

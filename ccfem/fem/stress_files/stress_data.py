@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from ccfem.base.arrays import FloatArray, IntArray, freeze
 from ccfem.base.errors import InputError
 
-__all__ = ["COMPONENTS", "StressData", "component_of", "component_order"]
-
 COMPONENTS = ("xx", "yy", "zz", "yz", "xz", "xy")
 """Voigt components in their order."""
 

@@ -18,8 +18,6 @@ from ccfem.fem.stress_files.stress_table import table_stress
 from ccfem.fem.stress_files.vtu_tensors import vtu_stress
 from ccfem.geometry.facets import positions
 
-__all__ = ["read_stress"]
-
 _MPA = {"pa": 1e-6, "kpa": 1e-3, "mpa": 1.0, "n/mm^2": 1.0, "n/mm2": 1.0, "gpa": 1e3}
 _SAME = 1e-5
 """Distance over the size of the part within which nodes are the same: files have six digits."""

@@ -10,8 +10,6 @@ from ccfem.base.errors import InputError, shown
 from ccfem.base.whole import text_of
 from ccfem.fem.stress_files.stress_data import StressData, component_of, component_order
 
-__all__ = ["table_stress"]
-
 
 def table_stress(path: Path) -> StressData:
     """Read a table of stress with one line for each element, or for each node.

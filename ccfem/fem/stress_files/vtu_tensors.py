@@ -11,8 +11,6 @@ from ccfem.base.tensor import to_voigt
 from ccfem.body.files.formats.vtu import Grid, read_grid
 from ccfem.fem.stress_files.stress_data import COMPONENTS, StressData, component_order
 
-__all__ = ["UNIT", "VTK_COMPONENTS", "vtk_tensors", "vtu_stress"]
-
 UNIT = "unit of stress"
 """Field data that holds the unit."""
 VTK_COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")

@@ -14,8 +14,6 @@ from ccfem.fem.plates.problem import PlaneProblem
 from ccfem.fem.topopt.equations import PlateEquations, TetEquations
 from ccfem.fem.topopt.groups import CellGroups
 
-__all__ = ["Compliance", "Response"]
-
 _TOLERANCE = 1e-6
 """Relative residual of a solve; contrasts of 1e9 leave no less in double precision."""
 

@@ -9,8 +9,6 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.facets import are_among, positions
 from ccfem.geometry.measures import signed_volumes
 
-__all__ = ["CutMesh", "cut_mesh", "volume_above"]
-
 _LEAST = 0.05
 """Least share of an edge on either side of a cut."""
 _PRISMS = np.array(

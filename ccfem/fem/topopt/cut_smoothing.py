@@ -9,8 +9,6 @@ from ccfem.fem.topopt.cut import CutMesh
 from ccfem.geometry.facets import are_among
 from ccfem.geometry.measures import signed_volumes
 
-__all__ = ["relaxed"]
-
 _FLAT = 1e-6
 """Share of the normals round a node in a direction, above which it must not move that way."""
 _THIN = 0.02

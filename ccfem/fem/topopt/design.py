@@ -11,8 +11,6 @@ from ccfem.fem.elasticity.problem import Order, Problem
 from ccfem.fem.plates.problem import PlaneProblem
 from ccfem.fem.topopt.material_axes import axes_about_z
 
-__all__ = ["FALLS_APART", "Design"]
-
 _APART = "falls apart between its loads and supports"
 _CURE = "raise the volume fraction or the filter radius"
 FALLS_APART = f"the design {_APART}: {_CURE}"

@@ -12,8 +12,6 @@ from ccfem.fem.elasticity.system import prepare as prepare_tets
 from ccfem.fem.plates.problem import PlaneProblem
 from ccfem.fem.plates.solve import prepare as prepare_plate
 
-__all__ = ["PlateEquations", "TetEquations"]
-
 
 class PlateEquations:
     """Equations of a plate; its elements are element matrices, one for all where all are equal."""

@@ -10,8 +10,6 @@ from scipy.spatial import cKDTree
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
 
-__all__ = ["ConeFilter"]
-
 
 @dataclass(frozen=True)
 class ConeFilter:

@@ -12,8 +12,6 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.facets import unique_edges
 
-__all__ = ["FlatPart", "Trace", "flat_part"]
-
 _ON = 1e-6
 """How far a node may lie from the line that it is on, over the size of the part."""
 

@@ -9,8 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError
 
-__all__ = ["CellGroups"]
-
 EntryT = TypeVar("EntryT", bound=np.generic)
 
 

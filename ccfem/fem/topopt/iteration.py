@@ -15,8 +15,6 @@ from ccfem.fem.topopt.optimality_criteria import optimality_criteria
 from ccfem.fem.topopt.parameters import Parameters
 from ccfem.fem.topopt.parametrisation import Parametrisation
 
-__all__ = ["iterate"]
-
 _WINDOW = 10
 """Iterations over which the objective must not change."""
 

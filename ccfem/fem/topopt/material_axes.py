@@ -7,8 +7,6 @@ from ccfem.base.errors import InputError
 from ccfem.base.tensor import rotate_stiffness
 from ccfem.fem.plates.stiffness import fitted_harmonics, rotate_plane, turned_by
 
-__all__ = ["axes_about_z", "harmonics", "sheet"]
-
 
 def sheet(plane: FloatArray) -> FloatArray:
     """Stiffness (6, 6) of a solid that is strained in its plane as a thin sheet, MPa.

@@ -4,8 +4,6 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray
 
-__all__ = ["optimality_criteria"]
-
 
 def optimality_criteria(
     density: FloatArray,

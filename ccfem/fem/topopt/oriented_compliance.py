@@ -11,8 +11,6 @@ from ccfem.fem.plates.stiffness import turned_by
 from ccfem.fem.topopt.compliance import Compliance, Response
 from ccfem.fem.topopt.filters import ConeFilter
 
-__all__ = ["OrientedCompliance", "Turn", "down_the_gradient", "to_principal_stress"]
-
 _LARGEST_TURN = np.radians(5.0)
 """Of a gradient step."""
 

@@ -13,8 +13,6 @@ from ccfem.fem.topopt.design import FALLS_APART
 from ccfem.geometry.isocontours import isocontours
 from ccfem.geometry.polylines import along_line, points_along
 
-__all__ = ["outline"]
-
 _PASSES = 10
 """Of the smoothing."""
 _RINGS = 4

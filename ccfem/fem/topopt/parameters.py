@@ -5,8 +5,6 @@ from typing import Literal
 
 from ccfem.base.checks import check_choices, check_fields
 
-__all__ = ["Parameters"]
-
 
 @dataclass(frozen=True)
 class Parameters:

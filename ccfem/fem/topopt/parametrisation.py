@@ -12,8 +12,6 @@ from ccfem.fem.topopt.filters import ConeFilter
 from ccfem.fem.topopt.groups import CellGroups
 from ccfem.fem.topopt.parameters import Parameters
 
-__all__ = ["Parametrisation"]
-
 
 @dataclass(frozen=True)
 class Parametrisation:

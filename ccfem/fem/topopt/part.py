@@ -13,8 +13,6 @@ from ccfem.fem.topopt.design import Design
 from ccfem.fem.topopt.plate_part import plate_outline, plate_part
 from ccfem.fem.topopt.tet_part import part_mesh
 
-__all__ = ["as_problem", "part_shape"]
-
 
 def part_shape(
     design: Design,

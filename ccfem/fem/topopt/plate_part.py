@@ -10,15 +10,14 @@ from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.patches import Plane
 from ccfem.body.meshing import extrude
-from ccfem.fem.elasticity.problem import Force, Load, PointForce, Problem, Support
+from ccfem.fem.elasticity.load_kinds import Load
+from ccfem.fem.elasticity.problem import Force, PointForce, Problem, Support
 from ccfem.fem.materials import Material
 from ccfem.fem.plates.problem import PlaneProblem
 from ccfem.fem.plates.raster_mesh import raster_image
 from ccfem.fem.topopt.design import Design
 from ccfem.fem.topopt.outline import outline
 from ccfem.fem.topopt.walls import Walls, patch_ends
-
-__all__ = ["plate_outline", "plate_part"]
 
 _BOTTOM = "bottom"
 

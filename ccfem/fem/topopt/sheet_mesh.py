@@ -11,8 +11,6 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.body.meshing.planform import triangulate
 from ccfem.geometry.symmetry import mirror_image, mirrors_of
 
-__all__ = ["sheet_mesh"]
-
 
 def sheet_mesh(
     planform: Any, low: float, high: float, edge_length: float, keep: FloatArray

@@ -23,8 +23,6 @@ from ccfem.fem.topopt.sheet_mesh import sheet_mesh
 from ccfem.fem.topopt.short_edges import without_short_edges
 from ccfem.geometry.symmetry import mirrors_of
 
-__all__ = ["plane_stiffness", "sheet_outline", "sheet_part", "sheet_problem"]
-
 _IN_PLANE = np.ix_([0, 1, 5], [0, 1, 5])
 _FACES = ("sheet_bottom", "sheet_top")
 _SHORTEST = 0.05

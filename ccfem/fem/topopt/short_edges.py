@@ -10,8 +10,6 @@ import shapely
 
 from ccfem.base.arrays import FloatArray, IntArray
 
-__all__ = ["without_short_edges"]
-
 _ON = 1e-7
 """Distance, mm, from a border or a point up to which a vertex lies on it."""
 

@@ -13,8 +13,6 @@ from ccfem.fem.topopt.iteration import iterate
 from ccfem.fem.topopt.parameters import Parameters
 from ccfem.fem.topopt.parametrisation import Parametrisation
 
-__all__ = ["Simp"]
-
 
 @dataclass(frozen=True)
 class Simp(Parameters):

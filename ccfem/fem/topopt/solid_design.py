@@ -6,8 +6,6 @@ from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.topopt.design import Design
 from ccfem.fem.topopt.simp import Simp
 
-__all__ = ["solid_design"]
-
 
 def solid_design(
     problem: Problem,

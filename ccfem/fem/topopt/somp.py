@@ -27,8 +27,6 @@ from ccfem.fem.topopt.oriented_compliance import (
 from ccfem.fem.topopt.parameters import Parameters
 from ccfem.fem.topopt.parametrisation import Parametrisation
 
-__all__ = ["Somp"]
-
 
 @dataclass(frozen=True)
 class Somp(Parameters):

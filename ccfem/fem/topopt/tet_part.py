@@ -16,8 +16,6 @@ from ccfem.fem.topopt.design import Design
 from ccfem.geometry.facets import unique_edges
 from ccfem.geometry.measures import connected
 
-__all__ = ["part_mesh"]
-
 _LEAST_VOID = 30.0
 """Enclosed voids below this many cells are filled."""
 

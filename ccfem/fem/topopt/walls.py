@@ -13,8 +13,6 @@ from ccfem.fem.elasticity.problem import PointForce
 from ccfem.fem.plates.mesh import PlaneMesh
 from ccfem.geometry.facets import are_among
 
-__all__ = ["Walls", "patch_ends"]
-
 _REACH = 1.5
 """How far a wall may lie from the patch that it takes over, in pixels."""
 _FACING = 0.5

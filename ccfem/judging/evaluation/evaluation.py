@@ -31,8 +31,6 @@ from ccfem.slicing.layers.layer_stress import stress_on
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["COLUMNS", "Evaluation", "FibreSamples", "evaluate"]
-
 COLUMNS: tuple[Column, ...] = tuple(
     column for module in indices.named().values() for column in module.COLUMNS
 )

@@ -12,8 +12,6 @@ from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress
 
-__all__ = ["Basis", "LayerPaths"]
-
 
 @dataclass(frozen=True)
 class LayerPaths:

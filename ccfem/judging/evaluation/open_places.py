@@ -7,8 +7,6 @@ import shapely
 
 from ccfem.judging.evaluation.plane_paths import PlanePaths
 
-__all__ = ["OpenPlace", "OpenPlaces", "open_places"]
-
 _FINE = 0.01
 """Deviation, in fibre widths, to which paths are simplified before their area is taken."""
 

@@ -13,8 +13,6 @@ from ccfem.geometry.polylines import lengths, merge_repeated, starts_segment
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["PlanePaths", "plane_paths", "pool"]
-
 _REPEATED = 1e-6
 """Points nearer than this, mm, to the one before them are the same point."""
 

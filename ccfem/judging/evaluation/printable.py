@@ -5,8 +5,6 @@ from dataclasses import dataclass
 
 from ccfem.machine.machine import Machine
 
-__all__ = ["why_not"]
-
 
 @dataclass(frozen=True)
 class _Rule:

@@ -8,8 +8,6 @@ import numpy as np
 from ccfem.base.arrays import FloatArray
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["COARSE", "Printed", "printed"]
-
 COARSE = 2.0
 """Distance, mm, between points that represent printed material, and between fibre samples."""
 

@@ -8,8 +8,6 @@ import numpy as np
 from ccfem.base.arrays import FloatArray, read_only
 from ccfem.fem.materials import Material
 
-__all__ = ["OffAxis", "acute", "plane_compliance", "strand_lamina"]
-
 
 def acute(angle: FloatArray) -> FloatArray:
     """Angle between lines, radians in [0, pi/2], of any angle (...,), radians."""

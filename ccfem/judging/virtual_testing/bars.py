@@ -18,8 +18,6 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.assembly import cell_gradients
 from ccfem.judging.virtual_testing.strands import Strands
 
-__all__ = ["Bars", "bar_stiffness", "bars"]
-
 
 def bar_stiffness(
     strands: Strands, volumes: FloatArray, share: FloatArray | None = None

@@ -30,8 +30,6 @@ from ccfem.judging.virtual_testing.strength import matrix_peak
 from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.paths.toolpaths import Toolpaths
 
-__all__ = ["Calibration", "calibrate", "read_calibration"]
-
 _RANGE = (1e-3, 1e3)
 """Values of rho, mm^2, that are tried."""
 

@@ -9,8 +9,6 @@ from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.buckets import Buckets, bucket
 
-__all__ = ["CutSteps", "cut_steps"]
-
 _TOUCH = 1e-9
 """Barycentric distance within which a piece counts as lying on a face."""
 

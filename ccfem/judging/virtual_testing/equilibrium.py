@@ -17,8 +17,6 @@ from ccfem.judging.virtual_testing.reinforced import Reduced, Reinforced
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strands import Strands
 
-__all__ = ["BONDED", "MODES", "TENSION", "Equilibrium", "equilibrium"]
-
 BONDED, TENSION = MODES = ("bonded", "tension")
 
 _UPDATES = 30

@@ -11,8 +11,6 @@ from ccfem.base.arrays import FloatArray, IntArray, freeze, read_only
 from ccfem.base.errors import InputError
 from ccfem.base.whole import text_of
 
-__all__ = ["Curve", "read_curve"]
-
 _LOW, _HIGH = 0.1, 0.4
 """Shares of the peak force between which the stiffness is taken (ISO 6891)."""
 _OFF = 0.25

@@ -24,8 +24,6 @@ from ccfem.fem.elasticity.zone import ZONE, distance_from_patches
 from ccfem.fem.materials import Material
 from ccfem.slicing.layers import Layer
 
-__all__ = ["ZONES", "Interlayer", "interlayer", "layer_normals"]
-
 ZONES = (ZONE, 0.5 * ZONE, 0.0)
 """Distances, mm, from patches of loads and supports within which nothing is judged. The first gives
 the result; the others show how much it depends on the zone."""

@@ -26,8 +26,6 @@ from ccfem.fem.elasticity.zone import ZONE, distance_from_patches
 from ccfem.judging.virtual_testing.strength import FIBRE_SHARE
 from ccfem.judging.virtual_testing.strengths import Limits
 
-__all__ = ["POWER", "MatrixPeaks", "Peak", "check_stretched", "nearness", "stretched_index"]
-
 Key = TypeVar("Key", bound=Hashable)
 
 POWER = 16.0

@@ -8,8 +8,6 @@ from ccfem.base.arrays import FloatArray
 from ccfem.fem.elasticity.held import Held
 from ccfem.judging.virtual_testing.bars import Bars
 
-__all__ = ["Reduced", "Reinforced"]
-
 
 @dataclass(frozen=True)
 class Reinforced:

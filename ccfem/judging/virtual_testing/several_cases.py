@@ -17,8 +17,6 @@ from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers import Layer
 
-__all__ = ["CasesFailure", "CasesTest", "cases_failure", "specimens", "virtual_tests"]
-
 
 @dataclass(frozen=True)
 class CasesTest:

@@ -14,8 +14,6 @@ from ccfem.fem.elasticity.solvers import Solver
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.fem.elasticity.system import System, prepare
 
-__all__ = ["Specimen"]
-
 _SOLVES = 30
 """Right-hand sides to expect: a virtual test takes some twenty, a design hundreds."""
 

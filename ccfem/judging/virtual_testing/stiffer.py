@@ -3,17 +3,6 @@
 from ccfem.base.errors import InputError
 from ccfem.judging.virtual_testing.virtual_test import Bracket
 
-__all__ = [
-    "FIRST",
-    "HONEST_PROMISE",
-    "IN_SHORT",
-    "RESOLUTION",
-    "SAME",
-    "SECOND",
-    "UNDECIDED",
-    "stiffer",
-]
-
 FIRST, SECOND, SAME, UNDECIDED = "first", "second", "no difference", "undecided"
 
 HONEST_PROMISE = (

@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 from ccfem.base.checks import check_fields
 
-__all__ = ["RHO", "RHO_SPAN", "Strand"]
-
 RHO = 4.0
 """Default of EA/E, mm^2: axial stiffness of a strand over Young's modulus of the matrix."""
 

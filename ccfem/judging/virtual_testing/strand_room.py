@@ -7,8 +7,6 @@ from ccfem.geometry.beads import Beads, beads
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 
-__all__ = ["fibre_beads", "room_of"]
-
 
 def fibre_beads(toolpaths: Toolpaths, machine: Machine) -> Beads:
     """Parts of the fibre paths, in the order of ``toolpaths.of_kind(FIBRE)``, with their room."""

@@ -13,8 +13,6 @@ from ccfem.judging.virtual_testing.strand_room import room_of
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 
-__all__ = ["Strands", "cut_strands"]
-
 
 @dataclass(frozen=True)
 class Strands:

@@ -20,8 +20,6 @@ from ccfem.judging.virtual_testing.strengths import Limits
 from ccfem.judging.virtual_testing.virtual_test import VirtualTest
 from ccfem.slicing.layers import Layer
 
-__all__ = ["FIBRE_SHARE", "FirstFailure", "fibre_peak", "first_failure", "matrix_peak"]
-
 FIBRE_SHARE = 0.99
 """Share of the fibre length whose axial force stays below the fibre's index."""
 

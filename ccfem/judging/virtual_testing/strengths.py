@@ -6,8 +6,6 @@ from ccfem.base.errors import InputError
 from ccfem.fem.materials import Material
 from ccfem.judging.virtual_testing.strand import Strand
 
-__all__ = ["Limits"]
-
 
 @dataclass(frozen=True)
 class Limits:

@@ -16,8 +16,6 @@ from ccfem.judging.virtual_testing.strands import Strands, cut_strands
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 
-__all__ = ["Bracket", "VirtualTest", "virtual_bracket", "virtual_test"]
-
 _SPAN_TOLERANCE = 1e-3
 """Relative residual of the solves for the span; the error of the ratio is of its square."""
 

@@ -21,8 +21,6 @@ from ccfem.printing.export.waypoints import read_waypoints
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.planar import Planar
 
-__all__ = ["STATED", "evaluate_published", "published_paths", "solved_loop", "waypoint_curvature"]
-
 PATHS = {"ours": "GcodeGenerater_Ours_raw.txt", "zigzag": "GcodeGenerater_Zigzag_Contour_raw.txt"}
 """File of each set of published paths: the authors' own and their zigzag with contours."""
 

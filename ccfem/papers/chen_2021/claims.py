@@ -17,8 +17,6 @@ from ccfem.papers.chen_2021.virtual_test import MATRIX_STRENGTH, authors_paths
 from ccfem.papers.verdicts import Check, judged
 from ccfem.paths.toolpaths import Toolpaths
 
-__all__ = ["EXPECTED", "agreement", "quantities", "verdicts"]
-
 EXPECTED = Path(__file__).with_name("expected.toml")
 _VALLEY = (0.3, 0.7)
 """Products of vectors about eta = 0.5 that "separated" leaves few pairs between."""

@@ -8,8 +8,6 @@ from ccfem.papers.chen_2021.whole import write_all
 from ccfem.papers.contents import Contents
 from ccfem.papers.verdicts import claim_table
 
-__all__ = ["CONTENTS"]
-
 CONTENTS = Contents(
     title="Chen et al. 2021, field-based toolpaths",
     seconds=90.0,

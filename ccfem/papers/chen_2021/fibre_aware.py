@@ -36,8 +36,6 @@ from ccfem.strategies.fibre_aware.upper_bound import upper_bound
 from ccfem.strategies.isocurve import Isocurve
 from ccfem.strategies.stream_function import StreamFunction
 
-__all__ = ["LAYER_COUNTS", "LENGTH", "Tested", "bound", "designs", "loop", "sliced", "tested"]
-
 LENGTH = 1000.0 * TABLE_2["ours"]
 """Fibre of the authors' own paths in table 2, mm."""
 

@@ -19,8 +19,6 @@ from ccfem.papers.wang_2021.panels import bar, curves, lines_of, panels, section
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["draw_all", "figures"]
-
 _PATH, _RING, _WRONG = "#0072b2", "#e69f00", "#b3261e"
 
 

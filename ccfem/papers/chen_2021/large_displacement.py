@@ -19,8 +19,6 @@ from ccfem.fem.elasticity.problem import Problem, Support
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.stress_field import StressField
 
-__all__ = ["Turned", "turned_by", "turns_at"]
-
 
 class Turned(NamedTuple):
     """Angles (m,) of the cells in [0, 90] degrees: in space, and against the turned material."""

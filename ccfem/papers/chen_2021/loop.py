@@ -16,8 +16,6 @@ from ccfem.fem.elasticity.problem import Force, Problem, Support
 from ccfem.fem.materials import isotropic
 from ccfem.slicing.slicers.planar import Planar
 
-__all__ = ["FOLDER", "LAYERS_PUBLISHED", "LAYERS_TABLE_2", "authors_folder", "authors_loop"]
-
 FOLDER = "CCFEM_CHEN2021"
 """Environment variable that names the authors' folder."""
 

@@ -25,15 +25,6 @@ from ccfem.judging.virtual_testing.bars import bar_stiffness
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strands import Strands
 
-__all__ = [
-    "fibre_share",
-    "mix",
-    "oriented_problem",
-    "oriented_ratio",
-    "oriented_stiffness",
-    "to_plane_stress",
-]
-
 
 def fibre_share(strands: Strands, volumes: FloatArray, area: float) -> FloatArray:
     """Share of each cell's volume that is fibre, (m,), in [0, 1].

@@ -27,8 +27,6 @@ from ccfem.slicing.layers.holes import holes_on
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.isocurve import Isocurve
 
-__all__ = ["STAGES", "LayerStages", "VectorField", "layer_stages", "planned", "vector_field"]
-
 STAGES = ("u", "s", "extraction", "connection")
 """Stages of a layer, as table 1 times them."""
 _LITERAL = Isocurve.literal()

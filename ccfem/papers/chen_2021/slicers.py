@@ -27,15 +27,6 @@ from ccfem.paths.planning.equal_fibre import TOLERANCE, length_per_layer
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = [
-    "PATTERNS",
-    "PROGRAM",
-    "extrusion_lines",
-    "slicer_found",
-    "slicer_paths",
-    "slicer_paths_to_length",
-]
-
 PROGRAM = "prusa-slicer"
 
 PATTERNS = {

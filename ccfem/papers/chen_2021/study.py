@@ -35,8 +35,6 @@ from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
 
-__all__ = ["PARTS_AT_HAND", "POWERS", "Model", "Study", "joined", "model", "run_study"]
-
 PARTS_AT_HAND = (
     "The authors published their Loop, Shell, bar and Wrench, not the Piston. The Loop is run "
     "here; `open_hole` and `lifting_eye` stand in for the others."

@@ -7,8 +7,6 @@ import numpy as np
 from ccfem.papers.chen_2021.pipeline import STAGES
 from ccfem.papers.chen_2021.study import Study
 
-__all__ = ["PAPER_1", "length_table", "time_table"]
-
 PAPER_1 = {
     "Loop": (32473, 12, 17.684, 0.810, 0.200, 0.030, 8.210, 0.591, 130.862),
     "Shell_Tensile": (112080, 12, 400.683, 3.262, 1.093, 0.096, 24.077, 1.225, 758.140),

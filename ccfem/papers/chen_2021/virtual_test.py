@@ -26,8 +26,6 @@ from ccfem.papers.chen_2021.oriented import oriented_ratio
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.export.waypoints import read_waypoints
 
-__all__ = ["MATRIX_STRENGTH", "PHYSICAL", "authors_paths", "ratios"]
-
 PHYSICAL = (1.79, 2.69, 1.50)
 """Measured zigzag/none, ours/none, ours/zigzag."""
 

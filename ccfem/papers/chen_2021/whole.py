@@ -10,8 +10,6 @@ from ccfem.papers.chen_2021.study import PARTS_AT_HAND, Study, run_study
 from ccfem.papers.chen_2021.tables import length_table, time_table
 from ccfem.papers.verdicts import claim_table
 
-__all__ = ["write", "write_all"]
-
 
 def write(study: Study, folder: Path) -> str:
     """Write everything into a folder; returns the table of claims."""

@@ -21,15 +21,6 @@ from ccfem.printing.export.robot_waypoints import read_layer_waypoints
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.surfaces import Surfaces
 
-__all__ = [
-    "authors_folder",
-    "authors_layers",
-    "authors_mesh",
-    "authors_strands",
-    "authors_stress",
-    "finer_mesh",
-]
-
 
 def authors_folder() -> Path:
     """Folder of the published data, named by ``CCFEM_FANG2024``."""

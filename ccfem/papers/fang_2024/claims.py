@@ -9,8 +9,6 @@ from ccfem.papers.fang_2024.planar_against_curved import failure_loads
 from ccfem.papers.fang_2024.t_bracket import PAPER_SECONDS
 from ccfem.papers.verdicts import Check, judged
 
-__all__ = ["quantities", "verdicts"]
-
 EXPECTED = Path(__file__).with_name("expected.toml")
 
 

@@ -3,8 +3,6 @@
 from ccfem.papers.contents import Contents
 from ccfem.papers.fang_2024.whole import write_all
 
-__all__ = ["CONTENTS"]
-
 CONTENTS = Contents(
     title="Fang et al. 2024, curved layers and winding strands",
     seconds=1800.0,

@@ -13,8 +13,6 @@ from ccfem.paths.planning import plan
 from ccfem.slicing.slicers.spatial import Spatial, SpatialSlicing
 from ccfem.strategies import create
 
-__all__ = ["VARIANTS", "field_study", "field_table"]
-
 BUILD = (0.0, 1.0, 0.0)
 
 VARIANTS: dict[str, dict[str, Any]] = {

@@ -18,8 +18,6 @@ from ccfem.slicing.principal_lines import strongest_stress
 from ccfem.strategies.winding_curves.joint_loops import joint_loops
 from ccfem.strategies.winding_curves.spaced import CLOSEST
 
-__all__ = ["Strands", "measured"]
-
 _AWAY = 12.0
 """Arc length from which on a strand is its own neighbour, mm (as the published spacing)."""
 

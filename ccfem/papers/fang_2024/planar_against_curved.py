@@ -18,8 +18,6 @@ from ccfem.slicing.layers.slicer import Slicer
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.slicing.slicers.spatial import Spatial
 
-__all__ = ["ROWS", "against", "failure_loads"]
-
 SLICINGS: dict[str, Slicer] = {
     "planar z": Planar(axis="z", thickness=1.0),
     "planar x": Planar(axis="x", thickness=1.0),

@@ -31,8 +31,6 @@ from ccfem.slicing.layers import Layer
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
 
-__all__ = ["SPECIFIED", "study"]
-
 HOLES, HEADS = ("base_left", "base_right"), ("head_left", "head_right")
 
 COUNTS = {"x": 131, "y": 61, "z": 32}

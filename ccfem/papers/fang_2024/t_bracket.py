@@ -33,8 +33,6 @@ from ccfem.slicing.layers.layer_stress import stress_on
 from ccfem.slicing.slicers.spatial import Spatial, SpatialSlicing
 from ccfem.strategies import create
 
-__all__ = ["PAPER_SECONDS", "Chain", "study", "timed_chain"]
-
 BUILD = (0.0, 1.0, 0.0)
 
 PAPER_SECONDS = {

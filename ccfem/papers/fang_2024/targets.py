@@ -8,8 +8,6 @@ from ccfem.papers.fang_2024.measures import Strands
 from ccfem.slicing.slicers.spatial import SpatialSlicing
 from ccfem.strategies.winding_curves.piece import pieces_with_joints
 
-__all__ = ["field_figures", "targets_table"]
-
 
 class _Target(NamedTuple):
     """A figure, the range that it has to lie in, and a better one to aim at."""

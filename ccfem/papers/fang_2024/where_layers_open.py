@@ -19,16 +19,6 @@ from ccfem.judging.virtual_testing.interlayer import layer_normals
 from ccfem.papers.fang_2024.planar_against_curved import ROWS
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = [
-    "PAPER_LOADS",
-    "PLACES",
-    "Opening",
-    "bonds_needed",
-    "openings",
-    "openings_picture",
-    "openings_table",
-]
-
 PLACES = {"base": (-np.inf, 20.0), "leg": (20.0, 35.0), "head": (35.0, np.inf)}
 """Parts of the T-bracket by height along y, mm."""
 PAPER_LOADS = {"planar z": ("head", 0.87), "planar y": ("head", 0.87), "planar x": ("base", 3.16)}

@@ -26,8 +26,6 @@ from ccfem.papers.verdicts import claim_table
 from ccfem.paths.toolpaths import MATRIX
 from ccfem.printing.export.robot_waypoints import write_robot_waypoints
 
-__all__ = ["write_all"]
-
 
 def write_all(
     folder: Path, progress: Progress = silent, loads: Sequence[str] = ("pull", "side")

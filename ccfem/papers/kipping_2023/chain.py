@@ -19,8 +19,6 @@ from ccfem.slicing.guidance.stress_regions import stress_regions
 from ccfem.slicing.slicers.load_oriented import LoadOriented, LoadOrientedSlicing
 from ccfem.strategies import create
 
-__all__ = ["PAPER_SECONDS", "PARTS", "Chain", "chain", "table_1", "table_2"]
-
 PARTS = {"A": "corner_bracket", "B": "arm_bracket"}
 PAPER_SECONDS = {"A": 1380.0, "B": 330.0}
 """Section 4: 23 and 5.5 minutes, i7-1165G7; the single steps of table 2 are lost."""

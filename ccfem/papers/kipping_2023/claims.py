@@ -13,8 +13,6 @@ from ccfem.printing.support import support_columns
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.load_oriented import LoadOriented
 
-__all__ = ["quantities", "support_table", "verdicts"]
-
 EXPECTED = Path(__file__).with_name("expected.toml")
 
 

@@ -10,8 +10,6 @@ from ccfem.papers.kipping_2023.fiso_shapes import shapes_table
 from ccfem.papers.kipping_2023.strength import failure_loads, on_pressing_supports, strength_table
 from ccfem.papers.kipping_2023.whole import write_all
 
-__all__ = ["CONTENTS"]
-
 
 def _run(progress: Progress) -> Mapping[str, Chain]:
     """Both parts, from stress to paths."""

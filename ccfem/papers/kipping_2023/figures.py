@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from ccfem.papers.kipping_2023.chain import Chain
 
-__all__ = ["blank", "part_figures", "senses_figure"]
-
 _MOST = 4000
 """Points or arrows that are drawn."""
 

@@ -23,16 +23,6 @@ from ccfem.slicing.layers.layer_stress import LayerStress
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies.fiso import Fiso
 
-__all__ = [
-    "OPTIONS",
-    "SHAPES",
-    "Strand",
-    "measured",
-    "options_table",
-    "shapes_picture",
-    "shapes_table",
-]
-
 WIDTH, BEND = 0.9, 25.0
 _REACH = 0.525
 """Distance from the strand, in widths, that counts as covered, as the addendum has it."""

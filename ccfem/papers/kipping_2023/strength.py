@@ -19,8 +19,6 @@ from ccfem.papers.kipping_2023.figures import blank
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.planar import Planar
 
-__all__ = ["SHEAR", "failure_loads", "on_pressing_supports", "sliding_picture", "strength_table"]
-
 TENSILE = 18.0
 SHEAR = (18.0, 35.0, 1e6)
 """Strength of the bond of printed PLA, MPa, across layers, and along them: as low, as published,

@@ -9,8 +9,6 @@ from ccfem.base.arrays import FloatArray
 from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["Distances", "distances_below"]
-
 _REACH = 8
 """So many layers below are looked at."""
 _FARTHEST = 1.0

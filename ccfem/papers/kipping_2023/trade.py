@@ -11,8 +11,6 @@ from ccfem.papers.kipping_2023.figures import blank
 from ccfem.papers.kipping_2023.thickness import distances_below
 from ccfem.slicing.slicers.load_oriented import LoadOriented
 
-__all__ = ["VARIANTS", "trade", "trade_picture", "trade_table"]
-
 VARIANTS: dict[str, dict[str, Any]] = {
     "default": {},
     "blend 0.25": {"blend": 0.25},

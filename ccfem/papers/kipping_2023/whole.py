@@ -17,8 +17,6 @@ from ccfem.papers.kipping_2023.strength import (
 from ccfem.papers.kipping_2023.trade import trade, trade_picture, trade_table
 from ccfem.papers.verdicts import claim_table
 
-__all__ = ["write_all"]
-
 
 def write_all(folder: Path, progress: Progress = silent) -> None:
     """Run the study, and write figures, tables and claims into a folder."""

@@ -25,8 +25,6 @@ from ccfem.papers.plocher_2022.plane_study import laid_plate, reduced_stiffness,
 from ccfem.papers.plocher_2022.sensitivity import ANGLES
 from ccfem.papers.plocher_2022.study import MATERIALS, CaseStudy
 
-__all__ = ["benchmark_fields", "layup_moduli", "layups", "shear", "turned_fibre"]
-
 LAYUPS = {
     "fibre at 0": ((0.0,), COLOURS["mps"]),
     "0/90": ((0.0, 90.0), COLOURS["grid 0"]),

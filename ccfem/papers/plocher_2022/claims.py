@@ -6,9 +6,7 @@ from pathlib import Path
 from scipy.stats import spearmanr
 
 from ccfem.papers.plocher_2022.study import CaseStudy
-from ccfem.papers.verdicts import Check, claim_table, judged
-
-__all__ = ["Check", "claim_table", "quantities", "raster_quantities", "verdicts"]
+from ccfem.papers.verdicts import Check, judged
 
 EXPECTED = Path(__file__).with_name("expected.toml")
 

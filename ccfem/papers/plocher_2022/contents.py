@@ -11,8 +11,6 @@ from ccfem.papers.plocher_2022.tables import case_table, index_table, material_t
 from ccfem.papers.plocher_2022.whole import write_all
 from ccfem.papers.verdicts import claim_table
 
-__all__ = ["CONTENTS"]
-
 _Both = tuple[Mapping[str, CaseStudy], Mapping[str, CaseStudy]]
 
 

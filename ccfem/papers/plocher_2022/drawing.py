@@ -14,8 +14,6 @@ from ccfem.comparison.plot.colours import INK, OUTLINE, SECTION
 from ccfem.papers.plocher_2022.plates import Plate
 from ccfem.papers.plocher_2022.study import CaseStudy
 
-__all__ = ["COLOURS", "image", "plain", "plates_grid", "polar", "section", "strokes", "title"]
-
 COLOURS = {
     "grid 45": "#d55e00",
     "grid 0": "#56b4e9",

@@ -9,8 +9,6 @@ from ccfem.base.arrays import FloatArray, IntArray, read_only
 from ccfem.geometry.polylines import arc_lengths, sample_at
 from ccfem.judging.evaluation.plane_paths import PlanePaths
 
-__all__ = ["FibreMap", "fibre_map"]
-
 _REACH = 2.0
 """Half length, in bead widths, of the chord that gives the angle."""
 _STEP = 0.25

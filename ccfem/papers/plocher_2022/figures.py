@@ -38,9 +38,6 @@ from ccfem.papers.plocher_2022.study import MATERIALS, CaseStudy, PatternStudy
 from ccfem.paths.raster.patterns import inside_shells
 from ccfem.paths.raster.skeleton import skeleton
 
-__all__ = ["COLOURS", "draw_all", "figures"]
-
-
 SPOKES = {
     "strain energy": ("energy_{}", "low"),
     "max stress": ("stress_{}", "low"),

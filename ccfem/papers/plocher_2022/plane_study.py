@@ -24,20 +24,6 @@ from ccfem.papers.plocher_2022.fibre_map import FibreMap
 from ccfem.papers.plocher_2022.sensitivity import ANGLES, Sensitivity
 from ccfem.paths.linking.print_order import nearest_end_order
 
-__all__ = [
-    "PRINT_SPEED",
-    "TRAVEL_SPEED",
-    "Benchmark",
-    "LaidPlate",
-    "bead_area",
-    "benchmark",
-    "laid_plate",
-    "mixed_stiffness",
-    "print_seconds",
-    "reduced_stiffness",
-    "turned_energies",
-]
-
 PRINT_SPEED, TRAVEL_SPEED = 8.3, 91.6
 """Speeds, mm/s, of the printer of Plocher et al. (2022), table 4."""
 

@@ -27,8 +27,6 @@ from ccfem.papers.plocher_2022.three_point_bending import three_point_bending
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.planar import Planar
 
-__all__ = ["Plate", "five_holes", "optimised_beam", "plates", "single_hole"]
-
 BEAD = 0.8
 """Bead width, mm: that of the printer of the paper is not stated."""
 _POISSON = 0.3

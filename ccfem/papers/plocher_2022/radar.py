@@ -12,8 +12,6 @@ from ccfem.comparison.plot.colours import INK, OUTLINE, palette
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_radar", "normalised", "radar_picture"]
-
 _RINGS = (0.25, 0.5, 0.75, 1.0)
 
 

@@ -10,8 +10,6 @@ from ccfem.base.arrays import FloatArray, read_only
 from ccfem.base.errors import InputError
 from ccfem.judging.evaluation.sensitivity import acute
 
-__all__ = ["ANGLES", "Sensitivity"]
-
 ANGLES = (0.0, 5.0, *(10.0 * n for n in range(1, 10)))
 """Angles, degrees, at which the plate is solved (equation 1 of the paper, and 0)."""
 

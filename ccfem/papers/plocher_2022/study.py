@@ -52,18 +52,6 @@ from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import stress_on
 from ccfem.strategies import create
 
-__all__ = [
-    "MATERIALS",
-    "PATTERNS",
-    "RASTER",
-    "CaseStudy",
-    "PatternStudy",
-    "Patterns",
-    "machine_of",
-    "run_case",
-    "run_study",
-]
-
 Patterns = Mapping[str, tuple[str, dict[str, Any]]]
 
 MATERIALS = {"C": "c_fram", "S": "s_fram"}

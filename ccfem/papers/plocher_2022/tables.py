@@ -9,15 +9,6 @@ from ccfem.judging.evaluation import COLUMNS
 from ccfem.papers.plocher_2022.plane_study import reduced_stiffness
 from ccfem.papers.plocher_2022.study import MATERIALS, CaseStudy
 
-__all__ = [
-    "case_table",
-    "index_table",
-    "material_table",
-    "prototype_table",
-    "rank_table",
-    "result_table",
-]
-
 PROTOTYPE = Path(__file__).with_name("prototype.toml")
 
 ROWS = {

@@ -12,8 +12,6 @@ from ccfem.fem.materials import plane_stress
 from ccfem.fem.plates import PlaneProblem, raster_mesh
 from ccfem.fem.topopt import Design, Simp, outline
 
-__all__ = ["BendingBeam", "three_point_bending", "three_point_bending_problem"]
-
 _COLUMNS, _ROWS, _TIMES = 68, 20, 3
 _SUPPORT_IN = 2
 """Cells between the ends of the beam and its supports."""

@@ -26,15 +26,6 @@ from ccfem.paths.raster.patterns import concentric_regions, medial_regions
 from ccfem.paths.raster.raster_plan import raster_plan
 from ccfem.strategies import create
 
-__all__ = [
-    "VARIANTS",
-    "Tried",
-    "metric_table",
-    "try_variants",
-    "variant_quantities",
-    "variant_table",
-]
-
 _MPS: tuple[str, dict[str, Any]] = ("mps", {"turns": "tight"})
 _ENDS: tuple[str, dict[str, Any]] = ("mps", {"seeds": "ends", "turns": "tight"})
 _GRID: tuple[str, dict[str, Any]] = ("grid", {"angle": 45.0})

@@ -24,8 +24,6 @@ from ccfem.papers.plocher_2022.variants import (
 )
 from ccfem.papers.verdicts import claim_table
 
-__all__ = ["write_all"]
-
 PROTOTYPE_NOTE = """\
 Both chains follow the same rules; they share no code. Where they differ:
 

@@ -10,13 +10,11 @@ from ccfem.base.tensor import in_plane, largest_in_plane
 from ccfem.geometry.medial_axis import medial_axis
 from ccfem.judging.evaluation.indices.matching import THRESHOLDS, matching_rate
 from ccfem.machine import SpeedTable
-from ccfem.papers.verdicts import Check, claim_table, judged
+from ccfem.papers.verdicts import Check, judged
 from ccfem.papers.wang_2021.study import BASELINES, LIMIT, PartStudy, PatternStudy, PlateStudy
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers import LayerStress
 from ccfem.strategies.stress_tracing.frame import frame
-
-__all__ = ["EXPECTED", "claim_table", "joint_discs", "quantities", "uniaxial", "verdicts"]
 
 EXPECTED = Path(__file__).with_name("expected.toml")
 

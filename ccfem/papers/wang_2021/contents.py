@@ -8,8 +8,6 @@ from ccfem.papers.wang_2021.study import run_study
 from ccfem.papers.wang_2021.tables import plate_table, speed_table
 from ccfem.papers.wang_2021.whole import write_all
 
-__all__ = ["CONTENTS"]
-
 CONTENTS = Contents(
     title="Wang et al. 2021, load-dependent path planning",
     seconds=120.0,

@@ -34,8 +34,6 @@ from ccfem.strategies.stress_tracing.frame import frame
 from ccfem.strategies.stress_tracing.main_paths import main_paths
 from ccfem.strategies.svt import Svt
 
-__all__ = ["draw_all", "figures"]
-
 _MOST = 4.0
 """End of the colour scale of curvature, 1/mm."""
 _FAINT = "#b5bac1"

@@ -17,23 +17,6 @@ from ccfem.cases.designed import DesignPlate
 from ccfem.comparison.plot.colours import INK, OUTLINE, SECTION, palette
 from ccfem.papers.wang_2021.study import PartStudy, PatternStudy
 
-__all__ = [
-    "COLOURS",
-    "LINK",
-    "PRESSED",
-    "PULLED",
-    "bar",
-    "by_level",
-    "curves",
-    "lines_of",
-    "panels",
-    "path",
-    "section",
-    "show_load",
-    "strokes",
-    "title",
-]
-
 COLOURS = {
     "lpp": "#0072b2",
     "lpp uncrossed": "#56b4e9",

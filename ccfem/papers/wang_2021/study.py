@@ -40,22 +40,6 @@ from ccfem.slicing.layers.layer_stress import stress_on
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create, named
 
-__all__ = [
-    "BASELINES",
-    "LEAST",
-    "LIMIT",
-    "PATTERNS",
-    "PLATES",
-    "PartStudy",
-    "PatternStudy",
-    "PlateStudy",
-    "curvature_along",
-    "plate_of",
-    "run_part",
-    "run_plate",
-    "run_study",
-]
-
 PLATES = DESIGNED
 
 PATTERNS: Mapping[str, tuple[str, dict[str, Any]]] = MappingProxyType(

@@ -5,8 +5,6 @@ from collections.abc import Mapping
 from ccfem.machine import SpeedTable
 from ccfem.papers.wang_2021.study import LIMIT, PatternStudy, PlateStudy
 
-__all__ = ["ROWS", "plate_table", "result_table", "speed_table"]
-
 ROWS = {
     "path 5": "fibre within 5 degrees of the stress, %",
     "path 10": "10 degrees",

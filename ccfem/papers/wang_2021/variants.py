@@ -23,8 +23,6 @@ from ccfem.papers.wang_2021.study import (
 from ccfem.paths.planning import plan
 from ccfem.strategies import create
 
-__all__ = ["RADII", "Tried", "try_hole", "try_radii", "variant_quantities", "variant_table"]
-
 RADII = (0.45, 0.8, 1.5, 2.5, 3.85)
 """Tightest turns, mm: half a strand, ours, and the paper's limit of 0.26 / mm among them."""
 _PLATES = ("bridge", "suspension")

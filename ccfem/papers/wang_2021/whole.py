@@ -18,8 +18,6 @@ from ccfem.papers.wang_2021.variants import (
     variant_table,
 )
 
-__all__ = ["write_all"]
-
 
 def write_all(folder: Path, progress: Progress = silent) -> None:
     """Run the study, and write figures, tables and claims into a folder."""

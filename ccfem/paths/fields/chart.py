@@ -22,8 +22,6 @@ from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.plane import Plane, plane_frame
 
-__all__ = ["Chart", "chart_of", "flat_view", "in_charts"]
-
 _ROUNDS = 30
 _STEP = 0.5
 _MOST_OVER = 0.01

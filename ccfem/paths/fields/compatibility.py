@@ -8,8 +8,6 @@ from numba import njit
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.checks import check_known
 
-__all__ = ["Incompatible", "incompatible"]
-
 _LIMIT = 0.5
 """The paper's eta."""
 

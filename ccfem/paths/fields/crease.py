@@ -14,8 +14,6 @@ from ccfem.base.arrays import FloatArray
 from ccfem.paths.fields.layer_elements import Surface, positive_definite
 from ccfem.paths.fields.orientation import orient
 
-__all__ = ["orient_along"]
-
 _ACROSS = 3e-3
 """Penalty of a change across the lines, over that of one along them. The cut runs along the lines
 while this is below (breadth / twice the length)^2 of the strip that they fill."""

@@ -13,8 +13,6 @@ from ccfem.paths.fields.orientation import orient
 from ccfem.paths.fields.tensile import Tension
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["Directed", "directed"]
-
 
 @dataclass(frozen=True)
 class Directed:

@@ -18,8 +18,6 @@ from ccfem.geometry.section_grid import SectionGrid, contains, section_grid
 from ccfem.geometry.shapes import Region
 from ccfem.paths.fields.streamlines import direction_at, line_field, streamline_step
 
-__all__ = ["evenly_spaced_streamlines"]
-
 _STEP = 0.1
 """Step along a streamline, in separations."""
 _LEAST = 0.03

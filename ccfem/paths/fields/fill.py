@@ -6,8 +6,6 @@ import scipy.sparse as sparse
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.paths.fields.layer_elements import Surface, positive_definite
 
-__all__ = ["fill_laplacian", "fill_screened"]
-
 _AVERAGES = 50
 
 

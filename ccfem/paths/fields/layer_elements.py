@@ -14,8 +14,6 @@ from ccfem.geometry.isocontours import triangle_edges
 from ccfem.geometry.measures import signed_areas
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["Surface", "positive_definite"]
-
 
 def positive_definite(matrix: Any) -> Any:
     """Factorise a sparse symmetric positive definite matrix; the result has ``solve``."""

@@ -11,8 +11,6 @@ from ccfem.paths.fields.orientation import orient
 from ccfem.paths.fields.tensile import Tension, plane_tension, spatial_tension
 from ccfem.slicing.layers.layer_stress import LayerStress
 
-__all__ = ["layer_tension", "mesh_tension"]
-
 _ANY_COMPRESSION = 1e12
 """Limit of compression over tension that excludes nothing."""
 

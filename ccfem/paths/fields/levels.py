@@ -8,8 +8,6 @@ from ccfem.base.arrays import FloatArray
 from ccfem.geometry.isocontours import Isocontours, isocontours, least_distance
 from ccfem.paths.fields.layer_elements import Surface
 
-__all__ = ["extract_levels", "levels_at", "start_count", "unit_levels"]
-
 
 def levels_at(surface: Surface, values: FloatArray, count: int) -> Isocontours:
     """Isocurves at `count` levels, half a step from the extremes [Chen et al. 2021, Eq. 7]."""

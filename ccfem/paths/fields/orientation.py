@@ -5,8 +5,6 @@ from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray
 
-__all__ = ["orient"]
-
 
 def orient(
     direction: FloatArray, pairs: IntArray, confidence: FloatArray | None = None

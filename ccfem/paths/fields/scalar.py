@@ -9,8 +9,6 @@ from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import SolveError
 from ccfem.paths.fields.layer_elements import Surface, positive_definite
 
-__all__ = ["fit_cone", "fit_constrained", "fit_literal", "fit_weighted"]
-
 _REGULARISATION = 1e-10
 _ITERATIONS = 20
 """Iterations of the alternating direction method: see `fit_constrained`."""

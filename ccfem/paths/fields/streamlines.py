@@ -11,8 +11,6 @@ from ccfem.base.tensor import strongest_in_plane
 from ccfem.geometry.facets import paired
 from ccfem.geometry.locate import locate
 
-__all__ = ["LineField", "direction_at", "line_field", "streamline_step", "streamlines"]
-
 _LONGEST = 10.0
 """Length, in diagonals of the points, at which a line stops in either sense."""
 

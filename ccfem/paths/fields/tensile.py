@@ -8,8 +8,6 @@ from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.tensor import largest_in_plane, principal, strongest
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["Tension", "plane_tension", "spatial_tension"]
-
 
 @dataclass(frozen=True)
 class Tension:

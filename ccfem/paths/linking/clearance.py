@@ -8,8 +8,6 @@ from numba import njit
 from ccfem.base.arrays import FloatArray
 from ccfem.geometry.polylines import is_closed, line_length, pack, runs
 
-__all__ = ["trim_to_clearance"]
-
 
 def trim_to_clearance(
     lines: Sequence[FloatArray], clearance: float, least_length: float, first: int = 0

@@ -11,8 +11,6 @@ from ccfem.geometry.shapes import Region, open_lines
 from ccfem.paths.linking.joining import Joint, join
 from ccfem.paths.linking.possible_links import ring_arc
 
-__all__ = ["lead_into", "parallel_curve"]
-
 
 def parallel_curve(boundary: shapely.Polygon, distance: float, section: Region) -> list[FloatArray]:
     """Curve at a distance from a closed boundary, inside the section.

@@ -24,8 +24,6 @@ from ccfem.geometry.polylines import (
 from ccfem.geometry.tight_bends import tight_bends, tight_samples
 from ccfem.paths.linking.joining import Joined
 
-__all__ = ["cut_turns"]
-
 _ONE_TURN = 3.0
 """Bends nearer to each other than this, in spacings, are one turn."""
 _LONGEST = 9.0

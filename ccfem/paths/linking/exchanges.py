@@ -12,8 +12,6 @@ from numba import njit
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError
 
-__all__ = ["Clusters", "greedy_order", "improved_order", "strands"]
-
 _BLOCK = 3
 """Maximum number of clusters that Or-opt moves at once."""
 _MANY = 50

@@ -10,8 +10,6 @@ from ccfem.geometry.polylines import along_line, is_closed, line_length, points_
 from ccfem.geometry.shapes import Region, open_lines
 from ccfem.paths.linking.joining import Joined, link_ends
 
-__all__ = ["close_short_ring", "keep_off_border", "linked_paths", "long_enough"]
-
 _OVERLAP = 0.1
 """Largest share of a ring's length that is laid twice [Chen et al. 2021: the ring round a hole of
 10.9 mm is 40.8 mm long, against a minimum of 42 mm]."""

@@ -18,8 +18,6 @@ from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.contour_tree import SAMPLES, ContourTree
 from ccfem.geometry.polylines import line_length
 
-__all__ = ["first_in_spiral_out"]
-
 _STEP = 1.8
 """Longest step from one contour to the next, in spacings; if one is longer, all are merged."""
 _NEIGHBOURS = 8

@@ -20,8 +20,6 @@ from ccfem.paths.linking.possible_links import (
     shortened,
 )
 
-__all__ = ["Joined", "Joint", "join", "link_ends"]
-
 
 @dataclass(frozen=True)
 class Joint:

@@ -14,8 +14,6 @@ from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.geometry.dubins import WORDS, advance, curve_points, word_sizes
 from ccfem.geometry.section_grid import SectionGrid, place, place_and_room
 
-__all__ = ["LinkCurves", "curve_cost", "link_curve", "link_curves", "stub_points"]
-
 _SAMPLE = 0.25
 """Step, mm, at which a curve is sampled close to the border."""
 _STRAIGHT = np.zeros(3, dtype=np.int64)

@@ -15,8 +15,6 @@ from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError
 from ccfem.paths.linking.exchanges import Clusters, greedy_order, improved_order, strands
 
-__all__ = ["costs_between_ends", "order_clusters"]
-
 _EXACT = 12
 """Maximum number of clusters for which the order is optimal."""
 

@@ -13,18 +13,6 @@ from ccfem.geometry.polylines import along_line, is_closed, points_along
 from ccfem.geometry.shapes import Region, Shapes, strings
 from ccfem.paths.linking.smooth_links import smooth_links
 
-__all__ = [
-    "CLEARANCE",
-    "CLOSING_TURN",
-    "Link",
-    "cut_back",
-    "cut_start",
-    "free_links",
-    "possible_links",
-    "ring_arc",
-    "shortened",
-]
-
 CLEARANCE = 0.9
 """Least distance of a link from other strands, in widths. Ends on a slanted boundary are slightly
 nearer to each other than the strands are."""

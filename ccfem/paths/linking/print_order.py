@@ -4,8 +4,6 @@ import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["nearest_end_order"]
-
 
 def nearest_end_order(starts: FloatArray, ends: FloatArray) -> tuple[IntArray, BoolArray, float]:
     """Order of printing in which the path with the nearest end always comes next.

@@ -7,8 +7,6 @@ from ccfem.machine.machine import Machine
 from ccfem.machine.speeds import table_speeds
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 
-__all__ = ["step_speeds"]
-
 _REACH = 2.0
 """Least length over which curvature is taken, in fibre widths. Our choice: over less, the corners
 that a mesh gives to round borders and to isocurves would count as turns, and paths would break into

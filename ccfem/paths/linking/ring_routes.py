@@ -13,8 +13,6 @@ from ccfem.geometry.section_grid import SectionGrid
 from ccfem.geometry.shapes import Region, Shapes
 from ccfem.paths.linking.link_curves import curve_cost
 
-__all__ = ["RingRoutes", "ring_cost", "ring_curve", "ring_routes"]
-
 _DISTANCE = 5.0
 """Distance, mm, from the ring to the part; at least the radius."""
 _LEADS = (5.0, 10.0, 16.0)

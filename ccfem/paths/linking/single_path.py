@@ -28,8 +28,6 @@ from ccfem.paths.linking.link_curves import LinkCurves, link_curve, link_curves,
 from ccfem.paths.linking.ordering import costs_between_ends, order_clusters
 from ccfem.paths.linking.ring_routes import RingRoutes, ring_cost, ring_curve, ring_routes
 
-__all__ = ["LinkedPath", "link_tracks"]
-
 _REACH = (1.0, 3.0, 6.0)
 """Straight extensions, mm, of tracks before a link turns."""
 _EXACT_GROUPS = 10

@@ -15,8 +15,6 @@ from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.geometry.dubins import WORDS, shortest_curve, word_sizes
 from ccfem.geometry.polylines import along_line, points_along
 
-__all__ = ["SmoothLink", "smooth_links"]
-
 _CUTS = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 6.0])
 """Distances before its end at which a strand may be left, in widths."""
 _HEADING = 1.0

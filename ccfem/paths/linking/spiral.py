@@ -10,8 +10,6 @@ from ccfem.geometry.polylines import is_closed
 from ccfem.geometry.shapes import Region
 from ccfem.paths.linking.possible_links import ring_arc
 
-__all__ = ["spiral"]
-
 _STRIDE = 4
 """Distance, in points, between the places of a ring that are tried for the seam."""
 

@@ -11,8 +11,6 @@ from ccfem.geometry.shapes import Region
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.level_cut import border_edges, chain
 
-__all__ = ["cut_layer"]
-
 _GRID = 1e-6
 """Grid, mm, of the places where a border crosses triangles."""
 _SAME = 3e-6

@@ -16,8 +16,6 @@ from ccfem.paths.placement.cut_layer import cut_layer
 from ccfem.paths.placement.region_shapes import Shape
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["FibrePlaces", "FibreRegion"]
-
 _SAME = 1e-6
 """Heights closer than this, mm, are the same."""
 

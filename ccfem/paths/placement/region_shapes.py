@@ -15,8 +15,6 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.shapes import Region
 from ccfem.slicing.layers.plane import Plane
 
-__all__ = ["InBody", "InBox", "InCylinder", "NearPatch", "Shape"]
-
 _ARC = 16
 """Pieces of a quarter of a circle."""
 _CUTS = 12

@@ -1,8 +1,9 @@
 """Planning: strategies, the paths of a whole part, and plans of equal fibre length."""
 
-from ccfem.paths.planning.equal_fibre import Planned, length_per_layer, plan_to_length
+from ccfem.paths.planning.equal_fibre import length_per_layer, plan_to_length
 from ccfem.paths.planning.given_paths import GivenPaths
 from ccfem.paths.planning.plan import plan
+from ccfem.paths.planning.planned import Planned
 from ccfem.paths.planning.strategy import Amount, LayerStrategy, PartStrategy, Strategy
 
 __all__ = [

@@ -7,8 +7,6 @@ import numpy as np
 from ccfem.base.arrays import FloatArray
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 
-__all__ = ["cut_to_length"]
-
 _ENOUGH = 1e-9
 """Length, mm, below which nothing more is cut."""
 _SAME = 1e-6

@@ -9,8 +9,6 @@ import numpy as np
 
 from ccfem.paths.planning.strategy import Strategy
 
-__all__ = ["Dial", "around"]
-
 _POWERS = (0.5, 3.0)
 """Bounds of the power of the parameter that the length is assumed to be proportional to."""
 

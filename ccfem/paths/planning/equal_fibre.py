@@ -23,17 +23,6 @@ from ccfem.paths.planning.strategy import LengthStrategy, Strategy
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = [
-    "TOLERANCE",
-    "Planned",
-    "check_wanted",
-    "extremes",
-    "length_per_layer",
-    "plan_to_length",
-    "plan_to_lengths",
-    "sampled_length",
-]
-
 TOLERANCE = 0.01
 """Share by which a length may differ from the wanted one and still count as equal."""
 _GUESSES = 3

@@ -14,8 +14,6 @@ from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress
 
-__all__ = ["GivenPaths"]
-
 _SAME = 1e-3
 """Heights nearer than this, mm, are equal: it allows for the rounding of path files."""
 

@@ -25,8 +25,6 @@ from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress
 
-__all__ = ["SPACING", "Infill", "Turns", "check_fill", "check_shells", "long_enough", "with_turns"]
-
 SPACING = Amount("spacing", most=1.0, least=20.0)
 """Amount of a strategy whose parameter `spacing` is the distance of strands in fibre widths."""
 

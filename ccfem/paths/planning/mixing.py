@@ -10,8 +10,6 @@ from ccfem.paths.planning.cutting import cut_to_length
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["Mixed", "layer_lengths", "mixed"]
-
 _SPARE = 0.005
 """Share of the wanted length that may stay unused before strands are cut to fill it."""
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)

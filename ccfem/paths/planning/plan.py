@@ -15,8 +15,6 @@ from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import stress_on
 from ccfem.slicing.layers.pitch import check_pitch
 
-__all__ = ["check_layers", "plan", "plan_layers"]
-
 
 def plan(
     strategy: Strategy, layers: Sequence[Layer], stress: PartStress, machine: Machine

@@ -6,8 +6,6 @@ from ccfem.base.arrays import in_brief
 from ccfem.paths.planning.strategy import Strategy
 from ccfem.paths.toolpaths import Toolpaths
 
-__all__ = ["Planned"]
-
 
 @dataclass(frozen=True)
 class Planned:

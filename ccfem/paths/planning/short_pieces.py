@@ -8,8 +8,6 @@ import shapely
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["about_short_pieces", "short_share"]
-
 _WORTH_A_WORD = 0.1
 
 

@@ -7,8 +7,6 @@ import numpy as np
 from ccfem.geometry.even_steps import OFF, even_steps
 from ccfem.paths.toolpaths import Toolpaths
 
-__all__ = ["in_even_steps"]
-
 _SHORTEST = 1e-6
 """Length, in steps, up to which a path counts as having none."""
 

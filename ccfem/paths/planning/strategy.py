@@ -11,16 +11,6 @@ from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress
 
-__all__ = [
-    "Amount",
-    "CasesStrategy",
-    "LayerPlanner",
-    "LayerStrategy",
-    "LengthStrategy",
-    "PartStrategy",
-    "Strategy",
-]
-
 
 @dataclass(frozen=True)
 class Amount:

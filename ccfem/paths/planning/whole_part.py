@@ -10,8 +10,6 @@ from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress
 
-__all__ = ["WholePart", "full_length"]
-
 
 def full_length(layers: Sequence[Layer], machine: Machine) -> float:
     """Length of fibre that covers a layer side by side, mm, mean over the layers."""

@@ -7,8 +7,6 @@ from scipy import ndimage
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["Metric", "bands", "depth"]
-
 Metric = Literal["euclid", "cross", "square"]
 
 

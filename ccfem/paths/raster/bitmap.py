@@ -11,8 +11,6 @@ from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
 from ccfem.geometry.shapes import Region
 
-__all__ = ["NEIGHBOURS", "Bitmap", "bitmap"]
-
 NEIGHBOURS = np.array([(-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1)])
 NEIGHBOURS.flags.writeable = False
 """Steps (row, column) to the 8 neighbours of a pixel, clockwise; even ones share a side."""

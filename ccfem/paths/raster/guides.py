@@ -14,8 +14,6 @@ from ccfem.paths.raster.skeleton import segments, skeleton
 from ccfem.paths.raster.thinning import thin
 from ccfem.slicing.layers.layer_stress import LayerStress
 
-__all__ = ["segment_seeds", "stress_guides"]
-
 _STEP = 0.5
 _APART = 2.0
 _SHORTEST = 6

@@ -13,21 +13,6 @@ from ccfem.base.arrays import BoolArray, IntArray, freeze
 from ccfem.paths.raster.bands import Metric, bands
 from ccfem.paths.raster.skeleton import nearest_segment, skeleton
 
-__all__ = [
-    "GUIDE",
-    "INFILL",
-    "SHELL",
-    "Regions",
-    "concentric_regions",
-    "first_touch",
-    "grid_regions",
-    "hatch_lines",
-    "inside_shells",
-    "medial_regions",
-    "rings_round",
-    "stress_regions",
-]
-
 SHELL, GUIDE, INFILL = range(3)
 
 _DASH = 12

@@ -14,8 +14,6 @@ from ccfem.paths.raster.tracing import PixelPaths, trace
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["RasterPlan", "raster_plan"]
-
 
 @dataclass(frozen=True)
 class RasterPlan:

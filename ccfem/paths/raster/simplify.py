@@ -5,8 +5,6 @@ from numba import njit
 
 from ccfem.base.arrays import BoolArray, IntArray
 
-__all__ = ["corners"]
-
 _STAIRS = 3
 """Minimum number of steps, alternating between two directions, that make a staircase."""
 

@@ -10,8 +10,6 @@ from ccfem.paths.raster.bands import depth
 from ccfem.paths.raster.bitmap import NEIGHBOURS
 from ccfem.paths.raster.thinning import thin
 
-__all__ = ["Segment", "nearest_segment", "segments", "skeleton"]
-
 _ALL = np.ones((3, 3), dtype=bool)
 _LEAST_SPUR = 5.0
 _SPUR, _MORE = 1.5, 1.0

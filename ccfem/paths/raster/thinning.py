@@ -9,8 +9,6 @@ from numba import njit
 
 from ccfem.base.arrays import BoolArray, IntArray
 
-__all__ = ["thin"]
-
 
 def thin(regions: IntArray) -> BoolArray:
     """Pixels that stay when every region is thinned.

@@ -16,8 +16,6 @@ from ccfem.paths.raster.walking import (
     walk,
 )
 
-__all__ = ["PixelPaths", "trace"]
-
 _STUB = 4
 """Branches and paths of fewer pixels beside another path of their region do not count: it absorbs
 them."""

@@ -10,8 +10,6 @@ from numba import njit
 
 from ccfem.paths.raster.bitmap import NEIGHBOURS
 
-__all__ = ["absorb", "chains", "cut_spurs", "extend_ends", "fill_corners", "join_ends", "walk"]
-
 _STEPS = NEIGHBOURS.copy()
 
 

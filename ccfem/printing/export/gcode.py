@@ -19,6 +19,7 @@ from ccfem.base.whole import whole_file
 from ccfem.machine.kinematics import axis_values
 from ccfem.machine.machine import Machine
 from ccfem.printing.export.gcode_head import gcode_head
+from ccfem.printing.laid_layer import COORDINATE_DIGITS
 from ccfem.printing.moves import (
     CUT,
     EVENTS,
@@ -35,9 +36,7 @@ from ccfem.printing.moves import (
     Moves,
 )
 from ccfem.printing.part_moves import part_moves
-from ccfem.printing.print_plan import COORDINATE_DIGITS, PrintPlan
-
-__all__ = ["gcode", "gcode_of_moves", "write_gcode"]
+from ccfem.printing.print_plan import PrintPlan
 
 _FEED_DIGITS = 5
 """Decimals of E, mm."""

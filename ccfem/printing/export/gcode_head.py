@@ -10,8 +10,6 @@ from ccfem.printing.duration import durations, waits
 from ccfem.printing.moves import LAY, Moves
 from ccfem.printing.print_plan import PrintPlan
 
-__all__ = ["gcode_head"]
-
 
 def gcode_head(moves: Moves, plan: PrintPlan, machine: Machine, title: str) -> list[str]:
     """Lines at the head of a file, as slicers write and printers read them.

@@ -16,8 +16,6 @@ from ccfem.base.whole import whole_file
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["draw_layer"]
-
 _COLOURS = {"BORDER": 8, "FIBRE": 7, "LINK": 5}
 """Colours of the DXF layers by their AutoCAD number: grey, black or white, blue."""
 _INKS = {"BORDER": "#5d6878", "FIBRE": "#1d2430", "LINK": "#4a8fd4"}

@@ -11,8 +11,6 @@ from ccfem.base.whole import text_of
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.printing.export.waypoints import LARGEST_NUMBER, check_near, read_waypoints
 
-__all__ = ["FRAMES", "read_path_table", "read_paths"]
-
 FRAMES = ("mesh", "tool")
 """What coordinates of a file may be in: those of the mesh, or the axes of the printer's tool."""
 

@@ -17,8 +17,6 @@ from ccfem.printing.moves import (
     Moves,
 )
 
-__all__ = ["write_robot_cell"]
-
 _HEADER = "path,tool,layer,x,y,z,nx,ny,nz,speed,feed,beside,width,height,event"
 
 

@@ -14,8 +14,6 @@ from ccfem.paths.linking.print_speed import step_speeds
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["read_layer_waypoints", "write_layer_waypoints", "write_robot_waypoints"]
-
 _HEADER = "layer,path,x,y,z,nx,ny,nz,height,feed"
 _JUMP = 3.0
 """Steps of a published file longer than this, mm, are travel between strands."""

@@ -5,8 +5,6 @@ from pathlib import Path
 from ccfem.base.whole import whole_file
 from ccfem.printing.print_plan import PrintPlan
 
-__all__ = ["write_trims"]
-
 
 def write_trims(path: str | Path, plan: PrintPlan) -> None:
     """Write the places as CSV: ``layer, x, y, z``, on the bed of the printer, mm.

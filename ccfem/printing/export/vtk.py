@@ -12,8 +12,6 @@ from ccfem.base.whole import whole_file
 from ccfem.body.files.vtk_xml import write_vtk_xml
 from ccfem.paths.toolpaths import Toolpaths
 
-__all__ = ["write_paths"]
-
 
 def write_paths(
     toolpaths: Toolpaths,

@@ -10,8 +10,6 @@ from ccfem.body.files.vtk_xml import as_bytes
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.fem.stress_files.vtu_tensors import UNIT, VTK_COMPONENTS, vtk_tensors
 
-__all__ = ["result_path", "write_result"]
-
 
 def result_path(path: str | Path, case: str = "") -> Path:
     """Name of the file of a load case; of the whole result without one.

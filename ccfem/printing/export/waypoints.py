@@ -18,8 +18,6 @@ from ccfem.geometry.polylines import pack
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["LARGEST_NUMBER", "check_near", "read_waypoints", "write_waypoints"]
-
 _CLOSED = 1e-3
 """Largest distance, mm, between the ends of a closed path: the files round to 6 digits."""
 LARGEST_NUMBER = 1e15

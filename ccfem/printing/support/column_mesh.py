@@ -22,8 +22,6 @@ from ccfem.geometry.locate import locate
 from ccfem.printing.support.overhang import hanging_facets
 from ccfem.slicing.layers.plane import plane_frame
 
-__all__ = ["ColumnMesh", "column_mesh"]
-
 _INWARD = 1e-3
 """Share of the way to the middle of its hanging facets at which a line is looked along: just inside
 the border of what hangs over, where it is told a hole's bottom from the open air."""

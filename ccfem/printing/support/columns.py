@@ -17,8 +17,6 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.printing.support.overhang import hanging_facets
 from ccfem.slicing.layers.plane import plane_frame
 
-__all__ = ["SupportColumns", "support_columns"]
-
 _OFF = 0.381966
 """Where columns stand between lines of the grid: off the corners and edges of parts."""
 _MOST = 5e7

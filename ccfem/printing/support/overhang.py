@@ -5,8 +5,6 @@ import numpy as np
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.body.mesh.tet_mesh import TetMesh
 
-__all__ = ["hanging_facets"]
-
 
 def hanging_facets(
     mesh: TetMesh, frame: FloatArray, bed: float, angle: float, reach: float, upright: float

@@ -18,8 +18,6 @@ from ccfem.printing.support.column_mesh import ColumnMesh
 from ccfem.slicing.guidance.bounded_gradient import Bounds, bounded
 from ccfem.slicing.guidance.energies import gradient_energy
 
-__all__ = ["SupportField", "support_field"]
-
 _RANGE = (0.2, 6.0)
 """Length of the gradient, in the part's, within which cells are turned up again."""
 

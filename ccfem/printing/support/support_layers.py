@@ -19,8 +19,6 @@ from ccfem.slicing.layers.standing import standing
 from ccfem.slicing.layers.sublayers import layers_within
 from ccfem.slicing.principal_lines.trace import mean_edge
 
-__all__ = ["SupportLayers", "slice_with_support", "support_layers"]
-
 _CARRIED = 45.0
 """Degrees from upright up to which flat layers carry themselves."""
 _LIFT = 10

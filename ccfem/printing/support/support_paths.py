@@ -15,8 +15,6 @@ from ccfem.printing.support.support_layers import SupportLayers
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.plane import Plane, plane_frame
 
-__all__ = ["support_paths"]
-
 
 def support_paths(support: SupportLayers, machine: Machine, spacing: float = 3.0) -> Toolpaths:
     """Fill the layers of a support with rings, open enough to be broken off or dissolved.

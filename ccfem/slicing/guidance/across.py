@@ -6,8 +6,6 @@ import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray
 
-__all__ = ["Across", "across_layers", "best_plane"]
-
 _DIRECTIONS = 2000
 """Number of plane directions that are tried, over half a sphere: 3 degrees apart."""
 

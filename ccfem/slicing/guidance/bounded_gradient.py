@@ -13,8 +13,6 @@ import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray
 
-__all__ = ["Bounds", "bounded"]
-
 _WEIGHTS = (1.0, 5.0, 30.0)
 """Weights of the bounds against the target: low first, for the nearest field, then high, to meet
 the bounds."""

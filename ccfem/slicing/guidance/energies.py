@@ -6,14 +6,6 @@ from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray
 
-__all__ = [
-    "alignment_energy",
-    "faces_between",
-    "gradient_energy",
-    "gradient_source",
-    "smoothness_energy",
-]
-
 _NEAREST = 0.3
 """Least distance between the centres of neighbouring cells that is used, in cube roots of the mean
 volume (half a mean edge): flat cells would otherwise outweigh all others."""

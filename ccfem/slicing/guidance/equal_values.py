@@ -5,8 +5,6 @@ import scipy.sparse as sp
 
 from ccfem.base.arrays import FloatArray, IntArray
 
-__all__ = ["equal_value_energy", "slabs"]
-
 
 def slabs(
     points: FloatArray, nodes: IntArray, direction: FloatArray, height: float

@@ -26,8 +26,6 @@ from ccfem.slicing.guidance.energies import (
 from ccfem.slicing.guidance.equal_values import equal_value_energy, slabs
 from ccfem.slicing.guidance.joints import Joint
 
-__all__ = ["GuidanceField", "JointForm", "Weights", "guidance_field"]
-
 JointForm = Literal["axis", "ring", "literal"]
 
 _MOST_SIGNS = 12

@@ -19,8 +19,6 @@ from ccfem.fem.elasticity.direct import superlu
 from ccfem.slicing.guidance.bounded_gradient import Bounds, bounded
 from ccfem.slicing.guidance.energies import gradient_energy
 
-__all__ = ["HeightField", "height_field", "inverted_share"]
-
 _LARGEST = 64.0
 """Blend above which the field is practically flat."""
 _CLOSE = 0.02

@@ -8,8 +8,6 @@ from ccfem.slicing.guidance.joints import Joint, joining_pairs
 from ccfem.slicing.principal_lines.critical import CriticalRegion, Keep, critical_region
 from ccfem.slicing.principal_lines.strongest import Strongest, strongest_stress
 
-__all__ = ["JointLines", "joint_lines"]
-
 _KNOWN = "_joint_lines"
 
 

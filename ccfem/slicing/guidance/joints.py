@@ -14,8 +14,6 @@ from ccfem.body.mesh.smooth_faces import fitted_cylinder
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.part_stress import PartStress
 
-__all__ = ["Joint", "joining_pairs", "joint_of", "joints_of"]
-
 _AGREE = np.cos(np.radians(20.0))
 """Cosine of the angle up to which a stated axis and that of the wall are the same one."""
 _FLAT = 0.02

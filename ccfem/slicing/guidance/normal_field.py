@@ -20,8 +20,6 @@ from ccfem.fem.elasticity.direct import superlu
 from ccfem.slicing.guidance.energies import faces_between
 from ccfem.slicing.guidance.stress_regions import StressRegions
 
-__all__ = ["NormalField", "normal_field"]
-
 _MOST_TRIED = 10
 """Regions up to which all senses are tried; above, this number of the best by a quadratic form."""
 _NOTHING = 1e-6

@@ -7,8 +7,6 @@ import numpy as np
 from ccfem.base.arrays import FloatArray
 from ccfem.slicing.guidance.guidance_field import GuidanceField
 
-__all__ = ["FieldQuality", "field_quality"]
-
 _RANGE = (0.4, 1.5)
 """Range of the local thickness, over the nominal one, that can be printed."""
 

@@ -15,8 +15,6 @@ from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.tet_mesh import TetMesh
 
-__all__ = ["StressRegions", "stress_regions"]
-
 _FEWEST = 10
 """Number of cells of the smallest region that counts."""
 _EVEN = 1e-6

@@ -9,8 +9,6 @@ from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["clean"]
-
 _FAN = 32
 """Most triangles at a point; collapses that would need more are skipped."""
 _TILT = 0.8

@@ -10,8 +10,6 @@ from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.level_cut import border_edges, chain
 
-__all__ = ["layer_from_surface"]
-
 _ON_PATCH = 0.6
 """Distance, mm, of both ends of a border edge from a patch up to which the edge lies on it."""
 

@@ -7,8 +7,6 @@ import shapely
 from ccfem.base.checks import check_known
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["holes_on"]
-
 
 def holes_on(layer: Layer, patches: Iterable[str]) -> list[shapely.Polygon]:
     """Holes of a flat layer whose edge touches one of the patches, as shapely Polygons.

@@ -14,8 +14,6 @@ from ccfem.geometry.measures import connected
 from ccfem.geometry.shapes import Region
 from ccfem.slicing.layers.plane import Plane
 
-__all__ = ["FlatLayer", "Layer"]
-
 
 @dataclass(frozen=True)
 class Layer(Shown):

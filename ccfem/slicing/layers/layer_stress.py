@@ -8,8 +8,6 @@ from ccfem.base.tensor import in_axes
 from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["LayerStress", "stress_on"]
-
 
 @dataclass(frozen=True)
 class LayerStress(Shown):

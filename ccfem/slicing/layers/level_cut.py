@@ -8,8 +8,6 @@ from numba import njit
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.body.mesh.tet_mesh import TetMesh
 
-__all__ = ["Cut", "border_edges", "chain", "cut_at_zero", "patch_edges"]
-
 
 @dataclass(frozen=True)
 class Cut:

@@ -15,8 +15,6 @@ from ccfem.slicing.layers.cleaning import clean
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.level_cut import border_edges, chain, cut_at_zero
 
-__all__ = ["LevelSurfaces", "level_surfaces", "thickness_at_nodes"]
-
 _SNAP = 1e-5
 """Distance from the level, as a share of the step, below which nodes count as lying on it."""
 _SAG = 0.05

@@ -9,8 +9,6 @@ from ccfem.base.errors import InputError
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["check_heights", "check_pitch"]
-
 _ROUNDING = 1e-6
 """Share of a strand's height by which layers may be nearer than it, because of rounding."""
 

@@ -8,8 +8,6 @@ import numpy as np
 from ccfem.base.arrays import FloatArray, freeze
 from ccfem.base.errors import InputError
 
-__all__ = ["Plane", "plane_frame"]
-
 
 @dataclass(frozen=True)
 class Plane:

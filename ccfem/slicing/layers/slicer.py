@@ -6,8 +6,6 @@ from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["Slicer", "Vector", "slicer_remarks"]
-
 Vector = tuple[float, float, float]
 
 

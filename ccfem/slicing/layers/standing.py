@@ -7,8 +7,6 @@ import numpy as np
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.slicer import Vector
 
-__all__ = ["standing"]
-
 _DOWN = 1e-3
 """Share of the layers' area that may face downwards."""
 

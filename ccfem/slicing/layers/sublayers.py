@@ -15,8 +15,6 @@ from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.level_cut import border_edges, chain
 from ccfem.slicing.layers.level_surfaces import LevelSurfaces, level_surfaces, thickness_at_nodes
 
-__all__ = ["layers_within"]
-
 _OFF = 1e-3
 """Least distance, in steps, of a layer from the ends of the field, which may be faces of cells."""
 _DEEPEST = 2

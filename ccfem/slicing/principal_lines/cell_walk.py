@@ -3,8 +3,6 @@
 import numpy as np
 from numba import njit
 
-__all__ = ["ENDS", "LOOP", "TOO_LONG", "TOO_MANY", "collect", "count_crossings", "survey"]
-
 ENDS = ("boundary", "loop", "too long", "too many cells", "no direction")
 BOUNDARY, LOOP, TOO_LONG, TOO_MANY, NO_DIRECTION = range(5)
 """Why a line ends."""

@@ -15,8 +15,6 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.slicing.principal_lines.trace import Traced, Tracer
 
-__all__ = ["CriticalRegion", "Keep", "critical_region"]
-
 Keep = Literal["joining", "touching", "all"]
 
 _MOST_JOINTS = 62

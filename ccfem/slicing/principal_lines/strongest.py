@@ -6,8 +6,6 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray, read_only
 
-__all__ = ["Strongest", "strongest_stress"]
-
 
 @dataclass(frozen=True)
 class Strongest:

@@ -14,8 +14,6 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.assembly import cell_gradients
 from ccfem.slicing.principal_lines.cell_walk import collect, count_crossings, survey
 
-__all__ = ["Traced", "Tracer", "mean_edge", "trace"]
-
 LONGEST = 100.0
 """Longest half of a line, in mean edge lengths (Fang et al. 2024, section 2.2)."""
 _MOST = 2000

@@ -24,8 +24,6 @@ from ccfem.slicing.layers.slicer import Vector
 from ccfem.slicing.layers.sublayers import layers_within
 from ccfem.slicing.principal_lines.trace import mean_edge
 
-__all__ = ["LoadOriented", "LoadOrientedSlicing"]
-
 _SHORTEST = 0.15
 """Shortest edge of the layers' triangles, in mean edges of the mesh."""
 

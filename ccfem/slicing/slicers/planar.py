@@ -17,8 +17,6 @@ from ccfem.slicing.layers.pitch import check_heights
 from ccfem.slicing.layers.plane import Plane, plane_frame
 from ccfem.slicing.layers.slicer import Vector
 
-__all__ = ["Planar", "slice_heights"]
-
 _TOP = 1e-3
 """Share of the part's height below its top where a height that cuts nothing lies on it."""
 _SNAP = 2e-6

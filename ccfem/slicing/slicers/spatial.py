@@ -27,8 +27,6 @@ from ccfem.slicing.principal_lines.critical import CriticalRegion, Keep
 from ccfem.slicing.principal_lines.trace import mean_edge
 from ccfem.slicing.slicers.planar import Planar
 
-__all__ = ["Spatial", "SpatialSlicing"]
-
 _THICKNESS = 0.5
 """Default nominal thickness, mm: the published layers are 0.53 mm apart."""
 _SMOOTH_OVER = 1.0 / 30.0

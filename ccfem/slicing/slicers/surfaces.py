@@ -14,8 +14,6 @@ from ccfem.slicing.layers.foreign import layer_from_surface
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.slicer import Vector
 
-__all__ = ["Surfaces"]
-
 
 @dataclass(frozen=True)
 class Surfaces:

@@ -16,8 +16,6 @@ from ccfem.base.arrays import FloatArray, IntArray, freeze
 from ccfem.strategies.fibre_aware.smeared import SmearedPart, SmearedSolution
 from ccfem.strategies.fibre_aware.spline_grid import SplineGrid
 
-__all__ = ["BorderLevels"]
-
 _UPRIGHT = 0.1
 """Largest cosine of a wall's normal to that of the layers at which it counts as upright."""
 

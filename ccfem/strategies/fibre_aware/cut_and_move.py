@@ -23,8 +23,6 @@ from ccfem.strategies.fibre_aware.judges import (
 from ccfem.strategies.fibre_aware.prune import prune
 from ccfem.strategies.fibre_aware.strand_moves import kept_radius, moved
 
-__all__ = ["best_cut", "prune_and_move"]
-
 _SHARES = (0.0, 0.5, 1.0)
 """Shares of the `strength` asked for with which fibre is cut."""
 

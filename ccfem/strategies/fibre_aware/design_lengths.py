@@ -11,8 +11,6 @@ from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.stream_design import DENSEST
 
-__all__ = ["designed_to_lengths"]
-
 _ENOUGH = 0.99
 """Share of a wanted length below which the design is repeated."""
 

@@ -12,8 +12,6 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray, freeze
 
-__all__ = ["FieldBends"]
-
 _SMALLEST = 0.05
 """Strands a width below which |g| is rounded off: bends hardly count where little fibre lies."""
 

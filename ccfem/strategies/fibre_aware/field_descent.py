@@ -15,8 +15,6 @@ from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import SolveError
 from ccfem.strategies.fibre_aware.border_levels import BorderLevels
 
-__all__ = ["TOLERANCE", "FieldMetric", "designed_fields", "drawn_to_borders", "improved"]
-
 _AT_BORDERS = 0.4
 """Share of the evaluations in which levels are drawn to the border."""
 

@@ -10,16 +10,6 @@ from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.smeared import SmearedPart
 
-__all__ = [
-    "alike_share",
-    "fibre_capacity",
-    "group_layers",
-    "layer_counts",
-    "layers_by_case",
-    "middle_layers",
-    "nearest_layer",
-]
-
 
 def nearest_layer(part: SmearedPart, layers: Sequence[Layer]) -> IntArray:
     """Position in `layers` of the one nearest in height to each cell, (m,)."""

@@ -22,17 +22,6 @@ from ccfem.strategies.fibre_aware.strain_worth import StrainWorth
 from ccfem.strategies.fibre_aware.strength_value import Worth, layer_normal
 from ccfem.strategies.fibre_aware.upper_bound import LEAST, OBJECTIVES, SUM, WORST
 
-__all__ = [
-    "Equilibria",
-    "Goal",
-    "Judge",
-    "Judged",
-    "equilibria",
-    "stiffest",
-    "stiffness_judge",
-    "strength_judge",
-]
-
 _POWERS = {WORST: 20.0, SUM: 1.0, LEAST: 20.0}
 
 _TOLERANCE = 1e-4

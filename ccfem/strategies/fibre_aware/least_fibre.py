@@ -21,8 +21,6 @@ from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.plan_cases import plan_cases
 from ccfem.strategies.fibre_aware.upper_bound import LEAST, WORST
 
-__all__ = ["LeastFibre", "for_every_case", "least_fibre"]
-
 _FIRST = 0.3
 """Share of the layers that the first plan covers."""
 

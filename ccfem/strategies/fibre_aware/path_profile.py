@@ -8,8 +8,6 @@ from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray
 
-__all__ = ["Profile", "least_price"]
-
 _BISECTIONS = 50
 
 _EQUAL = 1e-12

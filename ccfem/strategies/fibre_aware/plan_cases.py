@@ -31,8 +31,6 @@ from ccfem.strategies.fibre_aware.judges import Goal
 from ccfem.strategies.fibre_aware.prune import prune
 from ccfem.strategies.fibre_aware.upper_bound import WORST, measures
 
-__all__ = ["plan_by_layers", "plan_cases", "plan_cases_to_lengths"]
-
 _TOO_MUCH = 1.15
 """Length that is planned over that kept."""
 

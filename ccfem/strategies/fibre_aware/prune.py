@@ -24,8 +24,6 @@ from ccfem.strategies.fibre_aware.path_profile import Profile
 from ccfem.strategies.fibre_aware.shortening import shorten_bent, tight_share
 from ccfem.strategies.fibre_aware.strength_value import Worth, layer_normal, raised
 
-__all__ = ["fibre_length", "profiles", "prune", "taken_off"]
-
 _TOLERANCE = 1e-5
 """Relative residual of the tests, and so the error of the strain that says what fibre is worth."""
 

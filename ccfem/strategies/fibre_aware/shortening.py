@@ -17,8 +17,6 @@ from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.strategies.fibre_aware.path_profile import Profile, least_price
 
-__all__ = ["TIGHT_SHARES", "shorten", "shorten_bent", "tight_share"]
-
 TIGHT_SHARES = {"tight": 1.0, "cut": 0.0095}
 """Share of the fibre that may turn too tightly, for each value of the parameter `turns`."""
 

@@ -22,8 +22,6 @@ from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.strand_lines import strand_lines
 from ccfem.strategies.fibre_aware.strand_spacing import spacing
 
-__all__ = ["lines_to_slide_in", "slid_in"]
-
 _DEPTH = 0.8
 """Share of the distance from the border below which lines are cut; the rest of them slides in."""
 

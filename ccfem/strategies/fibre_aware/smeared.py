@@ -22,8 +22,6 @@ from ccfem.fem.elasticity.solvers import preconditioned_cg
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.judging.virtual_testing.specimen import Specimen
 
-__all__ = ["SmearedPart", "SmearedSolution", "on_linear_cells", "smeared_cases"]
-
 _UPDATES = 40
 """Updates of the displacement after which to give up."""
 

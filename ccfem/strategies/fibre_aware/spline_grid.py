@@ -9,8 +9,6 @@ import scipy.sparse as sp
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
 
-__all__ = ["SplineGrid"]
-
 
 @dataclass(frozen=True)
 class SplineGrid:

@@ -7,8 +7,6 @@ import numpy as np
 from ccfem.base.arrays import FloatArray, freeze, in_brief
 from ccfem.judging.virtual_testing.near_failure import POWER
 
-__all__ = ["StrainWorth"]
-
 
 @dataclass(frozen=True)
 class StrainWorth:

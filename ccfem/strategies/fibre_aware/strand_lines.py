@@ -21,8 +21,6 @@ from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["StrandLines", "strand_lines"]
-
 _STEP = 0.6
 """Distance between points, in strand widths."""
 

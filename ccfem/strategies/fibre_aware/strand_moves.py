@@ -24,8 +24,6 @@ from ccfem.strategies.fibre_aware.strand_lines import StrandLines, strand_lines
 from ccfem.strategies.fibre_aware.strand_pull import fibre_energy, plane_strain
 from ccfem.strategies.fibre_aware.strand_spacing import spacing
 
-__all__ = ["kept_radius", "moved"]
-
 _STEP = 0.2
 """First step, in widths: 95 % of the points move by at most this, and none by more than twice."""
 

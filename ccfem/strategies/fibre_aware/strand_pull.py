@@ -22,8 +22,6 @@ from ccfem.geometry.polylines import starts_segment
 from ccfem.judging.virtual_testing.near_failure import POWER
 from ccfem.strategies.fibre_aware.strain_worth import StrainWorth
 
-__all__ = ["PlaneStrain", "fibre_energy", "plane_strain"]
-
 _REACH = 1.0
 """Distance outside the mesh, mm, up to which the strain of the nearest cell is continued."""
 

@@ -21,8 +21,6 @@ from ccfem.fem.elasticity.skyline import skyline_within
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.strand_lines import StrandLines
 
-__all__ = ["Spacing", "spacing"]
-
 _REACH = 2.0
 """Distance, in widths, within which points are compared."""
 

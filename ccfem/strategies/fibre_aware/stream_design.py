@@ -23,21 +23,6 @@ from ccfem.strategies.fibre_aware.smeared import SmearedPart, SmearedSolution
 from ccfem.strategies.fibre_aware.spline_grid import SplineGrid
 from ccfem.strategies.fibre_aware.upper_bound import LEAST, SUM, WORST
 
-__all__ = [
-    "DENSEST",
-    "DESIGN_POWERS",
-    "OVER_BUDGET",
-    "SLACK",
-    "Objective",
-    "Pull",
-    "SmearedFibre",
-    "StreamDesign",
-    "StreamModel",
-    "StreamProblem",
-    "design",
-    "designed_in_steps",
-]
-
 DESIGN_POWERS = {WORST: 4.0, SUM: 1.0, LEAST: 4.0}
 """Power of ``bound / ratio`` in the sum over the cases, for each objective."""
 

@@ -23,8 +23,6 @@ from ccfem.strategies.fibre_aware.slide_in import lines_to_slide_in, slid_in
 from ccfem.strategies.fibre_aware.spline_grid import SplineGrid
 from ccfem.strategies.fibre_aware.worth_links import link_by_worth
 
-__all__ = ["CLEARANCE", "SHORTEST", "Extraction", "middle", "refined"]
-
 CLEARANCE = 0.95
 """Least distance between strands before linking, in widths. They are designed 1 / 0.975 apart and
 slide apart later: what a cut for some hundredths of a width removes would be lost."""

@@ -18,8 +18,6 @@ from ccfem.slicing.layers.layer_stress import stress_on
 from ccfem.strategies.fibre_aware.smeared import SmearedPart
 from ccfem.strategies.fibre_aware.stream_design import DENSEST, StreamModel, StreamProblem
 
-__all__ = ["field_along", "mixed_tension", "plane_axes", "start_fields"]
-
 _SPACING_WEIGHT = 0.1
 """Weight of the wanted density against the direction, as in `fields.scalar.fit_weighted`."""
 

@@ -36,8 +36,6 @@ from ccfem.strategies.fibre_aware.stream_design import (
     StreamProblem,
 )
 
-__all__ = ["StrengthProblem", "design_for_strength"]
-
 _TOLERANCE = 1e-3
 """Relative residual of the adjoint solve."""
 

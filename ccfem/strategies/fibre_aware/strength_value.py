@@ -32,8 +32,6 @@ from ccfem.judging.virtual_testing.strengths import Limits
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.strategies.fibre_aware.strain_worth import StrainWorth
 
-__all__ = ["Worth", "layer_normal", "raised"]
-
 _LITTLE = 1e-3
 """Share of the largest value below which values count as little when negative ones are raised."""
 

@@ -45,22 +45,6 @@ from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.heights import fibre_capacity
 from ccfem.strategies.fibre_aware.smeared import SmearedPart, SmearedSolution, smeared_cases
 
-__all__ = [
-    "LARGEST_GAP",
-    "LEAST",
-    "LOOSE",
-    "OBJECTIVES",
-    "SUM",
-    "WORST",
-    "UpperBound",
-    "affordable_iterations",
-    "certificate",
-    "directions",
-    "largest_gathered",
-    "measures",
-    "upper_bound",
-]
-
 WORST, SUM, LEAST = OBJECTIVES = ("worst", "sum", "least")
 """What is minimised: the largest of ``bound_i / ratio_i``, their weighted mean, or the largest of
 ``1 / ratio_i``, so that the least ratio is made large."""

@@ -30,8 +30,6 @@ from ccfem.paths.linking.possible_links import (
 )
 from ccfem.strategies.fibre_aware.path_profile import Profile
 
-__all__ = ["link_by_worth"]
-
 _HOPE = 0.5
 """Factor on the gain of a chain that is too short, besides its share of the length that it needs:
 joined to another one it may become long enough."""

@@ -14,8 +14,6 @@ from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress, stress_on
 from ccfem.strategies.stress_tracing.stress_lines import plane_stress_at, stress_lines
 
-__all__ = ["alike", "apart"]
-
 _SAME = 1e-6
 """Share of its area by which a section may differ from an equal one."""
 _TURNED = 0.1

@@ -17,8 +17,6 @@ from ccfem.geometry.polylines import along_line, points_along
 from ccfem.strategies.stress_tracing.frame import FREE, Frame, Member
 from ccfem.strategies.stress_tracing.main_paths import MainPath
 
-__all__ = ["STEP", "Band", "band", "extension"]
-
 STEP = 0.5
 """Distance between points of a band, mm."""
 _CLEARING = 0.9

@@ -10,8 +10,6 @@ from ccfem.geometry.offsets import join_rings, offset_rings
 from ccfem.geometry.polylines import line_length
 from ccfem.geometry.shapes import Region
 
-__all__ = ["blobs", "rest_of"]
-
 _STEP = 0.5
 """Distance of the points of a spiral, mm."""
 

@@ -13,8 +13,6 @@ from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.shapes import Region
 from ccfem.strategies.stress_tracing.band import STEP, Band
 
-__all__ = ["places"]
-
 _CHANGE = 0.3
 """Cost of one track more or less: as much as a tenth of the band left open over 3 mm."""
 _CROWDED = 4.0

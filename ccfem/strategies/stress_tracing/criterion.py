@@ -7,8 +7,6 @@ from numpy.typing import ArrayLike
 
 from ccfem.base.arrays import FloatArray
 
-__all__ = ["Criterion"]
-
 _EPSILON = 0.1
 """Coefficient of a property that is 0, an arbitrary constant of the paper. Its two others, the
 amplification k and eta, are 1."""

@@ -11,8 +11,6 @@ from ccfem.geometry.measures import connected
 from ccfem.geometry.medial_axis import MedialAxis, MedialSegment, medial_axis
 from ccfem.geometry.shapes import Region
 
-__all__ = ["ARC_CHORD", "FREE", "Frame", "Member", "ends_at", "frame"]
-
 FREE = -1
 """Joint of an end that meets no other member."""
 

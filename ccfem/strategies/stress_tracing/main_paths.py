@@ -17,8 +17,6 @@ from ccfem.strategies.stress_tracing.criterion import Criterion
 from ccfem.strategies.stress_tracing.frame import Frame, Member, ends_at
 from ccfem.strategies.stress_tracing.stress_lines import misalignment, plane_stress_at, stress_lines
 
-__all__ = ["MainPath", "main_paths", "outward"]
-
 _REACH = 5.0
 """Length, mm, beyond the disc of a joint over which the direction of a member is measured."""
 _OTHER_SIGN = 1.5

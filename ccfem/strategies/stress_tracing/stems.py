@@ -13,8 +13,6 @@ from ccfem.base.arrays import FloatArray
 from ccfem.strategies.stress_tracing.frame import FREE, Frame, Member
 from ccfem.strategies.stress_tracing.main_paths import MainPath, outward
 
-__all__ = ["with_shared_stems"]
-
 _ALONG = np.cos(np.radians(35.0))
 """A path runs along a stem that it would enter with a turn of up to 35 degrees."""
 _FORK = np.cos(np.radians(70.0))

@@ -9,8 +9,6 @@ from ccfem.base.tensor import in_plane, strongest_in_plane
 from ccfem.geometry.locate import locate
 from ccfem.slicing.layers.layer_stress import LayerStress
 
-__all__ = ["StressLines", "misalignment", "plane_stress_at", "stress_lines"]
-
 
 @dataclass(frozen=True)
 class StressLines:

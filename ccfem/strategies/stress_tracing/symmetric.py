@@ -10,8 +10,6 @@ from ccfem.geometry.polylines import along_line, points_along
 from ccfem.geometry.shapes import Region
 from ccfem.geometry.symmetry import mirror_lines, reflected
 
-__all__ = ["made_symmetric"]
-
 _LOST = 0.5
 """Length, mm, by which the ends of a track may lie beyond the border."""
 

@@ -18,8 +18,6 @@ from ccfem.strategies.stress_tracing.counts import places
 from ccfem.strategies.stress_tracing.frame import FREE, Frame
 from ccfem.strategies.stress_tracing.main_paths import MainPath
 
-__all__ = ["tail_turns"]
-
 _TURNS = np.radians([0.0, 15.0, -15.0, 30.0, -30.0, 45.0, -45.0, 60.0, -60.0])
 _NEAR = 0.75
 """Strands nearer than this share of the pitch lie beside each other,"""

@@ -16,8 +16,6 @@ from ccfem.strategies.stress_tracing.band import STEP, Band
 from ccfem.strategies.stress_tracing.counts import places
 from ccfem.strategies.stress_tracing.turning import relaxed
 
-__all__ = ["clipped", "eased", "tracks"]
-
 _BEYOND = 6
 """Number of points by which a track is continued where it leaves its band sideways."""
 _OUTSIDE = 1.5

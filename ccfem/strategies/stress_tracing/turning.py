@@ -22,8 +22,6 @@ from ccfem.slicing.layers.layer_stress import LayerStress
 from ccfem.strategies.stress_tracing.band import STEP, Band
 from ccfem.strategies.stress_tracing.stress_lines import plane_stress_at, stress_lines
 
-__all__ = ["relaxed"]
-
 _BENDING = 2.0
 _HELD = 2.0
 _FREE = 12.0

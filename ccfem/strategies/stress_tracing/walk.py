@@ -17,8 +17,6 @@ from ccfem.strategies.stress_tracing.criterion import Criterion
 from ccfem.strategies.stress_tracing.frame import ARC_CHORD
 from ccfem.strategies.stress_tracing.stress_lines import misalignment, plane_stress_at, stress_lines
 
-__all__ = ["walk"]
-
 _LEAST_POINTS = 3
 _STEP = 1.0
 """Distance, mm, of the points of the axis."""

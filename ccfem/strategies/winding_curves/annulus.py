@@ -6,8 +6,6 @@ import scipy.sparse as sp
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.paths.fields.layer_elements import Surface, positive_definite
 
-__all__ = ["annulus_field", "gradient_jumps"]
-
 _NEAR = 0.3
 """Least distance between triangles that is used, over the median one."""
 

@@ -7,8 +7,6 @@ from scipy.ndimage import gaussian_filter1d
 from ccfem.base.arrays import FloatArray
 from ccfem.geometry.polylines import resample
 
-__all__ = ["limit_bends"]
-
 _STEP = 0.5
 """Distance between points, mm."""
 _ROUNDS = 600

@@ -5,8 +5,6 @@ import numpy as np
 from ccfem.base.arrays import FloatArray
 from ccfem.paths.fields.layer_elements import Surface
 
-__all__ = ["evened", "steep"]
-
 _BINS = 40
 
 

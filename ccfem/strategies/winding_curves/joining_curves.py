@@ -18,8 +18,6 @@ from ccfem.base.errors import InputError
 from ccfem.strategies.winding_curves.straighten import straighten
 from ccfem.strategies.winding_curves.triangle_mesh import EdgePath, TriangleMesh, insert
 
-__all__ = ["border_tree", "join"]
-
 _PER_EDGE = 3
 """Number of points on an edge at which a curve may cross it."""
 _KEEP = 0.12

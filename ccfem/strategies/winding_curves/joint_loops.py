@@ -7,8 +7,6 @@ import numpy as np
 from ccfem.base.arrays import IntArray
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["joint_loops"]
-
 _SHARE = 0.4
 """Share of a loop's length that lies on the patch. Half of a hole may carry the load. If a layer
 leaves a hole through its outer border, the hole takes only a small share of that."""

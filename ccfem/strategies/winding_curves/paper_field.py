@@ -14,8 +14,6 @@ from ccfem.base.checks import check_fields
 from ccfem.paths.fields.layer_elements import Surface, positive_definite
 from ccfem.strategies.winding_curves.annulus import gradient_jumps
 
-__all__ = ["PaperWeights", "paper_field"]
-
 _EDGES = 3.0
 """Length over which gradients are compatible, in mean edges."""
 

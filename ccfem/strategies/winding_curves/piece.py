@@ -12,8 +12,6 @@ from ccfem.strategies.winding_curves.joining_curves import border_tree, join
 from ccfem.strategies.winding_curves.joint_loops import joint_loops
 from ccfem.strategies.winding_curves.triangle_mesh import TriangleMesh
 
-__all__ = ["Piece", "pieces_with_joints"]
-
 
 @dataclass(frozen=True)
 class Piece:

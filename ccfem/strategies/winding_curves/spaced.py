@@ -16,8 +16,6 @@ from scipy.spatial import cKDTree
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.polylines import is_closed, line_length, runs
 
-__all__ = ["CLOSEST", "kept_apart"]
-
 CLOSEST = 0.7
 """Least distance of strands, in the spacing asked for. Where it would be 1.4 another one starts."""
 _OWN = 6.0

@@ -8,8 +8,6 @@ from numba import njit
 from ccfem.base.arrays import FloatArray, seen_only
 from ccfem.strategies.winding_curves.triangle_mesh import EdgePath
 
-__all__ = ["straighten"]
-
 _SWEEPS = 20
 
 

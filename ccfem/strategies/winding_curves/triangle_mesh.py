@@ -6,8 +6,6 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray, IntArray
 
-__all__ = ["EdgePath", "TriangleMesh", "insert"]
-
 
 @dataclass(frozen=True)
 class TriangleMesh:

@@ -15,12 +15,12 @@ from ccfem.fem.materials import isotropic
 from ccfem.machine import Machine
 from ccfem.paths.planning import Amount, plan
 from ccfem.paths.planning.equal_fibre import (
-    Planned,
     extremes,
     length_per_layer,
     plan_to_length,
     plan_to_lengths,
 )
+from ccfem.paths.planning.planned import Planned
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.slicers.planar import Planar
 

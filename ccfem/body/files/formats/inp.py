@@ -19,8 +19,6 @@ from ccfem.body.files.cells import tetrahedra
 from ccfem.body.mesh.patches import match_boundary
 from ccfem.body.mesh.tet_mesh import TetMesh
 
-__all__ = ["read"]
-
 _KINDS = (
     (r"C3D4|DC3D4", "tetra", 4),
     (r"C3D10|DC3D10", "tetra10", 10),

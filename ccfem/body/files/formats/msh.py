@@ -12,8 +12,6 @@ from ccfem.body.isolated.process import ChildError
 from ccfem.body.mesh.patches import with_groups
 from ccfem.body.mesh.tet_mesh import TetMesh
 
-__all__ = ["read"]
-
 
 def read(path: Path) -> TetMesh:
     """Read a Gmsh mesh; physical groups of triangles become patches.

@@ -13,8 +13,6 @@ import numpy as np
 from ccfem.base.errors import InputError, shown
 from ccfem.body.mesh.tet_mesh import TetMesh
 
-__all__ = ["read", "write"]
-
 _PATCH = "patch:"
 _SMALL, _PACKED = 10_000_000, 200
 """Bytes that any archive may unpack to, and how many times its size more."""

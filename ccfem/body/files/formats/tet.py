@@ -16,8 +16,6 @@ import numpy as np
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.tet_mesh import TetMesh
 
-__all__ = ["read", "write"]
-
 
 def read(path: Path) -> TetMesh:
     """Read a ``.tet`` file.

@@ -18,8 +18,6 @@ from ccfem.body.isolated.process import ChildError
 from ccfem.body.mesh.patches import with_groups
 from ccfem.body.mesh.tet_mesh import TetMesh
 
-__all__ = ["Grid", "read", "read_grid", "write"]
-
 _PATCH = "patch:"
 _TYPES = {
     5: "triangle",

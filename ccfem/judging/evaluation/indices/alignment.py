@@ -14,16 +14,6 @@ from ccfem.judging.evaluation.plane_paths import PlanePaths
 from ccfem.judging.evaluation.sensitivity import acute
 from ccfem.slicing.layers.layer_stress import LayerStress
 
-__all__ = [
-    "COLUMNS",
-    "PLACE",
-    "AlignmentSamples",
-    "alignment_indices",
-    "indices",
-    "sample",
-    "sample_alignment",
-]
-
 PLACE = 40
 """Of these columns in tables: the smaller, the farther to the left."""
 

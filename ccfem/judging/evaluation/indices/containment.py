@@ -13,16 +13,6 @@ from ccfem.judging.evaluation.column import Column
 from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
 from ccfem.judging.evaluation.plane_paths import PlanePaths
 
-__all__ = [
-    "COLUMNS",
-    "PLACE",
-    "ContainmentSamples",
-    "containment_indices",
-    "indices",
-    "sample",
-    "sample_containment",
-]
-
 PLACE = 100
 """Of these columns in tables: the smaller, the farther to the left."""
 

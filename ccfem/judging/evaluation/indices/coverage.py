@@ -14,16 +14,6 @@ from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
 from ccfem.judging.evaluation.plane_paths import PlanePaths
 from ccfem.slicing.layers.layer_stress import LayerStress
 
-__all__ = [
-    "COLUMNS",
-    "PLACE",
-    "CoverageSamples",
-    "coverage_indices",
-    "indices",
-    "sample",
-    "sample_coverage",
-]
-
 PLACE = 90
 """Of these columns in tables: the smaller, the farther to the left."""
 

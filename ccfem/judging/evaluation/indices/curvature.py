@@ -13,16 +13,6 @@ from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
 from ccfem.judging.evaluation.plane_paths import PlanePaths
 from ccfem.machine.machine import Machine
 
-__all__ = [
-    "COLUMNS",
-    "PLACE",
-    "CurvatureSamples",
-    "curvature_indices",
-    "indices",
-    "sample",
-    "sample_curvature",
-]
-
 PLACE = 30
 """Of these columns in tables: the smaller, the farther to the left."""
 

@@ -15,8 +15,6 @@ from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["COLUMNS", "PLACE", "HeadSamples", "head_indices", "indices", "sample", "sample_head"]
-
 PLACE = 160
 """Of these columns in tables: the smaller, the farther to the left."""
 

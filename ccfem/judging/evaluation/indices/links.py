@@ -10,8 +10,6 @@ from ccfem.judging.evaluation.column import Column
 from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
 from ccfem.judging.evaluation.plane_paths import PlanePaths
 
-__all__ = ["COLUMNS", "PLACE", "LinkSamples", "indices", "link_indices", "sample", "sample_links"]
-
 PLACE = 120
 """Of these columns in tables: the smaller, the farther to the left."""
 

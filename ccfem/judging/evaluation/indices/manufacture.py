@@ -14,16 +14,6 @@ from ccfem.paths.linking.print_order import nearest_end_order
 from ccfem.paths.linking.print_speed import step_speeds
 from ccfem.paths.toolpaths import FIBRE, TRAVEL, Toolpaths
 
-__all__ = [
-    "COLUMNS",
-    "PLACE",
-    "ManufactureSamples",
-    "indices",
-    "manufacture_indices",
-    "sample",
-    "sample_manufacture",
-]
-
 PLACE = 10
 """Of these columns in tables: the smaller, the farther to the left."""
 

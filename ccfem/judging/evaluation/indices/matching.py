@@ -31,22 +31,6 @@ from ccfem.judging.evaluation.sensitivity import acute
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer_stress import LayerStress
 
-__all__ = [
-    "COLUMNS",
-    "PLACE",
-    "READINGS",
-    "SAMPLES",
-    "THRESHOLDS",
-    "MatchingSamples",
-    "Reading",
-    "along_fibre",
-    "indices",
-    "matching_curve",
-    "matching_indices",
-    "matching_rate",
-    "sample_matching",
-]
-
 PLACE = 50
 """Of these columns in tables: the smaller, the farther to the left."""
 

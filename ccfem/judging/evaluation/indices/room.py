@@ -16,8 +16,6 @@ from ccfem.judging.evaluation.plane_paths import PlanePaths
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["COLUMNS", "PLACE", "RoomSamples", "indices", "room_indices", "sample", "sample_room"]
-
 PLACE = 80
 """Of these columns in tables: the smaller, the farther to the left."""
 

@@ -11,19 +11,6 @@ from ccfem.judging.evaluation.column import Column
 from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
 from ccfem.judging.evaluation.plane_paths import PlanePaths
 
-__all__ = [
-    "COLUMNS",
-    "LONG",
-    "PLACE",
-    "TOLERANCES",
-    "SinuositySamples",
-    "indices",
-    "path_sinuosity",
-    "sample",
-    "sample_sinuosity",
-    "sinuosity_indices",
-]
-
 PLACE = 20
 """Of these columns in tables: the smaller, the farther to the left."""
 

@@ -16,8 +16,6 @@ from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = ["COLUMNS", "PLACE", "SkinSamples", "indices", "sample", "sample_skin", "skin_indices"]
-
 PLACE = 110
 """Of these columns in tables: the smaller, the farther to the left."""
 

@@ -24,8 +24,6 @@ from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.principal_lines.strongest import strongest_stress
 
-__all__ = ["COLUMNS", "PLACE", "SpaceSamples", "indices", "sample", "sample_space", "space_indices"]
-
 PLACE = 140
 """Of these columns in tables: the smaller, the farther to the left."""
 

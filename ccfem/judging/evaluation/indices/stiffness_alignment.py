@@ -13,17 +13,6 @@ from ccfem.judging.evaluation.indices.alignment import AlignmentSamples
 from ccfem.judging.evaluation.layer_paths import Basis
 from ccfem.judging.evaluation.sensitivity import OffAxis, acute, plane_compliance
 
-__all__ = [
-    "COLUMNS",
-    "PLACE",
-    "READINGS",
-    "SAMPLES",
-    "agreement",
-    "indices",
-    "performance_index",
-    "stiffness_alignment_indices",
-]
-
 PLACE = 60
 """Of these columns in tables: the smaller, the farther to the left."""
 

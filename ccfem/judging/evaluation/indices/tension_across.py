@@ -14,16 +14,6 @@ from ccfem.judging.evaluation.column import Column
 from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
 from ccfem.slicing.layers.layer import Layer
 
-__all__ = [
-    "COLUMNS",
-    "PLACE",
-    "TensionSamples",
-    "indices",
-    "sample",
-    "sample_tension",
-    "tension_indices",
-]
-
 PLACE = 150
 """Of these columns in tables: the smaller, the farther to the left."""
 
