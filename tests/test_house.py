@@ -222,7 +222,6 @@ CLOCKS = {
     "ccfem.comparison.stages",
     "ccfem.fem.elasticity.solve",
     "ccfem.base.progress",
-    "ccfem.comparison.studies.processes",
     "ccfem.comparison.studies.running",
     "ccfem.judging.virtual_testing.virtual_test",
 }

@@ -26,7 +26,7 @@ from ccfem.fem.elasticity import Force, PointForce, Problem, Support
 from ccfem.fem.materials import isotropic, plane_stress
 from ccfem.fem.plates import PlaneProblem, raster_mesh
 from ccfem.fem.topopt import Simp, Somp, as_problem
-from ccfem.papers.plocher_2022.three_point_bending import three_point_bending
+from ccfem.papers.plocher_2022.plates import three_point_bending
 
 UNIT = plane_stress(1.0, 1.0, 0.3, 1.0 / 2.6)
 WANG = plane_stress(18300.0, 19800.0, 0.17, 5150.0)

@@ -26,9 +26,9 @@ from ccfem.body.meshing import extrude
 from ccfem.cases.bar import bar_outline
 from ccfem.cases.bracket import HOLE_RADIUS, HOLES, bracket_outline
 from ccfem.cases.case import Case, pulled
-from ccfem.cases.loop import HOLE, loop_outline
-from ccfem.cases.loop import HOLE_RADIUS as EYE
 from ccfem.cases.open_hole import open_hole_outline
+from ccfem.cases.two_pull_loop import HOLE, loop_outline
+from ccfem.cases.two_pull_loop import HOLE_RADIUS as EYE
 from ccfem.comparison import compare
 from ccfem.fem.elasticity import Bearing, Problem, Support, solve
 from ccfem.fem.materials import printed_pla

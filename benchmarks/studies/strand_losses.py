@@ -37,9 +37,8 @@ from ccfem.strategies.fibre_aware.prune import prune
 from ccfem.strategies.fibre_aware.smeared import SmearedPart
 from ccfem.strategies.fibre_aware.stream_design import SLACK, StreamProblem, design
 from ccfem.strategies.fibre_aware.stream_paths import CLEARANCE, SHORTEST
-from ccfem.strategies.fibre_aware.stream_start import field_along, start_fields
 from ccfem.strategies.fibre_aware.upper_bound import UpperBound, upper_bound
-from ccfem.strategies.stream_function import StreamFunction
+from ccfem.strategies.stream_function import StreamFunction, field_along, start_fields
 
 __all__ = ["along_one_direction", "losses", "posed", "share_inside", "tension_of"]
 

@@ -37,10 +37,6 @@ def check_number(
     unit : str, optional
         Unit of the bounds in the message.
 
-    Raises
-    ------
-    InputError
-
     Examples
     --------
     >>> check_number("width", 0.4, above=0.0, unit="mm")
@@ -76,7 +72,6 @@ class Range:
 
     Attributes
     ----------
-    unit : str
     possible : tuple of 2 floats
         Beyond these no material, spring or load is: `check` refuses such a value.
     usual : tuple of 2 floats
@@ -92,10 +87,6 @@ class Range:
 
     def check(self, what: str, value: float) -> None:
         """Refuse a finite value, other than 0, of an impossible size.
-
-        Raises
-        ------
-        InputError
 
         Examples
         --------
@@ -165,10 +156,6 @@ def check_fields(value: object, *names: str, **bounds: Any) -> None:
         The fields.
     **bounds
         `at_least`, `above`, `at_most`, `below` and `unit` of `check_number`.
-
-    Raises
-    ------
-    InputError
     """
     for name in names:
         given = getattr(value, name)
@@ -244,11 +231,6 @@ def check_instance(kind: str, value: object) -> None:
     ----------
     kind : str
         What is expected, as "strategy".
-    value : object
-
-    Raises
-    ------
-    InputError
     """
     if isinstance(value, type):
         raise InputError(
@@ -268,15 +250,10 @@ def refuse_keywords(
 
     Parameters
     ----------
-    function : str
     unknown, known : iterable of str
         What was given beyond its keywords, and these.
     replaced : mapping of str to str
         What takes the place of a keyword that might be expected.
-
-    Raises
-    ------
-    InputError
     """
     for name in unknown:
         cure = f": give it as {replaced[name]}" if name in replaced else ""

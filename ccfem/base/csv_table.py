@@ -15,8 +15,6 @@ def write_csv(file: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]])
 
     Parameters
     ----------
-    file : Path
-    columns : sequence of str
     rows : iterable of sequences
         As long as `columns`; texts go through `as_text`.
     """

@@ -71,7 +71,6 @@ def spared(what: str, left_out: list[str]) -> Iterator[None]:
     ----------
     what : str
         What the block draws.
-    left_out : list of str
     """
     try:
         yield

@@ -210,7 +210,6 @@ def sweep(
 
     Parameters
     ----------
-    folder : Folder
     names : sequence of str
         Patterns, as of `fnmatch`, of these files; others stay, and so does their folder.
     mend : callable, optional

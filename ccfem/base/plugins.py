@@ -58,7 +58,6 @@ def create(
     kind : str
         What a member is called in messages, as "strategy".
     known : mapping of name to class or function
-    name : str
     parameters : mapping of name to value, optional
     cure : str, optional
         What else might have been meant by an unknown name.

@@ -37,7 +37,6 @@ def whole_folder(directory: Path, names: Sequence[str], force: bool = False) -> 
 
     Parameters
     ----------
-    directory : Path
     names : sequence of str
         Patterns, as of `fnmatch`, of the files that the command writes: nothing else is ever
         removed.

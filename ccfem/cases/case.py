@@ -39,12 +39,10 @@ class Case(Shown):
         becomes the name of a folder.
     title : str
         One line for tables and reports.
-    problem : Problem
     build : tuple of 3 floats, default z
         Build direction in the frame of the mesh.
     slicing : Slicer, default 12 flat layers
         Cuts the part into layers of fibre.
-    machine : Machine
     parameters : mapping of strategy name to parameters
         Parameters of strategies that should not use their defaults on this part.
     source : str
@@ -98,12 +96,7 @@ class Case(Shown):
 
 
 def check_name(name: str, title: str) -> None:
-    """Refuse a name that cannot be that of a folder, and a title that cannot be printed.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse a name that cannot be that of a folder, and a title that cannot be printed."""
     found = Mistakes()
     if not re.fullmatch(r"\w[\w .+-]{0,79}", name):
         found.lines.append(

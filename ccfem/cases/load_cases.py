@@ -21,7 +21,6 @@ def weighted_cases(case: Case, fields: Mapping[str, StressField]) -> WeightedCas
 
     Parameters
     ----------
-    case : Case
     fields : mapping of name to StressField
         Of all its load cases.
 

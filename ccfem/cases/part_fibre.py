@@ -38,10 +38,6 @@ def fibre_of(
         Without one there are no regions.
     base : FibrePlaces, optional
         What the table changes.
-
-    Raises
-    ------
-    InputError
     """
     if not isinstance(table, Mapping):
         raise InputError(f"fibre must be a table; got {shown(table)}: write [fibre] and its keys")

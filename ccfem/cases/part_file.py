@@ -235,20 +235,27 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeVar
 
+import numpy as np
+
 from ccfem.base.arrays import FloatArray
-from ccfem.base.errors import InputError, Mistakes
+from ccfem.base.errors import InputError, Mistakes, shown
 from ccfem.base.toml import from_table, read_toml
 from ccfem.body.files.surface import Surface
+from ccfem.body.mesh.cell_mesh import CellMesh
+from ccfem.body.mesh.cell_rules import CellBox, CellCylinder, CellRule
+from ccfem.body.mesh.face_names import face_name
 from ccfem.body.mesh.face_places import BodyFaces
 from ccfem.body.mesh.face_rules import Faces, Holes, OnBody, numbered_faces, without_faces
 from ccfem.body.mesh.patch_findings import about_patches
 from ccfem.body.mesh.patches import PatchRule, patches_from_rules, unit_vector
-from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE
+from ccfem.body.mesh.shell import Shell, refined
+from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE, smooth_faces
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.body.meshing.cad import is_cad
 from ccfem.body.meshing.volume import check_edge_length
-from ccfem.cases.before_meshing import check_before_meshing
 from ccfem.cases.case import Case, check_name
 from ccfem.cases.part_fibre import fibre_of, patches_of_fibre
 from ccfem.cases.part_keys import Part
@@ -259,16 +266,20 @@ from ccfem.cases.part_loads import (
     supports_of,
     weights_of,
 )
-from ccfem.cases.part_regions import region_rules_of, regions_of
-from ccfem.cases.part_slicing import slicing_of
-from ccfem.cases.part_tables import check_strategies, material_of, rules_of
-from ccfem.fem.elasticity.load_kinds import patches_in_use
-from ccfem.fem.elasticity.problem import Problem
+from ccfem.cases.part_tables import check_strategies, material_of, named_table, rules_of
+from ccfem.fem.elasticity.body import LoadedBody
+from ccfem.fem.elasticity.load_kinds import Load, PointForce, SurfaceLoad, patches_in_use
+from ccfem.fem.elasticity.loads import nodal_forces
+from ccfem.fem.elasticity.problem import Problem, Region
+from ccfem.fem.elasticity.support_kinds import AnySupport
+from ccfem.fem.elasticity.supports import held
 from ccfem.fem.materials import Material
 from ccfem.machine.machine import Machine
 from ccfem.machine.named_machines import machine_from
 from ccfem.paths.placement.fibre_places import FibrePlaces
+from ccfem.slicing import slicers as slicers
 from ccfem.slicing.layers.slicer import Slicer
+from ccfem.slicing.slicers.planar import Planar
 
 T = TypeVar("T")
 
@@ -298,10 +309,6 @@ def faces_of_part(path: str | os.PathLike[str], angle: float = FEATURE_ANGLE) ->
     """Faces of a part file's body, numbered as its rules have them; only the body is read.
 
     The feature angle is in degrees.
-
-    Raises
-    ------
-    InputError
     """
 
     def faces(content: Mapping[str, Any], path: Path) -> BodyFaces:
@@ -460,3 +467,138 @@ def _readable(content: Mapping[str, Any], found: Mistakes) -> tuple[Part, set[st
             from_table(Part, {key: value}, "the part file")
             good[key] = value
     return from_table(Part, good, "the part file"), set(content) - set(good)
+
+
+# The slicer of a part file.
+
+
+def slicing_of(part: Part) -> Slicer:
+    """Slicer of a part file: of its number of layers, their heights, or the table slicing."""
+    given = [key for key in ("layers", "heights", "slicing") if getattr(part, key) is not None]
+    if len(given) > 1:
+        raise InputError(
+            f"a part needs one of layers, heights and slicing; got {' and '.join(given)}: choose "
+            "one"
+        )
+    if part.slicing is not None:
+        return slicers.create(*named_table(part.slicing, "method", slicers.named(), "slicing"))
+    return Planar(count=part.layers, heights=part.heights)
+
+
+# The regions of a part file: which cells are of another material.
+
+
+REGIONS: dict[str, Callable[..., CellRule]] = {"box": CellBox, "cylinder": CellCylinder}
+"""Rules that choose cells."""
+
+
+def region_rules_of(
+    tables: Mapping[str, Any], found: Mistakes
+) -> dict[str, tuple[Material, CellRule]]:
+    """Materials and rules of the tables [regions.NAME]; what is wrong is noted."""
+    rules = {}
+    for name, table in tables.items():
+        with found.noted():
+            rules[name] = _region(f"regions.{name}", table)
+    return rules
+
+
+def _region(where: str, table: object) -> tuple[Material, CellRule]:
+    """Material of a region, and the rule that chooses its cells."""
+    rule, rest = named_table(table, "rule", REGIONS, where)
+    if "material" not in rest:
+        raise InputError(f"{where} needs the key 'material': a name of the table, or a table")
+    material = rest.pop("material")
+    if not isinstance(material, str | dict):
+        raise InputError(
+            f"{where}.material must be a string or a table; got {shown(material)}: name one"
+        )
+    chooses = from_table(REGIONS[rule], rest, where, infinite=rule == "box")
+    return material_of(material, f"{where}.material"), chooses
+
+
+def regions_of(mesh: TetMesh, rules: Mapping[str, tuple[Material, CellRule]]) -> tuple[Region, ...]:
+    """Choose the cells of every region.
+
+    Raises
+    ------
+    InputError
+        For a region without a cell, and for two that share some.
+    """
+    owner = np.full(len(mesh.cells), -1)
+    names, found = list(rules), []
+    for k, (name, (material, rule)) in enumerate(rules.items()):
+        try:
+            cells = rule(mesh)
+        except InputError as error:
+            raise InputError(f"region '{name}': {error}") from None
+        taken = owner[cells]
+        if (taken >= 0).any():
+            other = names[taken.max()]
+            raise InputError(
+                f"regions '{other}' and '{name}' share {np.count_nonzero(taken >= 0)} cells: move "
+                "their border so that each cell is in one of them"
+            )
+        owner[cells] = k
+        found.append(Region(material, cells))
+    return tuple(found)
+
+
+# What can be known of patches and supports before a surface is meshed, which may take minutes.
+
+
+@dataclass(frozen=True)
+class _Outline:
+    """Supports and loads on a surface alone."""
+
+    mesh: CellMesh
+    body: LoadedBody
+    supports: tuple[AnySupport, ...]
+    loads: Mapping[str, tuple[Load, ...]]
+
+
+def check_before_meshing(
+    surface: Surface,
+    edge_length: float,
+    rules: Mapping[str, PatchRule],
+    supports: tuple[AnySupport, ...],
+    loads: Mapping[str, tuple[Load, ...]],
+    case_supports: Mapping[str, tuple[AnySupport, ...]] = MappingProxyType({}),
+    angle: float = FEATURE_ANGLE,
+) -> None:
+    """Try rules, supports and loads on the surface, cut finer than the mesh will be.
+
+    The feature angle, degrees, is that between the faces of the surface.
+
+    Raises
+    ------
+    InputError
+        For rules that choose nothing, unknown patches, loads that their patch cannot take, and
+        motions that no support hinders.
+    """
+    found = Mistakes()
+    points, triangles, origin = refined(surface.points, surface.triangles, 0.5 * edge_length)
+    groups = {
+        face_name(k): triangles[np.isin(origin, face.facets)]
+        for k, face in enumerate(smooth_faces(surface.points, surface.triangles, angle), 1)
+    }
+    shell = Shell(points, triangles, groups)
+    for name, rule in rules.items():
+        with found.noted():
+            shell = patches_from_rules(shell, {name: rule})
+    own = [support for each in case_supports.values() for support in each]
+    for name in set(patches_in_use((*supports, *own), loads)) - set(rules):
+        with found.noted():
+            shell.patch(name)
+    found.complain()
+    sets = [(*supports, *case_supports.get(name, ())) for name in loads] or [supports]
+    for k, one in enumerate(sets):
+        if one not in sets[:k]:
+            with found.noted():
+                held(_Outline(shell, shell, one, loads))
+    for those in loads.values():
+        for load in those:
+            if isinstance(load, SurfaceLoad) and not isinstance(load, PointForce):
+                with found.noted():
+                    nodal_forces(shell, load)
+    found.complain()

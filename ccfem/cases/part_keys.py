@@ -1,10 +1,193 @@
 """The keys at the top of a part file."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
+import shapely
+
+from ccfem.base.checks import check_number
+from ccfem.base.errors import InputError, Mistakes
+from ccfem.base.toml import from_table
+from ccfem.base.whole import existing_file
+from ccfem.body.files import Surface, read_mesh
+from ccfem.body.mesh.check import check_mesh
+from ccfem.body.mesh.face_places import BodyFaces
+from ccfem.body.mesh.face_rules import numbered_faces
 from ccfem.body.mesh.patches import Vector
-from ccfem.cases.part_body import Body
+from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.meshing import extrude, faces_of_body, mesh_body
+from ccfem.body.meshing.volume import Mesher
+from ccfem.fem.elasticity.problem import Order
+
+# The body of a part file: a mesh, a surface to be filled, or a planform to be extruded.
+
+
+_SMALLEST, _LARGEST = 0.1, 1e5
+"""Diagonals, mm, beyond which a unit is wrong."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """The keys of a part file that say what its body is (see `ccfem.cases.part_file`).
+
+    Exactly one of `mesh`, `surface` and `planform` is given.
+
+    Attributes
+    ----------
+    mesh : str
+        File of tetrahedra: .tet .msh .vtu .inp .npz.
+    surface : str
+        Closed surface (.stl .obj .ply) or CAD file (.step .iges .brep), filled with tetrahedra.
+    planform : table
+        A flat part that stands on z = 0: its outline, holes, height and edge length.
+    edge_length : float, mm
+        Edge length of the tetrahedra that fill a surface.
+    scale : float
+        Factor on the coordinates of a file; 1000 for metres.
+    merge_nodes : bool
+        Whether to join pieces of a mesh where their nodes coincide.
+    order : int or str
+        Linear (1) or quadratic cells (2), or what the estimated error of linear ones calls for.
+    mesher : str
+        What fills a surface; "auto" is Gmsh where it is installed and works.
+    """
+
+    mesh: str | None = None
+    surface: str | None = None
+    planform: dict[str, Any] | None = None
+    edge_length: float | None = None
+    scale: float = 1.0
+    merge_nodes: bool = False
+    order: Order = "auto"
+    mesher: Mesher = "auto"
+
+    def check(self, folder: Path) -> None:
+        """Raise on keys that do not go together, and on files that do not exist."""
+        found = Mistakes()
+        given = [key for key in ("mesh", "surface", "planform") if getattr(self, key) is not None]
+        if len(given) != 1:
+            found.lines.append(
+                "a part needs one of mesh, surface and planform; got "
+                f"{' and '.join(given) or 'none'}: name one"
+            )
+        elif (self.edge_length is not None) != (self.surface is not None):
+            found.lines.append(
+                "edge_length goes with surface, and surface with edge_length: add the one that is "
+                "missing (a planform has its own edge_length)"
+            )
+        if self.planform is not None and self.scale != 1.0:
+            found.lines.append("scale goes with mesh or surface: leave it out of a planform")
+        if self.planform is not None:
+            with found.noted():
+                from_table(_Planform, self.planform, "planform")
+        with found.noted():
+            check_number("scale", self.scale, above=0.0)
+        for key in ("mesh", "surface"):
+            if getattr(self, key) is not None:
+                with found.noted():
+                    existing_file(folder / getattr(self, key), f"{key} file")
+        found.complain()
+
+    def faces(self, folder: Path, angle: float = FEATURE_ANGLE) -> BodyFaces:
+        """Faces of the part, numbered on its body: of a surface before any meshing.
+
+        The feature angle is in degrees.
+        """
+        self.check(folder)
+        if self.surface is None:
+            return numbered_faces(self.read(folder)[0], angle)
+        return faces_of_body(folder / self.surface, self.scale, angle)
+
+    def read(
+        self,
+        folder: Path,
+        before: Callable[[Surface], None] | None = None,
+        angle: float = FEATURE_ANGLE,
+    ) -> tuple[TetMesh, tuple[str, ...]]:
+        """Mesh of the part, checked, and what was found in it; files are relative to a folder.
+
+        `before` is called with a surface that has to be meshed; the feature angle between its
+        faces is in degrees.
+        """
+        self.check(folder)
+        made: tuple[str, ...] = ()
+        if self.mesh is not None:
+            mesh = read_mesh(folder / self.mesh, self.scale, check=False)
+            if self.order == 1 and mesh.order == 2:
+                mesh = mesh.linear()
+            mesh, report = check_mesh(mesh, merge=self.merge_nodes)
+        elif self.surface is not None and self.edge_length is not None:
+            file = folder / self.surface
+            mesh, made = mesh_body(file, self.edge_length, self.scale, self.mesher, before, angle)
+            mesh, report = check_mesh(mesh)
+        else:
+            mesh, report = check_mesh(_extruded(self))
+        size = report.diagonal
+        if not _SMALLEST <= size <= _LARGEST:
+            raise InputError(
+                f"the part measures {size:.3g} mm across; expected {_SMALLEST:g} to {_LARGEST:g} "
+                "mm: correct scale, which makes the coordinates mm"
+            )
+        found = (*made, *report.findings)
+        return mesh.quadratic() if self.order == 2 else mesh, found
+
+
+@dataclass(frozen=True)
+class _Hole:
+    """A hole of a planform: a circle or a polygon."""
+
+    centre: tuple[float, float] | None = None
+    radius: float | None = None
+    outline: tuple[tuple[float, float], ...] | None = None
+
+    def __post_init__(self) -> None:
+        circle = self.centre is not None and self.radius is not None
+        if circle == (self.outline is not None):
+            raise InputError("a hole needs centre and radius, or outline: give one of them")
+
+
+@dataclass(frozen=True)
+class _Planform:
+    """The table [planform]."""
+
+    outline: tuple[tuple[float, float], ...]
+    height: float
+    edge_length: float
+    holes: tuple[dict[str, Any], ...] = ()
+
+
+def _extruded(body: Body) -> TetMesh:
+    """Mesh of a planform."""
+    plan = from_table(_Planform, body.planform, "planform")
+    rings = []
+    for k, table in enumerate(plan.holes):
+        hole = from_table(_Hole, table, f"planform.holes[{k}]")
+        if hole.outline is not None:
+            rings.append(_polygon(hole.outline, f"planform.holes[{k}]"))
+        else:
+            rings.append(shapely.Point(hole.centre).buffer(hole.radius, quad_segs=32))
+    outline = _polygon(plan.outline, "planform")
+    for k, ring in enumerate(rings):
+        if not outline.contains_properly(ring):
+            raise InputError(f"planform.holes[{k}] must lie inside the outline: move or shrink it")
+    holes = shapely.union_all(rings)
+    return extrude(outline.difference(holes), plan.height, plan.edge_length)
+
+
+def _polygon(outline: tuple[tuple[float, float], ...], where: str) -> shapely.Polygon:
+    """Make a polygon of an outline that does not cross itself."""
+    if len(outline) < 3:
+        raise InputError(f"{where}.outline needs at least 3 points; got {len(outline)}: add some")
+    polygon = shapely.Polygon(outline)
+    if not polygon.is_valid or not polygon.area > 0.0:
+        raise InputError(
+            f"{where}.outline is not a valid polygon: {shapely.is_valid_reason(polygon)}: go round "
+            "it without crossing"
+        )
+    return polygon
 
 
 @dataclass(frozen=True, kw_only=True)

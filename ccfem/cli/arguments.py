@@ -51,7 +51,6 @@ def parameters_by_strategy(
 
     Parameters
     ----------
-    texts : sequence of str
     only : str, optional
         The one strategy that there is.
     """

@@ -5,16 +5,17 @@ Everything heavy is imported by the command that needs it, so that ``ccfem --hel
 
 import logging
 from importlib import metadata
+from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from ccfem.base.errors import InputError
+from ccfem.base.progress import progress_bar
 from ccfem.cli.arguments import drawings_of, names_of, parameters_by_strategy, path_of
 from ccfem.cli.fibre_amounts import front
 from ccfem.cli.fibre_choice import SetFibre, fibre_choice
-from ccfem.cli.in_python import say_in_python
 from ccfem.cli.machines import MachineName, SetMachine, machine_choice, machines
 from ccfem.cli.optimising import optimise
 from ccfem.cli.options import (
@@ -42,7 +43,6 @@ from ccfem.cli.options import (
     StressUnit,
     VirtualTest,
 )
-from ccfem.cli.papers_again import reproduce
 from ccfem.cli.part_commands import add_part_commands
 from ccfem.cli.run import (
     Output,
@@ -54,8 +54,199 @@ from ccfem.cli.run import (
     slicings_of,
     with_given_paths,
 )
-from ccfem.cli.study_file import study
-from ccfem.cli.supporting import support
+
+# What ``ccfem support`` does: the layers below a part, summed up, and their paths as a file.
+
+
+def support(
+    case: CasePath,
+    set_case: SetCase = None,
+    layers: Layers = None,
+    slicing: Slicing = None,
+    angle: Annotated[
+        float | None,
+        typer.Option(
+            metavar="DEGREES",
+            help="Support what leans over by more than this from upright; default 45 below flat "
+            "layers, 0 (all that looks down) below curved ones.",
+        ),
+    ] = None,
+    lift: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MM",
+            help="Height of the part above the bed; default 0, and ten layers or more below curved "
+            "layers, which become flat in it.",
+        ),
+    ] = None,
+    load_case: OneLoadCase = None,
+    backend: Backend = "auto",
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="PATHS.vtp", parser=path_of, help="Also write their paths here."
+        ),
+    ] = None,
+) -> None:
+    """Lay support below a part, in layers that continue its own down to the bed."""
+    import numpy as np
+
+    from ccfem.base.checks import check_known
+    from ccfem.base.whole import check_writable
+    from ccfem.cli.run import layers_of, load
+    from ccfem.fem.elasticity.solve import solve
+    from ccfem.printing.export.vtk import write_paths
+    from ccfem.printing.support import slice_with_support, support_paths
+    from ccfem.slicing.layers.plane import plane_frame
+    from ccfem.slicing.slicers import as_slicer
+
+    if out is not None:
+        check_writable(out)
+    part = load(case, set_case)
+    names = part.problem.cases
+    if load_case is not None:
+        check_known("load case", load_case, names)
+    stress = solve(part.problem, backend=backend)[load_case or names[0]]
+    chosen = layers_of(layers, None, slicing)
+    slicer = as_slicer(part.slicing if chosen is None else chosen)
+    own, found = slice_with_support(slicer, stress, part.build, part.machine, angle, lift)
+    columns = found.columns
+    x, y, z = columns.up.tolist()
+    if np.abs(columns.up - plane_frame(part.build)[2]).max() > 1e-3:
+        print(f"the part stands with ({x:.3f}, {y:.3f}, {z:.3f}) upwards: else layers look down")
+    print(
+        f"{len(found.layers)} layers of support below {len(own)} of the part, "
+        f"{found.thickness:.3g} mm in the mean: {columns.volume:.5g} mm^3; "
+        f"{columns.contact:.5g} mm^2 of the part rest on it, it stands on "
+        f"{columns.standing:.5g} mm^2 of the part"
+    )
+    if out is not None:
+        paths = support_paths(found, part.machine)
+        write_paths(paths, out)
+        print(f"{out}: {len(paths)} paths of matrix, {paths.lengths.sum() / 1000.0:.4g} m")
+
+
+# ``ccfem study``: run a study file, with the time left, and say what came out.
+
+
+def study(
+    file: Annotated[
+        Path | None,
+        typer.Argument(metavar="FILE.toml", help="Study file; ccfem study --example prints one."),
+    ] = None,
+    example: Annotated[
+        bool, typer.Option("--example", help="Print a study file to start from, and end.")
+    ] = False,
+    workers: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Processes; default as many as processors.", min=0),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers make the runs instead."),
+    ] = None,
+    out: Out = None,
+    force: Force = False,
+) -> None:
+    """Run parts x slicings x strategies x parameters; one that was stopped goes on where it was."""
+    if example:
+        text = (
+            files("ccfem.comparison.studies").joinpath("example.toml").read_text(encoding="utf-8")
+        )
+        print(text, end="")
+    elif file is None:
+        raise typer.BadParameter("name a study file; ccfem study --example prints one")
+    else:
+        _run(file, out, workers, scheduler, force)
+
+
+def _run(
+    file: Path, out: Path | None, workers: int | None, scheduler: str | None, force: bool
+) -> None:
+    """Run a study file and print what came out."""
+    from ccfem.comparison.studies import study
+    from ccfem.comparison.studies.study_fronts import COST
+
+    with progress_bar() as progress:
+        result = study(file, out, workers, scheduler, force, progress)
+    print(result)
+    for cost in COST:
+        front = result.front(cost)
+        if len(front):
+            print(f"on the front of stiffness over {cost}: {len(front)} runs")
+    parquet = (result.folder / "results.parquet").exists()
+    tables = "results.csv, results.parquet" if parquet else "results.csv"
+    print(f"{result.folder / 'study.html'}, and beside it {tables} and times.csv")
+    if not parquet:
+        print("results.parquet needs pyarrow: pip install 'ccfem[parquet]'")
+
+
+# The command `reproduce`: figures, tables and claims of papers.
+
+
+def reproduce(
+    paper: Annotated[
+        str | None, typer.Argument(metavar="PAPER", help="As wang_2021; none lists them.")
+    ] = None,
+    part: Annotated[
+        str | None, typer.Argument(metavar="PART", help="As table2 or figure8; none makes all.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Default results/PAPER.")
+    ] = None,
+) -> None:
+    """Make the figures, tables and claims of a paper again, ours beside theirs."""
+    from ccfem.base.progress import progress_bar
+    from ccfem.papers.reproduce import KEPT, named_papers
+    from ccfem.papers.reproduce import reproduce as make
+
+    if paper is None:
+        for name, contents in named_papers().items():
+            print(f"{name}  {contents.title}; about {contents.seconds:.0f} s")
+            if contents.parts:
+                print(f"    {', '.join(contents.parts)}")
+        return
+    with progress_bar(lines=True) as progress:
+        made = make(paper, part or "", None if out is None else path_of(out), progress)
+    print(made)
+    if part:
+        print(f"kept; made again only where code or data have changed ({made.parent / KEPT})")
+
+
+# The call in Python that does what a command does, said by the help of each.
+
+
+CALLS = {
+    "cases": "ccfem.cases.named_cases()",
+    "strategies": "ccfem.strategies.named()",
+    "slicers": "ccfem.slicing.slicers.named()",
+    "machines": "ccfem.machine.machine_names()",
+    "faces": "ccfem.faces(BODY)",
+    "check": "ccfem.check(CASE)",
+    "mesh": "ccfem.body.meshing.mesh_body(BODY, SIZE)",
+    "optimise": "ccfem.cases.optimise(CASE, VOLUME_FRACTION)",
+    "compare": "ccfem.compare(CASE, [A, B]), and ccfem.save(comparison, DIR)",
+    "plan": "ccfem.compare(CASE, [S], natural=True), or ccfem.plan(STRATEGY, LAYERS, STRESS)",
+    "solve": "ccfem.solve(CASE.problem)",
+    "calibrate": "ccfem.calibrate(PROBLEM, CURVE)",
+    "reproduce": "ccfem.reproduce(PAPER, PART)",
+    "new": "ccfem.cases.inspection.new_part(BODY)",
+    "example": "ccfem.cases.inspection.write_example(NAME)",
+    "cite": "ccfem.comparison.bibtex(ccfem.comparison.cited([METHOD]))",
+    "front": "ccfem.comparison.fibre_front(CASE, STRESS, NAME, STRATEGY, COUNTS)",
+    "study": "ccfem.study(FILE, workers=N)",
+    "support": "ccfem.printing.support.slice_with_support(SLICER, STRESS, BUILD)",
+}
+"""Call of each command, as its help prints it."""
+
+
+def say_in_python(app: typer.Typer) -> None:
+    """Let the help of each command end with its call."""
+    for command in app.registered_commands:
+        name = command.name or (command.callback.__name__ if command.callback else "")
+        if name in CALLS:
+            command.epilog = f"In Python: {CALLS[name]}"
+
 
 app = typer.Typer(
     name="ccfem",

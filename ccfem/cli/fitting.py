@@ -36,7 +36,6 @@ def fit_material(
     parameters : mapping of strategy name to parameters
     options : mapping
         Keyword arguments of `ccfem.compare`.
-    out : Path
     """
     curves = [each.resolve() for each in (unreinforced, reinforced) if each is not None]
     if out.resolve() in curves:

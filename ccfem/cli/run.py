@@ -139,7 +139,6 @@ class Output:
         Also draw PNG files of what the report shows.
     drawings : tuple of {"svg", "dxf"}
         Also draw every flat layer of every strategy to scale.
-    suffix : str
     details : bool
         Print every index and remark.
     """
@@ -167,7 +166,6 @@ def run(name: str, ask: "Callable[[], Request]", output: Output) -> None:
         Of a case, or of a part file.
     ask : callable
         Reads the part, and returns what is asked of it.
-    output : Output
     """
     from ccfem.base.result_folder import whole_folder
     from ccfem.cli.screen import print_comparison
@@ -202,9 +200,7 @@ def with_given_paths(
 
     Parameters
     ----------
-    case : Case
     strategies : dict of name to Strategy
-    files : sequence of str
     frame : {"mesh", "tool"}, optional
         What the coordinates of the files are in.
     """

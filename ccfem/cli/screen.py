@@ -170,7 +170,6 @@ def print_comparison(
 
     Parameters
     ----------
-    comparison : Comparison
     where : Path
         Folder of the results.
     seconds : float

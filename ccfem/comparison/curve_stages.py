@@ -48,7 +48,6 @@ def along_curve(
     ----------
     runs : sequence of Run
         With the strategies as they were asked for, and their lengths.
-    part : Part
     wanted : float, mm, or None
         Length per layer of the comparison; one of the three if possible.
     tested : callable

@@ -95,7 +95,6 @@ class Solved:
 
     Attributes
     ----------
-    case : Case
     cases : WeightedCases
         The load cases that paths are planned for: one, or several with their weights.
     given : GivenStress, optional
@@ -158,7 +157,6 @@ def solved(request: Request, seconds: dict[str, float] | None = None) -> Solved:
 
     Parameters
     ----------
-    request : Request
     seconds : dict of stage to float, optional
         Gets the time of each stage.
 
@@ -217,7 +215,6 @@ def answer(
 
     Parameters
     ----------
-    request : Request
     progress : callable, optional
         Receives what is being done, and the share of the work that is done.
     known : Solved, optional
@@ -573,10 +570,6 @@ def compare(
         without fibre as ``"2.5"``, or ``"1200N/mm"``.
     **unknown
         Refused: a keyword that there is not.
-
-    Returns
-    -------
-    Comparison
 
     Raises
     ------

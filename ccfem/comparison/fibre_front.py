@@ -51,12 +51,10 @@ def fibre_front(
 
     Parameters
     ----------
-    case : Case
     stress : StressField or WeightedCases
         Its solution under the load case that counts, or under several.
     name : str
         Of the strategy.
-    strategy : Strategy
     counts : sequence of int
         Numbers of flat layers, at least 1 each.
     points : int, default 5

@@ -52,7 +52,6 @@ class FrontPoint:
         several load cases in that case alone.
     why_not : str
         What keeps the paths from being printed as they are; empty where they can be.
-    toolpaths : Toolpaths
     strength : float, default 0
         How much the load at first failure counted when it was planned.
     cases : PointCases, optional
@@ -108,7 +107,6 @@ class FibreFront:
     ----------
     case : str
         Name of the part.
-    strategy : str
     points : tuple of FrontPoint
         By number of layers, then by how much strength counts, then by length.
     refused : mapping of int to str

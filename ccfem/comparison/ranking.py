@@ -37,7 +37,6 @@ def ranking(runs: Sequence[Run], wanted: Wanted) -> tuple[Run, ...]:
 
     Parameters
     ----------
-    runs : sequence of Run
     wanted : float, mm, InAll or None
         Length of fibre per layer, or in all, that all were held to; None where each laid its own.
     """

@@ -39,10 +39,8 @@ def remarks(runs: Sequence[Run], wanted: Wanted, bound: UpperBound | None = None
 
     Parameters
     ----------
-    runs : sequence of Run
     wanted : float, mm, InAll or None
         Length of fibre per layer, or in total, that all were held to; None if each laid its own.
-    bound : UpperBound, optional
     """
     order = ranking(runs, wanted)
     lines: dict[str, list[str]] = {}
@@ -160,7 +158,6 @@ def open_remarks(runs: Sequence[Run], layers: Sequence[Layer], width: float) -> 
 
     Parameters
     ----------
-    runs : sequence of Run
     layers : sequence of Layer
         That the runs were planned on.
     width : float, mm
@@ -210,7 +207,6 @@ def bound_remark(tested: Sequence[Run], bound: UpperBound) -> str:
     ----------
     tested : sequence of Run
         With a virtual test, the best first; at least one.
-    bound : UpperBound
     """
     best = tested[0]
     length, name = max(run.length_per_layer for run in tested), best.name
@@ -242,7 +238,6 @@ def why_above(run: Run, share: float) -> str:
 
     Parameters
     ----------
-    run : Run
     share : float
         Of its gain that lies above the bound.
     """

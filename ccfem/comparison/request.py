@@ -178,7 +178,6 @@ class Request:
 
     Attributes
     ----------
-    case : Case
     strategies : mapping of name to Strategy
         At least one.
     slicings : mapping of name to Slicing
@@ -398,7 +397,6 @@ def named_strategies(
 
     Parameters
     ----------
-    case : Case
     strategies : sequence of str or Strategy
         A strategy object keeps its parameters and gets the name of its module; a second one of the
         same name gets a number.

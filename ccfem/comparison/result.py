@@ -1,8 +1,9 @@
 """The result of a request: one table of runs, and what is said and drawn of it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ from ccfem.base.checks import check_known
 from ccfem.base.errors import InputError
 from ccfem.cases.case import Case
 from ccfem.comparison.curve import Curve
-from ccfem.comparison.headline import Headline
+from ccfem.comparison.headline import Headline, cell_text, headline_values
 from ccfem.comparison.plot.scenes import View, show
 from ccfem.comparison.plot.values import image
 from ccfem.comparison.ranking import ranking
@@ -19,7 +20,6 @@ from ccfem.comparison.remarks import open_remarks, remarks
 from ccfem.comparison.request import InAll, Request, Wanted
 from ccfem.comparison.runs import Run
 from ccfem.comparison.said_of_cases import cases_remarks, cases_verdict
-from ccfem.comparison.summary import SUMMARY, SUMMARY_OF_SLICINGS, summary_html, summary_text
 from ccfem.comparison.table import frame
 from ccfem.comparison.verdict import verdict
 from ccfem.comparison.views import front_picture, layer_view, paragraphs, shown_layer
@@ -306,3 +306,80 @@ class Comparison:
             table["strategy"] = [run.strategy_name for run in self.ranking]
             table.insert(1, "slicing", [run.slicing for run in self.ranking])
         return table
+
+
+# A comparison in a few lines: one row a strategy, for `print` and for notebooks.
+
+
+SUMMARY = (
+    Headline("printable", "printable", "", "{}"),
+    Headline("stiffness", "stiffness, N/mm", "high", "{:.4g}"),
+    Headline("stiffness_ratio_tension", "times unreinforced", "high", "{:.2f}"),
+    Headline("first_failure_load", "first failure, N", "high", "{:.0f}"),
+    Headline("fibre_per_layer", "fibre, mm a layer", "", "{:.0f}"),
+    Headline("efficiency", "efficiency", "high", "{:.3f}"),
+)
+"""Columns of the summary; those that no run has are left out."""
+
+SUMMARY_OF_SLICINGS = (
+    *SUMMARY[:4],
+    Headline("interlayer_load", "delamination load, N", "high", "{:.0f}"),
+    Headline("fibre_length", "fibre, mm", "", "{:.0f}"),
+    Headline("joints_linked", "joints linked", "high", "{:.2f}"),
+)
+"""The columns of the summary over several slicings."""
+
+
+def summary_text(
+    ranking: Sequence[Run], verdict: str = "", columns: Sequence[Headline] = SUMMARY
+) -> str:
+    """Summary as plain text.
+
+    Parameters
+    ----------
+    ranking : sequence of Run
+        From the best to the worst.
+    verdict : str
+        A sentence to end with.
+    """
+    rows = _rows(ranking, columns)
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = []
+    for row, run in zip(rows, [None, *ranking], strict=True):
+        cells = [row[0].ljust(widths[0])]
+        if run is not None and run.failure:
+            cells.append(f"failed: {run.failure}")
+        else:
+            cells += [text.rjust(width) for text, width in zip(row[1:], widths[1:], strict=True)]
+        lines.append("  ".join(cells).rstrip())
+    return "\n".join([*lines, verdict] if verdict else lines)
+
+
+def summary_html(
+    ranking: Sequence[Run], verdict: str = "", columns: Sequence[Headline] = SUMMARY
+) -> str:
+    """Summary as an HTML table; parameters as of `summary_text`."""
+    head, *body = _rows(ranking, columns)
+    rows = ["".join(f"<th>{escape(text)}</th>" for text in head)]
+    for row, run in zip(body, ranking, strict=True):
+        cells = [f"<td>{escape(text)}</td>" for text in row]
+        if run.failure:
+            said = escape(f"failed: {run.failure}")
+            cells[1:] = [f'<td colspan="{len(row) - 1}">{said}</td>']
+        rows.append("".join(cells))
+    table = "".join(f"<tr>{row}</tr>" for row in rows)
+    return f"<table>{table}</table>" + (f"<p>{escape(verdict)}</p>" if verdict else "")
+
+
+def _rows(ranking: Sequence[Run], columns: Sequence[Headline]) -> list[list[str]]:
+    """Titles, and the cells of each run."""
+    found = [headline_values(run) for run in ranking]
+    heads = [head for head in columns if any(head.column in values for values in found)]
+    rows = [["strategy", *(head.title for head in heads)]]
+    for run in ranking:
+        cells = [cell_text(run, head) for head in heads]
+        # Additions in smaller letters: where the part fails. The rest is in the report.
+        rows.append(
+            [run.name, *(f"{text} {more}" if more.isalpha() else text for text, more in cells)]
+        )
+    return rows

@@ -59,7 +59,6 @@ class Run:
         Of the strategy, and of the slicing where several are compared: "zigzag on planar:z".
     strategy : Strategy
         With the parameters that it ran with.
-    toolpaths : Toolpaths
     evaluation : Evaluation or None
         None where the strategy failed.
     tested : Tested or None

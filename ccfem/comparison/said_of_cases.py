@@ -19,10 +19,8 @@ def cases_verdict(runs: Sequence[Run], wanted: Wanted, bound: UpperBound | None)
 
     Parameters
     ----------
-    runs : sequence of Run
     wanted : float, mm, InAll or None
         Length of fibre that all were held to.
-    bound : UpperBound, optional
     """
     order = [run for run in comparable(runs, wanted) if is_tested(run)]
     if len(order) < 2:
@@ -66,10 +64,7 @@ def cases_remarks(
 
     Parameters
     ----------
-    runs : sequence of Run
     wanted : float, mm, InAll or None
-    cases : WeightedCases
-    bound : UpperBound, optional
     others : bool
         Whether the part has alternative supports.
     """

@@ -71,12 +71,9 @@ class Part:
     stress : PartStress
         That paths are planned and evaluated on; of several load cases that of the heaviest.
     layers : tuple of Layer
-    machine : Machine
     cases : WeightedCases
         The load cases that paths are planned for and tested under: one, or several.
-    strand : Strand, optional
     build : tuple of 3 floats, optional
-    support : SupportLayers, optional
     remarks : tuple of str
         Of the slicer, one line each.
     """
@@ -150,7 +147,6 @@ def planned_to_lengths(
     ----------
     run : Run
         Unplanned.
-    part : Part
     lengths : sequence of float, mm
     known : sequence of Planned
         Plans that exist already, as of `plan_to_lengths`; not used with several load cases.
@@ -231,7 +227,6 @@ def to_length(
         Name of the run whose natural length this is; it is not planned again.
     length : float, mm, optional
         None if no run lays fibre.
-    part : Part
     tell : callable
     """
 
@@ -316,7 +311,6 @@ class Tests:
 
     Attributes
     ----------
-    strand : Strand
     models : sequence of (Specimen, float)
         The part under its supports, and under alternative ones if there are any, each with the peak
         of the averaged von Mises stress without fibre, MPa.

@@ -31,7 +31,6 @@ def verdict(runs: Sequence[Run], wanted: Wanted) -> str:
 
     Parameters
     ----------
-    runs : sequence of Run
     wanted : float, mm, InAll or None
         Length of fibre per layer, or in total, that all were held to; None if each laid its own.
 
@@ -59,7 +58,6 @@ def left_out(runs: Sequence[Run], wanted: Wanted, best: Run | None = None) -> st
 
     Parameters
     ----------
-    runs : sequence of Run
     wanted : float, mm, InAll or None
     best : Run, optional
         Best of the runs that count; without it no run is called stiffer or untested.

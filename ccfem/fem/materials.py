@@ -25,7 +25,6 @@ class Material:
 
     Attributes
     ----------
-    name : str
     stiffness : (6, 6) array, MPa
         In material axes (fibre along axis 1), Voigt order of `ccfem.base.tensor`.
     tensile_strength, compressive_strength : float or None, MPa

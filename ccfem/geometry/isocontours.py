@@ -162,7 +162,6 @@ def least_distance(curves: Isocontours, reach: float, enough: float) -> float:
 
     Parameters
     ----------
-    curves : Isocontours
     reach : float, mm
         Larger distances are not looked for; the result is at most `reach`.
     enough : float, mm

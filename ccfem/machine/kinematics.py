@@ -53,7 +53,6 @@ def axis_values(
 
     Parameters
     ----------
-    kinematics : Kinematics
     place : (n, 3) array, mm
         Tip of the nozzle, in the frame of the part as it lies on the bed.
     normal : (n, 3) array

@@ -100,15 +100,10 @@ def updated(machine: Machine, *tables: Mapping[str, Any], where: str = "machine"
 
     Parameters
     ----------
-    machine : Machine
     *tables : mapping
         As returned by `machine_table`; values that they do not name stay.
     where : str
         Where the values came from, for messages.
-
-    Raises
-    ------
-    InputError
 
     Examples
     --------

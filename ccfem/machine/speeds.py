@@ -34,7 +34,6 @@ def table_speeds(
     ----------
     points, offsets
         The polylines, as in `ccfem.geometry.polylines`.
-    table : SpeedTable
     shortest : float, mm
         Curvature is taken over no less than this length on either side.
 

@@ -137,7 +137,6 @@ class Toolpaths(Shown):
             point equals its first.
         normals : sequence of (n_i, 3) arrays
             Unit normal of the layer at each of their points.
-        layer : Layer
         kind : int, default FIBRE
         """
         keep = [k for k, line in enumerate(lines) if len(line) >= 2]

@@ -48,11 +48,6 @@ class Beside:
 def beside(plan: PrintPlan, machine: Machine) -> Beside:
     """Choose the places of the auxiliary lines beside a part.
 
-    Parameters
-    ----------
-    plan : PrintPlan
-    machine : Machine
-
     Returns
     -------
     Beside

@@ -1,26 +1,142 @@
 """The print of a part of curved layers: support, then the matrix of each layer, then its fibre."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.geometry.cones import earlier_in_cones
+from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
+from ccfem.geometry.polylines import along_line, is_closed, pack, starts_segment
 from ccfem.machine.machine import Machine
-from ccfem.paths.toolpaths import FIBRE, Toolpaths
-from ccfem.printing.curved_layers import FilledLayer, filled_layers, in_order
-from ccfem.printing.head_lean import Matter, cleared, touched_length
+from ccfem.paths.linking.print_order import nearest_end_order
+from ccfem.paths.toolpaths import FIBRE, SUPPORT, Toolpaths
 from ccfem.printing.islands import Islands, clashes, island_order, islands_of, rests_on, steps_of
 from ccfem.printing.laid_layer import COORDINATE_DIGITS
-from ccfem.printing.poses import poses
+from ccfem.printing.layer_matrix import layer_matrix
+from ccfem.printing.poses import poses, under_bed
 from ccfem.printing.print_plan import PrintPlan
-from ccfem.printing.support import SupportLayers
+from ccfem.printing.support import SupportLayers, support_paths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.plane import plane_frame
 from ccfem.slicing.layers.slicer import Vector
 from ccfem.slicing.layers.standing import standing
+
+# Matrix and fibre on each curved layer, of the part or of its support.
+
+
+_LEAST = 0.2
+"""Least share of a layer's height that matrix fills, however much its fibre takes. Our choice."""
+_UNEVEN = 0.1
+"""Share by which rings may be higher or lower than that, so that their layer is exactly full."""
+
+
+@dataclass(frozen=True)
+class FilledLayer:
+    """A layer, and the paths laid on it.
+
+    Attributes
+    ----------
+    paths : Toolpaths
+        Matrix or support first, then fibre; at the top of the layer, half its thickness above it.
+    laid : (P,) array, mm
+        Height of matrix at each point.
+    piece : (K,) int array
+        Piece of the layer (`Layer.component`) that each path lies on.
+    missing : float, mm^3
+        Volume that rings leave out because they do not fit; negative if they lay too much.
+    """
+
+    layer: Layer
+    paths: Toolpaths
+    laid: FloatArray
+    piece: IntArray
+    missing: float = 0.0
+
+
+def filled_layers(
+    fibre: Toolpaths, layers: Sequence[Layer], support: SupportLayers | None, machine: Machine
+) -> list[FilledLayer]:
+    """Fill layers with matrix and fibre, and those of the support in between.
+
+    Parameters
+    ----------
+    layers : sequence of Layer
+        From the first printed to the last.
+
+    Returns
+    -------
+    list of FilledLayer
+        A layer of support stands just before the layer of the part at its level.
+    """
+    props = None if support is None else support_paths(support, machine)
+    found = []
+    for number, layer in enumerate(layers):
+        if support is not None and props is not None:
+            for k in np.flatnonzero(support.before == number).tolist():
+                own = props.on_layer(k)
+                own = replace(own, kind=np.full(len(own), SUPPORT))
+                found.append(_on_top(support.layers[k], own))
+        strands = fibre.on_layer(layer.index)
+        whole = _on_top(layer, Toolpaths.concatenate([layer_matrix([layer], machine), strands]))
+        found.append(_full(whole, machine))
+    return found
+
+
+def _on_top(layer: Layer, paths: Toolpaths) -> FilledLayer:
+    """Paths on the middle of a layer, raised to its top."""
+    if not len(paths):
+        return FilledLayer(layer, paths, np.zeros(0), np.zeros(0, dtype=np.int64))
+    found = nearest_on_triangles(layer.points, layer.triangles, paths.points)
+    corners = layer.local_thickness[layer.triangles[found.triangle]]
+    height = np.einsum("qk,qk->q", found.weights, corners)
+    piece = layer.component[found.triangle[paths.offsets[:-1]]]
+    raised = paths.points + 0.5 * height[:, None] * paths.normals
+    return FilledLayer(layer, replace(paths, points=raised), height, piece)
+
+
+def _full(filled: FilledLayer, machine: Machine) -> FilledLayer:
+    """Reduce matrix by the volume of fibre, and correct what rings lay too little or too much."""
+    layer, paths = filled.layer, filled.paths
+    room = float(layer.areas @ layer.local_thickness[layer.triangles].mean(axis=1))
+    strands = paths.kind == FIBRE
+    rest = room - machine.strand_area * float(paths.lengths[strands].sum())
+    share = max(rest / room, _LEAST)
+    start = np.flatnonzero(starts_segment(paths.offsets))
+    start = start[~np.repeat(strands, np.diff(paths.offsets))[start]]
+    steps = np.linalg.norm(paths.points[start + 1] - paths.points[start], axis=1)
+    rings = machine.matrix_width * float(steps @ filled.laid[start])
+    flow = share
+    if rings > 0.0:
+        flow = float(np.clip(rest / rings, share * (1.0 - _UNEVEN), share * (1.0 + _UNEVEN)))
+    return replace(filled, laid=flow * filled.laid, missing=rest - flow * rings)
+
+
+def in_order(paths: Toolpaths) -> tuple[Toolpaths, IntArray]:
+    """Paths in the order of printing, nearest end next, and the former places of their points."""
+    if not len(paths):
+        return paths, np.zeros(0, dtype=np.int64)
+    lines = list(paths)
+    ends = [np.array([line[k] for line in lines]) for k in (0, -1)]
+    order, backward, _ = nearest_end_order(*ends)
+    index = [
+        np.arange(paths.offsets[k], paths.offsets[k + 1])[:: -1 if back else 1]
+        for k, back in zip(order.tolist(), backward.tolist(), strict=True)
+    ]
+    at = np.concatenate(index)
+    points, offsets = pack([paths.points[own] for own in index])
+    return Toolpaths(
+        points=points,
+        normals=paths.normals[at],
+        offsets=offsets,
+        layer=paths.layer[order],
+        kind=paths.kind[order],
+        closed=np.array([is_closed(lines[k]) for k in order.tolist()]),
+    ), at
+
 
 _MISSING = 0.01
 """Share of the part's volume that may be missing without a warning."""
@@ -42,10 +158,10 @@ def curved_plan(
     end. A layer of support is printed just before the layer of the part at its level. If the head
     would touch other pieces while above a piece of a layer, that piece is printed first if possible
     (`ccfem.printing.islands`). The head stands along the normal of the layer, as far as
-    `Kinematics.tilt_limit` allows, and leans where it would still touch something
-    (`ccfem.printing.head_lean`); remaining contact is stated in the warnings. The nozzle is at the
-    top of a layer, half its thickness above its middle. The part stands in the middle of the bed,
-    on its support or on its lowest point.
+    `Kinematics.tilt_limit` allows, and leans where it would still touch something (`head_lean`);
+    remaining contact is stated in the warnings. The nozzle is at the top of a layer, half its
+    thickness above its middle. The part stands in the middle of the bed, on its support or on its
+    lowest point.
 
     Parameters
     ----------
@@ -55,7 +171,6 @@ def curved_plan(
         From the first printed to the last, some of them curved.
     mesh : TetMesh
         The part.
-    machine : Machine
     build : sequence of 3 floats
         Build direction. If layers face downwards from there, the part stands along their mean
         normal (`standing`).
@@ -209,3 +324,179 @@ def _check_tilt(normals: FloatArray, machine: Machine) -> None:
             f"{machine.head_angle:g} degrees touches those above {room:g}: choose "
             "machine.kinematics.kind = 'table_table' or 'head_head', or flatter layers"
         )
+
+
+# Leaning of the head where it would touch printed material, by the least angle that clears it.
+
+
+_LEANS = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0)
+"""Angles, degrees, by which a head may lean from the normal of its layer. Our choice: about half
+the angle at which its own side touches the layer (90 degrees less `Machine.head_angle`)."""
+_TURNS = (0.0, 30.0, -30.0, 60.0, -60.0, 90.0, -90.0, 135.0, -135.0, 180.0)
+"""Directions in which it leans, degrees from the direction away from the contact."""
+_RAMP = 8.0
+"""Length, mm, over which it leans and returns upright."""
+_EVERY = 2.0
+"""Distance, mm, between the places along a path at which contact is checked."""
+
+
+@dataclass(frozen=True)
+class Matter:
+    """Points that represent printed material, first step first.
+
+    Attributes
+    ----------
+    points : (n, 3) array, mm
+    step : (n,) int array
+        In which they are printed, ascending.
+    """
+
+    points: FloatArray
+    step: IntArray
+
+    def __post_init__(self) -> None:
+        freeze(self, points=float, step=int)
+
+    @classmethod
+    def of(cls, points: FloatArray, step: IntArray) -> "Matter":
+        """Points in any order; those of step -1 are not printed."""
+        order = np.argsort(step, kind="stable")
+        order = order[step[order] >= 0]
+        return cls(points[order], step[order])
+
+
+@dataclass(frozen=True)
+class Cleared:
+    """Axes of a head after leaning, and its remaining contact.
+
+    Attributes
+    ----------
+    axes : (n, 3) array
+        At every point of the paths.
+    before, after : float, mm
+        Length of the paths along which the head touches printed material, or the bed: with the
+        given axes, and with these.
+    place : (3,) array, mm, or None
+        First place of remaining contact.
+    """
+
+    axes: FloatArray
+    before: float
+    after: float
+    place: FloatArray | None = None
+
+
+def cleared(paths: Toolpaths, axes: FloatArray, matter: Matter, machine: Machine) -> Cleared:
+    """Let the head lean where it would touch material printed in earlier steps.
+
+    Parameters
+    ----------
+    paths : Toolpaths
+        In the coordinates of the printer; their `layer` is the step in which they are printed.
+    axes : (n, 3) array
+        Unit vectors along the head at every point of the paths.
+    machine : Machine
+        A head on three axes cannot lean.
+    """
+    sample, length, step = _samples(paths)
+    tips = paths.points[sample]
+    hits, point = _touched(tips, axes[sample], step, matter, machine)
+    before = float(length[hits].sum())
+    if machine.kinematics.kind == "three_axes" or not hits.any():
+        return Cleared(axes, before, before, _first(tips, hits))
+    off = _way_off(tips[hits], axes[sample][hits], point[hits], matter.points)
+    turned = _turned(tips[hits], axes[sample][hits], off, step[hits], matter, machine)
+    axes, old = _spread(paths, axes, sample[hits], turned), axes
+    new = np.abs(axes - old).max(axis=1)[sample] > 0.0
+    hits[new], _ = _touched(tips[new], axes[sample][new], step[new], matter, machine)
+    return Cleared(axes, before, float(length[hits].sum()), _first(tips, hits))
+
+
+def touched_length(paths: Toolpaths, axes: FloatArray, matter: Matter, machine: Machine) -> float:
+    """Length of paths, mm, along which the head touches earlier steps or the bed, as `cleared`."""
+    sample, length, step = _samples(paths)
+    hits, _ = _touched(paths.points[sample], axes[sample], step, matter, machine)
+    return float(length[hits].sum())
+
+
+def _first(tips: FloatArray, hits: BoolArray) -> FloatArray | None:
+    return tips[int(hits.argmax())] if hits.any() else None
+
+
+def _samples(paths: Toolpaths) -> tuple[IntArray, FloatArray, IntArray]:
+    """Points of the paths at about this distance, the length each stands for, and its step."""
+    index, length = [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
+    for start, end in zip(paths.offsets[:-1].tolist(), paths.offsets[1:].tolist(), strict=True):
+        along = along_line(paths.points[start:end])
+        cell = np.floor(along / _EVERY)
+        first = np.flatnonzero(np.append(True, np.diff(cell) > 0.0))
+        index.append(start + first)
+        length.append(np.diff(np.append(along[first], along[-1])))
+    chosen = np.concatenate(index)
+    step = np.repeat(paths.layer, np.diff(paths.offsets))[chosen]
+    return chosen, np.concatenate(length), step
+
+
+def _touched(
+    tips: FloatArray, axes: FloatArray, step: IntArray, matter: Matter, machine: Machine
+) -> tuple[BoolArray, IntArray]:
+    """Whether the head touches earlier steps, or the bed, and a point of the former, or -1."""
+    size = (machine.head_angle, machine.head_length)
+    point = earlier_in_cones(tips, axes, step, matter.points, matter.step, *size)
+    return (point >= 0) | under_bed(tips, axes, machine), point
+
+
+def _turned(
+    tips: FloatArray,
+    axes: FloatArray,
+    off: FloatArray,
+    step: IntArray,
+    matter: Matter,
+    machine: Machine,
+) -> FloatArray:
+    """Axes that clear by the least lean; axes without any are not changed."""
+    across = np.cross(axes, off)
+    left = np.ones(len(tips), dtype=bool)
+    found = axes.copy()
+    limit = np.cos(np.radians(machine.kinematics.tilt_limit)) - 1e-9
+    room = 90.0 - machine.head_angle
+    for lean in np.radians([lean for lean in _LEANS if lean < room]):
+        for turn in np.radians(_TURNS):
+            way = np.cos(turn) * off[left] + np.sin(turn) * across[left]
+            tried = np.cos(lean) * axes[left] + np.sin(lean) * way
+            hits, _ = _touched(tips[left], tried, step[left], matter, machine)
+            clear = (tried[:, 2] >= limit) & ~hits
+            done = np.flatnonzero(left)[clear]
+            found[done] = tried[clear]
+            left[done] = False
+            if not left.any():
+                return found
+    return found
+
+
+def _way_off(tips: FloatArray, axes: FloatArray, at: IntArray, points: FloatArray) -> FloatArray:
+    """Direction normal to each axis, away from a point that the head touches; else upright."""
+    way = np.where(at[:, None] >= 0, tips - points[np.maximum(at, 0)], [0.0, 0.0, 1.0])
+    way -= np.einsum("kd,kd->k", way, axes)[:, None] * axes
+    alike = np.linalg.norm(way, axis=1) < 1e-6
+    way[alike] = np.cross(axes[alike], np.eye(3)[np.abs(axes[alike]).argmin(axis=1)])
+    return np.asarray(way / np.linalg.norm(way, axis=1, keepdims=True))
+
+
+def _spread(paths: Toolpaths, axes: FloatArray, at: IntArray, turned: FloatArray) -> FloatArray:
+    """Axes at all points, which turn to those at some points and back along the paths."""
+    found = axes.copy()
+    path = np.searchsorted(paths.offsets, at, side="right") - 1
+    lean = turned - axes[at]
+    for number in np.unique(path).tolist():
+        start, end = int(paths.offsets[number]), int(paths.offsets[number + 1])
+        along, own = along_line(paths.points[start:end]), path == number
+        away = np.abs(along[:, None] - along[at[own] - start])
+        if paths.closed[number]:
+            away = np.minimum(away, along[-1] - away)
+        # Full over the stretch that a sample stands for, then decreasing.
+        share = np.clip(1.0 - np.maximum(away - _EVERY, 0.0) / _RAMP, 0.0, 1.0)
+        total = np.maximum(share.max(axis=1), 1e-300)
+        weight = share**4 / np.maximum((share**4).sum(axis=1), 1e-300)[:, None]
+        found[start:end] += total[:, None] * (weight @ lean[own])
+    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))

@@ -19,8 +19,6 @@ def durations(moves: Moves, machine: Machine, heating: bool = True) -> FloatArra
 
     Parameters
     ----------
-    moves : Moves
-    machine : Machine
     heating : bool, default True
         Whether the waits for tools count.
 

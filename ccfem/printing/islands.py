@@ -124,7 +124,6 @@ def clashes(islands: Islands, build: FloatArray, machine: Machine) -> FloatArray
 
     Parameters
     ----------
-    islands : Islands
     build : (3,) array
         Unit vector.
     machine : Machine

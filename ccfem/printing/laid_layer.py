@@ -48,12 +48,10 @@ class LaidLayer:
 
     Attributes
     ----------
-    paths : Toolpaths
     laid : (P,) array, mm
         Height of matrix, a line wide, on the step from each point.
     short : (K,) bool array
         Lines of matrix in place of strands that are too short for the cutter.
-    warning : str
     dropped, outside : float, mm
         Length that is left out, and length outside the part.
     """
@@ -79,14 +77,10 @@ def matrix_layer(
 
     Parameters
     ----------
-    fill : MatrixFill
     pads : sequence of (n, 2) arrays, mm
         Lines of pads.
-    below : Below
-    number : int
     height, thickness : float, mm
         Top of the layer over the bed, and its own height.
-    machine : Machine
     """
     found, which = _printed(fill.lines, height, number, MATRIX)
     heights, warning = np.zeros(0), ""

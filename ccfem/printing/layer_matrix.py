@@ -24,7 +24,6 @@ def layer_matrix(layers: Sequence[Layer], machine: Machine) -> Toolpaths:
 
     Parameters
     ----------
-    layers : sequence of Layer
     machine : Machine
         Its `matrix_width`.
 

@@ -25,7 +25,6 @@ def check_matrix_lines(mesh: TetMesh, build: Sequence[float], machine: Machine) 
         The part: its volume is filled with lines as long as its mean section is wide.
     build : 3 floats
         Build direction.
-    machine : Machine
 
     Raises
     ------
@@ -48,11 +47,6 @@ def check_matrix_lines(mesh: TetMesh, build: Sequence[float], machine: Machine) 
 
 def check_strands(layers: Sequence[Layer], machine: Machine) -> None:
     """Refuse layers that hold more than a hundred thousand strands side by side.
-
-    Parameters
-    ----------
-    layers : sequence of Layer
-    machine : Machine
 
     Raises
     ------

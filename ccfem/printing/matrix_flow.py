@@ -62,7 +62,6 @@ def with_flow(
         Fibre directly below it, none for a layer on matrix.
     below : float, mm
         Height of the fibre layers that they lie in.
-    machine : Machine
     sections : sequence of float, mm^2, optional
         Section of each strand; by default `Machine.strand_area`.
     shares : (K,) array, optional

@@ -5,15 +5,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import shapely
+from scipy.spatial import Voronoi
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.threads import in_threads
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.offsets import offset_rings
-from ccfem.geometry.shapes import Region
+from ccfem.geometry.shapes import Region, open_lines, strings
 from ccfem.machine.machine import Machine
-from ccfem.printing.gap_lines import gap_lines
 from ccfem.printing.slabs import Slab
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.planar import Planar
@@ -28,7 +28,6 @@ class MatrixFill:
 
     Attributes
     ----------
-    section : Region
     lines : list of (n, 2) arrays, mm
     widths : list of float, mm
         Of each line; less than the machine's in gaps.
@@ -60,7 +59,6 @@ def matrix_fills(
         Rows are the axes of the bed in the frame of the mesh.
     origin : (2,) array, mm
         Subtracted from X and Y along these axes.
-    machine : Machine
     """
     width, profile = machine.matrix_width, machine.gcode
     of_matrix = [k for k, slab in enumerate(slabs) if slab.fibre is None]
@@ -90,3 +88,81 @@ def matrix_fills(
     for layer, fill in zip(layers, in_threads(filled, layers), strict=True):
         found[of_matrix[layer.index]] = fill
     return found
+
+
+# Lines of matrix that a contour and a zigzag leave out: in narrow walls and beside holes.
+
+
+_NARROW = 0.3
+"""Least width of a gap that gets a line, in line widths. Our choice."""
+_SMALL = 1.0
+"""Least area of a gap and length of a line in it, in squares of a line width and in widths."""
+_STEP = 0.2
+"""Distance between points on the border of a gap, in line widths."""
+_OPPOSITE = 0.8
+"""Least chord between opposite points of the border, over twice the distance to the middle: a line
+through the middle ends before it branches into corners."""
+_ARC = 4
+"""Segments per quarter circle."""
+
+
+def gap_lines(
+    section: Region, lines: Sequence[FloatArray], width: float
+) -> tuple[list[FloatArray], list[float]]:
+    """Lines along the middle of the gaps that lines of a width leave in a section.
+
+    Parameters
+    ----------
+    section : shapely (Multi)Polygon, mm
+    lines : sequence of (n, 2) arrays, mm
+        Lines that fill it so far.
+    width : float, mm
+        Of a line, > 0.
+
+    Returns
+    -------
+    lines : list of (n, 2) arrays, mm
+        The parts of the medial axes of the gaps that pass between opposite sides.
+    widths : list of float, mm
+        Of the gap along each line, its mean.
+    """
+    # GEOS stumbles over the union of thousands of buffers, and its buffer of all may be invalid.
+    covered = shapely.buffer(shapely.multilinestrings(strings(lines)), 0.5 * width, quad_segs=_ARC)
+    gaps = shapely.difference(section, shapely.make_valid(covered))
+    reach = 0.5 * _NARROW * width
+    wide = shapely.buffer(gaps, -reach, quad_segs=_ARC)
+    opened = shapely.intersection(shapely.buffer(wide, 1.01 * reach, quad_segs=_ARC), gaps)
+    found: list[FloatArray] = []
+    widths: list[float] = []
+    for gap in shapely.get_parts(opened):
+        if gap.geom_type != "Polygon" or gap.area < _SMALL * width**2:
+            continue
+        border = gap.boundary
+        shapely.prepare(border)
+        for line in _middle(gap, _STEP * width):
+            drawn = shapely.simplify(shapely.LineString(line), 0.02 * width)
+            if drawn.length >= _SMALL * width:
+                points = shapely.get_coordinates(drawn)
+                middle = shapely.points(shapely.get_coordinates(shapely.segmentize(drawn, width)))
+                found.append(points)
+                widths.append(2.0 * float(shapely.distance(middle, border).mean()))
+    return found, widths
+
+
+def _middle(gap: shapely.Polygon, step: float) -> list[FloatArray]:
+    """Lines of the medial axis of a polygon that pass between its opposite sides."""
+    rings = shapely.get_rings(shapely.segmentize(gap, step))
+    points = np.concatenate([shapely.get_coordinates(ring)[:-1] for ring in rings])
+    if len(np.unique(points, axis=0)) < 4:
+        return []
+    diagram = Voronoi(points)
+    ridges = np.array(diagram.ridge_vertices)
+    sides = points[diagram.ridge_points[(ridges >= 0).all(axis=1)]]
+    ends = diagram.vertices[ridges[(ridges >= 0).all(axis=1)]]
+    chord = np.linalg.norm(sides[:, 1] - sides[:, 0], axis=1)
+    radius = np.linalg.norm(ends - sides[:, :1], axis=2).max(axis=1)
+    facing = chord >= _OPPOSITE * 2.0 * radius
+    edges = shapely.linestrings(ends[facing])
+    shapely.prepare(gap)
+    edges = edges[shapely.contains_properly(gap, edges)]
+    return open_lines(np.array([shapely.line_merge(shapely.multilinestrings(list(edges)))]))

@@ -1,20 +1,38 @@
 """From a plan to all actions of the machine: one sequence for every file that is written."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray
+from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.errors import InputError
+from ccfem.geometry.polylines import along_line, line_length, points_along, turning_angles
 from ccfem.machine.machine import Machine
+from ccfem.machine.speeds import step_curvatures, table_speeds
 from ccfem.paths.toolpaths import FIBRE, SUPPORT
 from ccfem.printing.beside import Beside, beside
+from ccfem.printing.duration import durations
 from ccfem.printing.laid_layer import COORDINATE_DIGITS
-from ccfem.printing.moves import FEED, LAY, TRAVEL, Moves
-from ccfem.printing.preheating import preheated
+from ccfem.printing.moves import (
+    CUT,
+    FAN,
+    FEED,
+    HEAT,
+    HEAT_BED,
+    LAY,
+    LAYER,
+    PATH_END,
+    PATH_START,
+    PREHEAT,
+    STANDBY,
+    TOOL,
+    TRAVEL,
+    WAIT,
+    WORK,
+    Moves,
+)
 from ccfem.printing.print_plan import PrintPlan
 from ccfem.printing.recorder import Recorder
-from ccfem.printing.tools import begin_layer, change_tool, lay_matrix, lay_strand
 
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -27,7 +45,6 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
 
     Parameters
     ----------
-    plan : PrintPlan
     machine : Machine
         The machine that the plan was made for.
 
@@ -162,3 +179,325 @@ def _check_bed(moves: Moves, machine: Machine) -> None:
             f"{bed[1]:g} x {bed[2]:g} mm: turn the part, or set process.prime = 'none' and "
             "process.skirt_loops = 0"
         )
+
+
+# Preheating of a waiting tool, so that the print does not wait for it.
+
+
+def preheated(moves: Moves, machine: Machine) -> Moves:
+    """Insert a row PREHEAT before each change back to a tool that was set to standby.
+
+    It is inserted before the last row that starts at least the heating time, (work - standby) over
+    the rate, ahead of the change; or right after the change away if that is later.
+    """
+    begin = np.concatenate([[0.0], np.cumsum(durations(moves, machine, heating=False))])[:-1]
+    rate = (machine.matrix_heating, machine.fibre_heating)
+    places, values, tools = [], [], []
+    for tool in (0, 1):
+        waits = np.flatnonzero((moves.event == STANDBY) & (moves.tool == tool))
+        works = np.flatnonzero((moves.event == WORK) & (moves.tool == tool))
+        for k in works.tolist():
+            before = waits[waits < k]
+            if not len(before):
+                standby, first = _waiting(tool, machine), 0
+            else:
+                standby, first = float(moves.amount[before[-1]]), int(before[-1])
+            need = max(float(moves.amount[k]) - standby, 0.0) / rate[tool]
+            at = int(np.searchsorted(begin, begin[k] - need, side="right")) - 1
+            # Behind the change away: standby, selection and wait of the other tool, and its fan.
+            behind = first + 4 if len(before) else 1
+            at = max(at, behind)
+            if need > 0.0 and at < k:
+                places.append(at)
+                values.append(float(moves.amount[k]))
+                tools.append(tool)
+    return _with_rows(moves, places, values, tools)
+
+
+def _waiting(tool: int, machine: Machine) -> float:
+    """Temperature of a tool before its first use; the start of the file waits for that of T0."""
+    return machine.fibre_standby if tool else machine.matrix_temperature + 1e3
+
+
+def _with_rows(moves: Moves, places: list[int], values: list[float], tools: list[int]) -> Moves:
+    """Insert rows PREHEAT before the rows at the given places."""
+    if not places:
+        return moves
+    found = {}
+    for one in fields(moves):
+        old = getattr(moves, one.name)
+        new = np.zeros((len(places), *old.shape[1:]), dtype=old.dtype)
+        at = np.array(places)
+        if one.name in ("place", "normal", "layer", "strand"):
+            new = old[np.maximum(at - 1, 0)]
+        elif one.name == "event":
+            new[:] = PREHEAT
+        elif one.name == "amount":
+            new[:] = values
+        elif one.name == "tool":
+            new[:] = tools
+        found[one.name] = np.insert(old, at, new, axis=0)
+    return Moves(**found)
+
+
+# What each tool needs before and after it lays something: heat, fan, its first filament, a cut.
+
+
+def matrix_area(machine: Machine) -> float:
+    """Section of the matrix filament, mm^2."""
+    return float(0.25 * np.pi * machine.matrix_diameter**2)
+
+
+def _working(tool: int, top: float, machine: Machine) -> float:
+    """Temperature of a tool while it lays a layer with this top, degrees Celsius."""
+    if tool:
+        return machine.fibre_temperature
+    warm = top <= machine.process.warm_height
+    return machine.matrix_temperature + warm * machine.process.warm_matrix
+
+
+def _fan(tool: int, top: float, machine: Machine) -> float:
+    process = machine.process
+    share = process.fibre_fan if tool else process.matrix_fan
+    return 0.0 if top <= process.warm_height else share
+
+
+def begin_layer(
+    recorder: Recorder, number: int, top: float, below: float, machine: Machine
+) -> None:
+    """Begin a layer: from a height on, nozzle and bed get less hot, and the fan of the tool runs.
+
+    Parameters
+    ----------
+    top, below : float, mm
+        Tops of this layer and of the one below it.
+    """
+    recorder.layer = number
+    recorder.note(LAYER, number)
+    warm = machine.process.warm_height
+    if below <= warm < top and below > 0.0:
+        if machine.process.warm_bed:
+            recorder.note(HEAT_BED, machine.bed_temperature)
+        if recorder.tool == 0 and machine.process.warm_matrix:
+            recorder.note(HEAT, machine.matrix_temperature)
+        if recorder.tool >= 0:
+            recorder.note(FAN, _fan(recorder.tool, top, machine))
+    recorder.top = max(recorder.top, below)
+
+
+def change_tool(recorder: Recorder, tool: int, top: float, machine: Machine) -> bool:
+    """Select a tool for a layer with this top; False where it is there.
+
+    The nozzle rises, matrix is drawn back, the old tool cools while the new one is waited for.
+    """
+    old = recorder.tool
+    if tool == old:
+        return False
+    process, profile = machine.process, machine.gcode
+    if old >= 0:
+        recorder.rise(recorder.top + process.tool_lift)
+        if old == 0 and process.tool_retract > recorder.drawn_back:
+            recorder.feed(recorder.drawn_back - process.tool_retract, profile.retract_speed)
+            recorder.drawn_back = process.tool_retract
+        cool = machine.fibre_standby if old else machine.matrix_standby
+        recorder.note(STANDBY, cool, old)
+    recorder.tool = tool
+    recorder.note(TOOL)
+    recorder.note(WORK, _working(tool, top, machine))
+    recorder.note(FAN, _fan(tool, top, machine))
+    return True
+
+
+def lay_matrix(
+    recorder: Recorder,
+    line: FloatArray,
+    normals: FloatArray,
+    heights: FloatArray,
+    what: str,
+    machine: Machine,
+    speed: float,
+) -> None:
+    """Lay a line (n, 3) of matrix, so high (n - 1,) on each of its steps, and leave it."""
+    profile, width = machine.gcode, machine.matrix_width
+    recorder.travel(line[0], normals[0])
+    if recorder.drawn_back:
+        recorder.feed(recorder.drawn_back, profile.retract_speed)
+        recorder.drawn_back = 0.0
+    feed = width * heights / matrix_area(machine)
+    speeds = np.full(len(heights), speed)
+    recorder.lay(line, normals, speeds, feed, width, heights, what)
+    if profile.retract:
+        recorder.feed(-profile.retract, profile.retract_speed)
+        recorder.drawn_back = profile.retract
+    recorder.retreat()
+
+
+def lay_strand(
+    recorder: Recorder, line: FloatArray, normals: FloatArray, height: float, machine: Machine
+) -> None:
+    """Feed, lay, cut and lay to its end a strand (n, 3), and leave it."""
+    process, profile = machine.process, machine.gcode
+    positions, speeds, cut_at = strand_speeds(line, machine)
+    along = along_line(line)
+    points = points_along(line, along, positions).round(COORDINATE_DIGITS)
+    across = points_along(normals, along, positions)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    cut = int(np.abs(positions - cut_at).argmin())
+    room = max(machine.fibre_width * height - machine.filament_area, 0.0)
+    round_it = machine.coextrusion * room / matrix_area(machine)
+    total = float(positions[-1])
+    recorder.travel(points[0], across[0])
+    recorder.note(PATH_START, total)
+    tail = line_length(points[cut:])
+    if machine.tail > 0.0:
+        recorder.feed(tail + process.restart_extra, profile.feed_speed)
+    if process.start_wait:
+        recorder.note(WAIT, process.start_wait)
+    steps, width = np.ones(len(speeds)), machine.fibre_width
+    for part, name, feed in (
+        (slice(0, cut), "fibre", process.feed_ratio),
+        (slice(cut, None), "tail", 0.0),
+    ):
+        if name == "tail":
+            recorder.note(CUT, machine.cut_wait)
+        ends = slice(part.start, len(points) if part.stop is None else part.stop + 1)
+        count = len(speeds[part])
+        if count:
+            recorder.lay(
+                points[ends],
+                across[ends],
+                speeds[part],
+                feed * steps[part],
+                width,
+                np.full(count, height),
+                name,
+                np.full(count, round_it),
+            )
+    recorder.note(PATH_END, total)
+    if process.ironing_length > 0.0:
+        _iron(recorder, points, across, positions, machine)
+    recorder.retreat(process.strand_lift)
+
+
+def _iron(
+    recorder: Recorder,
+    points: FloatArray,
+    normals: FloatArray,
+    positions: FloatArray,
+    machine: Machine,
+) -> None:
+    """Go back over the end of a strand without feeding."""
+    start = max(float(positions[-1]) - machine.process.ironing_length, 0.0)
+    back = np.append(positions[positions > start + 1e-3][::-1], start)
+    line = points_along(points, positions, back).round(COORDINATE_DIGITS)
+    across = points_along(normals, positions, back)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    speeds = np.full(len(back) - 1, machine.process.finish_speed)
+    recorder.lay(line, across, speeds, 0.0 * speeds, 0.0, 0.0 * speeds, "travel")
+
+
+# Speed along a strand: slow at its start, in tight turns and corners, and behind its cut.
+
+
+_REACH = 2.0
+"""Least length over which curvature is taken, in fibre widths; that of `ccfem.paths.linking`."""
+_PIECES = 5
+"""Pieces of the ramp from the start speed to the normal one."""
+_SAME = 1e-3
+_NEAR = 0.02
+"""Places where the speed changes are moved to points of the strand that are nearer than this, mm:
+rounded to 0.001 mm, a shorter step would turn anywhere."""
+
+
+def strand_speeds(line: FloatArray, machine: Machine) -> tuple[FloatArray, FloatArray, float]:
+    """Points of a strand, the speed of each of its steps, and where it is cut.
+
+    Parameters
+    ----------
+    line : (n, 2) or (n, 3) array, mm
+        At least as long as `Machine.tail`.
+
+    Returns
+    -------
+    positions : (m,) array, mm
+        Arc lengths, from 0 to the length of the line: its points and those where the speed changes.
+    speeds : (m - 1,) array, mm/s
+    cut : float, mm
+        One of the positions, `Machine.tail` before the end.
+    """
+    process, along = machine.process, along_line(line)
+    total = float(along[-1])
+    cut = max(total - machine.tail, 0.0)
+    normal, corners = _normal_speeds(line, machine)
+    ramp = process.start_length + np.linspace(0.0, process.ramp_length, _PIECES + 1)
+    breaks = [cut, *ramp.tolist()]
+    for corner in along[corners].tolist():
+        breaks += [corner - process.corner_length, corner + process.corner_length]
+    positions = _joined(along, np.array(breaks))
+    middle = 0.5 * (positions[1:] + positions[:-1])
+    step = np.clip(np.searchsorted(along, middle) - 1, 0, len(normal) - 1)
+    speeds = np.minimum(normal[step], machine.process.speed_limit or np.inf)
+    if machine.speeds is None:
+        bend = _bend_at(line, along, middle, _REACH * machine.fibre_width)
+        speeds = np.minimum(speeds, _speed_of(bend, machine))
+    slow = np.minimum(process.start_speed, speeds)
+    if process.start_length > 0.0:
+        behind = positions[:-1] - process.start_length
+        share = np.clip(behind / max(process.ramp_length, _SAME), 0.0, 1.0)
+        speeds = slow + np.where(behind < -_SAME, 0.0, share) * (speeds - slow)
+    for corner in along[corners].tolist():
+        reach = process.corner_length - _SAME
+        near = (positions[:-1] < corner + reach) & (positions[1:] > corner - reach)
+        speeds[near] = slow[near]
+    tail = middle > cut
+    speeds[tail] = np.minimum(speeds[tail], process.finish_speed)
+    return positions, speeds, cut
+
+
+def _normal_speeds(line: FloatArray, machine: Machine) -> tuple[FloatArray, BoolArray]:
+    """Speed of each step by the table, or by the radius of turns; points that are corners."""
+    process, ends = machine.process, np.array([0, len(line)])
+    turn = np.degrees(turning_angles(line, ends, np.zeros(1, dtype=bool)))
+    corner = turn > process.corner_angle
+    reach = _REACH * machine.fibre_width
+    if machine.speeds is not None:
+        return table_speeds(line, ends, machine.speeds, reach)[:-1], corner
+    return _speed_of(step_curvatures(line, ends, corner, reach), machine), corner
+
+
+def _speed_of(bend: FloatArray, machine: Machine) -> FloatArray:
+    """Speed by curvature, 1/mm, where there is no table."""
+    process = machine.process
+    slow, fast = min(process.start_speed, machine.fibre_speed), machine.fibre_speed
+    with np.errstate(divide="ignore"):
+        radius = 1.0 / bend
+    least, most = machine.minimum_radius, process.bend_radius
+    if most <= least:
+        share = (radius >= least).astype(np.float64)
+    else:
+        share = np.clip((np.minimum(radius, most) - least) / (most - least), 0.0, 1.0)
+    return np.asarray(slow + share * (fast - slow))
+
+
+def _bend_at(line: FloatArray, along: FloatArray, at: FloatArray, reach: float) -> FloatArray:
+    """Curvature of the circle through places on a line and those a reach before and behind."""
+    a, b, c = (
+        points_along(line, along, np.clip(at + off, 0.0, along[-1])) for off in (-reach, 0.0, reach)
+    )
+    u, v = b - a, c - b
+    sizes = [np.linalg.norm(one, axis=1) for one in (u, v, c - a)]
+    dot = np.einsum("ij,ij->i", u, v)
+    across = np.sqrt(np.maximum((sizes[0] * sizes[1]) ** 2 - dot**2, 0.0))
+    return np.asarray(2.0 * across / np.maximum(sizes[0] * sizes[1] * sizes[2], 1e-12))
+
+
+def _joined(along: FloatArray, breaks: FloatArray) -> FloatArray:
+    """Positions of points and breaks, none nearer to another than 0.02 mm."""
+    total = along[-1]
+    inner = breaks[(breaks > _SAME) & (breaks < total - _SAME)]
+    near = np.searchsorted(along, inner)
+    gap = np.minimum(inner - along[near - 1], along[np.minimum(near, len(along) - 1)] - inner)
+    inner = np.sort(inner[gap > _NEAR])
+    if len(inner):
+        inner = inner[np.append(True, np.diff(inner) > _NEAR)]
+    return np.sort(np.concatenate([along, inner]))

@@ -5,12 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
+from scipy.ndimage import label
 
 from ccfem.base.arrays import BoolArray, FloatArray, freeze, in_brief
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.geometry.polylines import line_length, starts_segment
-from ccfem.geometry.shapes import Region
+from ccfem.geometry.hatch import zigzag
+from ccfem.geometry.offsets import offset_rings
+from ccfem.geometry.polylines import along_line, line_length, points_along, starts_segment
+from ccfem.geometry.shapes import Region, open_lines, strings
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import FIBRE, MATRIX, Toolpaths
 from ccfem.printing.laid_layer import (
@@ -23,10 +26,8 @@ from ccfem.printing.laid_layer import (
 )
 from ccfem.printing.matrix_flow import THIN
 from ccfem.printing.matrix_lines import MatrixFill, matrix_fills
-from ccfem.printing.pads import pad_lines, pad_regions
 from ccfem.printing.slabs import Slab, check_cover, slabs_of
-from ccfem.printing.stacks import ended_in_stacks, height_over
-from ccfem.printing.turns import turned
+from ccfem.printing.strand_density import StrandDensity
 from ccfem.slicing.layers import Layer
 from ccfem.slicing.layers.plane import Plane
 from ccfem.slicing.slicers.planar import Planar
@@ -100,12 +101,7 @@ class PrintPlan:
 
 
 def check_machine(machine: Machine) -> None:
-    """Raise where a machine cannot print: a speed of 0, or strands that its cutter cannot lay.
-
-    Raises
-    ------
-    InputError
-    """
+    """Raise where a machine cannot print: a speed of 0, or strands that its cutter cannot lay."""
     for name in ("fibre_speed", "matrix_speed", "travel_speed", "matrix_height"):
         unused = name == "fibre_speed" and machine.speeds is not None
         if getattr(machine, name) == 0.0 and not unused:
@@ -142,7 +138,6 @@ def plan_print(
         Flat layers that the fibre lies on.
     mesh : TetMesh
         The part.
-    machine : Machine
 
     Raises
     ------
@@ -325,3 +320,287 @@ def _check_bed(plan: PrintPlan, machine: Machine) -> None:
             f"the part needs {size[0]:.4g} x {size[1]:.4g} x {size[2]:.4g} mm, but the printer has "
             f"{bed[0]:g} x {bed[1]:g} x {bed[2]:g} mm: turn it, or set bed in [machine.gcode]"
         )
+
+
+# Strands that leave the part: on pads, cut at its border, or refused.
+
+
+def turned(
+    lines: list[FloatArray], border: Region, layer: int, machine: Machine
+) -> tuple[list[FloatArray], FloatArray]:
+    """Strands of a layer by what `Process.turns` says, and where they cross its border."""
+    crossings = border_crossings(lines, border)
+    if not len(crossings) or machine.process.turns == "pad":
+        return lines, crossings
+    if machine.process.turns == "inside":
+        raise InputError(
+            f"strands leave fibre layer {layer} in {len(crossings)} places, but process.turns is "
+            "'inside': plan without loops outside (svt: links = 'none'), or set it to 'pad' or "
+            "'cut'"
+        )
+    return cut_at_border(lines, border), np.zeros((0, 2))
+
+
+# Pads under fibre without a part below it: columns of matrix down to the bed or the part.
+
+
+_MORE = 1.0
+"""Width by which a pad extends beyond the strands on it, mm. Our choice."""
+_CLEAR = 0.7
+"""Distance from a pad to the part, mm (Aura)."""
+_SHARE = 0.25
+"""Share of a pad that is filled (Aura)."""
+_SOLID = 2
+"""Number of solid layers of matrix under a strand. Our choice."""
+_SPAN = 2.0
+"""Longest way over the gap between a pad and the part, mm. A bent strand may hang over 3 mm, and
+lines of matrix do not reach every corner of pad and part."""
+_ARC = 4
+"""Segments per quarter circle in the borders of pads."""
+_NONE = shapely.Polygon()
+
+
+def pad_regions(
+    sections: Sequence[Region | None], strands: Sequence[Sequence[FloatArray]], machine: Machine
+) -> list[tuple[Region, Region]]:
+    """Regions where each layer of matrix needs pads, and where they are solid.
+
+    Parameters
+    ----------
+    sections : sequence of (Multi)Polygon or None, mm
+        Of all layers from the bed to the top: section of a layer of matrix, None of one of fibre.
+    strands : sequence of sequences of (n, 2) arrays, mm
+        Fibre on each of them.
+
+    Returns
+    -------
+    list of (Region, Region)
+        All of the pads, and their solid part; empty on layers of fibre.
+    """
+    reach, half = 0.5 * machine.fibre_width + _MORE, 0.5 * machine.matrix_width
+    # Where a section is narrower than a line, nothing is laid.
+    sections = [one and _opened(one, half) for one in sections]
+    wide: Region = _NONE
+    along: Region = _NONE
+    recent: list[Region] = []
+    found: list[tuple[Region, Region]] = []
+    for k in range(len(sections))[::-1]:
+        section = sections[k]
+        if section is None:
+            below = next((one for one in sections[:k][::-1] if one is not None), None)
+            if below is not None and len(strands[k]):
+                free = shapely.difference(strings(strands[k]), below)
+                along = free_area(_along_border(free, below), reach)
+                recent = [shapely.union(free_area(free, reach), _union(recent[:1])), *recent[1:]]
+            found.append((_NONE, _NONE))
+            continue
+        wide = _union([wide, *recent[:1]])
+        if wide.is_empty:
+            found.append((_NONE, _NONE))
+        else:
+            # Clear of the part, except below strands that run along its border.
+            room = shapely.buffer(section, _CLEAR, quad_segs=_ARC)
+            room = shapely.union(shapely.difference(room, along), section)
+            solid = _union(recent[:_SOLID])
+            found.append((shapely.difference(wide, room), shapely.difference(solid, room)))
+        recent, along = [_NONE, *recent[: _SOLID - 1]], _NONE
+    return found[::-1]
+
+
+def _opened(section: Region, half: float) -> Region:
+    """Part of a section that lines of twice that width reach."""
+    inner = shapely.buffer(section, -half, quad_segs=_ARC)
+    return shapely.buffer(inner, half, quad_segs=_ARC)
+
+
+def _along_border(free: shapely.Geometry, below: Region) -> shapely.Geometry:
+    """Pieces of lines that run on in the gap between a pad and the part."""
+    near = shapely.intersection(free, shapely.buffer(below, _CLEAR, quad_segs=_ARC))
+    lines = [line for line in open_lines(near) if line_length(line) > _SPAN]
+    return strings(lines) if lines else np.array([_NONE])
+
+
+def free_area(free: shapely.Geometry, reach: float) -> Region:
+    """Area round lines, simplified to a twentieth of a mm."""
+    return shapely.simplify(_union(shapely.buffer(free, reach, quad_segs=_ARC)), 0.05)
+
+
+def _union(parts: Sequence[Region]) -> Region:
+    return shapely.union_all(list(parts)) if len(parts) else _NONE
+
+
+def pad_lines(wide: Region, solid: Region, machine: Machine) -> list[FloatArray]:
+    """Lines (n, 2) of pads: a contour and lines far apart, close in the solid part."""
+    if wide.is_empty:
+        return []
+    width, angle = machine.matrix_width, float(np.radians(machine.gcode.matrix_angle))
+    rings = offset_rings(wide, 0.5 * width, width, width, 1)
+    lines = [ring for level in rings for ring in level]
+    sparse = shapely.difference(wide, solid)
+    for region, pitch in ((sparse, width / _SHARE), (solid, width)):
+        inside = shapely.intersection(region, shapely.buffer(wide, -0.75 * width))
+        if inside.area > width**2:
+            lines += zigzag(inside, 0.5 * width, width, pitch, angle)
+    return lines
+
+
+def border_crossings(lines: Sequence[FloatArray], section: Region) -> FloatArray:
+    """Places (k, 2) where strands cross the border of a section."""
+    if not len(lines):
+        return np.zeros((0, 2))
+    found = shapely.intersection(strings(lines), shapely.boundary(section))
+    return np.asarray(shapely.get_coordinates(found))
+
+
+def cut_at_border(lines: Sequence[FloatArray], section: Region) -> list[FloatArray]:
+    """Pieces of strands (n, 2) inside a section; rings go on through their first point."""
+    found: list[FloatArray] = []
+    for line in lines:
+        if section.covers(shapely.LineString(line)):
+            found.append(line)
+            continue
+        pieces = shapely.intersection(shapely.LineString(line), section)
+        found += open_lines(np.array([pieces]))
+    return found
+
+
+# Strands that would stack higher than the matrix above them end alternately where they cross.
+#
+# Where bundles of strands cross or join, their strands lie on top of each other. The matrix above
+# levels them as long as they are not higher than it. Where they are, pieces of strands are left
+# out, one in each stack at a time, that which stands most in the way first: of neighbours in a
+# bundle one ends and the other goes on.
+
+
+_STEP = 0.5
+"""Distance of the places on a strand where the stack is looked at, in fibre widths."""
+_ROUNDS = 40
+"""Most pieces that are left out in one stack."""
+_ENOUGH = 0.01
+"""Share of a section that may stay too high: as much as matrix is thin without a word."""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """Strands of a layer, some of which end in stacks.
+
+    Attributes
+    ----------
+    lines : list of (n, 2) arrays, mm
+    removed : float, mm
+        Length of the pieces that are left out.
+    places : int
+        Number of these pieces.
+    """
+
+    lines: list[FloatArray]
+    removed: float = 0.0
+    places: int = 0
+
+
+def height_over(lines: Sequence[FloatArray], section: Region, machine: Machine) -> float:
+    """Height of matrix over a layer of strands, mm, that levels them but for a hundredth of it."""
+    if not len(lines):
+        return 0.0
+    density = StrandDensity.of(lines, [machine.strand_area] * len(lines), machine.fibre_width)
+    high = np.sort(density.values[density.values > machine.strand_height])[::-1]
+    # Half of what is let pass: lines of matrix do not see the same places as this grid.
+    few = int(0.5 * _ENOUGH * section.area / density.cell**2)
+    most = float(high[few]) if few < len(high) else 0.0
+    return max(most + THIN - machine.strand_height, 0.0)
+
+
+def ended_in_stacks(
+    lines: Sequence[FloatArray], section: Region, room: float, machine: Machine
+) -> Ended:
+    """Let strands end where they would stack higher than there is room.
+
+    Parameters
+    ----------
+    lines : sequence of (n, 2) arrays, mm
+        Strands of one layer.
+    section : Region
+        Of the part: outside it nothing is left out.
+    room : float, mm
+        Height over the layer below that strands may have, spread over a fibre width or so.
+    machine : Machine
+        Its sections of strands, and the shortest that its cutter allows: no piece that stays is
+        shorter, but for strands that were.
+
+    Returns
+    -------
+    Ended
+        All strands as they were where less than a hundredth of the section is too high.
+    """
+    kept = [np.asarray(line) for line in lines]
+    removed, places = 0.0, 0
+    for _ in range(_ROUNDS):
+        density = StrandDensity.of(kept, [machine.strand_area] * len(kept), machine.fibre_width)
+        high = density.values > room
+        rows, columns = np.nonzero(high)
+        if len(rows):
+            middle = density.place(np.column_stack([rows, columns]))
+            high[rows, columns] = shapely.contains_xy(section, *middle.T)
+        if high.sum() * density.cell**2 <= _ENOUGH * section.area:
+            break
+        stacks, _ = label(high, np.ones((3, 3)))
+        passes = _passes(kept, stacks, density, room, machine)
+        if not passes:
+            break
+        pieces: dict[int, list[tuple[float, float]]] = {}
+        taken = set()
+        for _, stack, line, first, last in sorted(passes, reverse=True):
+            # One in each stack; a strand is cut in one place a round, since its pieces get short.
+            if stack in taken or line in pieces:
+                continue
+            taken.add(stack)
+            pieces[line] = [(first, last)]
+            removed += last - first
+            places += 1
+        kept = [piece for k, line in enumerate(kept) for piece in _without(line, pieces.get(k, []))]
+    return Ended(kept, removed, places)
+
+
+def _passes(
+    lines: Sequence[FloatArray],
+    stacks: FloatArray,
+    density: StrandDensity,
+    room: float,
+    machine: Machine,
+) -> list[tuple[float, int, int, float, float]]:
+    """List passes through stacks that may be left out: excess, stack, strand and both ends."""
+    shortest = max(machine.tail, machine.minimum_length)
+    found = []
+    for k, line in enumerate(lines):
+        along = along_line(line)
+        total = float(along[-1])
+        count = max(int(np.ceil(total / (_STEP * machine.fibre_width))), 1)
+        at = np.linspace(0.0, total, count + 1)
+        index = density.index(points_along(line, along, at))
+        stack, excess = stacks[index], density.values[index] - room
+        edges = np.flatnonzero(np.diff(stack, prepend=-1, append=-1))
+        for first, last in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+            if stack[first] == 0:
+                continue
+            low, high = float(at[max(first - 1, 0)]), float(at[min(last, count)])
+            # What stays is long enough for the cutter, or nothing.
+            low = 0.0 if low < 1e-9 else low
+            high = total if high > total - 1e-9 else high
+            if 0.0 < low < shortest or 0.0 < total - high < shortest:
+                continue
+            gain = float(excess[first:last].clip(0.0).sum()) / (high - low)
+            found.append((gain, int(stack[first]), k, low, high))
+    return found
+
+
+def _without(line: FloatArray, pieces: Sequence[tuple[float, float]]) -> list[FloatArray]:
+    """Pieces of a strand that stay."""
+    found, along, start = [], along_line(line), 0.0
+    total = float(along[-1])
+    for first, last in [*pieces, (total, total)]:
+        if first > start:
+            inner = along[(along > start + 1e-6) & (along < first - 1e-6)]
+            where = np.concatenate([[start], inner, [first]])
+            found.append(points_along(line, along, where))
+        start = last
+    return [piece for piece in found if line_length(piece) > 0.0]

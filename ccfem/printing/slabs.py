@@ -40,7 +40,6 @@ def slabs_of(
         Those of fibre.
     bottom, top : float, mm
         Ends of the part along the build direction.
-    machine : Machine
     over : mapping, optional
         Height of matrix, mm, that levels the strands of a fibre layer, by its index: the first
         layer of matrix over it is so high where there is room, up to `Machine.matrix_width`.

@@ -5,28 +5,33 @@ of the fibre. But the field is not fitted to the stress of the part without fibr
 compliance of the part with the fibre that its isocurves lay.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Protocol, TypeVar
 
 import numpy as np
+import scipy.sparse as sp
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.checks import check_choices, check_fields
 from ccfem.base.errors import InputError
+from ccfem.base.tensor import largest_in_plane
 from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.fem.elasticity.stress_field import StressField, solved
 from ccfem.fem.elasticity.weighted_cases import WeightedCases
 from ccfem.judging.virtual_testing.strand import RHO, Strand
 from ccfem.machine.machine import Machine
+from ccfem.paths.fields.fill import fill_screened
+from ccfem.paths.fields.layer_elements import Surface, positive_definite
 from ccfem.paths.fields.layer_tension import layer_tension
+from ccfem.paths.fields.orientation import orient
+from ccfem.paths.fields.tensile import Tension
 from ccfem.paths.planning.strategy import Amount, LayerPlanner
 from ccfem.paths.planning.whole_part import WholePart, full_length
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import stress_on
 from ccfem.strategies.fibre_aware.cut_and_move import prune_and_move
-from ccfem.strategies.fibre_aware.design_lengths import designed_to_lengths
 from ccfem.strategies.fibre_aware.heights import (
     alike_share,
     fibre_capacity,
@@ -42,6 +47,7 @@ from ccfem.strategies.fibre_aware.smeared import SmearedPart, smeared_cases
 from ccfem.strategies.fibre_aware.spline_grid import SplineGrid
 from ccfem.strategies.fibre_aware.strand_moves import kept_radius
 from ccfem.strategies.fibre_aware.stream_design import (
+    DENSEST,
     DESIGN_POWERS,
     StreamDesign,
     StreamModel,
@@ -49,7 +55,6 @@ from ccfem.strategies.fibre_aware.stream_design import (
     designed_in_steps,
 )
 from ccfem.strategies.fibre_aware.stream_paths import Extraction, refined
-from ccfem.strategies.fibre_aware.stream_start import plane_axes, start_fields
 from ccfem.strategies.fibre_aware.strength_design import design_for_strength
 from ccfem.strategies.fibre_aware.upper_bound import measures
 
@@ -362,3 +367,245 @@ def _check_tension(stresses: Sequence[StressField], layers: Sequence[Layer]) -> 
         "expected tension that fibre can carry; the largest tensile stress found is "
         f"{largest:.3g} MPa, outweighed by compression: turn the load round"
     )
+
+
+# Paths of several lengths from as few designs as possible.
+
+
+_ENOUGH = 0.99
+"""Share of a wanted length below which the design is repeated."""
+
+_NEAR = 0.95
+"""Share of the largest length above which shorter lengths are cut from its design."""
+
+_MORE = 1.03
+"""Factor on the length asked for in the repeated design, on top of the proportional increase."""
+
+
+class _Strategy(Protocol):
+    """A strategy that designs fields for a coverage, and for more fibre by its overfill."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+    amount: ClassVar[Amount]
+
+    @property
+    def coverage(self) -> float: ...
+    @property
+    def overfill(self) -> float: ...
+
+
+Designed = TypeVar("Designed", bound=_Strategy)
+
+
+def designed_to_lengths(
+    strategy: Designed,
+    layers: Sequence[Layer],
+    machine: Machine,
+    lengths: Sequence[float],
+    cut: Callable[[Designed, Sequence[float]], list[Toolpaths]],
+    again: bool = True,
+) -> list[tuple[Designed, LayerPlanner]]:
+    """Design for the largest length, and again for much shorter ones.
+
+    Parameters
+    ----------
+    strategy : StreamFunction
+    lengths : sequence of float, mm per layer
+        Lengths that need more than the largest coverage are reduced to that coverage.
+    cut : callable
+        Designs for the coverage of a strategy and cuts the paths to each of the lengths.
+    again : bool, default True
+        Whether to design for more fibre where the paths are too short, and to take the longer ones.
+
+    Returns
+    -------
+    list of (StreamFunction, LayerPlanner)
+        For each length the strategy with parameters that lay it, and the plan.
+    """
+    full = full_length(layers, machine)
+    most = max(strategy.amount.most, strategy.coverage) * full
+    lengths = [min(length, most) for length in lengths]
+    longest = max(lengths)
+    short = [k for k, length in enumerate(lengths) if length < _NEAR * longest]
+    if short:
+        anew = designed_to_lengths(
+            strategy, layers, machine, [lengths[k] for k in short], cut, again
+        )
+        near = [length for length in lengths if length >= _NEAR * longest]
+        rest = iter(designed_to_lengths(strategy, layers, machine, near, cut, again))
+        of = dict(zip(short, anew, strict=True))
+        return [of[k] if k in of else next(rest) for k in range(len(lengths))]
+    told = replace(strategy, coverage=longest / full)
+    found = cut(told, lengths)
+    laid = max(float(paths.lengths.sum()) for paths in found) / len(layers)
+    short_of = 0.0 < laid < _ENOUGH * longest
+    if again and short_of and strategy.overfill * told.coverage < DENSEST:
+        more = replace(told, overfill=min(_MORE * longest / laid, 2.0) * strategy.overfill)
+        longer = cut(more, lengths)
+        if max(float(paths.lengths.sum()) for paths in longer) > laid * len(layers):
+            told, found = more, longer
+    designed = told.overfill * told.coverage
+    return [
+        (_designed_for(told, length / full, designed), WholePart(paths))
+        for length, paths in zip(lengths, found, strict=True)
+    ]
+
+
+def _designed_for(strategy: Designed, coverage: float, designed: float) -> Designed:
+    """Strategy that lays a coverage from a design for `designed`, overfill included."""
+    return replace(strategy, coverage=coverage, overfill=max(designed / coverage, 1.0))
+
+
+# Start of the design of stream functions: their grid, and fields that follow the tension.
+
+
+_SPACING_WEIGHT = 0.1
+"""Weight of the wanted density against the direction, as in `fields.scalar.fit_weighted`."""
+
+_FILL_LENGTH = 3.0
+"""Length, mm, over which the screened fill carries the field on."""
+
+_FULLEST = 0.85
+"""Largest share of the fibre at the density limit to which the first field is scaled up."""
+
+_LEAST_WEIGHT = 1e-3
+_SMOOTH = 1e-5
+_REGULARISATION = 1e-9
+
+
+def plane_axes(part: SmearedPart, energies: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Centre (2,) and in-plane axes (2, 2) that rotate with the part and its loads.
+
+    They are the in-plane principal axes of inertia, of volume and strain energy in equal parts: a
+    symmetric part rarely has a load that is symmetric too.
+
+    Parameters
+    ----------
+    energies : sequence of (m,) arrays
+        Strain energy of each cell under each load case, in any unit.
+    """
+    mesh = part.mesh
+    place = part.centroids @ part.frame[:2].T
+    shares = np.mean([energy / energy.sum() for energy in energies], axis=0)
+    weight = mesh.volumes / mesh.volumes.sum() + shares
+    centre = weight @ place / weight.sum()
+    away = place - centre
+    _, vectors = np.linalg.eigh((away * weight[:, None]).T @ away)
+    first = vectors[:, 1] * (1.0 if vectors[np.abs(vectors[:, 1]).argmax(), 1] > 0.0 else -1.0)
+    return centre, np.stack([first, [-first[1], first[0]]])
+
+
+def start_fields(
+    problem: StreamProblem,
+    stresses: Sequence[StressField],
+    layers: Sequence[Layer],
+    cap: float,
+    tilt: float = 1.0,
+) -> FloatArray:
+    """Make fields (n * c,) to start with: each mainly follows the tension of its own case.
+
+    Field k follows ``sum over i of v_i s_i t_i t_i^T / sqrt(C_i)``, s_i the tension along t_i and
+    C_i the compliance without fibre, v_i the tilt for its own case and equal for the others. It is
+    as dense as the budget allows.
+
+    Parameters
+    ----------
+    stresses : sequence of StressField
+        Of the part without fibre, one for each case.
+    layers : sequence of Layer
+        One for each group, whose tension its field follows.
+    cap : float
+        Percentile of the stress above which the density no longer increases.
+    tilt : float in (0, 1], default 1
+        Weight of a field's own case. At 1 the initial fields are independent of each other; at
+        1 / n they start alike, and stay so.
+
+    Returns
+    -------
+    (n * c,) array
+        Coefficients, field after field; zero for a group without tension.
+    """
+    count = len(stresses)
+    tensions = [[layer_tension(stress_on(layer, one)) for one in stresses] for layer in layers]
+    size = np.sqrt([part.unreinforced.work for part in problem.parts])
+    found = []
+    for k in range(count):
+        factors = np.full(count, (1.0 - tilt) / max(count - 1, 1))
+        factors[k] = tilt
+        mixed = [mixed_tension(of_layer, factors / size) for of_layer in tensions]
+        found.append(field_along(problem.model, layers, mixed, cap))
+    return np.concatenate(found)
+
+
+def field_along(
+    model: StreamModel, layers: Sequence[Layer], tensions: Sequence[Tension], cap: float
+) -> FloatArray:
+    """Fields (c,) that follow given tensions of one layer for each group; cap as `start_fields`."""
+    values = np.concatenate([np.where(t.defined, t.stress, 0.0) for t in tensions])
+    weight = np.concatenate([layer.areas for layer in layers])
+    order = np.argsort(values, kind="stable")
+    below = np.cumsum(weight[order])
+    at = int(np.searchsorted(below, cap / 100.0 * below[-1] * (1.0 - 1e-12)))
+    top = max(float(values[order[min(at, len(order) - 1)]]), 1e-300)
+    field = np.concatenate(
+        [_fit(model, layer, tension, top) for layer, tension in zip(layers, tensions, strict=True)]
+    )
+    return _to_budget(model, field)
+
+
+def mixed_tension(tensions: Sequence[Tension], factors: FloatArray) -> Tension:
+    """Tension of ``sum of factor s t t^T`` over the tensions s along t of several load cases.
+
+    Parameters
+    ----------
+    tensions : sequence of Tension
+        In the plane of one layer.
+    factors : (n,) array
+        Not negative.
+    """
+    if len(tensions) == 1:  # only its size would change, which no field depends on
+        return tensions[0]
+    total = np.zeros((len(tensions[0].stress), 3))
+    for factor, one in zip(factors, tensions, strict=True):
+        x, y = one.direction.T
+        size = factor * np.where(one.defined, one.stress, 0.0)
+        total += size[:, None] * np.stack([x * x, y * y, x * y], axis=1)
+    largest, _, angle = largest_in_plane(total)
+    return Tension(np.stack([np.cos(angle), np.sin(angle)], axis=1), largest, largest > 0.0)
+
+
+def _fit(model: StreamModel, layer: Layer, tension: Tension, top: float) -> FloatArray:
+    """Coefficients (k,) of the field along the tension of one layer."""
+    grid = model.grid
+    if not tension.defined.any():
+        return np.zeros(len(grid))
+    surface = Surface.of(layer)
+    confidence = np.where(tension.defined, np.minimum(tension.stress / top, 1.0), 0.0)
+    direction, size = fill_screened(
+        surface, tension.direction, tension.stress, confidence, _FILL_LENGTH
+    )
+    direction = orient(direction, surface.neighbours, confidence)
+    density = DENSEST * np.clip(size / top, 0.0, 1.0)
+    weight = np.maximum(confidence, _LEAST_WEIGHT) * surface.areas
+    weight = weight / weight.sum()
+    x, y = grid.slopes(surface.points[surface.triangles].mean(axis=1))
+    a, b = direction.T
+    along = model.width * (sp.diags_array(a) @ x + sp.diags_array(b) @ y)
+    across = model.width * (sp.diags_array(a) @ y - sp.diags_array(b) @ x)
+    weighted = (_SPACING_WEIGHT * across).T * weight
+    bend = grid.laplacian.T @ grid.laplacian / len(grid)
+    matrix = (along.T * weight) @ along + weighted @ across + _SMOOTH * bend
+    matrix = matrix + _REGULARISATION * sp.eye_array(len(grid))
+    return np.asarray(positive_definite(matrix).solve(weighted @ density))
+
+
+def _to_budget(model: StreamModel, field: FloatArray) -> FloatArray:
+    """Scale a field so that it uses the budget as far as the density stays below its limit."""
+    size = np.hypot(*(slope @ field for slope in model.slopes))
+    most = _FULLEST * DENSEST * float(model.room.sum())
+    low, high = 1e-2, 1e2
+    for _ in range(60):
+        middle = float(np.sqrt(low * high))
+        length = model.room @ np.minimum(middle * size, DENSEST)
+        low, high = (middle, high) if length < min(model.budget, most) else (low, middle)
+    return low * field

@@ -8,14 +8,20 @@ Visualization in Scientific Computing '97, Springer (1997) 43.
 """
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
+import numpy as np
 import shapely
+from numba import njit
 
-from ccfem.base.checks import check_fields
-from ccfem.base.tensor import in_plane
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.checks import check_fields, check_number
+from ccfem.base.errors import InputError
+from ccfem.base.tensor import in_plane, strongest_in_plane
+from ccfem.geometry.section_grid import SectionGrid, contains, section_grid
+from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
-from ccfem.paths.fields.evenly_spaced import evenly_spaced_streamlines
+from ccfem.paths.fields.streamlines import direction_at, line_field, streamline_step
 from ccfem.paths.planning.infill import SPACING, check_fill, long_enough
 from ccfem.paths.planning.strategy import Amount
 from ccfem.paths.toolpaths import Toolpaths
@@ -73,3 +79,251 @@ class Streamline:
         smooth = shapely.simplify([shapely.LineString(line) for line in lines], _TOLERANCE * width)
         paths = Toolpaths.from_plane([shapely.get_coordinates(line) for line in smooth], layer)
         return long_enough(paths, self.minimum_length, machine)
+
+
+# Streamlines of the principal stress, evenly spaced.
+#
+# B. Jobard, W. Lefer, Creating evenly-spaced streamlines of arbitrary density, Visualization in
+# Scientific Computing '97, Springer (1997) 43.
+
+
+_STEP = 0.1
+"""Step along a streamline, in separations."""
+_EVENLY_LEAST = 0.03
+"""As `least` of `streamlines`: below it rounding decides where a line goes."""
+_SLACK = 1e-3
+"""Share of the separation by which a new line may be too near, for rounding and finite steps."""
+_MOST_POINTS = 20_000_000
+
+
+def evenly_spaced_streamlines(
+    points: FloatArray,
+    triangles: IntArray,
+    plane_stress: FloatArray,
+    region: Region,
+    separation: float,
+    closest: float = 0.5,
+    least_length: float = 0.0,
+) -> list[FloatArray]:
+    """Lines, a distance apart, along the principal stress of largest absolute value.
+
+    The first line goes through the most stressed triangle. Others begin `separation` away from the
+    points of existing lines, in the order of the lines. A line ends where it comes nearer than
+    `closest` separations to another line or to itself, where it leaves the region, and where the
+    stress has no direction. When no line is left to begin beside, the next one begins in the most
+    stressed triangle that is a separation away from all lines. So separate parts of the region and
+    of the field are reached too; the paper does not treat these.
+
+    Parameters
+    ----------
+    points, triangles, plane_stress
+        As in `streamlines`.
+    region : shapely (Multi)Polygon, mm
+        Lines stay in it.
+    separation : float, mm
+        Distance from existing lines at which new ones begin (d_sep), > 0.
+    closest : float in (0, 1), default 0.5
+        Least distance between lines, in separations (d_test / d_sep).
+    least_length : float, mm, default 0
+        Shorter lines are not laid and block no other line; never below one separation.
+
+    Returns
+    -------
+    list of (m, 2) arrays, mm
+        In the order in which they were found, in steps of a tenth of the separation. A line that
+        returns to its start is closed: its last point is its first.
+    """
+    check_number("separation of streamlines", separation, above=0.0, unit="mm")
+    check_number("closest", closest, above=0.0, below=1.0)
+    if shapely.is_empty(region) or not len(triangles):
+        return []
+    middles = points[triangles].mean(axis=1)
+    sizes = np.abs(strongest_in_plane(plane_stress)[0])
+    seeds = np.argsort(-sizes[triangles].mean(axis=1), kind="stable")
+    seeds = seeds[shapely.contains_xy(region, middles[seeds])]
+    step = _STEP * separation
+    room = 8.0 * float(region.area) / (closest * separation * step) + 1e5
+    if room > _MOST_POINTS:
+        raise InputError(
+            f"a separation of {separation} mm gives too many streamlines on {region.area:.0f} "
+            "mm^2: choose a larger one"
+        )
+    grid = section_grid(region, 2.0 * separation)
+    found, spans, closed = _lay(
+        line_field(points, triangles, plane_stress, _EVENLY_LEAST),
+        grid,
+        _empty(grid, separation, int(room)),
+        middles[seeds],
+        seeds,
+        np.asarray(region.centroid.coords[0]),
+        separation,
+        closest * separation,
+        step,
+        max(least_length, separation),
+    )
+    lines = []
+    for (start, turn, end), ring in zip(spans, closed, strict=True):
+        ahead, back = found[start:turn], found[turn:end]
+        lines.append(np.concatenate([ahead, ahead[:1]] if ring else [back[::-1], ahead]))
+    return lines
+
+
+class _Laid(NamedTuple):
+    """Points of lines, sorted into the cells of a grid.
+
+    For each point: place, unit direction, triangle, arc length from the seed (negative behind it),
+    line, and the previous point in the same cell.
+    """
+
+    spot: FloatArray
+    way: FloatArray
+    home: IntArray
+    along: FloatArray
+    line: IntArray
+    following: IntArray
+    head: IntArray
+    origin: FloatArray
+    cell: float
+
+
+def _empty(grid: SectionGrid, cell: float, room: int) -> _Laid:
+    extent = np.array(grid.room.shape) * grid.cell
+    nx, ny = (np.floor(extent / cell) + 1).astype(int)
+    return _Laid(
+        np.empty((room, 2)),
+        np.empty((room, 2)),
+        np.empty(room, np.int64),
+        np.empty(room),
+        np.empty(room, np.int64),
+        np.empty(room, np.int64),
+        np.full((nx, ny), -1),
+        grid.origin,
+        cell,
+    )
+
+
+@njit(cache=True, nogil=True)
+def _lay(field, grid, laid, seeds, homes, centre, apart, test, step, least):  # type: ignore[no-untyped-def]
+    """Points of all lines, their (start, turn, end) among these, and whether each is closed.
+
+    From start to turn the points run ahead of the seed, from turn to end back from it. Ahead is the
+    direction of the line beside which a line begins, or else away from the centre, so that the
+    order of lines does not depend on the orientation of the part.
+    """
+    way = np.zeros(2)
+    spans = np.empty((len(laid.line) // 4, 3), np.int64)
+    closed = np.zeros(len(spans), np.bool_)
+    # Literals as arguments would have signatures of their own, compiled besides those of numbers.
+    lines, count, no_line = np.int64(0), np.int64(0), np.int64(-1)
+    looked = tried = 0
+    while looked < 2 * count or tried < len(seeds):
+        if looked < 2 * count:
+            # On both sides of the points of lines.
+            p, side = looked // 2, 1.0 - 2.0 * (looked % 2)
+            x = laid.spot[p, 0] - side * apart * laid.way[p, 1]
+            y = laid.spot[p, 1] + side * apart * laid.way[p, 0]
+            home = laid.home[p]
+            way[0], way[1] = laid.way[p, 0], laid.way[p, 1]
+            looked += 1
+        else:
+            x, y = seeds[tried, 0], seeds[tried, 1]
+            home = homes[tried]
+            way[0], way[1] = x - centre[0], y - centre[1]
+            tried += 1
+        homing = lines < 0  # never
+        taken = _crowded(laid, x, y, no_line, 0.0, apart * (1.0 - _SLACK), homing)
+        if taken or not contains(grid, x, y):
+            continue
+        turn, end, ring = _trace(field, grid, laid, count, lines, x, y, way, home, test, step)
+        if (end - count) * step < least:
+            _take_back(laid, count, end)
+            continue
+        spans[lines, 0], spans[lines, 1], spans[lines, 2] = count, turn, end
+        closed[lines] = ring
+        lines += 1
+        count = end
+    return laid.spot[:count], spans[:lines], closed[:lines]
+
+
+@njit(cache=True, nogil=True)
+def _trace(field, grid, laid, first, number, x0, y0, way, home, test, step):  # type: ignore[no-untyped-def]
+    """Add points of a line from its seed ahead and back; return both ends, and if it is closed.
+
+    The numbers of the points start at `first`; ahead is roughly along `way`.
+    """
+    dx, dy, home, fine = direction_at(field, home, x0, y0, -1.0, way)
+    count = first
+    if not fine:
+        return count, count, False
+    _add(laid, count, x0, y0, dx, dy, home, 0.0, number)
+    count += 1
+    turn = count
+    for sense in (1.0, -1.0):
+        x, y, cell, along = x0, y0, home, 0.0
+        way[0], way[1] = sense * dx, sense * dy
+        while count < len(laid.line):
+            x, y, cell, fine = streamline_step(field, cell, x, y, step, way)
+            along += sense * step
+            if not fine or not contains(grid, x, y):
+                break
+            # Back at the seed from behind: the line is closed.
+            ahead = (x0 - x) * way[0] + (y0 - y) * way[1]
+            aside = abs((x0 - x) * way[1] - (y0 - y) * way[0])
+            homing = abs(along) > 4.0 * test and aside < 0.2 * test
+            homing = homing and -step < ahead < 2.0 * test
+            if homing and ahead <= 0.5 * step and sense > 0.0:
+                return count, count, True
+            if _crowded(laid, x, y, number, along, test, homing):
+                break
+            _add(laid, count, x, y, way[0], way[1], cell, along, number)
+            count += 1
+        if sense > 0.0:
+            turn = count
+    return turn, count, False
+
+
+@njit(cache=True, nogil=True)
+def _cell(laid, x, y):  # type: ignore[no-untyped-def]
+    return int((x - laid.origin[0]) / laid.cell), int((y - laid.origin[1]) / laid.cell)
+
+
+@njit(cache=True, nogil=True)
+def _add(laid, p, x, y, dx, dy, home, along, number):  # type: ignore[no-untyped-def]
+    laid.spot[p, 0], laid.spot[p, 1] = x, y
+    laid.way[p, 0], laid.way[p, 1] = dx, dy
+    laid.home[p], laid.along[p], laid.line[p] = home, along, number
+    i, j = _cell(laid, x, y)
+    laid.following[p] = laid.head[i, j]
+    laid.head[i, j] = p
+
+
+@njit(cache=True, nogil=True)
+def _take_back(laid, first, end):  # type: ignore[no-untyped-def]
+    """Remove the points that were added last."""
+    for p in range(end - 1, first - 1, -1):
+        i, j = _cell(laid, laid.spot[p, 0], laid.spot[p, 1])
+        laid.head[i, j] = laid.following[p]
+
+
+@njit(cache=True, nogil=True)
+def _crowded(laid, x, y, number, along, limit, homing):  # type: ignore[no-untyped-def]
+    """Whether a point of another line, or of another stretch of this one, is nearer than a limit.
+
+    The stretch round the seed does not count for a line that returns to it. Line -1 has no points
+    yet.
+    """
+    i, j = _cell(laid, x, y)
+    nx, ny = laid.head.shape
+    for a in range(max(i - 1, 0), min(i + 2, nx)):
+        for b in range(max(j - 1, 0), min(j + 2, ny)):
+            q = laid.head[a, b]
+            while q >= 0:
+                own = laid.line[q] == number
+                beside = own and abs(laid.along[q] - along) < 2.0 * limit
+                begun = own and homing and abs(laid.along[q]) < 4.0 * limit
+                if not beside and not begun:
+                    dx, dy = laid.spot[q, 0] - x, laid.spot[q, 1] - y
+                    if dx * dx + dy * dy < limit * limit:
+                        return True
+                q = laid.following[q]
+    return False

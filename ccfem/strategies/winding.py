@@ -13,15 +13,19 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
+import scipy.sparse as sp
+from numba import njit
+from scipy.ndimage import gaussian_filter1d
 
-from ccfem.base.arrays import FloatArray
+from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.checks import check_choices, check_fields
 from ccfem.base.errors import InputError
 from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.geometry.isocontours import isocontours
 from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
+from ccfem.geometry.polylines import resample
 from ccfem.machine.machine import Machine
-from ccfem.paths.fields.layer_elements import Surface
+from ccfem.paths.fields.layer_elements import Surface, positive_definite
 from ccfem.paths.planning.infill import SPACING, Turns, check_fill, long_enough, with_turns
 from ccfem.paths.planning.strategy import Amount, LayerPlanner
 from ccfem.paths.toolpaths import Toolpaths
@@ -31,13 +35,138 @@ from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress
 from ccfem.slicing.principal_lines.critical import Keep
 from ccfem.slicing.principal_lines.strongest import strongest_stress
-from ccfem.strategies.winding_curves.annulus import annulus_field
-from ccfem.strategies.winding_curves.bends import limit_bends
-from ccfem.strategies.winding_curves.even_levels import evened, steep
 from ccfem.strategies.winding_curves.joining_curves import border_tree
-from ccfem.strategies.winding_curves.paper_field import PaperWeights, paper_field
 from ccfem.strategies.winding_curves.piece import Piece, pieces_with_joints
 from ccfem.strategies.winding_curves.spaced import CLOSEST, kept_apart
+
+# The field of the paper: Fang et al. 2024, eq. 5 and 6.
+#
+# The printed equations are incomplete. Here the gradient on triangles with a side on the cut or on
+# a hole points away from it, and the field is softly zero there: its level is otherwise undefined.
+
+
+_EDGES = 3.0
+"""Length over which gradients are compatible, in mean edges."""
+
+
+@dataclass(frozen=True)
+class PaperWeights:
+    """Weights of eq. 5; the paper does not give them.
+
+    Attributes
+    ----------
+    stress : float, default 1
+        Of level lines along the stress.
+    curves : float, default 1
+        Of gradients of size 1 away from the cut and the holes.
+    compatible : float, default 0.1
+        Of equal gradients in neighbouring triangles.
+    zero : float, default 1
+        Of zero on the cut and the holes, by square mm round their points.
+    """
+
+    stress: float = 1.0
+    curves: float = 1.0
+    compatible: float = 0.1
+    zero: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_fields(self, "stress", at_least=0.0)
+        check_fields(self, "curves", "compatible", "zero", above=0.0)
+
+
+def paper_field(
+    surface: Surface, tension: FloatArray, inner: IntArray, weights: PaperWeights
+) -> FloatArray:
+    """Solve for the field of the paper on a piece of a layer.
+
+    Minimises ``stress sum_f A w (grad s . t)^2 + curves sum_c A |grad s - d|^2 +
+    compatible l^2 sum_e (l_e / h_e) |jump of grad s|^2 + zero sum_v s^2 A_v / l^2`` over all
+    triangles f, those c with a side on the curves, inner edges e and points v of the curves; d is
+    the unit vector away from the curves, l three mean edges.
+
+    Parameters
+    ----------
+    surface : Surface
+        In space.
+    tension : (t, 3, 3) array
+        ``w t t^T`` with the direction t of the stress and its weight w.
+    inner : (k,) int array
+        Points on the holes and on the curves that join them.
+
+    Returns
+    -------
+    (n,) array
+        In mm where its gradient has size 1.
+    """
+    on = np.zeros(len(surface.points), dtype=bool)
+    on[inner] = True
+    corners = on[surface.triangles]
+    touching = corners.sum(axis=1) == 2
+    frames, areas, t = surface.frames, surface.areas, surface.triangles
+    # Of a function that is 0 on the curves and 1 at the other corners.
+    away = np.einsum("ti,tid->td", np.where(corners, 0.0, 1.0), surface.gradients)
+    away = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-300)
+    sides = surface.points[t[:, [1, 2, 0]]] - surface.points[t]
+    length = _EDGES * float(np.linalg.norm(sides, axis=2).mean())
+    metric = weights.stress * np.einsum("tki,tij,tlj->tkl", frames, tension, frames)
+    metric = metric + weights.curves * touching[:, None, None] * np.eye(2)
+    matrix = surface.energy(areas[:, None, None] * metric).tocsr()
+    matrix = matrix + weights.compatible * length**2 * gradient_jumps(surface)
+    around = surface.lumped(np.ones(len(t)))
+    matrix = matrix + sp.diags_array(np.where(on, weights.zero * around / length**2, 0.0))
+    rhs = surface.source((weights.curves * areas * touching)[:, None] * away)
+    free = np.flatnonzero(matrix.diagonal() > 0.0)
+    field = np.zeros(len(on))
+    if len(free):
+        rows = sp.csr_array(sp.csr_array(matrix)[free, :])
+        field[free] = positive_definite(rows[:, free]).solve(rhs[free])
+    return field
+
+
+# Rescaling of a field so that its level lines are evenly spaced on average.
+
+
+_BINS = 40
+
+
+def evened(surface: Surface, field: FloatArray) -> FloatArray:
+    """Rescale a field in [0, 1] so that the mean distance between any two levels is the same.
+
+    The mean distance between two levels is the area between them over the mean length of the levels
+    there, which is the integral of the gradient's size over that area (coarea formula). Values
+    below 0 are stretched like the lowest ones.
+
+    Parameters
+    ----------
+    field : (n,) array
+
+    Returns
+    -------
+    (n,) array
+    """
+    size = np.linalg.norm(surface.gradient(field), axis=1)
+    corners = field[surface.triangles]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    edges = np.linspace(0.0, 1.0, _BINS + 1)
+    inside = np.minimum(high[:, None], edges[1:]) - np.maximum(low[:, None], edges[:-1])
+    share = np.clip(inside, 0.0, None) / np.maximum(high - low, 1e-12)[:, None]
+    area = surface.areas @ share
+    length = (surface.areas * size) @ share * _BINS
+    width = area / np.maximum(length, 1e-9)
+    values = np.concatenate([[0.0], np.cumsum(width)]) / width.sum()
+    return np.where(field < 0.0, field * values[1] * _BINS, np.interp(field, edges, values))
+
+
+def steep(surface: Surface, field: FloatArray, share: float) -> float:
+    """Size of the gradient, 1/mm, that this share of the level lines' length does not exceed."""
+    size = np.linalg.norm(surface.gradient(field), axis=1)
+    weight = surface.areas * size * (surface.mean(field) > 0.0)
+    order = np.argsort(size, kind="stable")
+    below = np.cumsum(weight[order])
+    at = min(int(np.searchsorted(below, share * below[-1])), len(size) - 1)
+    return float(size[order][at])
+
 
 _CLIP = 5.0
 """Largest weight of a triangle, in mean weights of its layer."""
@@ -182,7 +311,6 @@ class _Planner:
 
     Attributes
     ----------
-    strategy : Winding
     names : tuple of str
         Patches of the joints.
     direction : (m, 3) array
@@ -297,3 +425,181 @@ def _median_slope(surface: Surface, field: FloatArray) -> float:
     order = np.argsort(size, kind="stable")
     below = np.cumsum(surface.areas[order])
     return float(size[order][np.searchsorted(below, 0.5 * below[-1])])
+
+
+# The field that winds: low on the holes and the curves that join them, 1 on the outer border.
+
+
+_NEAR = 0.3
+"""Least distance between triangles that is used, over the median one."""
+
+
+def annulus_field(
+    surface: Surface,
+    tension: FloatArray,
+    isotropy: float,
+    smoothness: float,
+    fixed: IntArray,
+    values: FloatArray,
+) -> FloatArray:
+    """Solve for the field whose level lines run along the tension, round the holes.
+
+    Minimises ``sum_f A_f [grad s . (T_f + isotropy) grad s] + smoothness J(s)`` with given values
+    on the holes, on the curves that join them and on the outer border; J is `gradient_jumps`. No
+    level line ends inside, and none closes without going round the low region.
+
+    Parameters
+    ----------
+    surface : Surface
+        In space.
+    tension : (t, 3, 3) array
+        ``w t t^T`` with the direction t of the tension and its weight w.
+    isotropy : float > 0
+        Small values follow the tension closely, large ones give even spacing.
+    smoothness : float >= 0, mm^2
+        Weight of bends of the level lines.
+    fixed : (k,) int array
+        Points whose values are given.
+    values : (k,) array
+
+    Returns
+    -------
+    (n,) array
+    """
+    frames = surface.frames
+    metric = np.einsum("tki,tij,tlj->tkl", frames, tension, frames) + isotropy * np.eye(2)
+    matrix = surface.energy(surface.areas[:, None, None] * metric).tocsr()
+    if smoothness > 0.0:
+        matrix = matrix + smoothness * gradient_jumps(surface)
+    field = np.zeros(len(surface.points))
+    field[fixed] = values
+    free = matrix.diagonal() > 0.0
+    free[fixed] = False
+    inside = np.flatnonzero(free)
+    if len(inside):
+        rows = sp.csr_array(matrix[inside])
+        field[inside] = positive_definite(rows[:, inside]).solve(-(rows @ field))
+    return field
+
+
+def gradient_jumps(surface: Surface) -> sp.csr_array:
+    """Matrix (n, n) of the form ``sum_e l/h (change of ds/dn)^2`` over the inner edges.
+
+    l is the length of an edge and h the distance between the middles of its two triangles. The
+    derivative is normal to the edge, with both triangles laid flat.
+    """
+    triangles, pairs, n = surface.triangles, surface.neighbours, len(surface.points)
+    one, other = triangles[pairs[:, 0]], triangles[pairs[:, 1]]
+    shared = (one[:, :, None] == other[:, None, :]).any(axis=2)
+    ends = one[shared].reshape(-1, 2)
+    edge = surface.points[ends[:, 1]] - surface.points[ends[:, 0]]
+    length = np.linalg.norm(edge, axis=1)
+    edge = edge / np.maximum(length, 1e-300)[:, None]
+    middle = surface.points[triangles].mean(axis=1)
+    apart = np.linalg.norm(middle[pairs[:, 0]] - middle[pairs[:, 1]], axis=1)
+    apart = np.maximum(apart, _NEAR * np.median(apart)) if len(apart) else apart
+    gradients = np.einsum("tid,tdk->tik", surface.gradients, surface.frames)
+    normal = np.cross(surface.frames[:, 0], surface.frames[:, 1])
+    weight = np.sqrt(length / apart)[:, None]
+    sides = [
+        weight * np.einsum("fik,fk->fi", gradients[side], np.cross(edge, normal[side]))
+        for side in pairs.T
+    ]
+    row = np.tile(np.repeat(np.arange(len(pairs)), 3), 2)
+    column = np.concatenate([one.ravel(), other.ravel()])
+    value = np.concatenate([sides[0].ravel(), -sides[1].ravel()])
+    jump = sp.coo_array((value, (row, column)), shape=(len(pairs), n)).tocsr()
+    return sp.csr_array(jump.T @ jump)
+
+
+# Smoothing of closed curves, only where they bend too sharply.
+
+
+_STEP = 0.5
+"""Distance between points, mm."""
+_ROUNDS = 600
+_SLACK, _LEFT = 1.05, 0.01
+"""Smoothing stops when at most this share of points bends by more than this times the limit."""
+_SPREAD = np.exp(-0.5 * (np.arange(-8, 9) / 2.0) ** 2)
+"""Gaussian, a millimetre in standard deviation, over which the movement fades out."""
+
+
+def limit_bends(curve: FloatArray, largest: float, smoothing: float = 0.5) -> FloatArray:
+    """Smooth a closed curve where its curvature is above a limit.
+
+    Points there move against the fourth differences of the curve. This reduces bends and, unlike
+    second differences, hardly shortens the curve.
+
+    Parameters
+    ----------
+    curve : (n, 3) array, mm
+        Its last point is its first.
+    largest : float, 1/mm
+        Curvature.
+    smoothing : float, mm, default 0.5
+        Standard deviation of a Gaussian filter applied first, since crossings with triangle edges
+        are unevenly spaced.
+
+    Returns
+    -------
+    (m, 3) array
+        Closed, in steps of half a millimetre; near the surface, but no longer on it.
+    """
+    points, _ = resample(curve, np.array([0, len(curve)]), _STEP)
+    if len(points) < 12:
+        return points
+    points = points[:-1]
+    if smoothing > 0.0:
+        points = gaussian_filter1d(points, smoothing / _STEP, axis=0, mode="wrap")
+    points = _straightened(np.ascontiguousarray(points), largest, _SPREAD / _SPREAD.sum(), _ROUNDS)
+    return np.vstack([points, points[:1]])
+
+
+@njit(cache=True, nogil=True)
+def _straightened(  # type: ignore[no-untyped-def]
+    points, largest, spread, rounds
+):  # pragma: no cover, compiled
+    """Points of a closed curve after a number of rounds, or once its bends are small enough."""
+    n, half = len(points), len(spread) // 2
+    over, wide, step = np.zeros(n), np.zeros(n + 2 * half), np.zeros((n, 3))
+    for _ in range(rounds):
+        sharp = 0
+        for k in range(n):
+            before, after, dot = 0.0, 0.0, 0.0
+            for i in range(3):
+                one = points[k, i] - points[k - 2, i]
+                two = points[(k + 2) % n, i] - points[k, i]
+                before += one * one
+                after += two * two
+                dot += one * two
+            before, after = np.sqrt(before), np.sqrt(after)
+            square = max((before * after) ** 2 - dot * dot, 0.0)
+            bend = np.sqrt(square) / max(before * after, 1e-9) / (0.5 * (before + after))
+            over[k] = min(max(bend / largest - 1.0, 0.0), 1.0)
+            sharp += bend > _SLACK * largest
+        if sharp < _LEFT * n:
+            break
+        for k in range(n):
+            wide[half + k] = max(
+                over[k - 2], over[k - 1], over[k], over[(k + 1) % n], over[(k + 2) % n]
+            )
+        for k in range(half):
+            wide[k] = wide[n + k]
+            wide[half + n + k] = wide[half + k]
+        for k in range(n):
+            for i in range(3):
+                step[k, i] = 0.5 * (points[k - 1, i] + points[(k + 1) % n, i]) - points[k, i]
+        for k in range(n):
+            much = 0.0
+            for j in range(len(spread)):
+                much += spread[j] * wide[k + j]
+            over[k] = 0.5 * much
+        for i in range(3):
+            last, first = step[n - 1, i], step[0, i]
+            before = last
+            for k in range(n):
+                own = step[k, i]
+                after = first if k == n - 1 else step[k + 1, i]
+                points[k, i] += over[k] * (own - 0.5 * (before + after))
+                before = own
+    return points

@@ -148,8 +148,7 @@ def test_faces_are_those_of_the_command(values):
 
 
 def test_the_help_of_every_command_names_its_call_in_python():
-    from ccfem.cli.commands import app
-    from ccfem.cli.in_python import CALLS
+    from ccfem.cli.commands import CALLS, app
 
     names = [each.name or each.callback.__name__ for each in app.registered_commands]
     assert sorted(CALLS) == sorted(names)

@@ -10,10 +10,10 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.check import check_mesh
 from ccfem.cases import Case, create_case, named_cases
 from ccfem.cases.bar import bar_outline
-from ccfem.cases.loop import loop_outline
 from ccfem.cases.open_hole import open_hole_outline
 from ccfem.cases.stored.build import build
 from ccfem.cases.stored.stored_files import data_folder, manifest, stored_mesh
+from ccfem.cases.two_pull_loop import loop_outline
 from ccfem.fem.elasticity.solve import solve
 
 NAMES = ("bar", "loop", "open_hole")

@@ -12,11 +12,9 @@ from ccfem.body.files import write_mesh
 from ccfem.body.files.surface import Surface
 from ccfem.body.mesh import box_mesh
 from ccfem.body.mesh.patches import Plane
-from ccfem.cases.before_meshing import check_before_meshing
 from ccfem.cases.inspection import check
-from ccfem.cases.part_file import read_part
+from ccfem.cases.part_file import REGIONS, check_before_meshing, read_part
 from ccfem.cases.part_loads import LOADS, SUPPORTS
-from ccfem.cases.part_regions import REGIONS
 from ccfem.cases.part_writing import part_text
 from ccfem.comparison.plot.part_picture import support_marks
 from ccfem.fem.elasticity import (

@@ -9,8 +9,8 @@ import pytest
 from ccfem.body.mesh.box import box_mesh
 from ccfem.comparison.citations import METHODS, bibtex, cited, methods_of, sentence
 from ccfem.comparison.report import charts
-from ccfem.comparison.report.part_view import _coarser
-from ccfem.comparison.report.path_view import _nearest, angle_on_layer, drawn_paths, in_layer
+from ccfem.comparison.report.html_report import _coarser
+from ccfem.comparison.report.layer_view import _nearest, angle_on_layer, drawn_paths, in_layer
 from ccfem.comparison.runs import Run
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer_stress import LayerStress

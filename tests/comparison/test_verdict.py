@@ -11,8 +11,8 @@ import pytest
 
 import ccfem
 from ccfem.body.mesh import box_mesh
+from ccfem.comparison.files import results_rows, write_table
 from ccfem.comparison.ranking import best_values
-from ccfem.comparison.record import results_rows, write_table
 from ccfem.comparison.remarks import by_importance
 from ccfem.fem.elasticity import Force, Problem, Support, solve
 from ccfem.fem.materials import isotropic

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from ccfem.geometry.abutting import clear_ends
+from ccfem.strategies.mps import clear_ends
 
 WALL = np.array([[10.0, -20.0], [10.0, 20.0]])
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.geometry.free_ends import extend_free_ends, strips
+from ccfem.geometry.parallel_strands import extend_free_ends, strips
 
 REGION = shapely.box(0, -10, 20, 10)
 

@@ -5,8 +5,8 @@ import pytest
 import shapely
 from shapely import affinity
 
-from ccfem.geometry.guide_fit import fitted_guides
 from ccfem.geometry.parallel_strands import grow
+from ccfem.strategies.mps import fitted_guides
 
 GUIDE = np.array([[0.0, 0.0], [60.0, 0.0]])
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.geometry.medial_fill import medial_fill
 from ccfem.geometry.shapes import strings
+from ccfem.strategies.mat import medial_fill
 
 
 @pytest.mark.parametrize("count", range(1, 8))

@@ -8,10 +8,9 @@ import pytest
 from ccfem.body.mesh import box_mesh
 from ccfem.fem.elasticity import Force, Problem, Support
 from ccfem.fem.materials import isotropic
-from ccfem.papers.chen_2021.claims import EXPECTED, quantities
+from ccfem.papers.chen_2021.contents import EXPECTED, quantities, write
 from ccfem.papers.chen_2021.large_displacement import turned_by, turns_at
 from ccfem.papers.chen_2021.study import run_study
-from ccfem.papers.chen_2021.whole import write
 from ccfem.slicing.layers.layer_stress import stress_on
 from ccfem.strategies.isocurve import Isocurve
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from ccfem.body.mesh import box_mesh
-from ccfem.papers.kipping_2023.claims import verdicts
-from ccfem.papers.kipping_2023.fiso_shapes import measured
+from ccfem.papers.kipping_2023.contents import measured, verdicts
 from ccfem.papers.kipping_2023.thickness import distances_below
 from ccfem.papers.verdicts import claim_table
 from ccfem.slicing.slicers import Planar

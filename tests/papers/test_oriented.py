@@ -10,7 +10,7 @@ from ccfem.fem.elasticity.problem import Force, Problem, Support
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.materials import Material, isotropic, transversely_isotropic
 from ccfem.judging.virtual_testing.strands import cut_strands
-from ccfem.papers.chen_2021.oriented import (
+from ccfem.papers.chen_2021.virtual_test import (
     fibre_share,
     mix,
     oriented_problem,

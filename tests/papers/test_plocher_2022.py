@@ -5,19 +5,22 @@ import tomllib
 import numpy as np
 import pytest
 
-from ccfem.papers.plocher_2022.claims import EXPECTED, quantities, raster_quantities, verdicts
-from ccfem.papers.plocher_2022.figures import draw_all
-from ccfem.papers.plocher_2022.plates import five_holes
-from ccfem.papers.plocher_2022.study import RASTER, run_case
-from ccfem.papers.plocher_2022.tables import (
+from ccfem.papers.plocher_2022.contents import (
+    EXPECTED,
     ROWS,
     case_table,
     index_table,
+    metric_table,
     prototype_table,
+    quantities,
     rank_table,
+    raster_quantities,
     result_table,
+    verdicts,
 )
-from ccfem.papers.plocher_2022.variants import metric_table
+from ccfem.papers.plocher_2022.figures import draw_all
+from ccfem.papers.plocher_2022.plates import five_holes
+from ccfem.papers.plocher_2022.study import RASTER, run_case
 from ccfem.papers.verdicts import claim_table
 from ccfem.paths.raster.patterns import INFILL
 

@@ -6,7 +6,7 @@ import pytest
 from ccfem.base.errors import InputError
 from ccfem.fem.materials import named_material
 from ccfem.judging.evaluation.sensitivity import OffAxis
-from ccfem.papers.plocher_2022.benchmark_figures import layup_moduli
+from ccfem.papers.plocher_2022.figures import layup_moduli
 from ccfem.papers.plocher_2022.plane_study import reduced_stiffness
 from ccfem.papers.plocher_2022.sensitivity import ANGLES, Sensitivity
 

@@ -4,7 +4,7 @@ import shapely
 from scipy import ndimage
 
 from ccfem.fem.plates import solve_plane
-from ccfem.papers.plocher_2022.three_point_bending import (
+from ccfem.papers.plocher_2022.plates import (
     three_point_bending,
     three_point_bending_problem,
 )

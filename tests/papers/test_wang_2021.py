@@ -8,10 +8,17 @@ import pytest
 from ccfem.cases import create_case
 from ccfem.judging.evaluation.plane_paths import PlanePaths
 from ccfem.papers.verdicts import claim_table
-from ccfem.papers.wang_2021.claims import EXPECTED, quantities, verdicts
+from ccfem.papers.wang_2021.contents import (
+    EXPECTED,
+    ROWS,
+    plate_table,
+    quantities,
+    result_table,
+    speed_table,
+    verdicts,
+)
 from ccfem.papers.wang_2021.figures import draw_all
 from ccfem.papers.wang_2021.study import PATTERNS, PLATES, curvature_along, run_plate
-from ccfem.papers.wang_2021.tables import ROWS, plate_table, result_table, speed_table
 from ccfem.slicing.slicers.planar import Planar
 
 

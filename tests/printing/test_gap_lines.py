@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.printing.gap_lines import gap_lines
+from ccfem.printing.matrix_lines import gap_lines
 
 WIDTH = 0.8
 

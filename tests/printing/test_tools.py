@@ -7,8 +7,8 @@ import pytest
 
 from ccfem.machine import Machine
 from ccfem.printing.moves import FEED, LAY
+from ccfem.printing.part_moves import change_tool, lay_matrix
 from ccfem.printing.recorder import Recorder
-from ccfem.printing.tools import change_tool, lay_matrix
 
 UP = np.array([[0.0, 0.0, 1.0]] * 2)
 

@@ -8,12 +8,11 @@ import shapely
 
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import box_mesh
-from ccfem.geometry.contour_tree import contour_trees
 from ccfem.machine import Machine
 from ccfem.paths.fields.chart import chart_of
-from ccfem.paths.linking.first_in import first_in_spiral_out
 from ccfem.slicing.slicers import Planar
 from ccfem.strategies import create
+from ccfem.strategies.fiso import contour_trees, first_in_spiral_out
 
 WIDTH = 0.9
 

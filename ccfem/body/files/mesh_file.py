@@ -71,7 +71,6 @@ def write_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:
 
     Parameters
     ----------
-    mesh : TetMesh
     path : path
         ``.vtu`` or ``.npz`` (patches kept) or ``.tet`` (linear meshes only, patches left out: the
         format has no place for them).

@@ -35,7 +35,6 @@ def write_vtk_xml(
 
     Parameters
     ----------
-    path : path
     kind : str
         ``UnstructuredGrid`` or ``PolyData``.
     counts : mapping of name to int

@@ -78,12 +78,7 @@ class CellCylinder:
 
 
 def check_box(lower: Vector, upper: Vector) -> None:
-    """Refuse opposite corners of a box, mm, of which the first does not lie below the second.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse opposite corners of a box, mm, of which the first does not lie below the second."""
     if not (np.asarray(lower) < np.asarray(upper)).all():
         raise InputError(f"box lower must lie below upper; got {lower} and {upper}: swap them")
 

@@ -124,7 +124,6 @@ class OnBody:
 
     Attributes
     ----------
-    rule : Faces
     body : BodyFaces
         Whose faces the mesh has as groups.
     """

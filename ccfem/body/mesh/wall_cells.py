@@ -48,10 +48,6 @@ def coarse_wall(mesh: TetMesh) -> CoarseWall | None:
     A ray from the middle of each boundary facet goes straight into the part. Where it comes out
     at a face that lies opposite, without a node near it halfway, one cell lies across.
 
-    Parameters
-    ----------
-    mesh : TetMesh
-
     Returns
     -------
     CoarseWall, or None where all walls have more, but for a patch of the surface.

@@ -29,7 +29,6 @@ class CadSurface:
 
     Attributes
     ----------
-    surface : Surface
     face : (t,) int array
         Number of the face of each triangle, from 1.
     names : tuple of str
@@ -81,10 +80,6 @@ def mesh_cad(
         their names where they have some.
     about : str
         How well it fits.
-
-    Raises
-    ------
-    InputError
     """
     fine = read_cad(path, scale)
     check_edge_length(fine.surface, edge_length)

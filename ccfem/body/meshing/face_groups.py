@@ -26,10 +26,6 @@ def faces_of_body(
         Factor on the coordinates.
     angle : float, degrees
         Feature angle, of a surface.
-
-    Raises
-    ------
-    InputError
     """
     if not is_cad(path):
         surface = read_surface(path, scale)
@@ -51,7 +47,6 @@ def with_faces_of(surface: Surface, mesh: TetMesh, angle: float = FEATURE_ANGLE)
 
     Parameters
     ----------
-    surface : Surface
     mesh : TetMesh
         Made from it.
     angle : float, degrees

@@ -34,7 +34,6 @@ def tetrahedralise(surface: Surface, edge_length: float, mesher: Mesher = "auto"
 
     Parameters
     ----------
-    surface : Surface
     edge_length : float, mm
         Target edge length.
     mesher : {"auto", "gmsh", "ftetwild"}, default "auto"

@@ -33,7 +33,6 @@ class DesignPlate:
 
     Attributes
     ----------
-    name, title : str
     border : shapely Polygon, mm
         Without the holes; its box starts at the origin, and its sides lie on whole pixels.
     supports : mapping of patch name to (Stretch, components held)

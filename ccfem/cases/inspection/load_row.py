@@ -30,7 +30,6 @@ class LoadRow:
 
     Attributes
     ----------
-    case : str
     what : str
         Kind and patch.
     resultant : (3,) array, N

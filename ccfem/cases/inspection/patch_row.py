@@ -16,13 +16,11 @@ class PatchRow:
 
     Attributes
     ----------
-    name : str
     area : float, mm^2
     centre : (3,) array, mm
         Of the area.
     normal : (3,) array
         Mean outward normal by area: of length 1 for a plane, 0 for a whole round wall.
-    facets : int
     pieces : int
         That hang together through edges.
     carries : str

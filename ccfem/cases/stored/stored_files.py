@@ -91,7 +91,6 @@ def mesh_of_case(
 
     Parameters
     ----------
-    name : str
     element_size : float, mm
     order : 1, 2 or "auto"
         Linear or quadratic.

@@ -81,7 +81,6 @@ def amount_curves(
         Lengths, m, and what no paths exceed, of the panels that have a bound.
     bare : sequence of float, optional
         Value without fibre, for each panel: where its curves begin; NaN where it is not known.
-    heading : str
     together : mapping of label to sequence of (float, float), optional
         Lengths, m, and what no paths exceed in all panels of this mapping at once.
     """
@@ -148,7 +147,6 @@ def trade_curves(
     ----------
     curves : mapping of name to sequence of TradePoint
         Plans with as much fibre, by how much strength counts.
-    heading : str
     across, up : str
         What the axes are.
     """

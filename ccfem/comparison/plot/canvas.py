@@ -218,12 +218,7 @@ def save(figure: "Figure", path: str | Path, dpi: float = _DPI) -> None:
 
 
 def check_picture(path: str | Path) -> Path:
-    """Return `path` when a picture of that name can be written: to be asked before any work.
-
-    Raises
-    ------
-    InputError
-    """
+    """Return `path` when a picture of that name can be written: to be asked before any work."""
     path = Path(path)
     if path.suffix.lower() not in _FORMATS:
         raise InputError(

@@ -30,7 +30,6 @@ def matching_curves(
     rates : mapping of name to (k,) array
         As from `evaluation.matching.matching_curve`; NaN is left out.
     thresholds : (k,) array, degrees
-    heading : str
     colours : mapping of name to colour, optional
         Default `palette`.
     """

@@ -29,7 +29,6 @@ def design_picture(design: Design, planform: Any, part: "TetMesh", heading: str)
         Outline of the part of a sheet; without it the surface of the part is drawn.
     part : TetMesh
         Of the part.
-    heading : str
     """
     if planform is None:
         colour = [_SURFACE] * len(part.boundary)

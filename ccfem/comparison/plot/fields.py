@@ -50,10 +50,8 @@ def error_picture(
 
     Parameters
     ----------
-    layer : Layer
     error : (m,) array
         Of each cell of the mesh, as `ErrorEstimate.densities` gives it.
-    heading, caption : str
     """
     figure, (axes,) = new_figure(extents_of(layer.plane.points))
     values, colours = error[layer.cell], scale("stress")

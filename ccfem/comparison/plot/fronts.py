@@ -17,7 +17,6 @@ class FrontPoint(NamedTuple):
     ----------
     name : str
         That of its strategy: it has a colour.
-    x, y : float
     on_front : bool
         Whether no other run dominates it: such points are joined.
     printable : bool

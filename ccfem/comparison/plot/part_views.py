@@ -83,7 +83,6 @@ def part_figure(
         Written where they face the reader.
     arrows : sequence of Arrow, optional
         Drawn a sixth of the part long.
-    title : str, optional
     marks : (k, 3) array, mm, optional
         Places of a support: small triangles where they are seen.
     outlines : sequence of (n, 3) arrays, mm, optional

@@ -230,7 +230,6 @@ def layer_picture(
 
     Parameters
     ----------
-    layer : Layer
     stress : LayerStress or None
         Its tension colours the section, unless the paths have colours of their own.
     paths : Toolpaths

@@ -48,8 +48,6 @@ def space_picture(
     ----------
     layers : sequence of Layer
         Their borders are drawn in grey.
-    paths : Toolpaths
-    title : str
     build : sequence of 3 floats
         Upwards in the picture.
     """
@@ -97,9 +95,6 @@ def turning_page(
 
     Parameters
     ----------
-    layers : sequence of Layer
-    paths : Toolpaths
-    title : str
     build : sequence of 3 floats
         Upwards at the start.
 

@@ -42,7 +42,6 @@ def stiffness_curves(
         From the least fibre to the most.
     marked : sequence of float, mm per layer
         Lengths to mark: those that all curves have.
-    heading : str
     colours : mapping of name to colour, optional
         Default `palette`.
     """

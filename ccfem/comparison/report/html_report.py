@@ -1,28 +1,39 @@
 """The report of a comparison: one HTML file that holds everything and draws itself."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import spared
-from ccfem.cases.inspection import check
+from ccfem.cases.inspection import Check, check
 from ccfem.comparison.citations import bibtex, cited, methods_of, sentence
-from ccfem.comparison.headline import HEADLINE, HEADLINE_OF_SLICINGS, TEST_COLUMNS
-from ccfem.comparison.plot.colours import palette
-from ccfem.comparison.report.charts import curve_charts, fronts, spreads
-from ccfem.comparison.report.filling import filled_page
-from ccfem.comparison.report.layer_view import layer_views
-from ccfem.comparison.report.part_view import part_view
-from ccfem.comparison.report.report_tables import (
-    against_each_other,
-    all_indices,
-    curve_table,
-    headline_table,
-    load_cases_table,
-    stage_seconds,
+from ccfem.comparison.curve import Curve
+from ccfem.comparison.headline import (
+    HEADLINE,
+    HEADLINE_OF_SLICINGS,
+    TEST_COLUMNS,
+    Headline,
+    cell_text,
+    headline_values,
 )
+from ccfem.comparison.plot.colours import palette
+from ccfem.comparison.plot.part_picture import coloured, load_arrows, support_marks
+from ccfem.comparison.ranking import best_values, stiffness_ratios
+from ccfem.comparison.report.charts import curve_charts, fronts, spreads
+from ccfem.comparison.report.layer_view import layer_views
+from ccfem.comparison.report.packing import Rounded, as_bytes, compressed, pack
+from ccfem.comparison.request import Wanted
 from ccfem.comparison.result import Comparison
-from ccfem.fem.elasticity.stress_field import about_cells
+from ccfem.comparison.runs import Run
+from ccfem.comparison.said_of_cases import cases_rows
+from ccfem.fem.elasticity.stress_field import StressField, about_cells
 from ccfem.judging.evaluation import COLUMNS
 from ccfem.judging.virtual_testing.stiffer import HONEST_PROMISE
 
@@ -36,15 +47,10 @@ def report_html(
 
     Parameters
     ----------
-    comparison : Comparison
     record : mapping
         What ``results.json`` holds; a view that fails is added to its "left_out".
     part_file : str
         Text of the part file, where there is one.
-
-    Returns
-    -------
-    str
     """
     several, curve = comparison.over_slicings, comparison.curve
     strategies = palette(run.strategy_name for run in comparison.runs)
@@ -195,3 +201,295 @@ def _rows(values: Mapping[str, Any]) -> list[tuple[str, str]]:
     shown = {k: v for k, v in values.items() if v not in (None, "")}
     return [(k.replace("_", " "), f"{v:.4g}" if isinstance(v, float) else f"{v:,}" if
              isinstance(v, int) else str(v)) for k, v in shown.items()]  # fmt: skip
+
+
+# The page itself: a template filled with texts, and the data and programs that it holds.
+
+
+def filled_page(context: Mapping[str, Any], data: Mapping[str, Any]) -> str:
+    """Fill the template of the report.
+
+    Parameters
+    ----------
+    context : mapping
+        What the template names. All texts are escaped.
+    data : mapping
+        What the page draws: see `ccfem.comparison.report.packing.pack`.
+
+    Returns
+    -------
+    str
+        HTML that needs no other file and no network.
+    """
+    return _template().render(
+        **context,
+        style=_text("report.css"),
+        script=_text("report.js"),
+        data=pack(data),
+        plotly=_plotly(),
+    )
+
+
+def _text(name: str) -> str:
+    return files("ccfem.comparison.report").joinpath(name).read_text(encoding="utf-8")
+
+
+@cache
+def _template() -> Any:
+    """Template with all texts escaped; a name that nothing is given for is an error."""
+    from jinja2 import Environment, StrictUndefined
+
+    surroundings = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    return surroundings.from_string(_text("report.html.jinja"))
+
+
+@cache
+def _plotly() -> str:
+    """Return the drawing library that the package plotly ships, compressed."""
+    return compressed(files("plotly").joinpath("package_data", "plotly.min.js").read_bytes())
+
+
+# The part as the report draws it: patches, loads, supports, and how it deforms.
+
+
+_FACETS = 16_000
+"""Facets that are drawn; a part with more is drawn coarser."""
+_SHOWN = 0.06
+"""Largest displacement that is drawn, over the size of the part, at the scale that is proposed."""
+
+
+def part_view(checked: Check, stress: StressField) -> dict[str, Any]:
+    """Return what the page draws of a part.
+
+    Parameters
+    ----------
+    stress : StressField
+        Of the load case that counts.
+
+    Returns
+    -------
+    dict
+        A tree for `ccfem.comparison.report.packing.pack`.
+    """
+    mesh = checked.case.problem.mesh
+    colours, labels = coloured(checked)
+    known = list(dict.fromkeys(colours))
+    shade = np.array([known.index(colour) for colour in colours], dtype=np.uint8)
+    used, triangles = np.unique(mesh.boundary[:, :3], return_inverse=True)
+    points = mesh.points[used]
+    size = float(np.linalg.norm(np.ptp(points, axis=0)))
+    # The corners of quadratic cells come before the middles of their edges.
+    same = np.array_equal(stress.mesh.points[: len(mesh.points)], mesh.points)
+    moved = stress.displacement[used] if same else None
+    kept, triangles, drawn = _coarser(points, triangles.reshape(-1, 3), shade, size)
+    found = {
+        "points": Rounded(points[kept], 1e-4 * size),
+        "triangles": triangles,
+        "colours": known,
+        "colour": drawn,
+        "size": size,
+        "labels": [{"text": label.text, "at": label.place.tolist()} for label in labels],
+        "supports": support_marks(checked, stress.case).tolist(),
+        "arrows": [
+            {"text": arrow.text, "at": arrow.place.tolist(), "along": _unit(arrow.direction)}
+            for arrow in load_arrows(checked, stress.case)
+        ],
+        "coarser": len(kept) < len(points),
+    }
+    if moved is not None:
+        most = float(np.linalg.norm(stress.displacement, axis=1).max(initial=0.0))
+        found |= {
+            "moved": Rounded(moved[kept], max(most, 1e-300) / 2000.0),
+            "moved_size": as_bytes(np.linalg.norm(moved[kept], axis=1), most),
+            "most": most,
+            "scale": _round_scale(_SHOWN * size / most) if most > 0.0 else 1.0,
+        }
+    return found
+
+
+def _unit(direction: FloatArray) -> list[float]:
+    return [float(x) for x in direction / max(float(np.linalg.norm(direction)), 1e-300)]
+
+
+def _round_scale(scale: float) -> float:
+    """Largest of 1, 2, 5 times a power of ten that is at most `scale`."""
+    power = 10.0 ** np.floor(np.log10(scale))
+    return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= scale * 1.0001))
+
+
+def _coarser(
+    points: FloatArray, triangles: IntArray, shade: NDArray[np.uint8], size: float
+) -> tuple[IntArray, IntArray, NDArray[np.uint8]]:
+    """Merge points that share a cell of a grid until few enough facets are left.
+
+    Returns the points that stay, and the facets and their colours.
+    """
+    if len(triangles) <= _FACETS:
+        return np.arange(len(points)), triangles, shade
+    side = size / 120.0
+    while True:
+        _, first, number = np.unique(
+            np.floor(points / side).astype(np.int64), axis=0, return_index=True, return_inverse=True
+        )
+        merged = number.reshape(-1)[triangles]
+        whole = np.all(merged != np.roll(merged, 1, axis=1), axis=1)
+        if whole.sum() <= _FACETS:
+            return first, merged[whole], shade[whole]
+        side *= 1.25
+
+
+# Tables of the report as values: heads with what they mean, rows of cells.
+
+
+_OWN = {
+    "printable": "Whether the paths keep all limits of the machine, and why not.",
+    "fibre_per_layer": "Length of fibre over the number of layers.",
+    "paths_per_layer": "Paths over the number of layers.",
+    "all_crossings": "Points at which fibre crosses other fibre, or itself.",
+}
+"""Meaning of columns that are no index of their own."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell: its text, smaller text below it, what it is sorted by, and whether it is the best."""
+
+    text: str
+    small: str = ""
+    value: float | str = ""
+    best: bool = False
+    bad: bool = False
+
+
+@dataclass(frozen=True)
+class Head:
+    """Head of a column, and what it means."""
+
+    title: str
+    about: str = ""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table whose rows begin with a name; a row without cells says instead why it has none."""
+
+    heads: tuple[Head, ...]
+    rows: tuple[tuple[str, tuple[Cell, ...], str], ...]
+
+
+def number(value: float) -> str:
+    """Write a number in a table; a dash where there is none."""
+    if not np.isfinite(value):
+        return "–"
+    if abs(value) < 1e-9:
+        return "0"
+    return f"{value:,.0f}" if abs(value) >= 1000.0 else f"{value:.4g}"
+
+
+def _numbered(value: float) -> Cell:
+    return Cell(number(value), value=float(value))
+
+
+def headline_table(
+    comparison: Comparison, wanted: Wanted, columns: Sequence[Headline] = HEADLINE
+) -> Table:
+    """Table of the indices that matter first, the best run first."""
+    best, runs = best_values(comparison.runs, wanted), comparison.ranking
+    values = {run.name: headline_values(run) for run in runs}
+    heads = [h for h in columns if any(h.column in found for found in values.values())]
+    rows: list[tuple[str, tuple[Cell, ...], str]] = []
+    for run in runs:
+        cells = tuple(_headline_cell(run, head, values[run.name], best) for head in heads)
+        if run.evaluation is None:
+            rows.append((run.name, (), f"failed: {run.failure}"))
+        else:
+            rows.append((run.name, cells, ""))
+    about = {
+        column.name: f"{column.formula} {column.range}." for column in (*TEST_COLUMNS, *COLUMNS)
+    }
+    return Table(
+        tuple(Head(h.title, _OWN.get(h.column, about.get(h.column, ""))) for h in heads),
+        tuple(rows),
+    )
+
+
+def _headline_cell(
+    run: Run, head: Headline, values: Mapping[str, float], best: Mapping[str, float]
+) -> Cell:
+    text, extra = cell_text(run, head)
+    value = values.get(head.column, np.nan)
+    if head.column == "printable":
+        return Cell(text, value=value, bad=not run.printable)
+    is_best = run.printable and value == best.get(head.column, np.nan)
+    return Cell(text, extra, float(value), is_best)
+
+
+def against_each_other(comparison: Comparison) -> Table | None:
+    """Table of stiffness of each strategy over that of each other."""
+    runs = [run for run in comparison.ranking if run.tested is not None]
+    if len(runs) < 2:
+        return None
+    rows = []
+    for run in runs:
+        cells = []
+        for other in runs:
+            tension, bonded = stiffness_ratios(run, other)
+            text = "–" if run is other else f"{tension:.2f} ({bonded:.2f})"
+            cells.append(Cell(text, value=float(tension)))
+        rows.append((run.name, tuple(cells), ""))
+    return Table(tuple(Head(f"over {run.name}") for run in runs), tuple(rows))
+
+
+def load_cases_table(comparison: Comparison) -> Table | None:
+    """Table of every load case; None where paths are planned for one."""
+    if not comparison.several_cases:
+        return None
+    heads, rows = cases_rows(comparison.ranking)
+    cells = tuple((name, tuple(map(Cell, texts)), "") for name, texts in rows)
+    return Table(tuple(map(Head, heads)), cells) if rows else None
+
+
+def all_indices(comparison: Comparison) -> Table:
+    """Table of every index of every run."""
+    runs = [run for run in comparison.ranking if run.evaluation is not None]
+    values = [headline_values(run) for run in runs]
+    rows = []
+    for column in (*TEST_COLUMNS, *COLUMNS):
+        cells = tuple(_numbered(found.get(column.name, np.nan)) for found in values)
+        unit = "" if column.unit == "1" else f" ({column.unit})"
+        rows.append((f"{column.name}{unit}", cells, ""))
+    return Table(tuple(Head(run.name) for run in runs), tuple(rows))
+
+
+def curve_table(curve: Curve | None) -> Table | None:
+    """Table of the points of a curve; None without one."""
+    if curve is None:
+        return None
+    rows = []
+    for name, points in curve.points.items():
+        for wanted, run in points:
+            values = headline_values(run)
+            ratios = ("stiffness_ratio_tension", "stiffness_ratio_bonded")
+            cells = (
+                Cell(f"{wanted:.0f}", value=wanted),
+                Cell(f"{run.length_per_layer:.0f}", value=run.length_per_layer),
+                *(_numbered(values.get(column, np.nan)) for column in ratios),
+                Cell(run.failure or run.why_not or "yes", bad=not run.printable),
+            )
+            rows.append((name, cells, ""))
+    titles = ("wanted, mm a layer", "laid", "stiffness ×, tension only", "bonded", "printable")
+    return Table(tuple(map(Head, titles)), tuple(rows))
+
+
+def stage_seconds(comparison: Comparison) -> Table:
+    """Table of the seconds that each stage took for each run."""
+    stages = list(dict.fromkeys(stage for run in comparison.runs for stage in run.seconds))
+    rows: list[tuple[str, tuple[Cell, ...], str]] = []
+    for run in comparison.runs:
+        spent: list[Any] = [run.seconds.get(stage, np.nan) for stage in stages]
+        texts = ["–" if np.isnan(value) else f"{value:.2f}" for value in spent]
+        cells = tuple(Cell(text, value=float(v)) for text, v in zip(texts, spent, strict=True))
+        rows.append((run.name, cells, ""))
+    return Table(tuple(Head(f"{stage}, s") for stage in stages), tuple(rows))

@@ -38,7 +38,6 @@ class StudyResult:
 
     Attributes
     ----------
-    name : str
     folder : Path
         Where its tables, its page and its runs are.
     jobs : tuple of Job

@@ -38,12 +38,7 @@ def stiffness_contrast(stiffness: FloatArray, density: FloatArray | None) -> flo
 
 
 def about_conditioning(problem: Problem) -> str:
-    """Say what makes the equations of a problem ill-conditioned, each with its cure.
-
-    Parameters
-    ----------
-    problem : Problem
-    """
+    """Say what makes the equations of a problem ill-conditioned, each with its cure."""
     found, stiffness = [about_slivers(problem.mesh)], problem.cell_stiffness
     bulk = incompressibility(stiffness)
     if bulk > _NEARLY_INCOMPRESSIBLE:

@@ -39,7 +39,6 @@ class Contact:
         For the matrix with this contact, for further load cases.
     right : (n,) array
         Right-hand side.
-    solution : Solution
     iterations : int
         Of conjugate gradients, over all rounds.
     """
@@ -113,7 +112,6 @@ def check_pressed(held: Held, reactions: FloatArray, forces: FloatArray) -> None
 
     Parameters
     ----------
-    held : Held
     reactions : (n, 3) array, N
         Reactions of all supports, and of what keeps a loose part in place.
     forces : (n, 3) array, N

@@ -60,7 +60,6 @@ class GivenStress:
 
     Attributes
     ----------
-    mesh : TetMesh
     stress : (m, 3, 3) array, MPa
         Per cell.
     nodal : (n, 3, 3) array, MPa

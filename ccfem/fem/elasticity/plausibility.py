@@ -247,8 +247,6 @@ def check_effect(problem: Problem, case: str, held: Held, forces: FloatArray, si
 
     Parameters
     ----------
-    problem : Problem
-    case : str
     held : Held
         At its values in the case.
     forces : (n, 3) array, N
@@ -292,8 +290,6 @@ def check_balance(
 
     Parameters
     ----------
-    problem : Problem
-    case : str
     displacement : (n, 3) array, mm
     forces, reactions : (n, 3) array, N
     moved : bool
@@ -371,7 +367,6 @@ def about_solution(
     ----------
     problem : Problem
         As it was solved.
-    case : str
     displacement : (n, 3) array, mm
     stress : (m, 3, 3) array, MPa
         Of the cells.

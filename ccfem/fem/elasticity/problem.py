@@ -50,7 +50,6 @@ class Region:
 
     Attributes
     ----------
-    material : Material
     cells : (k,) int array
     """
 
@@ -67,7 +66,6 @@ class Problem(Shown):
 
     Attributes
     ----------
-    mesh : TetMesh
     material : Material
         Of all cells that no region names.
     supports : tuple of supports

@@ -69,7 +69,6 @@ def cell_stress(
 
     Parameters
     ----------
-    mesh : TetMesh
     displacement : (n, 3) array, mm
     stiffness : (6, 6) or (m, 6, 6) array, MPa
     free : (m, 6) array, optional

@@ -67,7 +67,6 @@ def check_motion(mesh: CellMesh, points: FloatArray, holds: Holds) -> None:
     mesh : TetMesh, or mesh of a plate
     points : (n, 3) array, mm
         Of its nodes, in space.
-    holds : Holds
 
     Raises
     ------

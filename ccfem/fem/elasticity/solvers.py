@@ -65,12 +65,10 @@ class Solver:
 
     Attributes
     ----------
-    backend : str
     matrix : bsr_array (n, n)
     apply : callable
         Returns the solution for a right-hand side (n,): exact to rounding for a direct backend,
         otherwise one application of the preconditioner.
-    exact : bool
     make : callable
         Makes `apply` for any matrix with the pattern of this one.
     because : str
@@ -184,7 +182,6 @@ def preconditioned_cg(
     solver : Solver
         For this matrix or a similar one (another stiffness on the same mesh and supports).
     x0 : (n,) array, optional
-    tolerance : float
 
     Raises
     ------
@@ -242,7 +239,6 @@ def choose(unknowns: int, order: int, solves: int = 1, neighbours: float = np.in
 
     Parameters
     ----------
-    unknowns : int
     order : int
         Of the displacement: 1 or 2.
     solves : int

@@ -22,7 +22,6 @@ class Support:
 
     Attributes
     ----------
-    patch : str
     components : str, default "xyz"
         Which components are held.
     value : tuple of 3 floats, mm, default zero
@@ -119,7 +118,6 @@ class PressingSupport:
 
     Attributes
     ----------
-    patch : str
     normal : str or tuple of 3 floats, optional
         Direction out of the part, towards the support, of any length, or "x", "-z" ...; by default
         the outward normal at each node.
@@ -139,7 +137,6 @@ class RigidPatch:
 
     Attributes
     ----------
-    patch : str
     components : str, default "xyz"
         Which components of the displacement of its centre are held; may be empty.
     rotations : str, default "xyz"
@@ -210,7 +207,6 @@ class Spring:
 
     Attributes
     ----------
-    patch : str
     stiffness : tuple of 3 floats, N/mm
         Of all of them together, along x, y and z; zero for none.
     """
@@ -249,7 +245,6 @@ class Foundation:
 
     Attributes
     ----------
-    patch : str
     normal : float, MPa/mm
         Traction normal to the surface over normal displacement.
     tangential : float, MPa/mm, default 0

@@ -9,10 +9,6 @@ from ccfem.fem.elasticity.support_kinds import AnySupport
 def support_sets(problem: Problem) -> tuple[Problem, ...]:
     """Split a problem into problems of one set of supports each, which share out its load cases.
 
-    Parameters
-    ----------
-    problem : Problem
-
     Returns
     -------
     tuple of Problem

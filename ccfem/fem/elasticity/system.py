@@ -31,7 +31,6 @@ class System:
 
     Attributes
     ----------
-    problem : Problem
     held : Held
         The supports, as far as no load case moves them.
     forces : dict of load case name to (n, 3) array, N

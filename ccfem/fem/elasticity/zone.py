@@ -29,7 +29,6 @@ def averaged_mises(
 
     Parameters
     ----------
-    problem : Problem
     case : str
         The load case.
     stress : (m, 3, 3) array, MPa

@@ -17,7 +17,6 @@ class PlaneField:
 
     Attributes
     ----------
-    problem : PlaneProblem
     case : str
         Name of the load case.
     displacement : (n, 2) array, mm
@@ -29,7 +28,6 @@ class PlaneField:
         Strain energy of each cell.
     reactions : (n, 2) array, N
         Force that the supports put on the plate; zero away from them.
-    record : SolveRecord
     """
 
     problem: PlaneProblem

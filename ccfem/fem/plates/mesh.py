@@ -81,7 +81,6 @@ class Sheet:
 
     Attributes
     ----------
-    mesh : PlaneMesh
     thickness : (m,) array, mm
     """
 

@@ -19,7 +19,6 @@ class PlaneProblem:
 
     Attributes
     ----------
-    mesh : PlaneMesh
     stiffness : (m, 3, 3) array, MPa
         Of each cell in the global axes, ``[s11, s22, s12] = Q @ [e11, e22, 2 e12]``; one (3, 3)
         matrix stands for all cells. See `rotate_plane` and `stack_plane`.

@@ -1,6 +1,10 @@
 """Stress that another program found, read from its file onto a mesh of ccfem."""
 
+import csv
+import math
 import os
+import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +13,10 @@ from scipy.spatial import cKDTree
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError, shown
 from ccfem.base.tensor import from_voigt
-from ccfem.base.whole import existing_file
+from ccfem.base.whole import existing_file, text_of
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.part_stress import LARGEST_STRESS, GivenStress, impossible_stress
-from ccfem.fem.stress_files.frd import frd_stress
-from ccfem.fem.stress_files.stress_data import COMPONENTS, StressData
-from ccfem.fem.stress_files.stress_table import table_stress
+from ccfem.fem.stress_files.stress_data import COMPONENTS, StressData, component_of, component_order
 from ccfem.fem.stress_files.vtu_tensors import vtu_stress
 from ccfem.geometry.facets import positions
 
@@ -36,7 +38,7 @@ def read_stress(
     ----------
     path : path
         ``.vtu``, ``.frd`` of CalculiX, or ``.csv`` by element or node
-        (`ccfem.fem.stress_files.stress_table`).
+        (`ccfem.fem.stress_files.stress_file`).
     mesh : TetMesh
         Of the part. The file must have stress for each of its corners or cells: nodes are found by
         their place, cells by their corners, and in a table both by their number.
@@ -221,3 +223,200 @@ def _averaged(mesh: TetMesh, cell: FloatArray) -> FloatArray:
         np.add.at(total, column, mesh.volumes[:, None] * cell)
         np.add.at(weight, column, mesh.volumes)
     return total / np.where(weight > 0.0, weight, 1.0)[:, None]
+
+
+# Stress of each element or node from tables (CSV).
+
+
+def table_stress(path: Path) -> StressData:
+    """Read a table of stress with one line for each element, or for each node.
+
+    The first line names the columns: ``element`` or ``node``, the number in the mesh, from 0 or
+    from 1, every one once in any order; and the six components as ``Sxx [MPa]``, ``S12`` or ``xy``,
+    all with the same unit or none. Other columns are left out. Columns are separated by commas,
+    semicolons or tabs; lines that start with ``#`` are left out.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, a column or a line is missing, or a value is no number.
+    """
+    lines = {
+        number: line
+        for number, line in enumerate(text_of(path, "table of stress").splitlines(), 1)
+        if line.strip() and not line.startswith("#")
+    }
+    if len(lines) < 2:
+        raise InputError(f"{path}: expected a line of column names and lines of numbers; got none")
+    heading = next(iter(lines.values()))
+    delimiter = max(";\t,", key=heading.count)
+    try:
+        titles, *rows = (next(csv.reader([line], delimiter=delimiter)) for line in lines.values())
+    except csv.Error as error:
+        raise InputError(f"{path} is not a table of comma-separated values: {error}") from None
+    names, units = zip(*(_name_and_unit(cell) for cell in titles), strict=True)
+    kinds = [name.lower() for name in names if name.lower() in ("element", "node")]
+    if len(kinds) != 1:
+        raise InputError(f"{path}: expected one column named element or node; got {titles}")
+    stressed = [k for k, name in enumerate(names) if component_of(name) >= 0]
+    order = component_order([names[k] for k in stressed], f"{path}: the columns")
+    given = sorted({units[k] for k in stressed})
+    if len(given) > 1:
+        raise InputError(f"{path}: the components have units {', '.join(given)}: give them one")
+    at = [name.lower() for name in names].index(kinds[0])
+    values, numbers = np.empty((len(rows), 6)), np.empty(len(rows), dtype=np.int64)
+    for k, (number, row) in enumerate(zip(list(lines)[1:], rows, strict=True)):
+        try:
+            values[k] = [float(row[stressed[column]]) for column in order]
+            numbers[k] = int(row[at])
+        except (ValueError, IndexError, OverflowError):
+            raise InputError(
+                f"{path}, line {number}: expected a whole number and six numbers; got "
+                f"{shown(lines[number])}: correct or delete it"
+            ) from None
+    first = int(numbers.min())
+    if first not in (0, 1) or not np.array_equal(np.sort(numbers), first + np.arange(len(numbers))):
+        raise InputError(
+            f"{path}: expected every {kinds[0]} from 0 or from 1 on, each once; got "
+            f"{len(numbers)} lines from {first} to {numbers.max()}: number them as the mesh does"
+        )
+    values, numbers = values[np.argsort(numbers, kind="stable")], np.sort(numbers)
+    if kinds[0] == "node":
+        return StressData(None, None, values, None, given[0], nodes=numbers)
+    return StressData(None, None, None, values, given[0], cells=numbers)
+
+
+def _name_and_unit(cell: str) -> tuple[str, str]:
+    """Name of a column, and the unit in brackets behind it."""
+    found = re.fullmatch(r"\s*(.*?)\s*(?:\[\s*(.*?)\s*\])?\s*", cell)
+    assert found is not None
+    return found[1], found[2] or ""
+
+
+# Stress at the nodes from result files of CalculiX (``.frd``, ASCII).
+
+
+_TETRAHEDRA = {3: 4, 6: 10}
+"""Nodes of the tetrahedra among the element types (CalculiX 2.20 user's manual, section 11)."""
+_STARTS = (13, 25, 37, 49, 61, 73)
+"""Columns where the values of a node begin, twelve wide each."""
+
+
+def frd_stress(path: Path) -> StressData:
+    """Stress of the last step of a file that CalculiX wrote with ``*NODE FILE`` and ``*EL FILE``.
+
+    Raises
+    ------
+    InputError
+        When the file has no tetrahedra or no stress, or other elements besides, or is cut off.
+    """
+    try:
+        lines = path.read_text(encoding="ascii", errors="replace").splitlines()
+    except OSError as error:
+        raise InputError(f"expected a result file of CalculiX at {path}: {error}") from None
+    points: dict[int, list[float]] = {}
+    cells: list[list[int]] = []
+    stress: dict[int, list[float]] = {}
+    names: list[str] = []
+    for block, body in _blocks(lines, path):
+        try:
+            if block == "2C":
+                points = _rows(body, 3)
+            elif block == "3C":
+                cells = _cells(body, path)
+            elif block == "STRESS":
+                names = [line.split()[1] for line in body if line.startswith(" -5")]
+                stress = _rows([line for line in body if line.startswith(" -1")], 6)
+        except (ValueError, IndexError) as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(
+                f"{path}: the block {block} is not as CalculiX writes it in ASCII ({error}): write "
+                "the file with ccx and its default output"
+            ) from None
+    if not points or not cells:
+        raise InputError(f"{path} has no mesh of tetrahedra: give the .frd file of a ccx run")
+    if not stress:
+        raise InputError(f"{path} has no stress: ask ccx for it with *EL FILE and S")
+    order = component_order(names[:6], f"{path}: the block STRESS")
+    return _mapped(points, cells, stress, order, path)
+
+
+def _blocks(lines: list[str], path: Path) -> Iterator[tuple[str, list[str]]]:
+    """Nodes (2C), elements (3C), and results by their name, each with its lines."""
+    name = ""
+    body: list[str] = []
+    for line in lines:
+        key = line.strip()
+        if key.startswith(("2C", "3C")):
+            name, body = key[:2], []
+        elif line.startswith(" -4"):
+            name, body = key.split()[1] if len(key.split()) > 1 else "", []
+        elif line.startswith(" -3") and name:
+            yield name, body
+            name = ""
+        elif name:
+            body.append(line)
+    if name:
+        raise InputError(f"{path} is cut off in its block {name}: copy it again, or run ccx again")
+
+
+def _rows(lines: list[str], count: int) -> dict[int, list[float]]:
+    """First `count` values of each node: columns of twelve after the number of the node."""
+    rows = {}
+    for line in lines:
+        rows[int(line[3:13])] = values = [float(line[k : k + 12]) for k in _STARTS[:count]]
+        if not all(map(math.isfinite, values)):
+            raise ValueError(f"{shown(line.strip())} is not finite")
+    return rows
+
+
+def _cells(body: list[str], path: Path) -> list[list[int]]:
+    """Corner nodes of each element."""
+    cells: list[list[int]] = []
+    wanted: list[tuple[int, int]] = []
+    for line in body:
+        if line.startswith(" -1"):
+            kind = int(line[13:18])
+            if kind not in _TETRAHEDRA:
+                raise InputError(
+                    f"{path} has elements of type {kind}; expected tetrahedra (C3D4 or C3D10) only"
+                )
+            wanted.append((int(line[3:13]), _TETRAHEDRA[kind]))
+            cells.append([])
+        elif line.startswith(" -2"):
+            cells[-1] += [int(line[k : k + 10]) for k in range(3, len(line.rstrip()), 10)]
+    for nodes, (number, count) in zip(cells, wanted, strict=True):
+        if len(nodes) != count:
+            raise ValueError(f"element {number} has {len(nodes)} nodes in place of {count}")
+    return [nodes[:4] for nodes in cells]
+
+
+def _mapped(
+    points: dict[int, list[float]],
+    cells: list[list[int]],
+    stress: dict[int, list[float]],
+    order: list[int],
+    path: Path,
+) -> StressData:
+    """Stress with the nodes numbered from 0 in the order of the file."""
+    missing = sorted(set(points) - set(stress))
+    if missing:
+        raise InputError(
+            f"{path}: {len(missing)} nodes have no stress, the first is {missing[0]}: write the "
+            "stress of all elements"
+        )
+    place = {number: k for k, number in enumerate(points)}
+    unknown = {node for nodes in cells for node in nodes} - set(place)
+    if unknown:
+        raise InputError(
+            f"{path}: an element names node {min(unknown)}, which the block 2C does not have: copy "
+            "the file again, or run ccx again"
+        )
+    return StressData(
+        np.array(list(points.values())),
+        np.array([[place[node] for node in nodes] for nodes in cells]),
+        np.array([stress[number] for number in points])[:, order],
+        None,
+        nodes=np.array(list(points)),
+    )

@@ -19,10 +19,8 @@ class Parametrisation:
 
     Attributes
     ----------
-    parameters : Parameters
     cells : CellGroups
         g groups of m cells; all that follows is by groups.
-    cone : ConeFilter
     solid, void : (g,) bool arrays
         Passive cells, whose density stays 1 or 0.
     """

@@ -6,11 +6,13 @@ from typing import Any
 import numpy as np
 import shapely
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.patches import Plane
 from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.meshing.planform import triangulate
 from ccfem.body.meshing.prisms import extrude
 from ccfem.fem.elasticity.load_kinds import Load, patches_in_use, patches_of
 from ccfem.fem.elasticity.problem import PointForce, Problem, Support
@@ -19,9 +21,7 @@ from ccfem.fem.topopt.design import Design
 from ccfem.fem.topopt.flat_part import FlatPart
 from ccfem.fem.topopt.material_axes import sheet
 from ccfem.fem.topopt.outline import outline
-from ccfem.fem.topopt.sheet_mesh import sheet_mesh
-from ccfem.fem.topopt.short_edges import without_short_edges
-from ccfem.geometry.symmetry import mirrors_of
+from ccfem.geometry.symmetry import mirror_image, mirrors_of
 
 _IN_PLANE = np.ix_([0, 1, 5], [0, 1, 5])
 _FACES = ("sheet_bottom", "sheet_top")
@@ -43,7 +43,6 @@ def sheet_problem(
 
     Parameters
     ----------
-    problem : Problem
     flat : FlatPart
         Of its mesh.
     edge_length : float, mm
@@ -117,7 +116,6 @@ def sheet_outline(design: Design, flat: FlatPart, edge_length: float, solid: Any
     ----------
     design : Design
         Of a problem of `sheet_problem`.
-    flat : FlatPart
     edge_length : float, mm
         Of its mesh.
     solid, void : shapely geometries, mm
@@ -215,3 +213,135 @@ def sheet_part(problem: Problem, flat: FlatPart, planform: Any, edge_length: flo
                 "or raise the volume fraction"
             )
     return replace(problem, mesh=mesh.with_patches(patches), axes=None, stiffness=None)
+
+
+# Outlines without the shortest edges, which would make cells a thousand times as long as high.
+#
+# They come about where the outline of a design meets the border of the whole part.
+
+
+_ON = 1e-7
+"""Distance, mm, from a border or a point up to which a vertex lies on it."""
+
+
+def without_short_edges(outline: Any, whole: Any, keep: FloatArray, least: float) -> Any:
+    """Leave out vertices of an outline until no edge is shorter than a length, where that can be.
+
+    Of the two ends of such an edge, one that is to be kept stays, then one on the border of the
+    whole part, whose walls stay where they are; of two alike the one at the sharper corner.
+
+    Parameters
+    ----------
+    outline : shapely Polygon, mm
+    whole : shapely Polygon, mm
+        Whose border the outline follows in places.
+    keep : (k, 2) array, mm
+        Points that stay.
+    least : float, mm
+
+    Returns
+    -------
+    shapely Polygon
+        The outline itself where what is left would not be valid.
+    """
+    border, points = shapely.boundary(whole), shapely.multipoints(keep)
+    rings = []
+    for ring in (outline.exterior, *outline.interiors):
+        vertices = shapely.get_coordinates(ring)[:-1]
+        places = shapely.points(vertices)
+        rank = np.where(shapely.distance(places, border) <= _ON, 1, 0)
+        if len(keep):
+            rank[shapely.distance(places, points) <= _ON] = 2
+        rings.append(_shortened(vertices, rank, least))
+    found = shapely.Polygon(rings[0], rings[1:])
+    return found if found.is_valid else outline
+
+
+def _shortened(vertices: FloatArray, rank: IntArray, least: float) -> FloatArray:
+    """Ring of vertices (n, 2), not closed, without those that its short edges do not need."""
+    while len(vertices) > 3:
+        step = np.roll(vertices, -1, axis=0) - vertices
+        size = np.hypot(*step.T)
+        after = np.roll(np.arange(len(vertices)), -1)
+        loose = np.minimum(rank, rank[after]) < 2
+        k = int(np.argmin(np.where(loose, size, np.inf)))
+        if not loose[k] or size[k] >= least:
+            break
+        before = np.roll(step, 1, axis=0)
+        cross = before[:, 0] * step[:, 1] - before[:, 1] * step[:, 0]
+        turn = np.abs(np.arctan2(cross, (before * step).sum(axis=1)))
+        ends = (k, int(after[k]))
+        left_out = min(ends, key=lambda n: (rank[n], turn[n]))
+        vertices, rank = np.delete(vertices, left_out, axis=0), np.delete(rank, left_out)
+    return vertices
+
+
+# One layer of prisms on a planform, symmetric where the planform is.
+
+
+def sheet_mesh(
+    planform: Any, low: float, high: float, edge_length: float, keep: FloatArray
+) -> tuple[TetMesh, IntArray]:
+    """Mesh a planform by one layer of prisms, each cut into three tetrahedra.
+
+    Parameters
+    ----------
+    planform : shapely Polygon, mm
+    low, high : float, mm
+        Along z.
+    edge_length : float, mm
+    keep : (k, 2) array, mm
+        Points on the outline that become points of the mesh.
+
+    Returns
+    -------
+    mesh : TetMesh
+        Without patches; its own mirror image wherever the planform is.
+    prism : (m,) int array
+        Prism of each cell.
+    """
+    mirrors = mirrors_of(planform)
+    left, bottom, right, top = planform.bounds
+    middle = np.array([0.5 * (left + right), 0.5 * (bottom + top)])
+    part = shapely.box(
+        left,
+        bottom,
+        middle[0] if 0 in mirrors else right,
+        middle[1] if 1 in mirrors else top,
+    )
+    quarter = shapely.intersection(planform, part) if mirrors else planform
+    if quarter.geom_type != "Polygon":
+        mirrors, quarter = (), planform
+    folded = keep.copy()
+    for axis in mirrors:
+        folded[:, axis] = middle[axis] - np.abs(folded[:, axis] - middle[axis])
+    points, triangles = triangulate(quarter, edge_length, folded)
+    rank = np.arange(len(points))
+    for axis in mirrors:
+        points, triangles, rank = _mirrored(points, triangles, rank, planform, axis)
+    n = len(points)
+    # The diagonal on a side rises from the end of the higher rank: mirror images match.
+    rising = np.take_along_axis(
+        triangles, np.argsort(rank[triangles], axis=1, kind="stable"), axis=1
+    )
+    prism = np.concatenate([rising, rising + n], axis=1)
+    cells = prism[:, [[0, 1, 2, 5], [0, 1, 4, 5], [0, 3, 4, 5]]].reshape(-1, 4)
+    levels = np.repeat([low, high], n)
+    points = np.column_stack([np.tile(points, (2, 1)), levels])
+    inside_out = TetMesh(points, cells).volumes < 0.0
+    cells[inside_out] = cells[inside_out][:, [0, 2, 1, 3]]
+    return TetMesh(points, cells), np.repeat(np.arange(len(triangles)), 3)
+
+
+def _mirrored(
+    points: FloatArray, triangles: IntArray, rank: IntArray, planform: Any, axis: int
+) -> tuple[FloatArray, IntArray, IntArray]:
+    """Mesh with its mirror image beside it; points on the mirror are shared."""
+    image = mirror_image(points, planform, axis)
+    size = float(np.ptp(points, axis=0).max())
+    away, nearest = cKDTree(points).query(image)
+    shared = away <= 1e-9 * size
+    number = np.where(shared, nearest, len(points) + np.cumsum(~shared) - 1)
+    every = np.concatenate([points, image[~shared]])
+    both = np.concatenate([triangles, number[triangles[:, [0, 2, 1]]]])
+    return every, both, np.concatenate([rank, rank[~shared]])

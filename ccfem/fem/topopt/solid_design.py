@@ -29,7 +29,6 @@ def solid_design(
         Of its cells.
     solid : (m,) bool array
         Cells that stay full.
-    max_iterations : int
     progress : callable, optional
     """
     method = Simp(

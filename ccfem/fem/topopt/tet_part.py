@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
@@ -10,11 +11,152 @@ from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.problem import PointForce, Problem
-from ccfem.fem.topopt.cut import cut_mesh, volume_above
-from ccfem.fem.topopt.cut_smoothing import relaxed
 from ccfem.fem.topopt.design import Design
-from ccfem.geometry.facets import unique_edges
-from ccfem.geometry.measures import connected
+from ccfem.geometry.facets import are_among, positions, unique_edges
+from ccfem.geometry.measures import connected, signed_volumes
+
+# The part of a tetrahedral mesh where a field lies above a level, as a mesh of its own.
+
+
+_LEAST = 0.05
+"""Least share of an edge on either side of a cut."""
+_PRISMS = np.array(
+    [
+        [0, 1, 2, 3, 4, 5],
+        [1, 2, 0, 4, 5, 3],
+        [2, 0, 1, 5, 3, 4],
+        [3, 5, 4, 0, 2, 1],
+        [4, 3, 5, 1, 0, 2],
+        [5, 4, 3, 2, 1, 0],
+    ]
+)
+"""Orders of the corners of a prism that begin with each of them and do not turn it inside out."""
+_SPLITS = np.array(
+    [
+        [[0, 1, 2, 5], [0, 1, 5, 4], [0, 4, 5, 3]],
+        [[0, 1, 2, 4], [0, 4, 2, 5], [0, 4, 5, 3]],
+    ]
+)
+"""Tetrahedra of a prism whose diagonals meet in corner 0, by the third diagonal: 15 or 24."""
+_LONE = ((0, 1, 2, 3), (1, 0, 3, 2), (2, 0, 1, 3), (3, 0, 2, 1))
+_PAIRS = (
+    (0, 1, 2, 3),
+    (2, 3, 0, 1),
+    (0, 2, 3, 1),
+    (3, 1, 0, 2),
+    (0, 3, 1, 2),
+    (1, 2, 0, 3),
+)
+"""Orders of the corners of a tetrahedron that keep it positive."""
+
+
+class CutMesh(NamedTuple):
+    """A part of a mesh.
+
+    Attributes
+    ----------
+    mesh : TetMesh
+        With what is left of the patches.
+    facet : (b,) int array
+        Boundary facet of the whole mesh that each boundary facet lies on; -1 on the cut.
+    """
+
+    mesh: TetMesh
+    facet: IntArray
+
+
+def volume_above(mesh: TetMesh, values: FloatArray, level: float) -> float:
+    """Volume where a piecewise linear field, (n,) at the nodes, is above a level, mm^3."""
+    off = np.sort(values[mesh.corners] - level, axis=1)[:, ::-1]
+    count = (off > 0.0).sum(axis=1)
+    share = (count == 4).astype(np.float64)
+    a, b, c, d = off.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        one = a**3 / ((a - b) * (a - c) * (a - d))
+        three = 1.0 + d**3 / ((a - d) * (b - d) * (c - d))
+        # Two of three corners, by the prism that is left of the tetrahedron.
+        x, y, z, w = a / (a - c), a / (a - d), b / (b - c), b / (b - d)
+        two = x * y + z * w * (1.0 - x) + (1.0 - y) * x * w
+    for chosen, part in ((1, one), (2, two), (3, three)):
+        share[count == chosen] = part[count == chosen]
+    return float(mesh.volumes @ share)
+
+
+def cut_mesh(mesh: TetMesh, values: FloatArray, level: float) -> CutMesh:
+    """Cut out the part of a mesh where a piecewise linear field is above a level.
+
+    Marching tetrahedra (Doi and Koide, IEICE Trans. E74 (1991) 214); the prisms that are left are
+    split by their least node, so that neighbours agree (Dompierre et al., How to subdivide
+    pyramids, prisms and hexahedra into tetrahedra, 8th International Meshing Roundtable, 1999).
+
+    Parameters
+    ----------
+    mesh : TetMesh
+        Linear.
+    values : (n,) array
+        At the nodes; some above the level.
+    """
+    n, inside = len(mesh.points), values > level
+    ends = np.sort(mesh.cells[:, mesh.edges].reshape(-1, 2), axis=1)
+    ends = ends[inside[ends[:, 0]] != inside[ends[:, 1]]]
+    keys = np.unique(ends[:, 0] * n + ends[:, 1])
+    ends = np.stack(np.divmod(keys, n), axis=1)
+    low, high = values[ends].T
+    share = np.clip((level - low) / (high - low), _LEAST, 1.0 - _LEAST)[:, None]
+    points = (1.0 - share) * mesh.points[ends[:, 0]] + share * mesh.points[ends[:, 1]]
+    cells = _cells(mesh, inside, keys)
+    points = np.concatenate([mesh.points, points])
+    turned = signed_volumes(points, cells) < 0.0
+    cells[turned] = cells[turned][:, [0, 2, 1, 3]]
+    used, number = np.unique(cells, return_inverse=True)
+    found = TetMesh(points[used], number.reshape(-1, 4))
+    own = np.repeat(np.arange(n)[:, None], 2, axis=1)
+    facet = _facets(mesh, np.concatenate([own, ends])[used][found.boundary])
+    patches = {}
+    for name, facets in mesh.patches.items():
+        chosen = are_among(mesh.boundary, facets)
+        patches[name] = found.boundary[chosen[facet] & (facet >= 0)]
+    return CutMesh(found.with_patches(patches), facet)
+
+
+def _cells(mesh: TetMesh, inside: BoolArray, keys: IntArray) -> IntArray:
+    """Cells (k, 4) of the part, the points of cut edges counted behind the nodes."""
+    n = len(mesh.points)
+
+    def cut(a: IntArray, b: IntArray) -> IntArray:
+        return n + np.searchsorted(keys, np.minimum(a, b) * n + np.maximum(a, b))
+
+    above = inside[mesh.cells]
+    count = above.sum(axis=1)
+    found = [mesh.cells[count == 4]]
+    prisms = [np.zeros((0, 6), dtype=np.int64)]
+    for order in _LONE:
+        first = above[:, order[0]]
+        a, b, c, d = mesh.cells[(count == 1) & first][:, order].T
+        found.append(np.stack([a, cut(a, b), cut(a, c), cut(a, d)], axis=1))
+        a, b, c, d = mesh.cells[(count == 3) & ~first][:, order].T
+        prisms.append(np.stack([b, c, d, cut(a, b), cut(a, c), cut(a, d)], axis=1))
+    for order in _PAIRS:
+        both = above[:, order[0]] & above[:, order[1]]
+        p, q, r, s = mesh.cells[(count == 2) & both][:, order].T
+        prisms.append(np.stack([p, cut(p, r), cut(p, s), q, cut(q, r), cut(q, s)], axis=1))
+    prism = np.concatenate(prisms)
+    prism = np.take_along_axis(prism, _PRISMS[prism.argmin(axis=1)], axis=1)
+    third = prism[:, [1, 5]].min(axis=1) > prism[:, [2, 4]].min(axis=1)
+    rows = np.arange(len(prism))[:, None, None]
+    found.append(prism[rows, _SPLITS[third.astype(np.int64)]].reshape(-1, 4))
+    return np.concatenate(found)
+
+
+def _facets(mesh: TetMesh, nodes: IntArray) -> IntArray:
+    """Boundary facet of the mesh (b,), or -1, of facets (b, 3, 2) given by the nodes they cut."""
+    nodes = np.sort(nodes.reshape(-1, 6), axis=1)
+    fresh = np.concatenate([np.ones((len(nodes), 1), dtype=bool), np.diff(nodes) > 0], axis=1)
+    flat = fresh.sum(axis=1) == 3
+    result = np.full(len(nodes), -1)
+    result[flat] = positions(nodes[flat][fresh[flat]].reshape(-1, 3), mesh.boundary)
+    return result
+
 
 _LEAST_VOID = 30.0
 """Enclosed voids below this many cells are filled."""
@@ -134,3 +276,113 @@ def _level(field: _Field, volume: float) -> float | None:
             return middle
         low, high = (middle, high) if found > volume else (low, middle)
     return middle if abs(found - volume) <= 0.02 * volume else None
+
+
+# Smoothing of a mesh that was cut out of another: its cut faces, and the cells behind them.
+
+
+_FLAT = 1e-6
+"""Share of the normals round a node in a direction, above which it must not move that way."""
+_THIN = 0.02
+"""Cells below this share of the mean volume must not shrink."""
+
+
+def relaxed(cut: CutMesh, passes: int = 30) -> TetMesh:
+    """Smooth a cut mesh.
+
+    Its surface is smoothed by Taubin's passes 0.5 and -0.53 (Curve and surface smoothing without
+    shrinkage, ICCV 1995), where nodes on the border of the whole mesh slide along it, and stay
+    where a patch ends; inner nodes move to the mean of their neighbours. A step that would flatten
+    a cell is not taken.
+
+    Parameters
+    ----------
+    passes : int, default 30
+
+    Returns
+    -------
+    TetMesh
+        Of the same cells and patches.
+    """
+    mesh = cut.mesh
+    n, surface = len(mesh.points), np.unique(mesh.boundary)
+    outer = _mean(_surface_pairs(cut), n)
+    inner = _mean(_both_ways(mesh.cells[:, mesh.edges]), n)
+    free = _free_directions(cut)
+    inside = np.setdiff1d(np.arange(n), surface)
+    points = np.array(mesh.points)
+    for _ in range(passes):
+        # Both steps before the check: one of them alone, taken again and again, would not end.
+        wanted = points.copy()
+        for factor in (0.5, -0.53):
+            step = (outer @ wanted - wanted)[surface]
+            wanted[surface] += factor * np.einsum("kij,kj->ki", free[surface], step)
+        wanted[inside] = (inner @ wanted)[inside]
+        points = _safely_moved(mesh.cells, points, wanted)
+    return TetMesh(points, mesh.cells, mesh.patches, mesh.axes)
+
+
+def _both_ways(edges: IntArray) -> IntArray:
+    """Pairs (k, 2) of each edge (..., 2) and of the same turned round."""
+    edges = edges.reshape(-1, 2)
+    return np.concatenate([edges, edges[:, ::-1]])
+
+
+def _surface_pairs(cut: CutMesh) -> IntArray:
+    """Nodes (k, 2) of the surface with the neighbours that they follow.
+
+    Nodes of the cut follow neighbours on the cut only, so that its rim stays sharp.
+    """
+    sides = cut.mesh.boundary[:, [[0, 1], [1, 2], [2, 0]]]
+    own, rest = _both_ways(sides[cut.facet < 0]), _both_ways(sides[cut.facet >= 0])
+    return np.concatenate([own, rest[~np.isin(rest[:, 0], own[:, 0])]])
+
+
+def _mean(pairs: IntArray, n: int) -> sp.csr_array:
+    """Matrix (n, n) that averages over the second nodes of the pairs (k, 2) of each first one."""
+    links = sp.csr_array((np.ones(len(pairs)), pairs.T), shape=(n, n))
+    links.data[:] = 1.0
+    count = np.maximum(np.diff(links.indptr), 1)
+    return sp.csr_array(sp.diags_array(1.0 / count) @ links)
+
+
+def _free_directions(cut: CutMesh) -> FloatArray:
+    """Projections (n, 3, 3) onto the directions along the border of the whole mesh."""
+    mesh = cut.mesh
+    border = mesh.boundary[cut.facet >= 0]
+    area, normal = mesh.facet_areas(border)
+    products = area[:, None, None] * normal[:, :, None] * normal[:, None, :]
+    sums = np.zeros((len(mesh.points), 3, 3))
+    for corner in border.T:
+        np.add.at(sums, corner, products)
+    size = np.maximum(np.trace(sums, axis1=1, axis2=2), 1e-300)
+    values, directions = np.linalg.eigh(sums / size[:, None, None])
+    kept = directions * (values <= _FLAT)[:, None, :]
+    kept[_patch_ends(mesh, border)] = 0.0
+    return kept @ np.swapaxes(kept, 1, 2)
+
+
+def _patch_ends(mesh: TetMesh, border: IntArray) -> BoolArray:
+    """Nodes (n,) where facets (b, 3) inside and outside a patch meet."""
+    ends = np.zeros(len(mesh.points), dtype=bool)
+    for facets in mesh.patches.values():
+        own = are_among(border, facets)
+        inside, outside = np.zeros((2, len(mesh.points)), dtype=bool)
+        inside[border[own]], outside[border[~own]] = True, True
+        ends |= inside & outside
+    return ends
+
+
+def _safely_moved(cells: IntArray, points: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Points moved to where they are wanted, except those whose cells would become flat."""
+    before = signed_volumes(points, cells)
+    least = _THIN * float(before.mean())
+    moved = wanted.copy()
+    while True:
+        after = signed_volumes(moved, cells)
+        flat = (after < least) & (after < before * (1.0 - 1e-12))
+        stuck = np.unique(cells[flat])
+        stuck = stuck[(moved[stuck] != points[stuck]).any(axis=1)]
+        if not len(stuck):
+            return moved
+        moved[stuck] = points[stuck]

@@ -42,13 +42,7 @@ _ROUNDING = 1e-3
 
 @dataclass(frozen=True)
 class FibreSamples:
-    """Samples along the fibre of one layer, from which curves are drawn.
-
-    Attributes
-    ----------
-    curvature : CurvatureSamples
-    alignment : AlignmentSamples
-    """
+    """Samples along the fibre of one layer, from which curves are drawn."""
 
     curvature: CurvatureSamples
     alignment: AlignmentSamples
@@ -138,18 +132,12 @@ def evaluate(
         Flat or curved, among them every layer that has a path. What is measured in the plane of
         a flat layer is measured in the chart of a curved one (`ccfem.paths.fields.chart`), with the
         lengths of the paths in space.
-    stress : PartStress
-    machine : Machine
     strand : Strand, optional
         How stiff the fibre is in the index of stiffness alignment; by default as in the virtual
         test. It counts where `stress` knows the material of the part.
     build : sequence of 3 floats, optional
         Build direction. The head's tilt on curved layers is measured from it, and flat layers
         normal to it serve for comparison (`across_flat`). Default: mean normal of the layers.
-
-    Returns
-    -------
-    Evaluation
 
     Raises
     ------

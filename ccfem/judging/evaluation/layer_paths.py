@@ -27,11 +27,8 @@ class LayerPaths:
         Fibre without its links; of a curved layer all of it.
     plane : PlanePaths
         The fibre in the plane of a flat layer, or in the chart of a curved one.
-    layer : Layer
     layer_stress : LayerStress
         On the flat layer, or on the chart.
-    stress : PartStress
-    machine : Machine
     below : Layer, optional
         Flat layer under a flat one.
     late : int

@@ -42,7 +42,6 @@ def open_places(paths: PlanePaths, width: float) -> OpenPlaces:
 
     Parameters
     ----------
-    paths : PlanePaths
     width : float, mm
         Fibre width W. Strands cover half of it to both sides, and nothing beyond their ends.
     """

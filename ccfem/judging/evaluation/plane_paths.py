@@ -25,7 +25,6 @@ class PlanePaths:
 
     Attributes
     ----------
-    layer : Layer
     points : (P, 2) array, mm
         Without repeated neighbouring points.
     offsets : (K + 1,) int array

@@ -35,7 +35,6 @@ def printed(layers: Sequence[Layer], build: Sequence[float] | None = None) -> Pr
 
     Parameters
     ----------
-    layers : sequence of Layer
     build : sequence of 3 floats, optional
         Build direction; by default the mean normal of the layers.
     """

@@ -28,7 +28,6 @@ def strand_lamina(matrix: Material, share: float) -> Material:
 
     Parameters
     ----------
-    matrix : Material
     share : float >= 0
         EA of a strand over Young's modulus of the matrix along axis 1, in mm^2, over the section
         that a strand has to itself.
@@ -40,12 +39,7 @@ def strand_lamina(matrix: Material, share: float) -> Material:
 
 @dataclass(frozen=True)
 class OffAxis:
-    """f(theta) of a sheet under uniform tension: the compliance at its best over that at theta.
-
-    Attributes
-    ----------
-    material : Material
-    """
+    """f(theta) of a sheet under uniform tension: the compliance at its best over that at theta."""
 
     material: Material
 

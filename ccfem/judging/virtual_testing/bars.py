@@ -26,7 +26,6 @@ def bar_stiffness(
 
     Parameters
     ----------
-    strands : Strands
     volumes : (m,) array, mm^3
         Of the cells.
     share : (s,) array in [0, 1], optional

@@ -40,7 +40,6 @@ class Calibration:
 
     Attributes
     ----------
-    name : str
     modulus : float, MPa
         Young's modulus of the printed matrix.
     poisson : float

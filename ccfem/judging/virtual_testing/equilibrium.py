@@ -86,8 +86,6 @@ def equilibrium(
 
     Parameters
     ----------
-    specimen : Specimen
-    strands : Strands
     axial_stiffness : float, N
         EA of one strand.
     mode : str

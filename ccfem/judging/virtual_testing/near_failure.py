@@ -236,7 +236,6 @@ class MatrixPeaks:
         displacement : (n, 3) array, mm
         fibre : Peak, optional
             None where no fibre is stretched.
-        limits : Limits
         normal : (3,) array, optional
             Of all layers.
         """

@@ -17,7 +17,6 @@ class Reinforced:
     ----------
     part : bsr_array (3n, 3n), N/mm
         Without fibres.
-    bars : Bars
     stiffness : (s,) array, N
         EA of each piece of fibre that carries; zero of the others.
     """
@@ -41,8 +40,6 @@ class Reduced:
     ----------
     part : bsr_array (3k, 3k), N/mm
         Reduced matrix of the part without fibres.
-    whole : Reinforced
-    held : Held
     """
 
     part: sp.bsr_array

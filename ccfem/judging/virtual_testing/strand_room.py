@@ -27,7 +27,6 @@ def room_of(toolpaths: Toolpaths, path: IntArray, arc: FloatArray, machine: Mach
 
     Parameters
     ----------
-    toolpaths : Toolpaths
     path : (s,) int array
         Fibre path of each place.
     arc : (s,) array, mm

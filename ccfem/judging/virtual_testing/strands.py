@@ -1,14 +1,16 @@
 """Strands in the mesh: every fibre path cut where it passes from one cell to the next."""
 
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray, freeze, in_brief
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.geometry.buckets import Buckets, bucket
 from ccfem.geometry.polylines import starts_segment
-from ccfem.judging.virtual_testing.cut_steps import cut_steps
 from ccfem.judging.virtual_testing.strand_room import room_of
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
@@ -141,3 +143,320 @@ def cut_strands(
         outside=outside,
         share=lent,
     )
+
+
+# Straight steps in the mesh, cut where they pass from one cell to the next.
+
+
+_TOUCH = 1e-9
+"""Barycentric distance within which a piece counts as lying on a face."""
+
+_CLEAR = 1e-4
+"""Barycentric distance from edges above which a step is followed from cell to cell: no other cells
+touch it there."""
+
+_SLIVER = 1e-12
+"""Share of a step below which a piece is dropped."""
+
+
+class CutSteps(NamedTuple):
+    """Pieces of steps, each in one cell, in the order of the steps.
+
+    Attributes
+    ----------
+    step, cell : (s,) int arrays
+        Step that each piece belongs to, and cell that holds the piece.
+    begin, end : (s,) arrays in [0, 1]
+        Shares of the step at the ends of the piece.
+    share : (s,) array
+        1 over the number of cells that hold the piece; it is listed once for each of them.
+    """
+
+    step: IntArray
+    cell: IntArray
+    begin: FloatArray
+    end: FloatArray
+    share: FloatArray
+
+
+def cut_steps(start: FloatArray, step: FloatArray, length: FloatArray, mesh: TetMesh) -> CutSteps:
+    """Cut steps at the faces of the cells.
+
+    Parameters
+    ----------
+    start, step : (k, 3) arrays, mm
+        Cutting is fastest where each step starts at the end of the one before.
+    length : (k,) array, mm
+        Of the steps.
+    mesh : TetMesh
+        Quadratic cells are taken as straight-sided.
+    """
+    tables = _tables(mesh)
+    room = 4 * len(start) + 1024
+    while True:
+        whole, real = np.empty((room, 2), dtype=np.int64), np.empty((room, 3))
+        count = _cut(start, step, length, *tables, whole, real)
+        if count <= room:
+            return CutSteps(*whole[:count].T, *real[:count].T)
+        room = count
+
+
+def _tables(mesh: TetMesh) -> tuple[Any, ...]:
+    """Return the tables of a mesh that `_cut` uses; the mesh stores them."""
+    known = mesh.__dict__
+    if "cut_tables" not in known:
+        across = np.ascontiguousarray(mesh.across)
+        known["cut_tables"] = (*_barycentric(mesh), across, *_grid(mesh))
+    found: tuple[Any, ...] = known["cut_tables"]
+    return found
+
+
+def _barycentric(mesh: TetMesh) -> tuple[FloatArray, FloatArray]:
+    """First corner (m, 3) and gradients (m, 3, 3) of the other corners' barycentric coordinates."""
+    corners = mesh.points[mesh.corners]
+    a, b, c = np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 0)
+    cross = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+    return corners[:, 0].copy(), cross / np.einsum("ij,ij->i", a, cross[:, 0])[:, None, None]
+
+
+def _grid(mesh: TetMesh) -> Buckets:
+    """Cells of the mesh by the boxes of a regular grid that each may touch."""
+    corners = mesh.points[mesh.corners]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    extent = np.prod(mesh.bounds[1] - mesh.bounds[0])
+    # The second keeps the number of boxes near that of the cells in parts that are mostly empty.
+    spacing = max(float(np.mean(high - low)), float(np.cbrt(extent / (4 * len(low)))))
+    margin = 1e-6 * spacing
+    return bucket(low - 2.0 * margin, high + margin, spacing)
+
+
+@njit(cache=True)
+def _cut(  # type: ignore[no-untyped-def]
+    start, step, length, origin, gradient, across, first, spacing, shape, offsets, candidates,
+    whole, real,
+):  # fmt: skip  # pragma: no cover
+    """Write the pieces and return their number, which may exceed the room given.
+
+    `whole` takes segment and cell; `real` takes begin, end (parameters in [0, 1]) and share. A step
+    is followed from cell to cell where it keeps clear of edges; elsewhere all cells near it are
+    tested.
+    """
+    count, last = 0, -1
+    found = np.empty(len(origin), dtype=np.int64)
+    ends = np.empty(2 * len(origin) + 1)
+    point, leap, middle = np.empty(3), np.empty(3), np.empty(3)
+    for s in range(len(start)):
+        steps = int(np.ceil(length[s] / spacing))
+        for part in range(steps):
+            t0, t1 = part / steps, (part + 1) / steps
+            for i in range(3):
+                point[i] = start[s, i] + t0 * step[s, i]
+                leap[i] = (t1 - t0) * step[s, i]
+            passed = 0
+            if last >= 0:
+                passed = _walk(point, leap, last, origin, gradient, across, found, ends)
+            u0 = 0.0
+            for e in range(passed):
+                begin, end = t0 + u0 * (t1 - t0), t0 + ends[e] * (t1 - t0)
+                u0, last = ends[e], found[e]
+                count = _write(whole, real, count, s, last, begin, end)
+            if passed:
+                continue
+            number, size = _touching(
+                point, leap, origin, gradient, first, spacing, shape, offsets, candidates, found,
+                ends,
+            )  # fmt: skip
+            u0 = 0.0
+            for e in range(size):
+                u1 = ends[e]
+                if u1 - u0 < _SLIVER:
+                    continue
+                for i in range(3):
+                    middle[i] = point[i] + 0.5 * (u0 + u1) * leap[i]
+                number = _complete(
+                    middle, origin, gradient, first, spacing, shape, offsets, candidates, found,
+                    number,
+                )  # fmt: skip
+                sharing = 0
+                for f in range(number):
+                    if _least(middle, origin, gradient, found[f]) >= -_TOUCH:
+                        found[sharing], found[f] = found[f], found[sharing]
+                        sharing += 1
+                begin, end = t0 + u0 * (t1 - t0), t0 + u1 * (t1 - t0)
+                u0 = u1
+                if sharing == 1:
+                    last = found[0]
+                    count = _write(whole, real, count, s, last, begin, end)
+                    continue
+                for f in range(sharing):
+                    if count < len(whole):
+                        whole[count, 0], whole[count, 1] = s, found[f]
+                        real[count, 0], real[count, 1] = begin, end
+                        real[count, 2] = 1.0 / sharing
+                    count += 1
+    return count
+
+
+@njit(cache=True)
+def _write(whole, real, count, segment, cell, begin, end):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Write a piece inside a cell, or make the last one longer; return the number of pieces."""
+    old = min(count, len(whole)) - 1
+    if (
+        old >= 0 and real[old, 1] == begin and real[old, 2] == 1.0
+        and whole[old, 0] == segment and whole[old, 1] == cell
+    ):  # fmt: skip
+        real[old, 1] = end
+        return count
+    if count < len(whole):
+        whole[count, 0], whole[count, 1] = segment, cell
+        real[count, 0], real[count, 1], real[count, 2] = begin, end, 1.0
+    return count + 1
+
+
+@njit(cache=True)
+def _walk(point, step, cell, origin, gradient, across, found, ends):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Write the cells that a step passes, and where it leaves each; return the number of cells.
+
+    The number is 0 where the step comes near an edge, runs along a face, or leaves the mesh.
+    """
+    value, slope = np.empty(4), np.empty(4)  # of the barycentric coordinates, the first one last
+    number, here = 0, 0.0
+    for _ in range(len(found)):
+        value[3], slope[3] = 1.0, 0.0
+        for i in range(3):
+            a, b = 0.0, 0.0
+            for j in range(3):
+                a += gradient[cell, i, j] * (point[j] - origin[cell, j])
+                b += gradient[cell, i, j] * step[j]
+            value[i], slope[i] = a, b
+            value[3] -= a
+            slope[3] -= b
+        begin, end, leaves = 0.0, 1.0, -1
+        for i in range(4):
+            if slope[i] > 0.0:
+                begin = max(begin, -value[i] / slope[i])
+            elif slope[i] < 0.0 and -value[i] / slope[i] < end:
+                end, leaves = -value[i] / slope[i], i
+        if abs(begin - here) > _SLIVER:
+            return 0
+        counts = end - here >= _SLIVER
+        near, off = 0, 0
+        for i in range(4):
+            first = value[i] + here * slope[i]
+            final = value[i] + end * slope[i]
+            near += first < _CLEAR
+            off += final < _CLEAR
+            if first < -_CLEAR or (counts and 0.5 * (first + final) < 10.0 * _TOUCH):
+                return 0
+        if near > 1 or (counts and off > 1):
+            return 0
+        if counts:
+            if number:
+                ends[number - 1] = min(here, begin)
+            found[number], ends[number] = cell, end
+            number += 1
+            here = end
+        if leaves < 0 or 1.0 - end < _SLIVER:
+            return number
+        cell = across[cell, (leaves + 1) % 4]
+        if cell < 0:
+            return 0
+    return 0
+
+
+@njit(cache=True)
+def _least(point, origin, gradient, cell):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Smallest barycentric coordinate of a point."""
+    rest, least = 1.0, 1.0
+    for i in range(3):
+        v = 0.0
+        for j in range(3):
+            v += gradient[cell, i, j] * (point[j] - origin[cell, j])
+        rest -= v
+        least = min(least, v)
+    return min(least, rest)
+
+
+@njit(cache=True)
+def _complete(  # type: ignore[no-untyped-def]
+    point, origin, gradient, first, spacing, shape, offsets, candidates, found, number
+):  # pragma: no cover
+    """Add the cells that hold a point where rounding hid all of them; return the new number."""
+    for f in range(number):
+        if _least(point, origin, gradient, found[f]) >= -_TOUCH:
+            return number
+    box = 0
+    for i in range(3):
+        at = int(np.floor((point[i] - first[i]) / spacing))
+        if at < 0 or at >= shape[i]:
+            return number
+        box = box * shape[i] + at
+    for c in range(offsets[box + 1] - 1, offsets[box] - 1, -1):
+        if _least(point, origin, gradient, candidates[c]) >= -_TOUCH:
+            found[number] = candidates[c]
+            number += 1
+    return number
+
+
+@njit(cache=True)
+def _touching(  # type: ignore[no-untyped-def]
+    point, step, origin, gradient, first, spacing, shape, offsets, candidates, found, ends
+):  # pragma: no cover
+    """Cells that a step touches, and the sorted parameters of entry and exit, with 1."""
+    low = np.empty(3, dtype=np.int64)
+    high = np.empty(3, dtype=np.int64)
+    for i in range(3):
+        a = (point[i] - first[i]) / spacing
+        b = a + step[i] / spacing
+        low[i] = max(int(np.floor(min(a, b))), 0)
+        high[i] = min(int(np.floor(max(a, b))) + 1, shape[i])
+    number, size = 0, 1
+    ends[0] = 1.0
+    for i in range(low[0], high[0]):
+        for j in range(low[1], high[1]):
+            for k in range(low[2], high[2]):
+                box = (i * shape[1] + j) * shape[2] + k
+                for c in range(offsets[box + 1] - 1, offsets[box] - 1, -1):
+                    cell = candidates[c]
+                    u0, u1 = _inside(point, step, origin, gradient, cell)
+                    known = u1 - u0 < _SLIVER
+                    for f in range(number):
+                        known = known or found[f] == cell
+                    if known:
+                        continue
+                    found[number] = cell
+                    number += 1
+                    for u in (u0, u1):
+                        at = size
+                        while at > 0 and ends[at - 1] > u:
+                            ends[at] = ends[at - 1]
+                            at -= 1
+                        ends[at] = u
+                        size += 1
+    return number, size
+
+
+@njit(cache=True)
+def _inside(point, step, origin, gradient, cell):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Interval of parameters in [0, 1] within which a step is inside a cell."""
+    u0, u1, rest, change = 0.0, 1.0, 1.0, 0.0
+    for i in range(4):
+        if i < 3:
+            a, slope = 0.0, 0.0
+            for j in range(3):
+                a += gradient[cell, i, j] * (point[j] - origin[cell, j])
+                slope += gradient[cell, i, j] * step[j]
+            rest -= a
+            change -= slope
+        else:
+            a, slope = rest, change
+        b = a + slope
+        if a < -_TOUCH and b < -_TOUCH:
+            return 1.0, 0.0
+        if abs(a) <= _TOUCH and abs(b) <= _TOUCH:
+            continue
+        if slope > 0.0:
+            u0 = max(u0, -a / slope)
+        elif slope < 0.0:
+            u1 = min(u1, -a / slope)
+    return u0, u1

@@ -90,7 +90,6 @@ def first_failure(
 
     Parameters
     ----------
-    test : VirtualTest
     strand : Strand, optional
         Its strength is the fibre's; default 86 N.
     matrix_strength : float, MPa, optional

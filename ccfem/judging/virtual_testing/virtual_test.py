@@ -132,10 +132,6 @@ def virtual_test(
     tolerance : float, default 1e-8
         Largest relative residual; the error of the stiffness is of its square.
 
-    Returns
-    -------
-    VirtualTest
-
     Raises
     ------
     InputError

@@ -100,7 +100,6 @@ class Tested:
     Attributes
     ----------
     length : float, mm
-    paths : int
     tension, bonded : float
         Stiffness ratio under the pull.
     bearing : float

@@ -63,17 +63,14 @@ class LayerStages:
 
     Attributes
     ----------
-    layer : Layer
     directed : Directed
         The filled and smoothed vectors.
     values : (n,) array
         The scalar field s.
-    curves : Isocontours
     rings : list of (k, 2) arrays
         Curves round the chosen holes.
     led : list of (k, 2) arrays
         Isocurves, cut back and led into the last of those curves.
-    paths : Toolpaths
     seconds : (4,) tuple
         Of `STAGES`.
     """
@@ -118,12 +115,10 @@ def layer_stages(
 
     Parameters
     ----------
-    layer : Layer
     tension : Tension
         Of all tetrahedra.
     patches : sequence of str
         Whose holes get curves round them.
-    machine : Machine
     power : float, default 1
         p of Eq. 5.
     """

@@ -212,7 +212,6 @@ def extrusion_lines(text: str, name: str = "G-code") -> list[FloatArray]:
 
     Parameters
     ----------
-    text : str
     name : str
         What error messages call it.
 

@@ -12,9 +12,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from ccfem.fem.elasticity.problem import Bearing
+from ccfem.base.arrays import FloatArray
+from ccfem.base.errors import InputError
+from ccfem.base.tensor import from_voigt, strain_from_voigt, to_voigt
+from ccfem.fem.elasticity.problem import Bearing, Problem
 from ccfem.fem.elasticity.solve import solve
-from ccfem.fem.materials import named_material
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.materials import Material, named_material
+from ccfem.judging.virtual_testing.bars import bar_stiffness
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.stiffer import FIRST, HONEST_PROMISE, SECOND, stiffer
 from ccfem.judging.virtual_testing.strand import Strand
@@ -22,7 +27,6 @@ from ccfem.judging.virtual_testing.strands import Strands, cut_strands
 from ccfem.judging.virtual_testing.strength import first_failure, matrix_peak
 from ccfem.judging.virtual_testing.virtual_test import virtual_bracket, virtual_test
 from ccfem.papers.chen_2021.loop import LAYERS_TABLE_2, authors_folder, authors_loop
-from ccfem.papers.chen_2021.oriented import oriented_ratio
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.export.waypoints import read_waypoints
 
@@ -104,3 +108,158 @@ def main() -> None:
 
 if __name__ == "__main__":
     main()
+
+
+# Oriented stiffness: fibres smeared over the cells, instead of bars in them.
+#
+# The stiffness of a transversely isotropic material is linear in ``a a`` and ``a a a a`` of its
+# fibre direction a (Spencer, Continuum Theory of the Mechanics of Fibre-Reinforced Composites,
+# 1984):
+#
+# stress = lam tr(e) I + 2 muT e + al (a.e a I + tr(e) aa) + 2 (muL - muT)(aa e + e aa) + be (a.e a)
+# aa
+#
+# so that averages of the two over the fibre of a cell are all that is needed, and the sign of a
+# never counts. Fibre and matrix are mixed by volume (Voigt's bound).
+
+
+def fibre_share(strands: Strands, volumes: FloatArray, area: float) -> FloatArray:
+    """Share of each cell's volume that is fibre, (m,), in [0, 1].
+
+    Parameters
+    ----------
+    volumes : (m,) array, mm^3
+    area : float, mm^2
+        Cross-section of a strand. Where strands overlap the share is clipped at 1.
+    """
+    length = np.bincount(strands.cell, strands.length, len(volumes))
+    return np.minimum(length * area / volumes, 1.0)
+
+
+def oriented_stiffness(fourth: FloatArray, fibre: Material) -> FloatArray:
+    """Stiffness of a transversely isotropic material averaged over fibre directions, MPa.
+
+    Parameters
+    ----------
+    fourth : (..., 6, 6) array
+        Average of ``m m^T`` with ``m = (ax^2, ay^2, az^2, ay az, ax az, ax ay)``: one direction,
+        or a distribution of them; the first three rows sum up to the average of ``a a``.
+    fibre : Material
+        Fibre along axis 1.
+
+    Returns
+    -------
+    (..., 6, 6) array, MPa
+
+    Raises
+    ------
+    InputError
+        When the material is not transversely isotropic about axis 1.
+    """
+    c = fibre.stiffness
+    transverse, along = c[3, 3], c[4, 4]
+    same = [c[0, 1] - c[0, 2], c[1, 1] - c[2, 2], along - c[5, 5], c[1, 1] - c[1, 2] - 2 * c[3, 3]]
+    lame, alpha = c[1, 2], c[0, 1] - c[1, 2]
+    beta = c[0, 0] + lame + 2.0 * transverse - 2.0 * c[0, 1] - 4.0 * along
+    unit = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    if np.abs(same).max() > 1e-6 * np.abs(c).max():
+        raise InputError(
+            f"material '{fibre.name}' must be transversely isotropic about axis 1 to be smeared; "
+            "it is not: make it with materials.transversely_isotropic"
+        )
+    second = fourth[..., :3, :].sum(axis=-2)
+    tensor = from_voigt(second)
+    both = np.stack(
+        [to_voigt(tensor @ strain + strain @ tensor) for strain in strain_from_voigt(np.eye(6))],
+        axis=-1,
+    )
+    isotropic = lame * np.outer(unit, unit) + transverse * np.diag(1.0 + unit)
+    crossed = second[..., :, None] * unit + unit[:, None] * second[..., None, :]
+    return isotropic + alpha * crossed + 2.0 * (along - transverse) * both + beta * fourth
+
+
+def mix(directions: FloatArray, share: FloatArray, fibre: Material, matrix: Material) -> FloatArray:
+    """Stiffness of pixels, or cells, with one fibre direction each.
+
+    Parameters
+    ----------
+    directions : (..., 3) array
+        Along the fibre; normalised here, sign free.
+    share : (...,) array in [0, 1]
+        Volume share of the fibre.
+
+    Returns
+    -------
+    (..., 6, 6) array, MPa
+    """
+    share = np.asarray(share, dtype=np.float64)
+    if not ((share >= 0.0) & (share <= 1.0)).all():
+        raise InputError(
+            f"the share of fibre must be within [0, 1]; got {share.min():.4g} to {share.max():.4g}"
+        )
+    a = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
+    m = to_voigt(a[..., :, None] * a[..., None, :])
+    smeared = oriented_stiffness(m[..., :, None] * m[..., None, :], fibre)
+    return matrix.stiffness + share[..., None, None] * (smeared - matrix.stiffness)
+
+
+def to_plane_stress(stiffness: FloatArray) -> FloatArray:
+    """Condense stiffness (..., 6, 6) to plane stress (..., 3, 3) in 11, 22, 12, MPa."""
+    kept, free = np.array([0, 1, 5]), np.array([2, 3, 4])
+    inner = stiffness[..., free[:, None], free]
+    across = stiffness[..., free[:, None], kept]
+    return stiffness[..., kept[:, None], kept] - np.swapaxes(across, -1, -2) @ np.linalg.solve(
+        inner, across
+    )
+
+
+def oriented_problem(problem: Problem, strands: Strands, fibre: Material, area: float) -> Problem:
+    """Return the problem with the stiffness of fibre and matrix mixed in each cell.
+
+    Parameters
+    ----------
+    problem : Problem
+        Without fibres.
+    fibre : Material
+        Transversely isotropic, fibre along axis 1.
+    area : float, mm^2
+        Cross-section of a strand, for example `Machine.filament_area`.
+
+    Returns
+    -------
+    Problem
+        Solve it as any other: `ccfem.fem.elasticity.solve.solve`.
+    """
+    volumes = problem.mesh.volumes
+    share = fibre_share(strands, volumes, area)
+    length = np.bincount(strands.cell, strands.length, len(volumes))
+    fourth = bar_stiffness(strands, volumes) * volumes[:, None, None]
+    held = share > 0.0
+    stiffness = np.array(np.broadcast_to(problem.cell_stiffness, (len(volumes), 6, 6)))
+    smeared = oriented_stiffness(fourth[held] / length[held, None, None], fibre)
+    stiffness[held] += share[held, None, None] * (smeared - stiffness[held])
+    return replace(problem, stiffness=stiffness)
+
+
+def oriented_ratio(
+    strands: Strands, part: StressField, fibre: Material, area: float, backend: str = "auto"
+) -> tuple[float, StressField]:
+    """Stiffness with smeared fibres over that of the part without, and the solution.
+
+    The smeared counterpart of the bonded virtual test; its stress is the mean of fibre and matrix.
+
+    Parameters
+    ----------
+    part : StressField
+        The part without fibres.
+    area : float, mm^2
+        Cross-section of a strand.
+    backend : str
+        Solver.
+    """
+    smeared = oriented_problem(part.problem, strands, fibre, area)
+    smeared = replace(smeared, loads={part.case: smeared.loads[part.case]})
+    after = solve(smeared, backend)[part.case]
+    specimen = Specimen.of(part, backend)
+    before = specimen.stiffness(part.displacement, part.strain_energy)
+    return specimen.stiffness(after.displacement, after.strain_energy) / before, after

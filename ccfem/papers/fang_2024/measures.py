@@ -38,7 +38,6 @@ class Strands:
         Layers with fibre, and strands on each of them.
     closed, round_all : float
         Shares of the strands that are closed, and that go once round all joints of their layer.
-    metres_per_layer : float
     angle, angle_weighted : float, degrees
         Mean angle to the strongest stress where stress lines join the joints, by length, and by
         length and number of these lines.
@@ -83,9 +82,6 @@ def measured(
 
     Parameters
     ----------
-    paths : Toolpaths
-    layers : sequence of Layer
-    stress : PartStress
     weight : (m,) array
         Of the cells: above 0 where stress lines join the joints.
     """

@@ -1,14 +1,309 @@
 """What of Kipping and Schueppstuhl 2023 can be made again."""
 
-from collections.abc import Mapping
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, cast
 
-from ccfem.base.progress import Progress
+import numpy as np
+import shapely
+
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.progress import Progress, silent
+from ccfem.body.meshing import extrude
+from ccfem.cases.arm_bracket import HOLES
+from ccfem.comparison.plot.canvas import png
+from ccfem.fem.elasticity.ball import BALL, ball_averages
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.elasticity.support_kinds import PressingSupport
+from ccfem.fem.materials import isotropic
+from ccfem.judging.virtual_testing.interlayer import interlayer, layer_normals
+from ccfem.machine import Machine
 from ccfem.papers.contents import Contents, WhenAsked
-from ccfem.papers.kipping_2023.chain import PARTS, Chain, chain, table_1, table_2
-from ccfem.papers.kipping_2023.claims import support_table
-from ccfem.papers.kipping_2023.fiso_shapes import shapes_table
-from ccfem.papers.kipping_2023.strength import failure_loads, on_pressing_supports, strength_table
-from ccfem.papers.kipping_2023.whole import write_all
+from ccfem.papers.kipping_2023.chain import PAPER_SECONDS, PARTS, Chain, chain, table_1, table_2
+from ccfem.papers.kipping_2023.figures import blank, part_figures, senses_figure
+from ccfem.papers.kipping_2023.thickness import distances_below
+from ccfem.papers.verdicts import Check, claim_table, judged
+from ccfem.paths.fields.chart import chart_of
+from ccfem.printing.support import support_columns
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.slicers.load_oriented import LoadOriented
+from ccfem.slicing.slicers.planar import Planar
+from ccfem.strategies.fiso import Fiso
+
+# First in, spiral out on eight shapes, flat and bent to a radius of 25 mm.
+#
+# python -m ccfem.papers.kipping_2023.contents [FOLDER]
+#
+# prints the table; into a folder it draws the strands.
+
+
+WIDTH, BEND = 0.9, 25.0
+_REACH = 0.525
+"""Distance from the strand, in widths, that counts as covered, as the addendum has it."""
+
+
+def _disc(x: float, y: float, radius: float) -> shapely.Polygon:
+    return shapely.Point(x, y).buffer(radius, quad_segs=24)
+
+
+def _plate(length: float, width: float, holes: list[shapely.Polygon]) -> shapely.Polygon:
+    return shapely.box(0.0, 0.0, length, width).difference(shapely.union_all(holes))
+
+
+def _star() -> shapely.Polygon:
+    angle = np.pi * np.arange(14) / 7.0
+    radius = np.where(np.arange(14) % 2, 14.0, 30.0)
+    return shapely.Polygon(np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
+
+
+SHAPES = {
+    "disc": _disc(0.0, 0.0, 15.0),
+    "rectangle": _plate(50.0, 20.0, []),
+    "dumbbell": shapely.union_all(
+        [_disc(-20.0, 0.0, 10.0), _disc(20.0, 0.0, 12.0), shapely.box(-20.0, -2.0, 20.0, 2.0)]
+    ),
+    "annulus": _disc(0.0, 0.0, 20.0).difference(_disc(0.0, 0.0, 8.0)),
+    "eccentric annulus": _disc(0.0, 0.0, 20.0).difference(_disc(6.0, 2.0, 8.0)),
+    "three holes": _plate(60.0, 30.0, [_disc(12, 15, 5), _disc(30, 11, 4), _disc(47, 17, 6)]),
+    "twelve holes": _plate(
+        80.0,
+        60.0,
+        [_disc(10.0 + 20.0 * i, 10.0 + 20.0 * j, 4.0) for i in range(4) for j in range(3)],
+    ),
+    "star": _star(),
+}
+
+
+OPTIONS: dict[str, dict[str, float | bool]] = {
+    "as published": {},
+    "entry": {"entry": True},
+    "necks opened at 3/4 of a width": {"closest": 0.5},
+    "nothing nearer than a width": {"closest": 1.0},
+    "least radius 1.5 mm": {"least_radius": 1.5},
+    "least radius 3.85 mm": {"least_radius": 3.85},
+}
+"""Options of `Fiso`."""
+
+
+@dataclass(frozen=True)
+class Strand:
+    """Figures of the strands on a shape: shares of its area, steps in widths."""
+
+    paths: int
+    coverage: float
+    coverage_opened: float
+    crossings: int
+    longest_step: float
+    off_surface: float
+    lines: tuple[FloatArray, ...]
+
+
+def measured(name: str, bent: bool, **options: Any) -> Strand:
+    """Lay strands on a shape, and measure them where it lies flat."""
+    section, machine = SHAPES[name], Machine(fibre_width=WIDTH)
+    lay, no_stress = Fiso(**options, turns="tight"), cast(LayerStress, None)
+    layer = Planar(count=1).cut(extrude(section, 1.0, 1.5))[0]
+    if bent:
+        x, y, _ = layer.points.T
+        curved = np.stack([BEND * np.sin(x / BEND), y, BEND * np.cos(x / BEND)], axis=1)
+        layer = replace(layer, points=curved, flat=None)
+        chart = chart_of(layer)
+        flat = lay(chart.flat, no_stress, machine)
+        region = chart.flat.plane.polygon
+        lifted = chart.lifted(flat)
+        off = float(np.abs(np.hypot(lifted.points[:, 0], lifted.points[:, 2]) - BEND).max())
+        lines = [chart.flat.plane.project(path) for path in flat]
+    else:
+        flat = lay(layer, no_stress, machine)
+        region, off = layer.plane.polygon, 0.0
+        lines = [layer.plane.project(path) for path in flat]
+    strings = np.array([shapely.linestrings(line) for line in lines])
+    bands = shapely.union_all(shapely.buffer(strings, _REACH * WIDTH, cap_style="flat"))
+    opened = region.buffer(-0.5 * WIDTH).buffer(0.5 * WIDTH)
+    crossings = int((~shapely.is_simple(strings)).sum())
+    crossings += int(np.triu(shapely.crosses(strings[:, None], strings), 1).sum())
+    return Strand(
+        len(strings),
+        bands.intersection(region).area / region.area,
+        bands.intersection(opened).area / opened.area,
+        crossings,
+        max(_longest_step(line, region) for line in strings),
+        off,
+        tuple(lines),
+    )
+
+
+def _longest_step(line: shapely.LineString, section: shapely.Polygon) -> float:
+    """Longest way, in widths, that lies off all distances from the border at which contours lie."""
+    margin = 0.15 * WIDTH
+    border = shapely.segmentize(section.boundary, 1.0)
+    points = shapely.get_coordinates(shapely.segmentize(line, 0.05))
+    off = shapely.distance(shapely.points(points), border) - 0.5 * WIDTH
+    away = np.abs(off - WIDTH * np.round(off / WIDTH)) > margin
+    size = np.append(np.linalg.norm(np.diff(points, axis=0), axis=1), 0.0)
+    turns = np.concatenate([[0], np.cumsum(np.diff(away.astype(int)) != 0)])
+    return float(np.bincount(turns[away], size[away], minlength=1).max() + 2.0 * margin) / WIDTH
+
+
+def shapes_table() -> tuple[str, dict[tuple[str, bool], Strand]]:
+    """Table in Markdown, and the strands by shape, flat and bent."""
+    head = ["shape", "", "paths", "coverage", "of the opened area", "crossings", "longest step"]
+    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
+    found = {}
+    for name in SHAPES:
+        for bent in (False, True):
+            one = found[name, bent] = measured(name, bent)
+            lines.append(
+                f"| {name} | {'bent' if bent else 'flat'} | {one.paths} | {one.coverage:.3f} | "
+                f"{one.coverage_opened:.3f} | {one.crossings} | {one.longest_step:.2f} |"
+            )
+    return "\n".join(lines) + "\n", found
+
+
+def options_table() -> str:
+    """Table of what the options cost in coverage, on the flat shapes."""
+    lines = ["| options | paths | mean coverage | least | crossings | longest step |"]
+    lines.append("|---" * 6 + "|")
+    for title, options in OPTIONS.items():
+        each = [measured(name, False, **options) for name in SHAPES]
+        coverage = [one.coverage for one in each]
+        lines.append(
+            f"| {title} | {sum(one.paths for one in each)} | {np.mean(coverage):.3f} | "
+            f"{min(coverage):.3f} | {sum(one.crossings for one in each)} | "
+            f"{max(one.longest_step for one in each):.2f} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def shapes_picture(strands: dict[tuple[str, bool], Strand]) -> bytes:
+    """Draw the flat ones."""
+    figure = blank(20.0, 10.0)
+    for axes, name in zip(figure.subplots(2, 4).flat, SHAPES, strict=True):
+        for line in strands[name, False].lines:
+            axes.plot(*line.T, lw=0.8)
+            axes.plot(*line[0], "go", ms=4)
+            axes.plot(*line[-1], "rs", ms=4)
+        axes.set_aspect("equal")
+        axes.set_title(name)
+        axes.axis("off")
+    return png(figure)
+
+
+if __name__ == "__main__":
+    table, laid = shapes_table()
+    print(table)
+    print(options_table())
+    if len(sys.argv) > 1:
+        folder = Path(sys.argv[1])
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "figure_7.png").write_bytes(shapes_picture(laid))
+
+
+# The whole of the paper: its study, figures, tables and claims beside ours.
+
+
+def write_all(folder: Path, progress: Progress = silent) -> None:
+    """Run the study, and write figures, tables and claims into a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    chains: dict[str, Chain] = {}
+    for part, name in PARTS.items():
+        progress(f"planning part {part}", len(chains) / len(PARTS))
+        chains[part] = chain(name)
+    tables = [table_1(chains), table_2(chains), support_table(chains)]
+    print("\n".join(tables), flush=True)
+    trades = {part: trade(run) for part, run in chains.items()}
+    loads = {part: failure_loads(run) for part, run in chains.items()}
+    pressed = on_pressing_supports(chains["B"])
+    loads["B, pressed"] = failure_loads(chains["B"], pressed)
+    shapes, strands = shapes_table()
+    tables += [trade_table(trades), strength_table(loads), shapes, options_table()]
+    print("\n".join(tables[3:]), flush=True)
+    pictures = {"figure_7.png": shapes_picture(strands), "trade.png": trade_picture(trades)}
+    models = {"holes held": chains["B"].stress, "supports press": pressed}
+    pictures["sliding_B.png"] = sliding_picture(chains["B"], models)
+    pictures["figure_1_3.png"] = senses_figure()[0]
+    for part, run in chains.items():
+        pictures |= part_figures(part, run)
+    for name, picture in pictures.items():
+        (folder / name).write_bytes(picture)
+    (folder / "tables.md").write_text("\n".join(tables), encoding="utf-8")
+    found = quantities(chains, trades, loads, strands)
+    (folder / "quantities.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
+    claims = claim_table(verdicts(found))
+    (folder / "claims.md").write_text(claims, encoding="utf-8")
+    print(claims)
+
+
+# What flatter layers cost: tension across layers over the blend, and the paper's own choices.
+
+
+VARIANTS: dict[str, dict[str, Any]] = {
+    "default": {},
+    "blend 0.25": {"blend": 0.25},
+    "blend 0.5": {"blend": 0.5},
+    "blend 1": {"blend": 1.0},
+    "blend 2": {"blend": 2.0},
+    "no gap filter": {"gap": 0.0},
+    "blend alone": {"even": False},
+    "as published": {"quantile": 1.0, "gap": 0.0, "blend": 0.0, "even": False},
+}
+"""Parameters of `LoadOriented`."""
+
+COLUMNS = ("tension", "below z", "below the best plane", "angle", "tilt", "inverted", "in range")
+
+
+def trade(run: Chain) -> dict[str, dict[str, float]]:
+    """Figures of the variants by name: `COLUMNS`."""
+    slicer = run.case.slicing
+    assert isinstance(slicer, LoadOriented)
+    found = {}
+    for name, given in VARIANTS.items():
+        sliced = run.sliced if name == "default" else replace(slicer, **given).slice(run.stress)
+        across = sliced.across.tension
+        gradient = sliced.field.gradient
+        cosine = gradient @ sliced.field.up / np.linalg.norm(gradient, axis=1)
+        tilt = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+        found[name] = {
+            "tension": across,
+            "below z": 1.0 - across / sliced.across_build.tension,
+            "below the best plane": 1.0 - across / sliced.across_best.tension,
+            "angle": sliced.across.angle,
+            "tilt": float(np.average(tilt, weights=run.stress.mesh.volumes)),
+            "inverted": sliced.inverted,
+            "in range": distances_below(sliced.layers).within(slicer.thinnest, slicer.thickest),
+            "blend": sliced.field.blend,
+        }
+    return found
+
+
+def trade_table(found: dict[str, dict[str, dict[str, float]]]) -> str:
+    """Table in Markdown, by part and variant."""
+    lines = [f"| part | variant | {' | '.join(COLUMNS)} |", "|---" * (len(COLUMNS) + 2) + "|"]
+    for part, variants in found.items():
+        for name, figures in variants.items():
+            values = " | ".join(f"{figures[column]:.4g}" for column in COLUMNS)
+            lines.append(f"| {part} | {name} | {values} |")
+    return "\n".join(lines) + "\n"
+
+
+def trade_picture(found: dict[str, dict[str, dict[str, float]]]) -> bytes:
+    """Draw the tension across layers over the blend."""
+    figure = blank(6.0, 4.0)
+    axes = figure.subplots()
+    for part, variants in found.items():
+        rows = [v for name, v in variants.items() if set(VARIANTS[name]) <= {"blend"}]
+        rows = sorted((v for v in rows if v["inverted"] == 0.0), key=lambda v: v["blend"])
+        axes.plot([v["blend"] for v in rows], [v["tension"] for v in rows], "o-", label=part)
+    axes.set_xlabel("blend")
+    axes.set_ylabel("share of the tension across layers")
+    axes.set_ylim(bottom=0.0)
+    axes.legend()
+    return png(figure)
 
 
 def _run(progress: Progress) -> Mapping[str, Chain]:
@@ -35,3 +330,199 @@ CONTENTS = Contents(
         "fiso": lambda study: shapes_table()[0],
     },
 )
+
+
+# The claims of the paper beside ours: every quantity is computed from a run.
+
+
+EXPECTED = Path(__file__).with_name("expected.toml")
+
+
+def quantities(
+    chains: Mapping[str, Chain],
+    trades: Mapping[str, Mapping[str, Mapping[str, float]]],
+    loads: Mapping[str, Mapping[str, tuple[float, ...]]],
+    strands: Mapping[tuple[str, bool], Strand],
+) -> dict[str, float]:
+    """Every quantity that `expected.toml` may name."""
+    found: dict[str, float] = {}
+    for part, run in chains.items():
+        found |= {f"{part}: seconds, {name}": value for name, value in run.seconds.items()}
+        found[f"{part}: time over the paper's"] = run.seconds["all"] / PAPER_SECONDS[part]
+        found[f"{part}: inverted"] = run.sliced.inverted
+        found[f"{part}: thickness"] = run.distances.mean
+        found[f"{part}: with a layer below"] = run.distances.covered
+        found[f"{part}: paths"] = float(len(run.paths))
+        layers = len(np.unique(run.paths.layer))
+        found[f"{part}: layers with paths"] = float(layers)
+        found |= {f"{part}: support, {name}": v for name, v in _support(run).items()}
+        for name, figures in trades[part].items():
+            found |= {f"{part}, {name}: {key}": value for key, value in figures.items()}
+    for part, each in loads.items():
+        flat, ours = each["flat, z"], each["load-oriented"]
+        found[f"{part}: failure load over flat"] = ours[0] / flat[0]
+        found[f"{part}: failure load over flat, bond strong in shear"] = ours[3] / flat[3]
+        found[f"{part}: failure load over flat, by opening"] = ours[6] / flat[6]
+    found["strands: most paths"] = float(max(s.paths for s in strands.values()))
+    found["strands: least coverage"] = min(s.coverage for s in strands.values())
+    found["strands: least coverage, opened"] = min(s.coverage_opened for s in strands.values())
+    found["strands: crossings"] = float(sum(s.crossings for s in strands.values()))
+    found["strands: longest step"] = max(s.longest_step for s in strands.values())
+    return found
+
+
+def _support(run: Chain) -> dict[str, float]:
+    """Figures of the layers below a part."""
+    support, slicer = run.support, run.case.slicing
+    assert isinstance(slicer, LoadOriented)
+    node = support.columns.node
+    shared = node >= 0
+    jump = np.abs(support.field.values[shared] - run.sliced.field.values[node[shared]])
+    lowest = support.layers[0]
+    tilt = np.degrees(np.arccos(np.clip(lowest.normals @ run.sliced.field.up, -1.0, 1.0)))
+    distances = distances_below(support.layers)
+    both: list[Layer] = []
+    judged: list[bool] = []
+    for k, layer in enumerate(run.sliced.layers):
+        before = support.layers_before(k)
+        both += [*before, layer]
+        judged += [False] * len(before) + [True]
+    return {
+        "layers": float(len(support.layers)),
+        "mm^3": support.columns.volume,
+        "contact mm^2": support.columns.contact,
+        "jump in layers": float(jump.max()) / run.sliced.step,
+        "tilt of the lowest": float(np.average(tilt, weights=lowest.areas)),
+        "inverted": support.field.inverted,
+        "in range": distances.within(slicer.thinnest, slicer.thickest),
+        "thickness": distances.mean,
+        "part with a layer below": distances_below(both, judged).covered,
+    }
+
+
+def support_table(chains: Mapping[str, Chain]) -> str:
+    """Table of the support of each part: layers along the stress, and flat ones that carry 45."""
+    head = "| part | layers | mm^3 | contact mm^2 | part mm^3 | number | 0.2 to 0.5 mm | inverted |"
+    lines = [head, "|---" * 8 + "|"]
+    for part, run in chains.items():
+        mesh, own = run.stress.mesh, _support(run)
+        flat = support_columns(mesh, angle=45.0)
+        lines += [
+            f"| {part} | load-oriented | {own['mm^3']:.0f} | {own['contact mm^2']:.0f} | "
+            f"{mesh.volumes.sum():.0f} | {own['layers']:.0f} | {own['in range']:.1%} | "
+            f"{own['inverted']:.2%} |",
+            f"| {part} | flat, over 45 degrees | {flat.volume:.0f} | {flat.contact:.0f} | "
+            f"{mesh.volumes.sum():.0f} | | | |",
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def verdicts(found: Mapping[str, float]) -> list[Check]:
+    """Judge the claims by the quantities found."""
+    return judged(found, EXPECTED)
+
+
+# What the layers are worth: load at which they come apart, flat beside load-oriented.
+
+
+TENSILE = 18.0
+SHEAR = (18.0, 35.0, 1e6)
+"""Strength of the bond of printed PLA, MPa, across layers, and along them: as low, as published,
+and without end, so that layers come apart by opening alone."""
+_HEAD = 6.0
+"""Radius of the heads of the bolts, twice that of the bolts, mm. Our choice."""
+_LOAD = 100.0
+
+
+def _slicings(run: Chain) -> dict[str, Sequence[Layer]]:
+    mesh = run.stress.mesh
+    x, y, z = (float(part) for part in run.sliced.best)
+    return {
+        "flat, z": Planar(thickness=0.35).cut(mesh, (0.0, 0.0, 1.0)),
+        "flat, best plane": Planar(thickness=0.35).cut(mesh, (x, y, z)),
+        "load-oriented": run.sliced.layers,
+    }
+
+
+def failure_loads(run: Chain, stress: StressField | None = None) -> dict[str, tuple[float, ...]]:
+    """Load, N, at which layers come apart outside 3, 1.5 and 0 mm from the bolts, by slicing.
+
+    Three loads for each of `SHEAR`. The part is without fibre: what the layers alone are worth.
+    All are judged by one stress, by default that which the layers were made for.
+    """
+    found: dict[str, tuple[float, ...]] = {}
+    for name, layers in _slicings(run).items():
+        told: list[float] = []
+        for shear in SHEAR:
+            bond = isotropic(3500.0, 0.35, interlayer_tensile=TENSILE, interlayer_shear=shear)
+            judged = interlayer(run.stress if stress is None else stress, layers, bond)
+            told += [_LOAD / max(index, 1e-12) for index in judged.zone_indices]
+        found[name] = tuple(told)
+    return found
+
+
+def on_pressing_supports(run: Chain) -> StressField:
+    """Stress of the arm bracket where its bolts, their heads and the ground only press."""
+    problem = run.case.problem
+    mesh = problem.mesh
+    middle = mesh.points[mesh.boundary].mean(axis=1)
+    up = mesh.facet_areas(mesh.boundary)[1][:, 2]
+    feet = [HOLES[name].point for name in ("foot_near", "foot_far")]
+    near = [np.hypot(middle[:, 0] - x, middle[:, 1] - y) < _HEAD for x, y, _ in feet]
+    thick = float(middle[(up > 0.99) & near[1], 2].max())
+    heads = (up > 0.99) & (near[0] | near[1]) & (np.abs(middle[:, 2] - thick) < 1e-3)
+    ground = (up < -0.99) & (middle[:, 2] < 1e-3)
+    patches = {"heads": mesh.boundary[heads], "ground": mesh.boundary[ground]}
+    names = ("foot_near", "foot_far", "heads", "ground")
+    supports = tuple(PressingSupport(name) for name in names)
+    pressed = replace(problem, mesh=mesh.with_patches(patches), supports=supports)
+    return solve(pressed)["lift"]
+
+
+def sliding_picture(run: Chain, models: dict[str, StressField]) -> bytes:
+    """Where layers open and where they slide, near the middle of the arm bracket, at 100 N."""
+    mesh = run.stress.mesh
+    centre = mesh.points[mesh.corners].mean(axis=1)
+    middle = 0.5 * (mesh.points[:, 1].min() + mesh.points[:, 1].max())
+    shown = np.flatnonzero(np.abs(centre[:, 1] - middle) < 3.0)
+    slicings = {name: each for name, each in _slicings(run).items() if "best" not in name}
+    figure, row = blank(14.0, 3.2 * len(slicings) * len(models)), 0
+    for model, stress in models.items():
+        for name, layers in slicings.items():
+            opening, sliding = _tractions(stress, layers, centre, shown)
+            for column, (what, values) in enumerate(
+                {"across the layers": opening, "along the layers": sliding}.items()
+            ):
+                axes = figure.add_subplot(len(slicings) * len(models), 2, 2 * row + column + 1)
+                x, _, z = centre[shown].T
+                dots = axes.scatter(x, z, c=values, s=9, cmap="coolwarm", vmin=-8.0, vmax=8.0)
+                axes.set_aspect("equal")
+                axes.set_title(f"{name}, {model}: {what}, MPa", fontsize=9)
+                figure.colorbar(dots, ax=axes, shrink=0.7)
+            row += 1
+    return png(figure)
+
+
+def _tractions(
+    stress: StressField, layers: Sequence[Layer], centre: FloatArray, shown: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Traction across layers, positive where it opens them, and along them, at some cells."""
+    every = stress.stress.reshape(-1, 9)
+    tensor = ball_averages(centre, every, stress.mesh.volumes, shown, BALL).reshape(-1, 3, 3)
+    normal = layer_normals(layers, centre[shown])
+    traction = np.einsum("mij,mj->mi", tensor, normal)
+    opening = np.einsum("mi,mi->m", traction, normal)
+    return opening, np.linalg.norm(traction - opening[:, None] * normal, axis=1)
+
+
+def strength_table(loads: dict[str, dict[str, tuple[float, ...]]]) -> str:
+    """Table in Markdown, by part and slicing; a load for each zone, 3, 1.5 and 0 mm."""
+    heads = ("S 18 MPa", "S 35 MPa", "opening alone")
+    lines = [f"| part | layers | {' | '.join(heads)} | over flat |", "|---" * 6 + "|"]
+    for part, found in loads.items():
+        flat = np.array(found["flat, z"])
+        for name, values in found.items():
+            told = [f"{a:.0f}, {b:.0f}, {c:.0f} N" for a, b, c in np.reshape(values, (-1, 3))]
+            gain = ", ".join(f"{values[k] / flat[k]:.2f}" for k in (0, 3, 6))
+            lines.append(f"| {part} | {name} | {' | '.join(told)} | {gain} |")
+    return "\n".join(lines) + "\n"

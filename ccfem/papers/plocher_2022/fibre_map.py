@@ -47,7 +47,6 @@ def fibre_map(paths: PlanePaths, centres: FloatArray, bead: float) -> FibreMap:
 
     Parameters
     ----------
-    paths : PlanePaths
     centres : (m, 2) array, mm
         Of square cells one bead wide.
     bead : float, mm

@@ -44,7 +44,6 @@ class LaidPlate:
 
     Attributes
     ----------
-    field : PlaneField
     components : (L, m, 3) array, MPa
         s11, s22, s12 at the centre of each cell in the axes of each layer.
     """
@@ -233,7 +232,6 @@ def bead_area(paths: PlanePaths, bead: float) -> tuple[float, float]:
 
     Parameters
     ----------
-    paths : PlanePaths
     bead : float, mm
         Width of a bead; its ends are cut square, its corners round.
 

@@ -61,7 +61,6 @@ def radar_picture(
         One value an index.
     indices : mapping of title to {"low", "high"}
         Title of each spoke, and which values are better.
-    heading : str
     colours : mapping of name to colour, optional
         Default `palette`.
     """

@@ -74,8 +74,6 @@ class PatternStudy:
 
     Attributes
     ----------
-    toolpaths : Toolpaths
-    paths : PlanePaths
     total : mapping of index to float
         From `evaluate`.
     rates : mapping of reading to (18,) array
@@ -115,12 +113,8 @@ class PartStudy:
 
     Attributes
     ----------
-    case : Case
     machine : Machine
         That of the case, with no shortest path.
-    field : StressField
-    layer : Layer
-    stress : LayerStress
     patterns : mapping of name to PatternStudy
     """
 
@@ -138,13 +132,10 @@ class PlateStudy:
 
     Attributes
     ----------
-    plate : DesignPlate
-    optimised, original : PartStudy
     design : Design, optional
         Of an optimisation in this run.
     off_stored : float
         Area by which its outline differs from the stored one, over the area; NaN without it.
-    seconds : float
     """
 
     plate: DesignPlate
@@ -173,7 +164,6 @@ def run_study(
 
     Parameters
     ----------
-    plates, patterns : sequence of str
     design : bool, default True
         Whether to optimise the plates again, beside the outlines that are stored.
     progress : callable, optional

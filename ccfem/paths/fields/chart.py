@@ -37,7 +37,6 @@ class Chart:
 
     Attributes
     ----------
-    layer : Layer
     flat : Layer
         The same triangles in the plane z = 0; its `turns` rotate tensors of the part into it.
     stretches : (t, 2) array

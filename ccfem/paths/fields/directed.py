@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import scipy.sparse as sparse
 
 from ccfem.base.arrays import FloatArray
-from ccfem.paths.fields.crease import orient_along
 from ccfem.paths.fields.fill import fill_laplacian, fill_screened
-from ccfem.paths.fields.layer_elements import Surface
+from ccfem.paths.fields.layer_elements import Surface, positive_definite
 from ccfem.paths.fields.orientation import orient
 from ccfem.paths.fields.tensile import Tension
 from ccfem.slicing.layers.layer import Layer
@@ -20,9 +20,6 @@ class Directed:
 
     Attributes
     ----------
-    layer : Layer
-    surface : Surface
-    tension : Tension
     cap : float, MPa
         Stress at which the density reaches its full value.
     confidence : (t,) array in [0, 1]
@@ -52,7 +49,6 @@ def directed(
 
     Parameters
     ----------
-    layer : Layer
     tension : Tension
         On its triangles.
     cap : float
@@ -80,3 +76,79 @@ def directed(
             direction = orient(direction, surface.neighbours)
         direction, size = fill_laplacian(surface, direction, tension.stress, tension.defined)
     return Directed(layer, surface, tension, top, confidence, direction, size)
+
+
+# Signs for a field of lines that no choice of signs makes continuous: a cut along the field.
+#
+# If a pin pulls a lug, the lines of tension come from the far end, turn round the hole and go back:
+# a vector that follows them once round the hole has changed its sign. So there must be a cut across
+# which neighbouring vectors oppose each other. If the cut runs along the lines, the scalar field
+# has a crease there, and its isocurves stay parallel to the cut. If it crosses the lines, the
+# isocurves turn aside. A spanning tree of neighbours cannot tell these cases apart.
+
+
+_ACROSS = 3e-3
+"""Penalty of a change across the lines, over that of one along them. The cut runs along the lines
+while this is below (breadth / twice the length)^2 of the strip that they fill."""
+_LEAST_WEIGHT = 1e-3
+_POWER = 0.5
+_ITERATIONS = 20
+
+
+def orient_along(surface: Surface, direction: FloatArray, confidence: FloatArray) -> FloatArray:
+    """Flip vectors so that, where they have to oppose each other, they do so across a line.
+
+    The sign is that of a function u that is as smooth as possible along the lines. With the signs s
+    of a spanning tree, inverse iteration minimises ``sum_f w_f A_f [(t . grad(s u))^2 + a |grad(s
+    u)|^2]``, a small, at a fixed ``sum_f w_f A_f |u|^(1 + p)``. With p = 1 the result is an
+    eigenvector, which may be confined to one limb of a part and meaningless elsewhere; with a
+    smaller p it has a size everywhere. If a continuous choice of signs exists, u is constant, and
+    the result is that of `orientation.orient`.
+
+    Parameters
+    ----------
+    direction : (t, 2) array
+        Unit vectors on the triangles, of any sign.
+    confidence : (t,) array in [0, 1]
+        w: the smaller it is, the less a cut costs.
+
+    Returns
+    -------
+    (t, 2) array
+        `direction` or its opposite, triangle by triangle.
+    """
+    direction = orient(direction, surface.neighbours, confidence)
+    triangles = surface.triangles
+    weight = confidence + _LEAST_WEIGHT
+    relative = np.einsum("td,tkd->tk", direction, _at_points(surface, direction)[triangles])
+    sign = np.where(relative < 0.0, -1.0, 1.0)
+
+    metric = direction[:, :, None] * direction[:, None, :] + _ACROSS * np.eye(2)
+    stiffness = _turned_energy(surface, (weight * surface.areas)[:, None, None] * metric, sign)
+    mass = surface.lumped(weight)
+    mass += 1e-9 * mass.mean()  # points without triangles
+    reach = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
+    solver = positive_definite(stiffness + sparse.diags_array(mass / reach**2, format="csc"))
+
+    shares = (sign * (weight * surface.areas)[:, None]).ravel()
+    values = np.sign(np.bincount(triangles.ravel(), shares, minlength=len(surface.points)))
+    for _ in range(_ITERATIONS):
+        values = solver.solve(mass * values)
+        values /= np.abs(values).max()
+        values = np.sign(values) * np.abs(values) ** _POWER
+    opposed = (sign * values[triangles]).sum(axis=1) < 0.0
+    return np.where(opposed[:, None], -direction, direction)
+
+
+def _at_points(surface: Surface, direction: FloatArray) -> FloatArray:
+    """Mean line at the points, (n, 2), of any sign."""
+    cosine = surface.lumped(direction[:, 0] ** 2 - direction[:, 1] ** 2)
+    sine = surface.lumped(2.0 * direction[:, 0] * direction[:, 1])
+    angle = 0.5 * np.arctan2(sine, cosine)
+    return np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def _turned_energy(surface: Surface, metric: FloatArray, sign: FloatArray) -> sparse.csc_array:
+    """As `Surface.energy`, with the value at each corner of each triangle times a sign (t, 3)."""
+    slopes = surface.gradients * sign[:, :, None]
+    return surface.matrix(np.einsum("tid,tde,tje->tij", slopes, metric, slopes))

@@ -22,7 +22,6 @@ def fill_laplacian(
 
     Parameters
     ----------
-    surface : Surface
     direction : (t, 2) array
         Oriented vectors; those of undefined triangles are ignored.
     stress : (t,) array, MPa
@@ -66,7 +65,6 @@ def fill_screened(
 
     Parameters
     ----------
-    surface : Surface
     direction : (t, 2) array
         Unit vectors on the triangles, of any sign.
     stress : (t,) array, MPa

@@ -25,7 +25,6 @@ def layer_tension(
 
     Parameters
     ----------
-    stress : LayerStress
     source : {"nodal", "cell"}
         Recovered stress, averaged over the corners of each triangle, or stress of its tetrahedron.
     sense : {"tensile", "absolute"}

@@ -36,7 +36,6 @@ def extract_levels(surface: Surface, values: FloatArray, width: float) -> Isocon
 
     Parameters
     ----------
-    surface : Surface
     values : (n,) array
         The scalar field.
     width : float, mm

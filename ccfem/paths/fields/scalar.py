@@ -25,7 +25,6 @@ def fit_literal(surface: Surface, vectors: FloatArray) -> FloatArray:
 
     Parameters
     ----------
-    surface : Surface
     vectors : (t, 2) array
         u of Eq. 5, along the tension.
 
@@ -53,7 +52,6 @@ def fit_weighted(
 
     Parameters
     ----------
-    surface : Surface
     direction : (t, 2) array
         Oriented unit vectors.
     density : (t,) array

@@ -44,7 +44,6 @@ def lead_into(
     Parameters
     ----------
     lines : sequence of (n_i, 2) arrays, mm
-    boundary : shapely Polygon
     distance : float, mm
     section : shapely (Multi)Polygon
         Pieces of the curve outside it join nothing.

@@ -81,7 +81,6 @@ def long_enough(joined: Joined, least_length: float) -> Joined:
 
     Parameters
     ----------
-    joined : Joined
     least_length : float, mm
         Of a path.
     """

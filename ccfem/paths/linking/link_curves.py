@@ -58,7 +58,6 @@ def link_curves(
     reach : (t, v) array, mm
         Extensions to choose from; the first is the usual one.
     radius : float, mm
-    grid : SectionGrid
     weights : (3,) array
         Extra cost of each mm inside the part, over its voids, and outside.
     bound : (t, t) array, mm

@@ -20,7 +20,6 @@ def step_speeds(toolpaths: Toolpaths, machine: Machine) -> FloatArray:
     ----------
     toolpaths : Toolpaths
         Paths of any kind; the speed table is for fibre.
-    machine : Machine
 
     Returns
     -------

@@ -14,19 +14,192 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
+from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
+from ccfem.geometry.dubins import WORDS, curve_points, word_sizes
 from ccfem.geometry.offsets import ring_from
 from ccfem.geometry.places import INSIDE, VOID, cut_at_section
-from ccfem.geometry.polylines import between, is_closed, line_length, runs
-from ccfem.geometry.section_grid import section_grid
-from ccfem.geometry.shapes import Region
-from ccfem.paths.linking.exchanges import Clusters, improved_order, strands
-from ccfem.paths.linking.link_curves import LinkCurves, link_curve, link_curves, stub_points
-from ccfem.paths.linking.ordering import costs_between_ends, order_clusters
-from ccfem.paths.linking.ring_routes import RingRoutes, ring_cost, ring_curve, ring_routes
+from ccfem.geometry.polylines import between, is_closed, line_length, resample, runs
+from ccfem.geometry.section_grid import SectionGrid, section_grid
+from ccfem.geometry.shapes import Region, Shapes
+from ccfem.paths.linking.exchanges import Clusters, greedy_order, improved_order, strands
+from ccfem.paths.linking.link_curves import (
+    LinkCurves,
+    curve_cost,
+    link_curve,
+    link_curves,
+    stub_points,
+)
+
+# Links that lead round a part, along a ring outside it.
+
+
+_DISTANCE = 5.0
+"""Distance, mm, from the ring to the part; at least the radius."""
+_LEADS = (5.0, 10.0, 16.0)
+"""How far ahead on the ring, mm, a lead may end; more if turns are wide."""
+
+_NEAR = 0.01
+"""Half the length, mm, of the chord taken as a tangent of the ring."""
+
+
+class RingRoutes(NamedTuple):
+    """A ring round a part, and leads from ends to it.
+
+    Attributes
+    ----------
+    ring : (n, 2) array, mm
+        Closed; anticlockwise.
+    length : float, mm
+    starts : (t, 3) array
+        Poses at which leads begin.
+    goal : (t, 2, v, 3) array
+        Poses on the ring at which they end: anticlockwise, then clockwise.
+    position : (t, 2, v) array, mm
+        Arc length on the ring of these poses.
+    cost : (t, 2, v) array, mm
+        Of the leads.
+    word : (t, 2, v) int array
+    radius : float, mm
+    """
+
+    ring: FloatArray
+    length: float
+    starts: FloatArray
+    goal: FloatArray
+    position: FloatArray
+    cost: FloatArray
+    word: IntArray
+    radius: float
+
+
+def ring_routes(
+    starts: FloatArray, section: Region, radius: float, grid: SectionGrid, weights: FloatArray
+) -> RingRoutes:
+    """Ring round a part, and the cheapest leads to it.
+
+    Parameters
+    ----------
+    starts : (t, 3) array
+        Poses heading out of strands.
+    section : shapely (Multi)Polygon, mm
+    radius : float, mm
+    weights : (3,) array
+        Extra cost of each mm inside the part, over its voids, and outside.
+    """
+    ring = _ring(section, max(_DISTANCE, radius))
+    line = shapely.LineString(ring)
+    length = float(line.length)
+    ahead = np.array(_LEADS) * max(1.0, 0.5 * radius)
+    foot = shapely.line_locate_point(line, shapely.points(starts[:, :2]))
+    sense = np.array([1.0, -1.0])
+    position = (foot[:, None, None] + sense[:, None] * ahead) % length
+    flat = position.ravel()
+    here, before, after = (
+        shapely.get_coordinates(shapely.line_interpolate_point(line, (flat + d) % length))
+        for d in (0.0, -_NEAR, _NEAR)
+    )
+    way = (after - before).reshape(*position.shape, 2) * sense[:, None, None]
+    goal = np.concatenate(
+        [here.reshape(*position.shape, 2), np.arctan2(way[..., 1:], way[..., :1])], axis=-1
+    )
+    cost, word = _leads(starts, goal, radius, grid, weights)
+    return RingRoutes(ring, length, starts, goal, position, cost, word, radius)
+
+
+def _ring(section: Region, distance: float) -> FloatArray:
+    """Lay a closed curve (n, 2) round a section at a distance; round the hull of several parts."""
+    for filled in (shapely.union_all(_filled(section)), shapely.convex_hull(section)):
+        grown = shapely.union_all(_filled(shapely.buffer(filled, 2.0 * distance)))
+        outline = shapely.buffer(grown, -distance, quad_segs=32)
+        if outline.geom_type == "Polygon":
+            break
+    ring = shapely.get_coordinates(shapely.get_exterior_ring(shapely.normalize(outline)))
+    return ring if shapely.is_ccw(shapely.linearrings(ring)) else ring[::-1]
+
+
+def _filled(section: Region) -> Shapes:
+    return shapely.polygons(shapely.get_exterior_ring(shapely.get_parts(section)))
+
+
+@njit(cache=True, nogil=True)
+def _leads(starts, goal, radius, grid, weights):  # type: ignore[no-untyped-def]
+    count, _, variants, _ = goal.shape
+    cost = np.full(goal.shape[:3], np.inf)
+    word = np.zeros(goal.shape[:3], np.int64)
+    sizes = np.empty((6, 3))
+    for a in range(count):
+        for side in range(2):
+            for v in range(variants):
+                word_sizes(starts[a], goal[a, side, v], radius, sizes)
+                for k in range(6):
+                    found = curve_cost(
+                        starts[a], WORDS[k], sizes[k], radius, grid, weights, cost[a, side, v]
+                    )
+                    if found < cost[a, side, v]:
+                        cost[a, side, v] = found
+                        word[a, side, v] = k
+    return cost, word
+
+
+@njit(cache=True, nogil=True)
+def ring_cost(routes: RingRoutes) -> tuple[FloatArray, IntArray]:
+    """Cost of the way along the ring between each two ends, and an index of that way.
+
+    Returns
+    -------
+    cost : (t, t) array, mm
+        Symmetric.
+    way : (t, t) int array
+        Sense and leads, encoded as a number that `ring_curve` reads.
+    """
+    position, lead, length = routes.position, routes.cost, routes.length
+    count, _, variants = position.shape
+    cost = np.full((count, count), np.inf)
+    way = np.zeros((count, count), np.int64)
+    for a in range(count):
+        for b in range(count):
+            for side in range(2):
+                sense = 1.0 - 2.0 * side
+                for v in range(variants):
+                    for w in range(variants):
+                        along = sense * (position[b, 1 - side, w] - position[a, side, v])
+                        along -= length * np.floor(along / length)
+                        found = lead[a, side, v] + along + lead[b, 1 - side, w]
+                        if found < cost[a, b] - 1e-9:
+                            cost[a, b] = found
+                            way[a, b] = (side * variants + v) * variants + w
+    return cost, way
+
+
+def ring_curve(routes: RingRoutes, a: int, b: int, way: int, step: float) -> FloatArray:
+    """Points (n, 2), mm, of the way from start a along the ring to start b."""
+    variants = routes.position.shape[2]
+    side, v, w = way // variants**2, way // variants % variants, way % variants
+    out = _lead(routes, a, side, v, step)
+    back = _lead(routes, b, 1 - side, w, step)[::-1]
+    s, t = routes.position[a, side, v], routes.position[b, 1 - side, w]
+    if side:
+        s, t = t, s
+    if t < s:
+        t += routes.length
+    twice = np.concatenate([routes.ring, routes.ring[1:]])
+    arc = between(twice, float(s), float(t))
+    arc, _ = resample(arc, np.array([0, len(arc)]), step)
+    return np.concatenate([out, (arc[::-1] if side else arc)[1:-1], back])
+
+
+def _lead(routes: RingRoutes, a: int, side: int, v: int, step: float) -> FloatArray:
+    start, goal = routes.starts[a], routes.goal[a, side, v]
+    sizes = np.empty((6, 3))
+    word_sizes(start, goal, routes.radius, sizes)
+    word = int(routes.word[a, side, v])
+    turns = WORDS[word] * np.where(sizes[word] < 0.0, -1, 1)
+    return curve_points(start, goal, turns, np.abs(sizes[word]), routes.radius, step)
+
 
 _REACH = (1.0, 3.0, 6.0)
 """Straight extensions, mm, of tracks before a link turns."""
@@ -278,3 +451,133 @@ def _assembled(tracks: Sequence[FloatArray], visits: IntArray, network: _Network
         parts.append(track[::-1] if entered % 2 else track)
         marks.append(np.zeros(len(track), dtype=bool))
     return LinkedPath(np.concatenate(parts), np.concatenate(marks))
+
+
+# Order in which items with several ends are visited so that the links between them cost least.
+#
+# A cluster is visited once: it is entered at one of its terminals and left at another. A strand is
+# a cluster of two terminals; a group of strands that are laid together is a cluster of all their
+# ends. The order of the clusters and their terminals are found together. For few clusters, dynamic
+# programming over sets of clusters gives the optimum (M. Held, R. M. Karp, A dynamic programming
+# approach to sequencing problems, Journal of SIAM 10 (1962) 196). Otherwise stretches of the order
+# are exchanged (2-opt, Or-opt), each order being evaluated with its best terminals.
+
+
+_EXACT = 12
+"""Maximum number of clusters for which the order is optimal."""
+
+
+def order_clusters(clusters: Clusters, exact: int = _EXACT, rounds: int = 30) -> IntArray:
+    """Order of clusters, and the terminals at which each is entered and left.
+
+    Parameters
+    ----------
+    exact : int, default 12
+        Up to this many clusters the order is optimal; the work is 2^p t^2.
+    rounds : int, default 30
+        Rounds of the search above that (`improved_order`); fewer for more than fifty clusters.
+
+    Returns
+    -------
+    (p, 2) int array
+        Terminals entered and left, in order.
+
+    Raises
+    ------
+    InputError
+        For arrays that do not fit together, or where no way exists.
+    """
+    links, visit = (np.ascontiguousarray(cost, dtype=np.float64) for cost in clusters[:2])
+    offsets = np.ascontiguousarray(clusters.offsets, dtype=np.int64)
+    count = len(offsets) - 1
+    size = (int(offsets[-1]), int(offsets[-1]))
+    if links.shape != size or visit.shape != size or not (np.diff(offsets) > 0).all():
+        raise InputError(
+            f"links and visit must have the shape {size} of the terminals in offsets, and every "
+            f"cluster a terminal; got {links.shape} and {visit.shape}"
+        )
+    if count == 0:
+        return np.zeros((0, 2), dtype=np.int64)
+    clusters = Clusters(links, visit, offsets, clusters.first, clusters.last)
+    if count <= exact:
+        return _traced(_costs_of_sets(clusters), clusters)
+    return improved_order(greedy_order(clusters), clusters, rounds)
+
+
+def costs_between_ends(links: FloatArray) -> FloatArray:
+    """Least cost of laying all strands of a group from one of their ends to another.
+
+    Parameters
+    ----------
+    links : (2k, 2k) array
+        Cost of the link between each two ends, the same both ways; strand i has the ends 2i and
+        2i + 1.
+
+    Returns
+    -------
+    (2k, 2k) array
+        inf where the strands cannot be laid that way, as from an end to itself. For more than 12
+        strands only pairs of ends that a search finds to be good have a finite cost.
+    """
+    if len(links) <= 2 * _EXACT:
+        every = range(len(links))
+        return np.stack([_costs_of_sets(strands(links, first))[-1] for first in every])
+    table = np.full(links.shape, np.inf)
+    starts = [-1]
+    while starts:
+        way = order_clusters(strands(links, starts.pop(0)), rounds=5)
+        a, b = int(way[0, 0]), int(way[-1, 1])
+        cost = float(links[way[:-1, 1], way[1:, 0]].sum())
+        if not np.isfinite(table).any():
+            starts = [a ^ 1, b, b ^ 1]
+        table[a, b] = table[b, a] = min(cost, table[a, b])
+    return table
+
+
+@njit(cache=True, nogil=True)
+def _costs_of_sets(clusters):  # type: ignore[no-untyped-def]
+    """Least cost of having visited a set of clusters and left at one of its terminals, (2^p, t)."""
+    links, visit, offsets, first, _ = clusters
+    count, terminals = len(offsets) - 1, len(links)
+    best = np.full((1 << count, terminals), np.inf)
+    entry = np.empty(terminals)
+    for done in range((1 << count) - 1):
+        for c in range(count):
+            if done >> c & 1:
+                continue
+            for a in range(offsets[c], offsets[c + 1]):
+                entry[a] = np.inf
+                if done == 0:
+                    entry[a] = 0.0 if first < 0 or first == a else np.inf
+                    continue
+                for d in range(count):
+                    if done >> d & 1:
+                        for t in range(offsets[d], offsets[d + 1]):
+                            entry[a] = min(entry[a], best[done, t] + links[t, a])
+            more = done | 1 << c
+            for a in range(offsets[c], offsets[c + 1]):
+                if entry[a] < np.inf:
+                    for b in range(offsets[c], offsets[c + 1]):
+                        best[more, b] = min(best[more, b], entry[a] + visit[a, b])
+    return best
+
+
+def _traced(best: FloatArray, clusters: Clusters) -> IntArray:
+    """Terminals entered and left on the best way, read from the costs of sets backwards."""
+    links, visit, offsets, first, last = clusters
+    cluster = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+    done = len(best) - 1
+    left = last if last >= 0 else int(np.argmin(best[done]))
+    if not np.isfinite(best[done, left]):
+        raise InputError("there is no way through all clusters: some visit must be possible")
+    way: list[tuple[int, int]] = []
+    while True:
+        own = np.arange(offsets[cluster[left]], offsets[cluster[left] + 1])
+        done &= ~(1 << int(cluster[left]))
+        if not done:
+            way.append((first if first >= 0 else int(own[np.argmin(visit[own, left])]), left))
+            return np.array(way[::-1])
+        through = best[done][:, None] + links[:, own] + visit[own, left]
+        t, a = np.unravel_index(int(np.argmin(through)), through.shape)
+        way.append((int(own[a]), left))
+        left = int(t)

@@ -111,7 +111,6 @@ class NearPatch:
 
     Attributes
     ----------
-    patch : str
     within : float, mm
         Largest distance from the patch, above 0.
     """

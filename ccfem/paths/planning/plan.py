@@ -1,14 +1,17 @@
 """Planning the paths of a whole part."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from ccfem.base.checks import check_instance
 from ccfem.base.errors import InputError
 from ccfem.base.threads import in_threads
 from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.geometry.even_steps import OFF, even_steps
 from ccfem.machine.machine import Machine
 from ccfem.paths.fields.chart import chart_of, flat_view
-from ccfem.paths.planning.steps import in_even_steps
 from ccfem.paths.planning.strategy import LayerPlanner, PartStrategy, Strategy
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
@@ -27,10 +30,8 @@ def plan(
     ----------
     strategy : Strategy
         Called from several threads at once, each with a layer of its own.
-    layers : sequence of Layer
     stress : PartStress
         A `StressField`, or a `GivenStress` for strategies that do not solve the part again.
-    machine : Machine
 
     Returns
     -------
@@ -69,11 +70,8 @@ def plan_layers(
     ----------
     planner : LayerPlanner
         Called from several threads at once, each with a layer of its own.
-    layers : sequence of Layer
     views : sequence of Layer
         The same layers as passed to the planner: laid flat if it works in a plane.
-    stress : PartStress
-    machine : Machine
     """
 
     def planned(layer: Layer, view: Layer) -> Toolpaths:
@@ -101,3 +99,48 @@ def check_layers(strategy: Strategy, layers: Sequence[Layer], machine: Machine) 
             "strategy for curved layers"
         )
     check_pitch(layers, machine)
+
+
+# Final form of planned paths: steps of about a fibre width, and no paths of zero length.
+
+
+_SHORTEST = 1e-6
+"""Length, in steps, up to which a path counts as having none."""
+
+
+def in_even_steps(toolpaths: Toolpaths, step: float) -> Toolpaths:
+    """Paths in steps no longer than a length, mm, and shorter only where paths bend.
+
+    Parameters
+    ----------
+    step : float, mm
+        Machines that get more points than they need stutter, while indices sampled at points need
+        no fewer.
+
+    Returns
+    -------
+    Toolpaths
+        The same paths within 0.005 steps; corners and ends are exact. Paths of no length are left
+        out.
+    """
+    paths = toolpaths.select(toolpaths.lengths > _SHORTEST * step)
+    if not len(paths):
+        return paths
+    # Where a link begins or ends, its first step is the first that is one, or is none any more.
+    inner = np.ones(len(paths.points), dtype=bool)
+    inner[paths.offsets[:-1]] = False
+    changes = inner & (paths.link != np.roll(paths.link, 1))
+    points, offsets, source, share = even_steps(
+        paths.points, paths.offsets, changes, step, OFF * step
+    )
+    before, after = (paths.normals[source[:, k]] for k in (0, 1))
+    normals = before + share[:, None] * (after - before)
+    link = paths.link[source[:, 0]]
+    link[offsets[1:] - 1] = False
+    return replace(
+        paths,
+        points=points,
+        normals=normals / np.linalg.norm(normals, axis=1)[:, None],
+        offsets=offsets,
+        link=link,
+    )

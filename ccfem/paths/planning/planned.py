@@ -15,7 +15,6 @@ class Planned:
     ----------
     strategy : Strategy
         With the values found (for most layers, see `note`).
-    toolpaths : Toolpaths
     length_per_layer : float, mm
         Fibre length divided by the number of layers.
     note : str

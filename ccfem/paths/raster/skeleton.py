@@ -27,7 +27,6 @@ class Segment:
         Row and column, in their order.
     forks : tuple of 2 ints
         Number of the fork at each end; -1 for a free end, and for those of a closed line.
-    closed : bool
     """
 
     pixels: IntArray

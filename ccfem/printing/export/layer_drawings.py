@@ -35,7 +35,6 @@ def draw_layer(paths: Toolpaths, layer: Layer, width: float, file: str | Path) -
     ----------
     paths : Toolpaths
         Of the whole part, or of this layer.
-    layer : Layer
     width : float, mm
         Of a strand.
     file : path

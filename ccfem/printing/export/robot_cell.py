@@ -26,7 +26,6 @@ def write_robot_cell(path: str | Path, moves: Moves) -> None:
     Parameters
     ----------
     path : str or Path
-    moves : Moves
 
     Notes
     -----

@@ -89,7 +89,6 @@ def write_layer_waypoints(path: str | Path, toolpaths: Toolpaths, layer: int) ->
     Parameters
     ----------
     path : str or Path
-    toolpaths : Toolpaths
     layer : int
         Index of the layer.
 

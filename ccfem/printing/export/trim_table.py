@@ -12,7 +12,6 @@ def write_trims(path: str | Path, plan: PrintPlan) -> None:
     Parameters
     ----------
     path : str or Path
-    plan : PrintPlan
 
     Raises
     ------

@@ -37,7 +37,6 @@ def write_result(field: StressField, path: str | Path) -> None:
 
     Parameters
     ----------
-    field : StressField
     path : path
 
     Raises

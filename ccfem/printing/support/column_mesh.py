@@ -91,7 +91,6 @@ def column_mesh(
 
     Parameters
     ----------
-    mesh : TetMesh
     build : sequence of 3 floats, default z
         Build direction.
     angle : float, degrees, default 0

@@ -76,7 +76,6 @@ def support_columns(
 
     Parameters
     ----------
-    mesh : TetMesh
     build : sequence of 3 floats, default z
         Build direction.
     angle : float, degrees, default 0

@@ -13,7 +13,6 @@ def hanging_facets(
 
     Parameters
     ----------
-    mesh : TetMesh
     frame : (3, 3) array
         Its last row is the build direction.
     bed : float, mm

@@ -59,7 +59,6 @@ def support_field(
 
     Parameters
     ----------
-    columns : ColumnMesh
     part : (p,) array
         Field at the nodes of the part.
     slope : float, 1/mm

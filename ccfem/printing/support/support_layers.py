@@ -179,11 +179,9 @@ def slice_with_support(
     ----------
     slicer : Slicer
         Of flat layers, or one that says the field of its layers (`slice`).
-    stress : PartStress
     build : tuple of 3 floats, default z
         Where curved layers look down from there, the support is laid below the part as it stands
         along their mean normal (`standing`): ``support.columns.up``.
-    machine : Machine, optional
     angle, lift : float, optional
         As of `support_layers`.
 

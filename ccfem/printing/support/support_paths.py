@@ -23,7 +23,6 @@ def support_paths(support: SupportLayers, machine: Machine, spacing: float = 3.0
 
     Parameters
     ----------
-    support : SupportLayers
     machine : Machine
         Its `matrix_width`.
     spacing : float, default 3

@@ -79,7 +79,6 @@ def bounded(
     ----------
     target : (m, 3) array
         Wanted gradient in the cells.
-    bounds : Bounds
     solve : callable
         Returns the field whose gradient is nearest to a target.
     enough : callable, optional

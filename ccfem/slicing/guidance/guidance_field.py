@@ -23,7 +23,6 @@ from ccfem.slicing.guidance.energies import (
     gradient_source,
     smoothness_energy,
 )
-from ccfem.slicing.guidance.equal_values import equal_value_energy, slabs
 from ccfem.slicing.guidance.joints import Joint
 
 JointForm = Literal["axis", "ring", "literal"]
@@ -71,7 +70,6 @@ class GuidanceField:
 
     Attributes
     ----------
-    mesh : TetMesh
     values : (n,) array, mm
         At the nodes; the mean size of its gradient is 1. Zero at nodes that are no cell's corner.
     gradient : (m, 3) array
@@ -121,13 +119,10 @@ def guidance_field(
 
     Parameters
     ----------
-    mesh : TetMesh
     tension : (m, 3) array
         Direction tau of the strongest stress.
     importance : (m,) array
         omega: 0 where the stress has no effect.
-    joints : sequence of Joint
-    weights : Weights
     form : {"axis", "ring", "literal"}
     signs : sequence of {1, -1}, optional
         s_k; by default those of the lowest energy.
@@ -135,10 +130,6 @@ def guidance_field(
         Height of a slab for "ring".
     build : (3,) array
         Unit vector of the build direction: the mean gradient does not point against it.
-
-    Returns
-    -------
-    GuidanceField
 
     Raises
     ------
@@ -300,3 +291,54 @@ def _energies(product: FloatArray, wanted: Sequence[int] | None) -> dict[tuple[i
         flips = [(*signs[:k], -signs[k], *signs[k + 1 :]) for k in range(1, count)]
         signs = min([signs, *flips], key=energy)
     return found
+
+
+# Equal values of a field within groups of nodes: the paper's term for the joints.
+
+
+def slabs(
+    points: FloatArray, nodes: IntArray, direction: FloatArray, height: float
+) -> tuple[IntArray, int]:
+    """Group nodes by slabs normal to a direction; return each node's group and their number.
+
+    Parameters
+    ----------
+    points : (n, 3) array, mm
+    nodes : (k,) int array
+    direction : (3,) array
+    height : float, mm
+        Of a slab; infinite for one group of all.
+    """
+    along = points[nodes] @ direction
+    slab = np.zeros(len(nodes), dtype=np.int64)
+    if np.isfinite(height):
+        slab = np.floor((along - along.min()) / height).astype(np.int64)
+    _, group = np.unique(slab, return_inverse=True)
+    return group, int(group.max()) + 1
+
+
+def equal_value_energy(
+    nodes: IntArray, group: IntArray, weight: float, first: int, n: int
+) -> sp.csr_array:
+    """Matrix of ``weight / N sum_groups sum_v (G_v - M_group)^2`` (Fang et al. 2024, eq. 3).
+
+    The values M of the groups are unknowns after those of the nodes. At the minimum they are the
+    means of their groups; the matrix stays sparse.
+
+    Parameters
+    ----------
+    nodes : (k,) int array
+    group : (k,) int array
+        Of each node.
+    weight : float
+        Of all N nodes together, mm.
+    first : int
+        Index of the first group among the unknowns.
+    n : int
+        Number of unknowns.
+    """
+    rows = np.repeat(np.arange(len(nodes)), 2)
+    columns = np.stack([nodes, first + group], axis=1).ravel()
+    values = np.tile([1.0, -1.0], len(nodes))
+    away = sp.coo_array((values, (rows, columns)), shape=(len(nodes), n)).tocsr()
+    return sp.csr_array(weight / len(nodes) * (away.T @ away))

@@ -64,7 +64,6 @@ def height_field(
 
     Parameters
     ----------
-    mesh : TetMesh
     direction : (m, 3) array
         Unit vectors that the gradient should follow.
     blend : float, optional

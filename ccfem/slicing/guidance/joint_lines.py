@@ -23,8 +23,6 @@ def joint_lines(stress: PartStress, joints: Sequence[Joint], keep: Keep) -> Join
 
     Parameters
     ----------
-    stress : PartStress
-    joints : sequence of Joint
     keep : {"joining", "touching", "all"}
         As in `critical_region`.
 

@@ -70,7 +70,6 @@ def joint_of(
 
     Parameters
     ----------
-    mesh : TetMesh
     name : str
         Patch: the wall of a hole, or a part of it; or any other patch.
     rings : int, default 4
@@ -115,16 +114,11 @@ def joints_of(
 
     Parameters
     ----------
-    stress : PartStress
     names : sequence of str, default ()
         Patches; by default all that are held or loaded.
     rings : int, default 4
     directions : mapping of patch to three numbers, optional
         As in `joint_of`.
-
-    Raises
-    ------
-    InputError
     """
     names, directions = tuple(names) or stress.held_or_loaded, directions or {}
     for name in directions:

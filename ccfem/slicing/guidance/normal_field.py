@@ -55,8 +55,6 @@ def normal_field(mesh: TetMesh, regions: StressRegions, build: FloatArray) -> No
 
     Parameters
     ----------
-    mesh : TetMesh
-    regions : StressRegions
     build : (3,) array
         Unit vector, used as the direction of pieces of the part without a region. The field as a
         whole does not point against it.

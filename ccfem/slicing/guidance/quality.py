@@ -55,7 +55,6 @@ def field_quality(
 
     Parameters
     ----------
-    field : GuidanceField
     tension : (m, 3) array
         Direction of the strongest stress.
     importance : (m,) array

@@ -67,7 +67,6 @@ def stress_regions(
 
     Parameters
     ----------
-    mesh : TetMesh
     stress : (m, 3, 3) array, MPa
     build : (3,) array
         The mean direction of a region does not point against it.

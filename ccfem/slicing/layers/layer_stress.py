@@ -15,7 +15,6 @@ class LayerStress(Shown):
 
     Attributes
     ----------
-    layer : Layer
     cell : (t, 3, 3) array, MPa
         Stress of the tetrahedron that each triangle was cut from.
     nodal : (n, 3, 3) array, MPa

@@ -38,7 +38,6 @@ def cut_at_zero(mesh: TetMesh, signed: FloatArray, among: IntArray | None = None
 
     Parameters
     ----------
-    mesh : TetMesh
     signed : (n,) array
         Values at the nodes, linear in between; nodes of value 0 become points of the surface.
     among : (k,) int array, optional

@@ -17,10 +17,6 @@ def check_pitch(layers: Sequence[Layer], machine: Machine) -> None:
     """Refuse flat layers nearer to each other than the height of a strand of the machine.
 
     Curved layers are not checked, since their distance varies.
-
-    Raises
-    ------
-    InputError
     """
     check_heights(
         np.sort([layer.flat.height for layer in layers if layer.flat is not None]), machine
@@ -28,12 +24,7 @@ def check_pitch(layers: Sequence[Layer], machine: Machine) -> None:
 
 
 def check_heights(heights: FloatArray, machine: Machine) -> None:
-    """Refuse ascending heights, mm, of flat layers that are nearer than the height of a strand.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse ascending heights, mm, of flat layers that are nearer than the height of a strand."""
     if len(heights) < 2:
         return
     gaps, least = np.diff(heights), machine.strand_height

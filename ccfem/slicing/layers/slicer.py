@@ -27,7 +27,6 @@ class Slicer(Protocol):
             The part's mesh, and the stress on it for slicers that follow the stress.
         build : tuple of 3 floats
             Build direction in the frame of the mesh, of any length.
-        machine : Machine
         """
         ...
 

@@ -21,7 +21,6 @@ def standing(layers: Sequence[Layer], build: Vector) -> Vector:
 
     Parameters
     ----------
-    layers : sequence of Layer
     build : tuple of 3 floats
         Build direction.
     """

@@ -35,7 +35,6 @@ def layers_within(
 
     Parameters
     ----------
-    mesh : TetMesh
     values : (n,) array
         At the nodes.
     step : float

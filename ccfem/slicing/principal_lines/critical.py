@@ -59,7 +59,6 @@ def critical_region(
 
     Parameters
     ----------
-    mesh : TetMesh
     direction : (m, 3) array
         Of the strongest principal stress (`strongest_stress`).
     joints : sequence of int arrays

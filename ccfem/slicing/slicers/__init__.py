@@ -117,7 +117,6 @@ def slice(
         As in `as_slicer`.
     build : tuple of 3 floats, default z
         Build direction.
-    machine : Machine, optional
 
     Returns
     -------

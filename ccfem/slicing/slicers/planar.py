@@ -113,7 +113,6 @@ class Planar:
 
         Parameters
         ----------
-        mesh : TetMesh
         build : tuple of 3 floats, default z
             Build direction.
 

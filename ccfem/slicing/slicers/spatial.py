@@ -45,11 +45,9 @@ class SpatialSlicing:
     Attributes
     ----------
     layers : tuple of Layer
-    field : GuidanceField
     region : CriticalRegion
         Stress lines that join the joints.
     joints : tuple of Joint
-    quality : FieldQuality
     step : float
         Difference of the field between layers.
     bubbles, specks : int
@@ -151,7 +149,6 @@ class Spatial:
 
         Parameters
         ----------
-        stress : PartStress
         build : tuple of 3 floats, default z
             Layers are counted along this direction.
 

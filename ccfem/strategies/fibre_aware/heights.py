@@ -45,7 +45,6 @@ def alike_share(part: SmearedPart, stress: FloatArray, size: float) -> float:
 
     Parameters
     ----------
-    part : SmearedPart
     stress : (m, 3, 3) array, MPa
     size : float, mm
         Side of the squares above which the stress is averaged over the height.

@@ -128,8 +128,6 @@ def equilibria(
 
     Parameters
     ----------
-    goal : Goal
-    strands : Strands
     strand : Strand, optional
         Default rho = EA/E = 4 mm^2.
     known : sequence of (n, 3) arrays, mm, optional

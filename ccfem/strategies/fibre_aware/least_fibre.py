@@ -87,12 +87,10 @@ def least_fibre(
 
     Parameters
     ----------
-    strategy : Strategy
     layers : sequence of Layer
         All layers of the part.
     stress : StressField or WeightedCases
         The part without fibre, under the load that counts, or under several.
-    machine : Machine
     ratio : float
         Wanted stiffness over that of the part without fibre, above 1.
     strand : Strand, optional

@@ -54,11 +54,9 @@ def plan_cases(
 
     Parameters
     ----------
-    strategy : Strategy
     layers : sequence of Layer
         All layers of the part; flat ones for several load cases.
     stress : StressField or WeightedCases
-    machine : Machine
     wanted : float, mm, optional
         Fibre per layer, mean over the stack; default what the strategy lays by itself, of which
         nothing is taken off.
@@ -155,10 +153,6 @@ def plan_by_layers(
 
     Parameters
     ----------
-    strategy : Strategy
-    layers : sequence of Layer
-    cases : WeightedCases
-    machine : Machine
     length : float, mm, optional
         Per layer, met within 5 %; default the strategy's own.
     """

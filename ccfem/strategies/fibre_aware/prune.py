@@ -137,7 +137,6 @@ def taken_off(
 
     Parameters
     ----------
-    toolpaths : Toolpaths
     strands : Strands
         Of these toolpaths.
     value : (s,) array
@@ -162,7 +161,6 @@ def profiles(toolpaths: Toolpaths, strands: Strands, value: FloatArray) -> list[
 
     Parameters
     ----------
-    toolpaths : Toolpaths
     strands : Strands
         Of these toolpaths.
     value : (s,) array

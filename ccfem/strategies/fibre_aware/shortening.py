@@ -43,7 +43,6 @@ def shorten(
 
     Parameters
     ----------
-    toolpaths : Toolpaths
     along : sequence of Profile
         Of its fibre paths, from `profiles`.
     length : float, mm

@@ -94,7 +94,6 @@ class SmearedPart:
 
         Parameters
         ----------
-        stress : StressField
         frame : (3, 3) array
         backend : str, optional
             Preconditioner; default "superlu" for small systems, else "amg". Both are always

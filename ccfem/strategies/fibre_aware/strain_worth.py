@@ -19,12 +19,9 @@ class StrainWorth:
 
     Attributes
     ----------
-    squared : float
     displacement : (n, 3) array, mm
-    mixed : float
     adjoint : (n, 3) array, mm, optional
         None where only the squared strain counts.
-    peak : float
     most : float
         The largest strain of the fibre.
     """

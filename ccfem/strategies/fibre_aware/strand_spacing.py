@@ -65,7 +65,6 @@ class Spacing:
 
     Attributes
     ----------
-    lines : StrandLines
     width : float, mm
         Distance that strands keep from each other.
     inset : (P,) array, mm
@@ -164,7 +163,6 @@ def spacing(
 
     Parameters
     ----------
-    lines : StrandLines
     layers : sequence of Layer
         All on which there are strands.
     width : float, mm

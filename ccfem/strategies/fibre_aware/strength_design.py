@@ -64,8 +64,6 @@ class StrengthProblem:
 
     Attributes
     ----------
-    problem : StreamProblem
-    limits : Limits
     strength : float in [0, 1]
         The share w.
     judges : tuple of MatrixPeaks
@@ -252,7 +250,6 @@ def design_for_strength(
 
     Parameters
     ----------
-    problem : StreamProblem
     field : (n * c,) array
         Designed for stiffness alone, field after field.
     solutions : tuple of SmearedSolution

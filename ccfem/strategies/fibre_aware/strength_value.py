@@ -70,8 +70,6 @@ class Worth:
     ----------
     parts : tuple of Specimen
         The part without fibre under each load case.
-    strand : Strand
-    limits : Limits
     strength : float in [0, 1]
         Weight of the load at first failure; the stiffness has the rest.
     judges : tuple of MatrixPeaks
@@ -131,7 +129,6 @@ class Worth:
 
         Parameters
         ----------
-        strands : Strands
         found : sequence of Equilibrium
             Of the part with them, under each load case.
         normal : (3,) array, optional

@@ -460,7 +460,6 @@ class DensityAscent:
         ----------
         stretch : (m, k) array
             Strain along each direction at the present density, not negative.
-        merit : float
         Merit of the present density, which grows with the stiffness.
         """
         steps = self.steps + 1 if merit >= self.merit else 1

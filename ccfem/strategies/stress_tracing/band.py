@@ -84,8 +84,6 @@ def band(
 
     Parameters
     ----------
-    path : MainPath
-    frame : Frame
     crossing : bool, default True
         Whether an end in a joint continues beyond it; otherwise it stops in the joint's middle.
     turns : 2 floats, radians, default 0

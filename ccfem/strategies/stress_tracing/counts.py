@@ -44,7 +44,6 @@ def places(band: Band, pitch: float, section: Region) -> FloatArray:
 
     Parameters
     ----------
-    band : Band
     pitch : float, mm
         Wanted distance between neighbouring tracks.
     section : shapely (Multi)Polygon, mm

@@ -65,9 +65,6 @@ def main_paths(
 
     Parameters
     ----------
-    frame : Frame
-    stress : LayerStress
-    criterion : Criterion, optional
     width_ratio : float, default 2
         Largest ratio of the widest member of a main path to its narrowest, by their median widths:
         the same tracks fill both.

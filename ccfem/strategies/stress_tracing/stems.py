@@ -24,11 +24,6 @@ _ALIKE = 3.0
 def with_shared_stems(paths: Sequence[MainPath], frame: Frame) -> list[MainPath]:
     """Let main paths share members with a free end.
 
-    Parameters
-    ----------
-    paths : sequence of MainPath
-    frame : Frame
-
     Returns
     -------
     list of MainPath

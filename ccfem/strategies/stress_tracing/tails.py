@@ -42,8 +42,6 @@ def tail_turns(
 
     Parameters
     ----------
-    paths : sequence of MainPath
-    frame : Frame
     pitch : float, mm
         Distance between neighbouring tracks.
     section : shapely (Multi)Polygon, mm

@@ -17,7 +17,6 @@ def joint_loops(layer: Layer, names: Iterable[str]) -> dict[str, IntArray]:
 
     Parameters
     ----------
-    layer : Layer
     names : iterable of str
         Patches; those that the layer does not meet have no loop.
 

@@ -19,7 +19,6 @@ class Piece:
 
     Attributes
     ----------
-    layer : Layer
     mesh : TriangleMesh
         Points of the layer keep their numbers.
     loops : tuple of int arrays
@@ -83,7 +82,6 @@ def pieces_with_joints(layer: Layer, names: Sequence[str]) -> Iterator[Piece]:
 
     Parameters
     ----------
-    layer : Layer
     names : sequence of str
         Patches of the joints.
     """

@@ -55,7 +55,6 @@ def insert(mesh: TriangleMesh, path: EdgePath) -> tuple[TriangleMesh, IntArray]:
 
     Parameters
     ----------
-    mesh : TriangleMesh
     path : EdgePath
         Consecutive edges belong to one triangle, and no triangle is crossed twice.
 

@@ -8,7 +8,7 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh import box_mesh
 from ccfem.body.mesh.check import check_mesh
 from ccfem.body.meshing import extrude, triangulate
-from ccfem.body.meshing.cache import kept
+from ccfem.body.meshing.meshed_body import kept
 
 
 def smallest_angles(points, triangles):
@@ -214,7 +214,7 @@ def test_what_is_remembered_is_neither_shared_nor_mixed_up():
 def test_the_cache_removes_meshes_of_its_own_names_alone(tmp_path, monkeypatch):
     """Where a user names a folder with other files in it."""
     monkeypatch.setenv("CCFEM_CACHE", str(tmp_path))
-    monkeypatch.setattr("ccfem.body.meshing.cache._MOST", 2)
+    monkeypatch.setattr("ccfem.body.meshing.meshed_body._MOST", 2)
     mine = {f"wing{k}.npz" for k in range(4)}
     for name in mine:
         (tmp_path / name).write_bytes(b"mine")

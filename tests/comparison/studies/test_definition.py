@@ -5,8 +5,7 @@ import ccfem
 from ccfem.base.errors import InputError
 from ccfem.comparison.front import on_front
 from ccfem.comparison.studies.fingerprint import fingerprint
-from ccfem.comparison.studies.jobs import jobs_of
-from ccfem.comparison.studies.sweep import variants
+from ccfem.comparison.studies.jobs import jobs_of, variants
 from ccfem.comparison.studies.transport import packed, unpacked
 
 

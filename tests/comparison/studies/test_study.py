@@ -15,7 +15,7 @@ import pytest
 import ccfem
 from ccfem.base.errors import InputError
 from ccfem.comparison.studies.jobs import Part
-from ccfem.comparison.studies.store import opened
+from ccfem.comparison.studies.running import opened
 from ccfem.comparison.studies.transport import unpacked
 from ccfem.comparison.studies.work import part_bytes, solve_part
 from ccfem.comparison.studies.worker import _stress

@@ -6,13 +6,11 @@ import scipy.sparse as sp
 from scipy.linalg import eigh
 
 from ccfem.body.mesh.box import box_mesh
-from ccfem.fem.elasticity.aggregation import aggregates
 from ccfem.fem.elasticity.assembly import assemble
 from ccfem.fem.elasticity.conjugate_gradient import highest_eigenvalue
-from ccfem.fem.elasticity.galerkin import galerkin, smoothed
 from ccfem.fem.elasticity.gauss_seidel import GaussSeidel
 from ccfem.fem.elasticity.held import rigid_modes
-from ccfem.fem.elasticity.quick_aggregation import quick_aggregation
+from ccfem.fem.elasticity.quick_aggregation import aggregates, galerkin, quick_aggregation, smoothed
 from ccfem.fem.materials import isotropic
 
 

@@ -19,8 +19,7 @@ from ccfem.fem.elasticity import (
 )
 from ccfem.fem.materials import isotropic, plane_stress
 from ccfem.fem.plates import PlaneMesh, PlaneProblem, raster_mesh, rotate_plane, stack_plane
-from ccfem.fem.plates.assembly import PlaneElements
-from ccfem.fem.plates.solve import prepare, solve_plane
+from ccfem.fem.plates.solve import PlaneElements, prepare, solve_plane
 
 C_FRAM = (73200.0, 4100.0, 0.33, 2200.0)
 STEEL = plane_stress(200000.0, 200000.0, 0.3, 200000.0 / 2.6)

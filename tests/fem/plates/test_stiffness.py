@@ -5,8 +5,8 @@ from hypothesis import strategies as st
 
 from ccfem.base.errors import InputError
 from ccfem.fem.materials import plane_stress
-from ccfem.fem.plates.assembly import PlaneElements
 from ccfem.fem.plates.raster_mesh import raster_mesh
+from ccfem.fem.plates.solve import PlaneElements
 from ccfem.fem.plates.stiffness import (
     rotate_plane,
     stack_plane,

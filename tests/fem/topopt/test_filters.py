@@ -3,7 +3,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ccfem.fem.topopt.filters import ConeFilter
-from ccfem.fem.topopt.optimality_criteria import optimality_criteria
+from ccfem.fem.topopt.iteration import optimality_criteria
 
 
 def dense(centres, volumes, radius):

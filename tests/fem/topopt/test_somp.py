@@ -9,7 +9,7 @@ from ccfem.fem.materials import plane_stress
 from ccfem.fem.plates import PlaneProblem, raster_mesh, rotate_plane, solve_plane
 from ccfem.fem.topopt import Compliance, Simp, Somp
 from ccfem.fem.topopt.material_axes import harmonics
-from ccfem.fem.topopt.oriented_compliance import OrientedCompliance
+from ccfem.fem.topopt.somp import OrientedCompliance
 
 FIBRE = plane_stress(50000.0, 4000.0, 0.3, 2500.0)
 WANG = plane_stress(18300.0, 19800.0, 0.17, 5150.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from ccfem.paths.fields.crease import orient_along
+from ccfem.paths.fields.directed import orient_along
 from ccfem.paths.fields.layer_elements import Surface
 
 HOLE, RIM = 5.0, 20.0

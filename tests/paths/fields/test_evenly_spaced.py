@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from ccfem.base.errors import InputError
 from ccfem.geometry.polylines import pack
-from ccfem.paths.fields.evenly_spaced import evenly_spaced_streamlines
+from ccfem.strategies.streamline import evenly_spaced_streamlines
 
 
 def sheet(across, along, place):

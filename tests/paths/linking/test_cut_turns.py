@@ -9,8 +9,8 @@ import shapely
 from ccfem.geometry.even_steps import OFF, even_steps
 from ccfem.geometry.polylines import along_line, is_closed, line_length
 from ccfem.geometry.tight_bends import tight_bends, tight_samples
-from ccfem.paths.linking.cut_turns import cut_turns
 from ccfem.paths.linking.joining import Joined
+from ccfem.paths.planning.infill import cut_turns
 
 RADIUS, WIDTH, LEAST = 3.85, 1.0, 42.0
 

@@ -7,7 +7,7 @@ import pytest
 
 from ccfem.base.errors import InputError
 from ccfem.paths.linking.exchanges import Clusters, improved_order, strands
-from ccfem.paths.linking.ordering import costs_between_ends, order_clusters
+from ccfem.paths.linking.single_path import costs_between_ends, order_clusters
 
 
 def distances(seed: int, count: int) -> np.ndarray:

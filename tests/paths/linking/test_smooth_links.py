@@ -5,7 +5,7 @@ import shapely
 
 from ccfem.geometry.polylines import line_length
 from ccfem.paths.linking.joining import link_ends
-from ccfem.paths.linking.smooth_links import smooth_links
+from ccfem.paths.linking.possible_links import smooth_links
 
 RADIUS, WIDTH = 3.85, 1.0
 PLATE = shapely.box(-10.0, -30.0, 110.0, 30.0)

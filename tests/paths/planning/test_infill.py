@@ -14,7 +14,7 @@ from ccfem.fem.elasticity.solve import solve
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning import plan
 from ccfem.paths.planning.infill import Infill, long_enough
-from ccfem.paths.planning.steps import in_even_steps
+from ccfem.paths.planning.plan import in_even_steps
 from ccfem.paths.raster.patterns import grid_regions
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer_stress import stress_on

@@ -4,7 +4,6 @@ from scipy import ndimage
 from scipy.spatial.distance import cdist
 
 from ccfem.paths.raster.bands import bands, depth
-from ccfem.paths.raster.guides import segment_seeds
 from ccfem.paths.raster.patterns import (
     GUIDE,
     INFILL,
@@ -18,6 +17,7 @@ from ccfem.paths.raster.patterns import (
     rings_round,
     stress_regions,
 )
+from ccfem.strategies.mps import segment_seeds
 
 CROSS = ndimage.generate_binary_structure(2, 1)
 

@@ -4,8 +4,7 @@ from scipy import ndimage
 
 from ccfem.paths.raster.bands import bands
 from ccfem.paths.raster.bitmap import NEIGHBOURS
-from ccfem.paths.raster.simplify import corners
-from ccfem.paths.raster.tracing import trace
+from ccfem.paths.raster.raster_plan import corners, trace
 
 
 def free_links(mask):

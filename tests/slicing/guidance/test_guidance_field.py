@@ -10,7 +10,7 @@ from ccfem.body.mesh import box_mesh
 from ccfem.fem.elasticity import cell_gradients
 from ccfem.slicing.guidance import Joint, Weights, field_quality, guidance_field, joint_of
 from ccfem.slicing.guidance.energies import alignment_energy, gradient_energy, smoothness_energy
-from ccfem.slicing.guidance.equal_values import equal_value_energy, slabs
+from ccfem.slicing.guidance.guidance_field import equal_value_energy, slabs
 
 WEIGHTS = Weights(stress=1.0, smoothness=0.01, joints=1.0, length=3.0)
 

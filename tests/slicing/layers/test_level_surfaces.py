@@ -8,9 +8,8 @@ from scipy.integrate import dblquad
 from ccfem.body.mesh import box_mesh
 from ccfem.body.mesh.patches import Cylinder, patches_from_rules
 from ccfem.body.meshing import extrude
-from ccfem.slicing.layers.cleaning import clean
 from ccfem.slicing.layers.level_cut import border_edges
-from ccfem.slicing.layers.level_surfaces import level_surfaces
+from ccfem.slicing.layers.level_surfaces import clean, level_surfaces
 
 RADIUS = 40.0
 CENTRE = np.array([0.0, 0.0, RADIUS])

@@ -10,12 +10,12 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh import box_mesh
 from ccfem.fem.elasticity.part_stress import GivenStress
 from ccfem.machine import Machine
-from ccfem.slicing.guidance.across import across_layers, best_plane
 from ccfem.slicing.guidance.height_field import height_field
 from ccfem.slicing.guidance.normal_field import normal_field
 from ccfem.slicing.guidance.stress_regions import StressRegions, stress_regions
 from ccfem.slicing.layers.sublayers import layers_within
 from ccfem.slicing.slicers import LoadOriented, create
+from ccfem.slicing.slicers.load_oriented import across_layers, best_plane
 
 UP = np.array([0.0, 0.0, 1.0])
 SIZE = (24.0, 8.0, 6.0)

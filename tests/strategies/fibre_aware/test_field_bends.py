@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ccfem.strategies.fibre_aware.field_bends import FieldBends
 from ccfem.strategies.fibre_aware.spline_grid import SplineGrid
+from ccfem.strategies.fibre_aware.stream_design import FieldBends
 
 ANGLE = 0.4
 

@@ -13,7 +13,7 @@ from ccfem.machine.machine import Machine
 from ccfem.paths.planning.plan import plan
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.slicers.planar import Planar
-from ccfem.strategies.fibre_aware.slide_in import lines_to_slide_in, slid_in
+from ccfem.strategies.fibre_aware.stream_paths import lines_to_slide_in, slid_in
 from ccfem.strategies.stream_function import StreamFunction
 
 MACHINE = Machine()

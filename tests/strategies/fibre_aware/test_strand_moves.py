@@ -19,8 +19,7 @@ from ccfem.strategies import create
 from ccfem.strategies.fibre_aware.judges import Goal, stiffness_judge
 from ccfem.strategies.fibre_aware.strain_worth import StrainWorth
 from ccfem.strategies.fibre_aware.strand_lines import strand_lines
-from ccfem.strategies.fibre_aware.strand_moves import moved
-from ccfem.strategies.fibre_aware.strand_pull import fibre_energy, plane_strain
+from ccfem.strategies.fibre_aware.strand_moves import fibre_energy, moved, plane_strain
 from ccfem.strategies.fibre_aware.strand_spacing import spacing
 
 MACHINE = Machine()

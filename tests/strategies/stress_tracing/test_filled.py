@@ -6,8 +6,7 @@ import shapely
 import shapely.affinity
 
 from ccfem.geometry.symmetry import mirror_lines
-from ccfem.strategies.stress_tracing.blobs import blobs, rest_of
-from ccfem.strategies.stress_tracing.symmetric import made_symmetric
+from ccfem.strategies.svt import blobs, made_symmetric, rest_of
 
 
 def test_an_open_place_is_filled_and_keeps_off_the_strands():

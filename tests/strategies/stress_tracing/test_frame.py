@@ -5,7 +5,7 @@ from shapely import affinity
 
 from ccfem.strategies.stress_tracing.frame import FREE, ends_at, frame
 from ccfem.strategies.stress_tracing.main_paths import main_paths
-from ccfem.strategies.stress_tracing.walk import walk
+from ccfem.strategies.svt import walk
 
 STRIP = shapely.box(0, 0, 60, 9)
 CROSS = shapely.union_all(

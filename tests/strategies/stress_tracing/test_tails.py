@@ -9,12 +9,12 @@ from ccfem.fem.elasticity import Force, Problem, Support, solve
 from ccfem.fem.materials import isotropic
 from ccfem.slicing.layers.layer_stress import stress_on
 from ccfem.slicing.slicers.planar import Planar
-from ccfem.strategies.stress_tracing.alike import alike, apart
 from ccfem.strategies.stress_tracing.band import band, extension
 from ccfem.strategies.stress_tracing.frame import FREE, Frame, Member
 from ccfem.strategies.stress_tracing.main_paths import MainPath
 from ccfem.strategies.stress_tracing.stems import with_shared_stems
 from ccfem.strategies.stress_tracing.tails import tail_turns
+from ccfem.strategies.svt import alike, apart
 
 
 def straight(start, end, width, ends):

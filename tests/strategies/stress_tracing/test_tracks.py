@@ -3,7 +3,7 @@ import pytest
 import shapely
 
 from ccfem.geometry.polylines import turning_angles
-from ccfem.strategies.stress_tracing import turning
+from ccfem.strategies.stress_tracing import tracks as turning
 from ccfem.strategies.stress_tracing.band import Band, band
 from ccfem.strategies.stress_tracing.frame import FREE, Frame, Member, frame
 from ccfem.strategies.stress_tracing.main_paths import MainPath, main_paths

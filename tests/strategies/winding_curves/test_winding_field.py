@@ -10,11 +10,16 @@ from ccfem.body.meshing import triangulate
 from ccfem.geometry.isocontours import isocontours
 from ccfem.geometry.measures import connected
 from ccfem.paths.fields.layer_elements import Surface
-from ccfem.strategies.winding_curves.annulus import annulus_field, gradient_jumps
-from ccfem.strategies.winding_curves.bends import limit_bends
-from ccfem.strategies.winding_curves.even_levels import evened, steep
+from ccfem.strategies.winding import (
+    PaperWeights,
+    annulus_field,
+    evened,
+    gradient_jumps,
+    limit_bends,
+    paper_field,
+    steep,
+)
 from ccfem.strategies.winding_curves.joining_curves import join
-from ccfem.strategies.winding_curves.paper_field import PaperWeights, paper_field
 from ccfem.strategies.winding_curves.triangle_mesh import TriangleMesh
 
 INNER, OUTER = 5.0, 20.0

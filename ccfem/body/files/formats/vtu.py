@@ -145,8 +145,6 @@ def write(
 
     Parameters
     ----------
-    mesh : TetMesh
-    path : path
     point, cell, field : mapping of name to array, optional
         Data of points, of cells, and of the whole.
     components : mapping of name to names, optional

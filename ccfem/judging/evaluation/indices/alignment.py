@@ -121,7 +121,6 @@ def sample_alignment(paths: PlanePaths, stress: LayerStress, step: float) -> Ali
 
     Parameters
     ----------
-    paths : PlanePaths
     stress : LayerStress
         Stress on the same layer; its nodal values are used.
     step : float, mm

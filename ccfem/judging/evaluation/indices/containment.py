@@ -74,7 +74,6 @@ def sample_containment(paths: PlanePaths, step: float = 1.0) -> ContainmentSampl
 
     Parameters
     ----------
-    paths : PlanePaths
     step : float, mm
         Distance of the samples along the fibre.
     """

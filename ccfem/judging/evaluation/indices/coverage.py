@@ -107,7 +107,6 @@ def sample_coverage(paths: PlanePaths, stress: LayerStress, width: float) -> Cov
 
     Parameters
     ----------
-    paths : PlanePaths
     stress : LayerStress
         Stress on the same layer; its nodal values are used, interpolated in the triangles.
     width : float, mm

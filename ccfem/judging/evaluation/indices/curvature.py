@@ -99,7 +99,6 @@ def sample_curvature(paths: PlanePaths, step: float) -> CurvatureSamples:
 
     Parameters
     ----------
-    paths : PlanePaths
     step : float, mm
         Wanted step h of the resampling; a path of length L gets ``max(1, round(L / h))`` equal
         steps. On a circle of radius R the samples are 1 / R. Closed paths are also sampled where

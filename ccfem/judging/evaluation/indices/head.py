@@ -79,10 +79,8 @@ def sample_head(
     ----------
     fibre : Toolpaths
         On this layer.
-    layer : Layer
     stack : Printed, optional
         What `printed` makes of all layers.
-    machine : Machine
     """
     if stack is None or layer.flat is not None or not len(fibre):
         length = fibre.lengths

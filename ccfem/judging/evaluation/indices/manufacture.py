@@ -107,10 +107,8 @@ def sample_manufacture(
 
     Parameters
     ----------
-    paths : PlanePaths
     toolpaths : Toolpaths
         Every path of the same layer, of all kinds, in the order of printing.
-    machine : Machine
     """
     drawn = toolpaths.select(toolpaths.kind != TRAVEL)
     starts, ends = drawn.points[drawn.offsets[:-1]], drawn.points[drawn.offsets[1:] - 1]

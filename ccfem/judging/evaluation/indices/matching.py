@@ -113,7 +113,6 @@ def matching_rate(
 
     Parameters
     ----------
-    paths : Toolpaths
     stresses : sequence of LayerStress
         Of the layers that count, one or more.
     reading : {"path", "energy", "stress_nearest", "stress_best"}

@@ -136,8 +136,6 @@ def sample_room(
 
     Parameters
     ----------
-    paths : PlanePaths
-    machine : Machine
     below : Layer, optional
         The layer under it; by default it lies on the bed.
     late : int

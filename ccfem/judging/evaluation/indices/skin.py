@@ -63,7 +63,6 @@ def sample_skin(fibre: Toolpaths, layer: Layer, mesh: TetMesh, machine: Machine)
     ----------
     fibre : Toolpaths
         On this layer.
-    layer : Layer
     mesh : TetMesh
         Of the part.
     machine : Machine

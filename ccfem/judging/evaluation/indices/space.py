@@ -128,7 +128,6 @@ def sample_space(fibre: Toolpaths, layer: Layer, stress: PartStress, step: float
     ----------
     fibre : Toolpaths
         On this layer, without links outside the section or over a void.
-    layer : Layer
     stress : PartStress
         Its nodal values are used for the fibre, those of the cells for the layer.
     step : float, mm

@@ -57,7 +57,6 @@ def sample_spacing(paths: PlanePaths, width: float) -> SpacingSamples:
 
     Parameters
     ----------
-    paths : PlanePaths
     width : float, mm
         Fibre width W. Samples lie 0.2 W apart. A path is its own neighbour from 5 W of arc on
         (round a closed path the shorter way). The search ends at 5 W: a lone strand has the spacing
