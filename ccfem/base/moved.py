@@ -15,14 +15,118 @@ _INDICES = (
     *("stiffness_alignment", "tension_across"),
 )
 
+_FOLDED = {
+    "body.mesh.check": "body.mesh.hanging",
+    "body.meshing.meshed_body": "body.meshing.cache",
+    "cases.inspection.part_check": "cases.inspection.cost",
+    "cases.optimised": "cases.passive",
+    "cases.part_file": "cases.before_meshing cases.part_regions cases.part_slicing",
+    "cases.part_keys": "cases.part_body",
+    "cli.commands": "cli.in_python cli.papers_again cli.study_file cli.supporting",
+    "comparison.files": "comparison.record",
+    "comparison.report.html_report": (
+        "comparison.report.filling comparison.report.part_view comparison.report.report_tables"
+    ),
+    "comparison.report.layer_view": "comparison.report.path_view",
+    "comparison.result": "comparison.summary",
+    "comparison.studies.jobs": "comparison.studies.sweep",
+    "comparison.studies.running": (
+        "comparison.studies.cluster comparison.studies.page comparison.studies.processes "
+        "comparison.studies.store"
+    ),
+    "fem.elasticity.direct": "fem.elasticity.supernodes",
+    "fem.elasticity.error_estimate": "fem.elasticity.patch_recovery",
+    "fem.elasticity.quick_aggregation": "fem.elasticity.aggregation fem.elasticity.galerkin",
+    "fem.elasticity.stress_field": "fem.elasticity.probe",
+    "fem.elasticity.supports": "fem.elasticity.frames",
+    "fem.plates.solve": "fem.plates.assembly",
+    "fem.stress_files.stress_file": "fem.stress_files.frd fem.stress_files.stress_table",
+    "fem.topopt.compliance": "fem.topopt.equations",
+    "fem.topopt.iteration": "fem.topopt.optimality_criteria",
+    "fem.topopt.part": "fem.topopt.plate_part fem.topopt.walls",
+    "fem.topopt.sheet_part": "fem.topopt.sheet_mesh fem.topopt.short_edges",
+    "fem.topopt.somp": "fem.topopt.oriented_compliance",
+    "fem.topopt.tet_part": "fem.topopt.cut fem.topopt.cut_smoothing",
+    "geometry.beads": "geometry.band_overlap",
+    "geometry.parallel_strands": "geometry.free_ends",
+    "judging.virtual_testing.strands": "judging.virtual_testing.cut_steps",
+    "papers.chen_2021.contents": (
+        "papers.chen_2021.claims papers.chen_2021.figures papers.chen_2021.tables "
+        "papers.chen_2021.whole"
+    ),
+    "papers.chen_2021.virtual_test": "papers.chen_2021.oriented",
+    "papers.fang_2024.contents": (
+        "papers.fang_2024.claims papers.fang_2024.field_study papers.fang_2024.targets "
+        "papers.fang_2024.where_layers_open papers.fang_2024.whole"
+    ),
+    "papers.kipping_2023.contents": (
+        "papers.kipping_2023.claims papers.kipping_2023.fiso_shapes "
+        "papers.kipping_2023.strength papers.kipping_2023.trade papers.kipping_2023.whole"
+    ),
+    "papers.plocher_2022.contents": (
+        "papers.plocher_2022.claims papers.plocher_2022.tables papers.plocher_2022.variants "
+        "papers.plocher_2022.whole"
+    ),
+    "papers.plocher_2022.figures": (
+        "papers.plocher_2022.benchmark_figures papers.plocher_2022.drawing"
+    ),
+    "papers.plocher_2022.plates": "papers.plocher_2022.three_point_bending",
+    "papers.wang_2021.contents": (
+        "papers.wang_2021.claims papers.wang_2021.tables papers.wang_2021.variants "
+        "papers.wang_2021.whole"
+    ),
+    "paths.fields.directed": "paths.fields.crease",
+    "paths.linking.possible_links": "paths.linking.smooth_links",
+    "paths.linking.single_path": "paths.linking.ordering paths.linking.ring_routes",
+    "paths.placement.fibre_places": "paths.placement.cut_layer",
+    "paths.planning.equal_fibre": "paths.planning.dial",
+    "paths.planning.infill": "paths.linking.cut_turns",
+    "paths.planning.mixing": "paths.planning.cutting",
+    "paths.planning.plan": "paths.planning.steps",
+    "paths.raster.raster_plan": "paths.raster.simplify paths.raster.tracing paths.raster.walking",
+    "printing.curved_plan": "printing.curved_layers printing.head_lean",
+    "printing.export.gcode": "printing.export.gcode_head",
+    "printing.matrix_lines": "printing.gap_lines",
+    "printing.part_moves": "printing.preheating printing.strand_speed printing.tools",
+    "printing.print_plan": "printing.pads printing.stacks printing.turns",
+    "slicing.guidance.guidance_field": "slicing.guidance.equal_values",
+    "slicing.layers.level_surfaces": "slicing.layers.cleaning",
+    "slicing.principal_lines.trace": "slicing.principal_lines.cell_walk",
+    "slicing.slicers.load_oriented": "slicing.guidance.across",
+    "slicing.slicers.surfaces": "slicing.layers.foreign",
+    "strategies.fibre_aware.strand_moves": "strategies.fibre_aware.strand_pull",
+    "strategies.fibre_aware.stream_design": "strategies.fibre_aware.field_bends",
+    "strategies.fibre_aware.stream_paths": "strategies.fibre_aware.slide_in",
+    "strategies.fiso": "geometry.contour_tree paths.linking.first_in",
+    "strategies.isocurve": "paths.linking.spiral",
+    "strategies.mat": "geometry.medial_fill",
+    "strategies.mps": "geometry.abutting geometry.guide_fit paths.raster.guides",
+    "strategies.stream_function": (
+        "strategies.fibre_aware.design_lengths strategies.fibre_aware.stream_start"
+    ),
+    "strategies.streamline": "paths.fields.evenly_spaced",
+    "strategies.stress_tracing.tracks": "strategies.stress_tracing.turning",
+    "strategies.svt": (
+        "strategies.stress_tracing.alike strategies.stress_tracing.blobs "
+        "strategies.stress_tracing.symmetric strategies.stress_tracing.walk"
+    ),
+    "strategies.winding": (
+        "strategies.winding_curves.annulus strategies.winding_curves.bends "
+        "strategies.winding_curves.even_levels strategies.winding_curves.paper_field"
+    ),
+    "strategies.winding_curves.joining_curves": "strategies.winding_curves.straighten",
+}
+"""Modules that became sections of another one, by that one."""
+
 MOVED = {
+    **{part: whole for whole, parts in _FOLDED.items() for part in parts.split()},
     "arrays": "base.arrays",
     "checks": "base.checks",
     "comparison.charts": "comparison.report.charts",
     "comparison.layer_view": "comparison.report.layer_view",
-    "comparison.part_view": "comparison.report.part_view",
-    "comparison.path_view": "comparison.report.path_view",
-    "comparison.report_tables": "comparison.report.report_tables",
+    "comparison.part_view": "comparison.report.html_report",
+    "comparison.path_view": "comparison.report.layer_view",
+    "comparison.report_tables": "comparison.report.html_report",
     "display": "base.display",
     "elasticity": "fem.elasticity",
     "errors": "base.errors",
@@ -36,11 +140,11 @@ MOVED = {
     "io": "body.files",
     "io.csv_table": "base.csv_table",
     "io.folder": "base.folder",
-    "io.frd": "fem.stress_files.frd",
+    "io.frd": "fem.stress_files.stress_file",
     "io.result_folder": "base.result_folder",
     "io.stress_data": "fem.stress_files.stress_data",
     "io.stress_file": "fem.stress_files.stress_file",
-    "io.stress_table": "fem.stress_files.stress_table",
+    "io.stress_table": "fem.stress_files.stress_file",
     "io.toml": "base.toml",
     "io.vtu_tensors": "fem.stress_files.vtu_tensors",
     "io.whole": "base.whole",
