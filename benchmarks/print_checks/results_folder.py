@@ -1,6 +1,6 @@
 """Hold what a folder of results says against its G-code, and every strand against the rules.
 
-    python -m benchmarks.print_checks.results_folder FOLDER PART.vtu [FOLDER PART.vtu ...]
+    python -m benchmarks.print_checks.results_folder FOLDER PART.vtu [...] [--pictures DIR]
 
 A folder is one of ``ccfem plan ... --gcode --out FOLDER``, with flat layers; PART.vtu is the part's
 mesh, as of ``ccfem solve PART -o PART.vtu``. Only files are read: the strands of the G-code by a
@@ -309,9 +309,55 @@ def _numbers(said: Said) -> str:
     )
 
 
+def draw(folder: Folder, file: Path) -> None:
+    """Draw the layer with the most folds: red what folds, magenta crossings, blue what is outside.
+
+    Beside it, the four folds that turn most, with the strand of each.
+    """
+    from matplotlib.figure import Figure
+
+    layers: dict[float, list[Measured]] = {}
+    for strand in folder.printed:
+        layers.setdefault(round(float(strand.points[0, 2]), 3), []).append(strand)
+    level = max(layers, key=lambda z: sum(len(s.folds) + len(s.crossings) for s in layers[z]))
+    strands = layers[level]
+    worst = sorted((s for s in strands if len(s.folds)), key=lambda s: -s.turn)[:4]
+    figure = Figure(figsize=(20, 10), layout="constrained")
+    grid = figure.add_gridspec(2, 4)
+    axes = [figure.add_subplot(grid[:, :2])]
+    axes += [figure.add_subplot(grid[k // 2, 2 + k % 2]) for k in range(len(worst))]
+    for axis, shown in zip(axes, [None, *worst], strict=True):
+        for ring in shapely.get_rings(shapely.get_parts(folder.section(round(level, 4)))):
+            axis.plot(*shapely.get_coordinates(ring).T, color="black", linewidth=0.8)
+        for strand in strands:
+            outside = strand.outside > folder.rules.outside
+            axis.plot(*strand.points[:, :2].T, color="#3070c0" if outside else "#a0a0a0", lw=0.8)
+        for strand in strands if shown is None else [shown]:
+            if shown is not None:
+                axis.plot(*strand.points[:, :2].T, ".-", color="black", lw=1.0, ms=2.0)
+            for begin, end in strand.folds:
+                part = strand.at(np.linspace(begin, end, 30))
+                axis.plot(*part[:, :2].T, "o-", color="#d01020", lw=2.0, ms=3.0)
+            axis.plot(*strand.crossings.T, "x", color="#c000c0")
+        if shown is not None:
+            x, y, _ = shown.at([shown.folds[0].mean()])[0]
+            axis.set(xlim=(x - 8.0, x + 8.0), ylim=(y - 8.0, y + 8.0))
+            axis.set_title(
+                f"{shown.turn:.0f} degrees, free {shown.free:.1f} of {shown.length:.1f} mm"
+            )
+        axis.set_aspect("equal")
+    axes[0].set_title(f"{folder.path.name}: {level:g} mm")
+    figure.savefig(file, dpi=70)
+
+
 def main(arguments: Iterable[str]) -> int:
     """Print what is found of each folder; how many say other than their file."""
-    names, wrong = list(arguments), 0
+    names, wrong, pictures = list(arguments), 0, None
+    if "--pictures" in names:
+        at = names.index("--pictures")
+        pictures = Path(names[at + 1])
+        pictures.mkdir(parents=True, exist_ok=True)
+        names = names[:at] + names[at + 2 :]
     for path, part in zip(names[::2], names[1::2], strict=True):
         folder = Folder(Path(path), Path(part))
         (run,) = (r for r in folder.json["strategies"] if r["name"] == folder.strategy)
@@ -326,7 +372,9 @@ def main(arguments: Iterable[str]) -> int:
             f"in the file alone, {len(folder.planned) - len(pairs)} in the waypoints alone"
         )
         for name, strands in (("file", folder.printed), ("paths", folder.planned)):
-            print(f"  {name:6}{figures(strands, folder.rules)}")
+            print(f"  {name:6}{figures(strands, folder.rules)}", flush=True)
+        if pictures is not None:
+            draw(folder, pictures / f"{Path(path).name}.png")
     return wrong
 
 

@@ -19,7 +19,8 @@ section at the height of the strand.
 a width from any end: what ends on the side of another strand does not cross it.
 
 *Over.* Length along which the axis of another strand, or of this one farther along, is nearer than
-half a width; *close*: nearer than nine tenths. *Stack*: most strands at one place of the axis.
+half a width; *close*: nearer than nine tenths, which no spacing of a width explains. *Stack*: most
+strands at one place of the axis. A crossing explains two widths of lying over, and four of close.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,7 +33,7 @@ from scipy.spatial import cKDTree
 
 __all__ = ["Measured", "Rules", "broken", "folds", "largest_turn", "measure"]
 
-_LATTICE = 0.005
+_LATTICE = 0.002
 """Corners nearer to a straight line than this are those of rounding, mm."""
 _SLACK = np.radians(0.5)
 """A right angle of rounded numbers is no fold."""
@@ -52,6 +53,8 @@ class Rules:
         Largest turn within the window.
     outside : float
         Largest share of a strand's width outside the part.
+    close : float
+        Largest share of its length, crossings aside, that is close to other fibre.
     held : float, mm
         Least length that is held before a cut and after a start.
     """
@@ -62,6 +65,7 @@ class Rules:
     tail: float = 42.0
     turn: float = 90.0
     outside: float = 0.05
+    close: float = 0.1
     held: float = 20.0
 
     @property
@@ -316,9 +320,12 @@ def broken(strand: Measured, rules: Rules) -> dict[str, str]:
     if len(strand.crossings):
         x, y = strand.crossings[0]
         wrong["crossings"] = f"crosses {len(strand.crossings)} times, as at ({x:.1f}, {y:.1f}) mm"
-    # A crossing at a right angle lies over by a width.
-    if strand.over > 2.0 * rules.width * (1 + len(strand.crossings)):
+    # A crossing at a right angle lies over by a width, one at 30 degrees by two.
+    explained = 2.0 * rules.width * (1 + len(strand.crossings))
+    if strand.over > explained:
         wrong["over"] = f"lies over fibre along {strand.over:.1f} mm"
+    elif strand.close > rules.close * strand.length + 2.0 * explained:
+        wrong["over"] = f"lies close to fibre along {strand.close:.1f} mm"
     if strand.before_cut < rules.held - 0.01:
         wrong["cut"] = f"is cut with {max(strand.before_cut, 0.0):.1f} mm held"
     if strand.after_start < rules.held - 0.01:
