@@ -119,9 +119,10 @@ class Folder:
     @property
     def firmware(self) -> str:
         """Name by which `printer` knows the machine: the one whose words the file has."""
-        start = " ".join(self.machine.gcode.start + self.machine.gcode.cut)
+        words = str(vars(self.machine.gcode))
         marks = {"M1001": "aura_like", "SET_SERVO": "klipper", "M568": "reprap_duet"}
-        name = next((name for mark, name in marks.items() if mark in start), "marlin_two_tools")
+        marks |= {"M116": "reprap_duet", "M532": "aura_like"}
+        name = next((name for mark, name in marks.items() if mark in words), "marlin_two_tools")
         assert name in KNOWN
         return name
 
