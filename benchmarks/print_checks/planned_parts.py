@@ -4,9 +4,9 @@
 
 A row a plan; what is in FOLDER already is not planned again. Parts are cases, or the part files of
 `docs/how_to/your_part.md`; `LAYERS` says how many layers each has by default. The columns: what
-ccfem says of printing it; strands, minutes of laying and grams of the table and of the file; strands
-of the file that are none of the written paths; strands that break each rule. A row is *wrong* where
-the table says other than the file, or where ccfem calls printable what breaks a rule.
+ccfem says of printing it; strands, minutes of laying and grams of the table and of the file;
+strands of the file that are none of the written paths; strands that break each rule. A row is
+*wrong* where the table says other than the file, or where ccfem calls printable what breaks a rule.
 """
 
 import re

@@ -112,12 +112,12 @@ def _rows(heights: Sequence[float]) -> list[Line]:
     return [_cut([(0.0, y), (LENGTH, y)]) for y in heights]
 
 
-def _woven(top: float, depth: float = 2.0, angle: float = 17.5) -> list[Line]:
-    """Three pairs of strands, each up and down against the other within a depth."""
+def _woven(top: float, count: int = 6, depth: float = 2.0, angle: float = 17.5) -> list[Line]:
+    """Pairs of strands, each up and down against the other within a depth."""
     half = depth / np.tan(np.radians(angle))
     x = half * np.arange(40.0)
     strands = []
-    for number in range(6):
+    for number in range(count):
         down = (np.arange(40) + number) % 2
         strands.append(_cut(np.column_stack([x, top - (number // 2) * depth - depth * down])))
     return strands
@@ -178,10 +178,9 @@ def sets() -> dict[str, list[Line]]:
     half, low = TOP - 0.5, TOP - 0.5 - np.arange(6.0)
     back = [_cut([(0.0, y), (49.0, y), (0.0, y)]) for y in low]
     mixed = [
-        *_rows(low[:3]),
-        _cut([(0.0, TOP), (LENGTH, TOP)]),
-        _serpentines(47.5, low[3])[0],
-        _woven(low[0], 6.0)[1],
+        *_rows(TOP - np.arange(4.0)),
+        _serpentines(47.5, TOP - 4.0)[0],
+        _woven(TOP - 4.0)[1],
     ]
     return {
         "honest_rows": _rows(low),
@@ -192,7 +191,7 @@ def sets() -> dict[str, list[Line]]:
         "close_and_outside": _rows(TOP - 0.1 - 0.8 * np.arange(6.0)),
         "out_and_back": back,
         "hairpins_on_border": _serpentines(15.5, TOP),
-        "woven_on_border": _woven(TOP),
+        "woven_and_outside": [*_rows([TOP, TOP - 1.0]), *_woven(TOP - 2.0, 4)],
         "bulbs": _serpentines(15.5, half, _bulb),
         "two_corners": _two_corners(),
         "short_pieces": _short(),
