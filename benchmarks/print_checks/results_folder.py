@@ -28,7 +28,7 @@ from benchmarks.print_checks.sections import Sections
 from benchmarks.print_checks.strand_checks import cut_of, measured, rules_of, strands_of
 from benchmarks.print_checks.strand_rules import Measured, Rules, broken, measure
 
-__all__ = ["Folder", "figures", "read_paths", "read_waypoints"]
+__all__ = ["Folder", "agreement", "figures", "read_waypoints", "tally"]
 
 FRAMES = {
     (1, 0, 0): ((0, 1, 0), (0, 0, 1), (1, 0, 0)),
@@ -54,15 +54,6 @@ def read_waypoints(path: Path) -> list[np.ndarray]:
         elif line.startswith("X"):
             strands[-1].append([float(word[1:]) for word in line.split()])
     return [np.array(points) for points in strands]
-
-
-def read_paths(path: Path) -> list[np.ndarray]:
-    """Strands (n, 3) of a table with the columns x, y, z, path, layer."""
-    with path.open(encoding="utf-8", newline="") as file:
-        rows = [(int(row["path"]), *(float(row[c]) for c in "xyz")) for row in csv.DictReader(file)]
-    table = np.array(rows)
-    parts = np.flatnonzero(np.diff(table[:, 0])) + 1
-    return [points[:, 1:] for points in np.split(table, parts)]
 
 
 @dataclass(frozen=True)

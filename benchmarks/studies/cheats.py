@@ -188,7 +188,7 @@ def sets() -> dict[str, list[Line]]:
         "woven": _woven(half),
         "hairpins": _serpentines(15.5, half),
         "rows_too_close": _rows(half - 0.6 * np.arange(6.0)),
-        "close_and_outside": _rows(TOP - 0.1 - 0.8 * np.arange(6.0)),
+        "close_and_outside": _rows(TOP - 0.1 - 0.92 * np.arange(6.0)),
         "out_and_back": back,
         "hairpins_on_border": _serpentines(15.5, TOP),
         "woven_and_outside": [*_rows([TOP, TOP - 1.0]), *_woven(TOP - 2.0, 4)],
