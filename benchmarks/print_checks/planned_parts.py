@@ -39,7 +39,7 @@ def _part(name: str, folder: Path) -> str:
     if not file.exists():
         page = (ROOT / "docs" / "how_to" / "your_part.md").read_text(encoding="utf-8")
         texts = re.findall(r"```toml\n(.*?)```", page, flags=re.S)
-        (text,) = (one for one in texts if _BODIES[name] in one)
+        text = next(text for text in texts if _BODIES[name] in text)
         getattr(own_parts, _MAKERS[name])(folder / _BODIES[name])
         file.write_text(text, encoding="utf-8")
     return str(file)
@@ -70,17 +70,17 @@ def planned(plan: str, folder: Path) -> Folder:
 
 def _row(plan: str, folder: Folder) -> tuple[str, bool]:
     """Row of a plan, and whether it is wrong."""
-    (run,) = (one for one in folder.json["strategies"] if one["name"] == folder.strategy)
     said, done = folder.table(), folder.file()
     count = tally(folder.printed, folder.rules)
     other = len(folder.printed) - len(folder.pairs())
     alike = all(good for *_, good in agreement(folder))
+    printable = bool(folder.verdict["printable"])
     row = (
-        f"| {plan} | {'yes' if run['printable'] else 'no'} | {said.strands:.0f}/{done.strands} "
+        f"| {plan} | {'yes' if printable else 'no'} | {said.strands:.0f}/{done.strands} "
         f"| {said.seconds / 60:.1f}/{done.seconds / 60:.1f} | {said.mass:.2f}/{done.mass:.2f} "
         f"| {other} | {' | '.join(str(count[rule]) for rule in RULES)} |"
     )
-    return row, not alike or bool(run["printable"] and count)
+    return row, not alike or (printable and bool(count))
 
 
 def main(arguments: list[str]) -> int:

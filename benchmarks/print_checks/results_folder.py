@@ -165,8 +165,13 @@ class Folder:
 
     def record(self) -> Said:
         """Read what results.json says."""
-        (run,) = (one for one in self.json["strategies"] if one["name"] == self.strategy)
-        return _said(run["total"], "print_time_nearest")
+        return _said(self.verdict["total"], "print_time_nearest")
+
+    @property
+    def verdict(self) -> dict[str, Any]:
+        """Record of the strategy in results.json."""
+        runs: list[dict[str, Any]] = self.json["strategies"]
+        return next(run for run in runs if run["name"] == self.strategy)
 
     def page(self) -> Said:
         """Read what the table of the report says; NaN for what it does not show."""
@@ -352,7 +357,7 @@ def main(arguments: Iterable[str]) -> int:
         names = names[:at] + names[at + 2 :]
     for path, part in zip(names[::2], names[1::2], strict=True):
         folder = Folder(Path(path), Path(part))
-        (run,) = (r for r in folder.json["strategies"] if r["name"] == folder.strategy)
+        run = folder.verdict
         verdict = "printable" if run["printable"] else f"not printable: {run['why_not']}"
         print(f"{path}: {folder.strategy}, {verdict}")
         for name, numbers, good in agreement(folder):

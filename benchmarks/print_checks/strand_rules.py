@@ -291,8 +291,8 @@ def measure(
         turn = largest_turn(points, rules.window)
         result.append(Measured(line, length, turn, bends, float(runs.max()), share))
         result[-1].before_cut = length - rules.tail
-    height = np.array([one.points[0, 2] for one in result]).round(3)
-    flat = np.array([np.ptp(one.points[:, 2]) < 1e-9 for one in result], dtype=bool)
+    height = np.array([strand.points[0, 2] for strand in result]).round(3)
+    flat = np.array([np.ptp(strand.points[:, 2]) < 1e-9 for strand in result], dtype=bool)
     for level in np.unique(height[flat]).tolist():
         mine = np.flatnonzero(flat & (height == level)).tolist()
         lines = [result[k].points for k in mine]

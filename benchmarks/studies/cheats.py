@@ -85,15 +85,17 @@ CANTILEVER = Posed(
     (0.0, -20.0, 0.0),
     ("stream_function", "isocurve", "pruned"),
 )
+ARM = 66.0
+"""Length of both arms of the bracket, mm."""
 BRACKET = Posed(
     "bracket",
-    ((0.0, 0.0), (100.0, 0.0), (100.0, 14.0), (14.0, 14.0), (14.0, 100.0), (0.0, 100.0)),
-    ("x", "y"),
-    "-y",
-    (0.0, -200.0, 0.0),
+    ((0.0, 0.0), (ARM, 0.0), (ARM, 14.0), (14.0, 14.0), (14.0, ARM), (0.0, ARM)),
+    ("-y", "x"),
+    "y",
+    (20.0, 0.0, 0.0),
     ("stream_function", "isocurve", "pruned", "contour_zigzag", "concentric"),
 )
-"""An L held at both ends and pressed at the underside of its foot."""
+"""An L held at the underside and the end of its foot, with 20 N aside at the top of its wall."""
 
 Line = np.ndarray
 
@@ -200,11 +202,8 @@ def sets() -> dict[str, list[Line]]:
 
 
 def bracket_rows() -> list[Line]:
-    """Straight rows along both arms of the bracket, that do not meet."""
-    places = (0.5, 1.5, 2.5, 11.5, 12.5, 13.5)
-    foot = [np.array([(14.5, at), (99.5, at)]) for at in places]
-    wall = [np.array([(at, 0.5), (at, 99.5)]) for at in places]
-    return [*foot, *wall]
+    """Straight rows along the wall of the bracket, on its side in tension."""
+    return [np.array([(x, 0.5), (x, ARM - 0.5)]) for x in 0.5 + np.arange(6.0)]
 
 
 def _stacked(lines: Sequence[Line]) -> Iterator[tuple[int, Line]]:
@@ -258,7 +257,8 @@ def _remarks(name: str, said: Sequence[str], run: dict[str, Any]) -> str:
     lines = [line.split(": ", 1)[1] for line in said if line.startswith(f"{name}: ")]
     lines = [line for line in lines if "undecided" not in line and "no difference" not in line]
     reason = run["why_not"] or run["failure"]
-    return "; ".join([reason] * bool(reason) + [one for one in lines if reason not in one]) or "-"
+    lines = [line for line in lines if not reason or reason not in line]
+    return "; ".join([reason] * bool(reason) + lines) or "-"
 
 
 def study(part: Posed, given: dict[str, list[Line]], folder: Path) -> int:

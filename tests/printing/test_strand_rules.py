@@ -19,9 +19,9 @@ def arc(radius, angle=180.0, count=200):
     return radius * np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1)
 
 
-def rules_broken(*strands, section=None):
-    found = measure(strands, RULES, None if section is None else lambda _: section)
-    return [set(broken(one, RULES)) for one in found]
+def rules_broken(*lines, section=None):
+    strands = measure(lines, RULES, None if section is None else lambda _: section)
+    return [set(broken(line, RULES)) for line in strands]
 
 
 def test_a_circle_turns_by_the_window_over_its_radius():
@@ -38,9 +38,9 @@ def test_a_circle_turns_by_the_window_over_its_radius():
 
 def test_a_hairpin_is_a_fold_of_its_own_length_and_parts_the_runs():
     hairpin = strand((0, 0), (50, 0), (50, 1), (20, 1))
-    (found,) = measure([hairpin], RULES)
-    np.testing.assert_allclose(found.folds, [[50.0, 51.0]])
-    assert (found.free, found.turn) == (50.0, 180.0)
+    (bent,) = measure([hairpin], RULES)
+    np.testing.assert_allclose(bent.folds, [[50.0, 51.0]])
+    assert (bent.free, bent.turn) == (50.0, 180.0)
     back = strand((0, 0), (45, 0), (5, 0))
     np.testing.assert_allclose(folds(back, RULES.window), [[45.0, 45.0]])
 
@@ -62,7 +62,7 @@ def test_rounded_numbers_make_no_fold():
 def test_the_share_outside_is_that_of_the_width():
     section = shapely.box(0.0, 0.0, 100.0, 14.0)
     rows = [strand((0, y), (100, y)) for y in (0.0, 0.3, 0.5, 7.0)]
-    shares = [one.outside for one in measure(rows, RULES, lambda _: section)]
+    shares = [line.outside for line in measure(rows, RULES, lambda _: section)]
     assert shares == pytest.approx([0.5, 0.2, 0.0, 0.0], abs=1e-6)
     # A tenth of the strand lies beyond the end.
     (over,) = measure([strand((10, 7), (110, 7))], RULES, lambda _: section)
@@ -72,14 +72,14 @@ def test_the_share_outside_is_that_of_the_width():
 
 def test_a_lattice_has_as_many_crossings_as_pairs():
     along = [strand((0, y), (50, y)) for y in (10, 20, 30)]
-    # With a corner in each crossing, which still is one.
+    # With a corner in each crossing, which still is line.
     across = [strand((x, 0), (x, 10), (x, 20), (x, 30), (x, 50)) for x in (5, 15, 25, 35)]
-    found = measure([*along, *across], RULES)
-    assert [len(one.crossings) for one in found] == [4, 4, 4, 3, 3, 3, 3]
-    assert sum(one.over for one in found) == pytest.approx(24.0, rel=0.2)
+    strands = measure([*along, *across], RULES)
+    assert [len(line.crossings) for line in strands] == [4, 4, 4, 3, 3, 3, 3]
+    assert sum(line.over for line in strands) == pytest.approx(24.0, rel=0.2)
     # On other layers there are none; an end on the side of a strand does not cross it.
     other = [line + np.array([0.0, 0.0, 1.0]) for line in across]
-    assert not any(len(one.crossings) for one in measure([*along, *other], RULES))
+    assert not any(len(line.crossings) for line in measure([*along, *other], RULES))
     assert not len(
         measure([strand((0, 0), (50, 0)), strand((9, 0.3), (9, 60))], RULES)[0].crossings
     )
@@ -99,19 +99,19 @@ def test_strands_over_each_other_are_told_from_neighbours():
 def test_what_is_held_before_the_cut_is_all_but_the_tail():
     short, long = (measure([strand((0, 0), (x, 0))], RULES)[0] for x in (61.0, 63.0))
     assert (short.before_cut, long.before_cut) == pytest.approx((19.0, 21.0))
-    assert [set(broken(one, RULES)) for one in (short, long)] == [{"cut"}, set()]
+    assert [set(broken(line, RULES)) for line in (short, long)] == [{"cut"}, set()]
 
 
 def test_strands_of_a_file_are_those_that_were_planned(small_part):
     bent = np.array([[5.0, 5.0], [75.0, 5.0], [75.0, 6.0], [10.0, 6.0]])
     plain = np.array([[5.0, 15.0], [80.0, 15.0]])
     job = small_part("marlin_two_tools", lines=(bent, plain))
-    found = measured(job, job.done)
-    assert sorted(one.length for one in found) == pytest.approx(
+    strands = measured(job, job.done)
+    assert sorted(line.length for line in strands) == pytest.approx(
         [75.0, 75.0, 136.0, 136.0], abs=0.01
     )
-    for one in found:
-        assert one.before_cut == pytest.approx(one.length - 42.0, abs=0.05)
-        assert one.after_start == one.length
+    for line in strands:
+        assert line.before_cut == pytest.approx(line.length - 42.0, abs=0.05)
+        assert line.after_start == line.length
     wrong = {check.__name__: len(check(job, job.done)) for check in STRAND_RULES}
     assert wrong == dict.fromkeys(wrong, 0) | {"folds": 2}
