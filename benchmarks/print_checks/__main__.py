@@ -4,7 +4,8 @@ Run ``python -m benchmarks.print_checks [PART,...] [MACHINE,...] [--pictures FOL
 the specification of the print has twelve checks; each is a column, with its first failure below the
 table. All numbers are those of a printer that reads the file (`printer`), and of VTK's sections of
 the part; s are seconds of CPU to write, follow and check a file. The twelfth, spoiled files, is
-`tests/printing/test_spoiled_files.py`.
+`tests/printing/test_spoiled_files.py`. The columns behind the bar count the strands that break each
+of the rules for strands (`strand_rules`), of as many as the last column says.
 """
 
 import argparse
@@ -15,6 +16,7 @@ from benchmarks.print_checks.all_checks import CHECKS
 from benchmarks.print_checks.filling import fullness
 from benchmarks.print_checks.motion import free_fibre
 from benchmarks.print_checks.parts import PARTS, Part, job_of
+from benchmarks.print_checks.strand_checks import STRAND_RULES, measured
 from ccfem.base.errors import InputError
 from ccfem.machine import machine_names
 
@@ -28,6 +30,7 @@ def main() -> int:
     parser.add_argument("--files", type=Path, help="folder for the files that are followed")
     given = parser.parse_args()
     names = "".join(f"{check.__name__[:7]:>8}" for check in CHECKS)
+    names += " |" + "".join(f"{check.__name__[:7]:>8}" for check in STRAND_RULES) + " strands"
     print(
         f"{'part':8} {'machine':17} {'full':>6} {'layers':>11} {'free':>6} {'span':>5} "
         f"{'time':>7} {'s':>5}{names}"
@@ -54,15 +57,19 @@ def row(
         return [f"refused: {error}"]
     began = time.process_time()
     found = {check.__name__: check(job, job.done) for check in CHECKS}
+    rules = {check.__name__: check(job, job.done) for check in STRAND_RULES}
     seconds = spent["write"] + spent["follow"] + time.process_time() - began
     whole, layers = fullness(job, job.done)
     shares = [share for _, share in layers]
     free, spans = free_fibre(job, job.done)
-    marks = "".join(f"{len(wrong) or '-':>8}" for wrong in found.values())
+    marks, broken = (
+        "".join(f"{len(wrong) or '-':>8}" for wrong in group.values()) for group in (found, rules)
+    )
     print(
         f"{name:8} {machine:17} {whole:6.1%} {min(shares):5.1%}-{max(shares):.1%} {free:6.2%} "
         f"{max((length for length, _ in spans), default=0.0):5.1f} "
-        f"{float(job.done.head['TIME']) / 60:5.0f}m {seconds:5.1f}{marks}",
+        f"{float(job.done.head['TIME']) / 60:5.0f}m {seconds:5.1f}{marks} |"
+        f"{broken}{len(measured(job, job.done)):8d}",
         flush=True,
     )
     if files is not None:
@@ -75,7 +82,7 @@ def row(
         draw(job, f"{name}, {machine}", pictures / f"{name}_{machine}.png")
     wrong = [
         f"{name}: {lines[0]}" + (f" ({len(lines)} such)" if lines[1:] else "")
-        for name, lines in found.items()
+        for name, lines in {**found, **rules}.items()
         if lines
     ]
     return wrong

@@ -1,12 +1,14 @@
 """Checks of how nozzles move: speeds, travel, what lies below fibre, the bed."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from benchmarks.print_checks.height_map import HeightMap, sampled
 from benchmarks.print_checks.job import Job, Lines
 from benchmarks.print_checks.printer import Run, Step
 
-__all__ = ["arc", "bed", "free_fibre", "speeds", "support", "travel"]
+__all__ = ["arc", "bed", "beneath", "free_fibre", "speeds", "support", "travel"]
 
 STRAIGHT, CURVED = 8.0, 3.0
 """Longest span over nothing, mm, of a strand that turns by less than 10 degrees, and of others."""
@@ -104,17 +106,19 @@ def travel(job: Job, run: Run) -> list[str]:
     return wrong
 
 
-def free_fibre(job: Job, run: Run) -> tuple[float, list[tuple[float, float]]]:
-    """Share of the fibre with nothing below it; length and turn, degrees, of each run of it."""
+def beneath(job: Job, run: Run) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+    """Find steps of each strand, places along them, the way on from each, and which have support.
+
+    Lines that lie lower are support; those of the same layer carry nothing.
+    """
     lines = Lines.of(run)
     layer, area = job.machine.strand_height, HeightMap(job.machine.gcode.bed)
     fibre = lines.lays & (lines.tool == 1)
     height = lines.end[:, 2].round(3)
-    free, spans, done = 0.0, [], 0
+    done = 0
     order = np.argsort(np.where(lines.lays, height, np.inf), kind="stable")
     order = order[: int(lines.lays.sum())]
     for z in np.unique(height[fibre]).tolist():
-        # All that lies lower; lines of the same layer carry nothing.
         count = int(np.searchsorted(height[order], z))
         new = order[done:count]
         if len(new):
@@ -127,9 +131,17 @@ def free_fibre(job: Job, run: Run) -> tuple[float, list[tuple[float, float]]]:
             place, _ = sampled(lines.start[steps], lines.end[steps], 0.5)
             held = area.highest(place, 0.2) >= z - 1.6 * layer - 1e-6
             way = np.append(np.linalg.norm(np.diff(place, axis=0), axis=1), 0.0)
-            free += float(way[~held].sum())
-            spans += _runs(place, way, held)
-    return free / max(float(lines.length[fibre].sum()), 1e-9), spans
+            yield steps, place, way, held
+
+
+def free_fibre(job: Job, run: Run) -> tuple[float, list[tuple[float, float]]]:
+    """Share of the fibre with nothing below it; length and turn, degrees, of each run of it."""
+    free, total, spans = 0.0, 0.0, []
+    for _, place, way, held in beneath(job, run):
+        free += float(way[~held].sum())
+        total += float(way.sum())
+        spans += _runs(place, way, held)
+    return free / max(total, 1e-9), spans
 
 
 def _runs(place: np.ndarray, way: np.ndarray, held: np.ndarray) -> list[tuple[float, float]]:

@@ -81,6 +81,7 @@ class Run:
     waited: float = 0.0
     head: dict = field(default_factory=dict)
     lines: object = None
+    measured: object = None
 
     def strands(self) -> dict[str, list]:
         """List the steps of each strand by its name; those beside the part come last."""
