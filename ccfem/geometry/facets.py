@@ -1,12 +1,8 @@
 """Facets and edges by their nodes, whatever the order of these: pairs, places, unique edges."""
 
 import numpy as np
-from numba import njit
 
 from ccfem.base.arrays import BoolArray, IntArray
-
-_FEW = 16
-"""Node numbers to a pair of nodes, up to which all of them are counted."""
 
 
 def facet_keys(*tables: IntArray) -> list[IntArray]:
@@ -24,14 +20,24 @@ def facet_keys(*tables: IntArray) -> list[IntArray]:
         where node numbers are so large that a product of them would not fit, the keys of the first
         columns are ranked in between.
     """
-    nodes = np.sort(np.concatenate(tables).astype(np.int64), axis=1)
-    count = int(nodes.max(initial=0)) + 1
-    key = nodes[:, 0]
-    for column in nodes.T[1:]:
+    nodes = _ascending(np.concatenate(tables).astype(np.int64))
+    count = int(nodes[-1].max(initial=0)) + 1
+    key = nodes[0]
+    for column in nodes[1:]:
         if int(key.max(initial=0)) >= np.iinfo(np.int64).max // count:
             _, key = np.unique(key, return_inverse=True)
         key = key * count + column
     return np.split(key, np.cumsum([len(table) for table in tables])[:-1])
+
+
+def _ascending(table: IntArray) -> list[IntArray]:
+    """Columns of a table (k, c) with every row sorted: faster than by row where c is small."""
+    columns = list(table.T)
+    for last in range(len(columns) - 1, 0, -1):
+        for j in range(last):
+            low, high = columns[j : j + 2]
+            columns[j : j + 2] = np.minimum(low, high), np.maximum(low, high)
+    return columns
 
 
 def paired(facets: IntArray) -> tuple[IntArray, IntArray]:
@@ -72,39 +78,8 @@ def unique_edges(ends: IntArray) -> tuple[IntArray, IntArray]:
 
     The edges ascend, and so do the nodes of each.
     """
-    low, high = np.minimum(*ends.T), np.maximum(*ends.T)
-    nodes = int(high.max(initial=-1)) + 1
-    if nodes > _FEW * (len(ends) + 1):
-        known, number = np.unique(np.concatenate([low, high]), return_inverse=True)
-        edges, edge = _numbered(number[: len(ends)], number[len(ends) :], len(known))
-        return known[edges], edge
-    edges, edge = _numbered(low, high, nodes)
-    return edges.astype(ends.dtype, copy=False), edge
-
-
-@njit(cache=True, nogil=True)
-def _sorted(values, order, most):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Sort an order by values below a number; equal ones stay as they come."""
-    start = np.zeros(most + 1, np.int64)
-    for k in range(len(values)):
-        start[values[k] + 1] += 1
-    for i in range(most):
-        start[i + 1] += start[i]
-    result = np.empty(len(order), np.int64)
-    for k in order:
-        result[start[values[k]]] = k
-        start[values[k]] += 1
-    return result
-
-
-@njit(cache=True, nogil=True)
-def _numbered(low, high, nodes):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Edges in ascending order, and the edge of each pair."""
-    order = _sorted(low, _sorted(high, np.arange(len(low)), nodes), nodes)
-    edges, edge, count = np.empty((len(low), 2), np.int64), np.empty(len(low), np.int64), 0
-    for k in order:
-        if count == 0 or edges[count - 1, 0] != low[k] or edges[count - 1, 1] != high[k]:
-            edges[count, 0], edges[count, 1] = low[k], high[k]
-            count += 1
-        edge[k] = count - 1
-    return edges[:count].copy(), edge
+    (key,) = facet_keys(ends)
+    _, edge = np.unique(key, return_inverse=True)
+    edges = np.empty((int(edge.max(initial=-1)) + 1, 2), dtype=ends.dtype)
+    edges[edge] = np.column_stack(_ascending(ends))
+    return edges, edge

@@ -1,8 +1,10 @@
 """Nearest points of a surface, against a plane, and against sampled triangles."""
 
 import numpy as np
+import pytest
 from scipy.spatial import Delaunay, cKDTree
 
+from ccfem.base.errors import InputError
 from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
 
 
@@ -58,3 +60,39 @@ def test_a_fan_of_many_slivers_has_its_nearest_one_found():
     queries = np.column_stack([np.full(50, 1.0), np.linspace(0.5, 9.5, 50), np.zeros(50)])
     found = nearest_on_triangles(points, triangles, queries)
     np.testing.assert_allclose(found.distance, 0.0, atol=1e-9)
+
+
+def test_far_from_a_long_strip_the_nearest_point_is_exact():
+    plane = np.random.default_rng(9).uniform(0.0, 1.0, (200, 2))
+    plane = np.concatenate([plane, [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]])
+    triangles = Delaunay(plane).simplices
+    points = np.column_stack([plane * [4.0, 500.0], np.zeros(len(plane))])
+    queries = np.random.default_rng(10).normal(0.0, 3000.0, (300, 3))
+    found = nearest_on_triangles(points, triangles, queries)
+    inside = np.clip(queries, [0.0, 0.0, 0.0], [4.0, 500.0, 0.0])
+    np.testing.assert_allclose(found.points, inside, atol=1e-9)
+    np.testing.assert_allclose(found.distance, np.linalg.norm(inside - queries, axis=1))
+
+
+def test_triangles_without_area_are_passed_over():
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]])
+    found = nearest_on_triangles(
+        points, np.array([[0, 0, 1], [0, 1, 2], [0, 2, 3]]), points[[1]] - [[0, 2, 0]]
+    )
+    assert found.triangle.tolist() == [2]
+    np.testing.assert_allclose(found.points, points[[1]])
+
+
+@pytest.mark.parametrize(
+    ("triangles", "query", "wanted"),
+    [
+        ([[0, 1, 2]], [0.0, 0.0, 0.0], "area at a finite distance; got 1 tri"),
+        (np.zeros((0, 3), int), [0.0, 0.0, 0.0], "area at a finite distance; got 0 tri"),
+        ([[0, 1, 3]], [1e200, 0.0, 0.0], "a surface with area at a finite distance"),
+        ([[0, 1, 3]], [np.nan, 0.0, 0.0], "finite points"),
+    ],
+)
+def test_nothing_is_nearest(triangles, query, wanted):
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]])
+    with pytest.raises(InputError, match=wanted):
+        nearest_on_triangles(points, np.array(triangles), np.array([query]))

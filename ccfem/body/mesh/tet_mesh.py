@@ -76,7 +76,7 @@ class TetMesh(CellMesh, Shown):
     @cached_property
     def partners(self) -> IntArray:
         """Facet on the other side of each facet, (4 m,): see `pair_facets`."""
-        return read_only(pair_facets(self.corners, _FACES, len(self.points)), np.int64)
+        return read_only(pair_facets(self.corners, _FACES), np.int64)
 
     @cached_property
     def _pairing(self) -> tuple[IntArray, IntArray]:

@@ -1,13 +1,35 @@
 """Thinning of the regions of an image to lines one pixel wide.
 
 Z. Guo, R. W. Hall, Parallel thinning with two-subiteration algorithms, Communications of the ACM
-32 (1989) 359.
+32 (1989) 359. What happens to a pixel depends on its eight neighbours alone, so it is looked up in
+tables of 256 entries.
 """
 
 import numpy as np
-from numba import njit
+from numpy.typing import NDArray
 
 from ccfem.base.arrays import BoolArray, IntArray
+
+_BITS = np.array([[128, 1, 2], [64, 0, 4], [32, 16, 8]], dtype=np.uint8)
+"""A pixel's neighbours in a number: p_0 to p_7 are its bits, clockwise from above."""
+
+
+def _tables() -> tuple[BoolArray, BoolArray, BoolArray, BoolArray]:
+    """Whether each pass takes a pixel off; whether it is a corner; whether a corner can go."""
+    p = (np.arange(256) >> np.arange(8)[:, None] & 1).astype(bool)
+    side, diagonal = p[0::2], p[1::2]
+    before, after = np.roll(diagonal, 1, axis=0), np.roll(side, -1, axis=0)
+    # The neighbours are one connected piece: the pixel is not needed between them.
+    alone = (~side & (diagonal | after)).sum(axis=0) == 1
+    pairs = np.minimum((before | side).sum(axis=0), (side | diagonal).sum(axis=0))
+    border = alone & (pairs >= 2) & (pairs <= 3)
+    first = border & ~((p[4] | p[5] | ~p[7]) & p[6])
+    second = border & ~((p[0] | p[1] | ~p[3]) & p[2])
+    corner = (p[0] | p[4]) & (p[2] | p[6])
+    return first, second, corner, corner & alone
+
+
+_FIRST, _SECOND, _CORNER, _FREE_CORNER = _tables()
 
 
 def thin(regions: IntArray) -> BoolArray:
@@ -26,70 +48,28 @@ def thin(regions: IntArray) -> BoolArray:
     -------
     (H, W) bool array
     """
-    return np.asarray(_thin(np.ascontiguousarray(regions, dtype=np.int64)))
-
-
-@njit(cache=True)
-def _around(left, regions, i, j, p):  # type: ignore[no-untyped-def]
-    """Fill p (8,) with which neighbours, clockwise from above, are of the same region."""
-    own = regions[i, j]
-    p[0] = left[i - 1, j] and regions[i - 1, j] == own
-    p[1] = left[i - 1, j + 1] and regions[i - 1, j + 1] == own
-    p[2] = left[i, j + 1] and regions[i, j + 1] == own
-    p[3] = left[i + 1, j + 1] and regions[i + 1, j + 1] == own
-    p[4] = left[i + 1, j] and regions[i + 1, j] == own
-    p[5] = left[i + 1, j - 1] and regions[i + 1, j - 1] == own
-    p[6] = left[i, j - 1] and regions[i, j - 1] == own
-    p[7] = left[i - 1, j - 1] and regions[i - 1, j - 1] == own
-
-
-@njit(cache=True)
-def _pieces(p):  # type: ignore[no-untyped-def]
-    """Count the connected pieces of the neighbours; 1 where the pixel is not needed between."""
-    count = 0
-    for k in range(0, 8, 2):
-        if not p[k] and (p[k + 1] or p[(k + 2) % 8]):
-            count += 1
-    return count
-
-
-@njit(cache=True)
-def _thin(regions):  # type: ignore[no-untyped-def]
-    height, width = regions.shape
     left = regions >= 0
-    p = np.zeros(8, dtype=np.bool_)
-    off = np.empty((height * width, 2), dtype=np.int64)
-    changed = True
-    while changed:
-        changed = False
-        for turn in range(2):
-            count = 0
-            for i in range(1, height - 1):
-                for j in range(1, width - 1):
-                    if not left[i, j]:
-                        continue
-                    _around(left, regions, i, j, p)
-                    if _pieces(p) != 1:
-                        continue
-                    one = (p[7] or p[0]) + (p[1] or p[2]) + (p[3] or p[4]) + (p[5] or p[6])
-                    two = (p[0] or p[1]) + (p[2] or p[3]) + (p[4] or p[5]) + (p[6] or p[7])
-                    if not 2 <= min(one, two) <= 3:
-                        continue
-                    if turn == 0:
-                        kept = (p[4] or p[5] or not p[7]) and p[6]
-                    else:
-                        kept = (p[0] or p[1] or not p[3]) and p[2]
-                    if not kept:
-                        off[count, 0], off[count, 1] = i, j
-                        count += 1
-            for k in range(count):
-                left[off[k, 0], off[k, 1]] = False
-            changed = changed or count > 0
-    for i in range(1, height - 1):
-        for j in range(1, width - 1):
-            if left[i, j]:
-                _around(left, regions, i, j, p)
-                corner = (p[0] or p[4]) and (p[2] or p[6])
-                if corner and _pieces(p) == 1:
-                    left[i, j] = False
+    inner = left[1:-1, 1:-1]
+    neighbours = []
+    for i, j in np.argwhere(_BITS):
+        window = slice(i, i + len(inner)), slice(j, j + inner.shape[1])
+        alike = regions[window] == regions[1:-1, 1:-1]
+        neighbours.append((left[window], _BITS[i, j] * alike))
+
+    def numbers() -> NDArray[np.uint8]:
+        """Return the neighbours of all pixels, as entries of the tables."""
+        total = np.zeros(inner.shape, dtype=np.uint8)
+        for beside, bit in neighbours:
+            total |= beside * bit
+        return total
+
+    pixels = -1
+    while pixels != (pixels := int(inner.sum())):
+        for removed in (_FIRST, _SECOND):
+            inner &= ~removed[numbers()]
+    # One after the other, since two corners may not both go.
+    for i, j in np.argwhere(inner & _CORNER[numbers()]):
+        square = slice(i, i + 3), slice(j, j + 3)
+        alike = left[square] & (regions[square] == regions[i + 1, j + 1])
+        inner[i, j] = not _FREE_CORNER[int(_BITS[alike].sum())]
     return left

@@ -123,32 +123,17 @@ class Spacing:
     def _pairs(self, points: FloatArray) -> IntArray:
         """Pairs (n, 2): points, and first points of segments that may come too near to them."""
         lines, width = self.lines, self.width
-        paths, reach = lines.toolpaths, _REACH * width
-        low = points.min(axis=0)
-        shape = ((points.max(axis=0) - low) / reach).astype(np.int64) + 1
-        order, layer = np.unique(lines.layer, return_inverse=True)
-        heads = np.full((len(order), *shape), -1)
-        following = np.empty(len(points), dtype=np.int64)
-        place = ((points - low) / reach).astype(np.int64)
-        pairs = np.empty((0, 2), dtype=np.int64)
-        whole = np.where(paths.closed, paths.lengths, np.inf)
-        for _ in range(2):  # counted, then written
-            heads[:] = -1
-            found = _near(
-                points,
-                place,
-                layer,
-                lines.path,
-                lines.arc,
-                whole,
-                reach,
-                _OWN * width,
-                heads,
-                following,
-                pairs,
-            )
-            pairs = np.empty((found, 2), dtype=np.int64) if len(pairs) < found else pairs
-        return pairs
+        tree = cKDTree(_lifted(points, lines.layer))
+        pairs = tree.query_pairs(_REACH * width, output_type="ndarray")
+        # Along a path, the shorter way round a closed one, points may be close to each other.
+        path = lines.path[pairs]
+        whole = np.where(lines.toolpaths.closed, lines.toolpaths.lengths, np.inf)[path[:, 0]]
+        along = np.abs(np.diff(lines.arc[pairs], axis=1)[:, 0])
+        far = np.minimum(along, whole - along) > _OWN * width
+        pairs = pairs[(path[:, 0] != path[:, 1]) | far]
+        pairs = np.concatenate([pairs, pairs[:, ::-1]])
+        goes_on = np.append(lines.path[1:] == lines.path[:-1], False)
+        return pairs[goes_on[pairs[:, 1]]]
 
 
 def spacing(
@@ -213,32 +198,6 @@ def _solve(matrix: Any, right: FloatArray) -> FloatArray:
         matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options
     )
     return np.asarray(factor.solve(right))
-
-
-@njit(cache=True)
-def _near(points, place, layer, path, arc, whole, reach, own, heads, following, pairs):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Count, and write where there is room, points and segments whose starts are within reach."""
-    for p in range(len(points)):
-        following[p] = heads[layer[p], place[p, 0], place[p, 1]]
-        heads[layer[p], place[p, 0], place[p, 1]] = p
-    count, most = 0, reach * reach
-    for p in range(len(points)):
-        for i in range(max(place[p, 0] - 1, 0), min(place[p, 0] + 2, heads.shape[1])):
-            for j in range(max(place[p, 1] - 1, 0), min(place[p, 1] + 2, heads.shape[2])):
-                q = heads[layer[p], i, j]
-                while q >= 0:
-                    dx, dy = points[q, 0] - points[p, 0], points[q, 1] - points[p, 1]
-                    wanted = dx * dx + dy * dy < most
-                    wanted = wanted and q + 1 < len(points) and path[q + 1] == path[q]
-                    if wanted and path[q] == path[p]:
-                        apart = abs(arc[q] - arc[p])
-                        wanted = min(apart, whole[path[p]] - apart) > own
-                    if wanted:
-                        if count < len(pairs):
-                            pairs[count, 0], pairs[count, 1] = p, q
-                        count += 1
-                    q = following[q]
-    return count
 
 
 @njit(cache=True)
