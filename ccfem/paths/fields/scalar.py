@@ -85,8 +85,8 @@ def fit_constrained(
     convex problem is solved by the alternating direction method of multipliers (Boyd et al.,
     Foundations and Trends in Machine Learning 3 (2011) 1, section 3): one factorisation, then one
     back-substitution and one projection in each iteration. After 20 iterations the objective is
-    within 1 % of the optimum, and single triangles exceed the bound by a few per cent, so strands
-    still have to be trimmed.
+    within 1 % of the optimum (20 % on layers that the strands fit almost without misfit), and
+    single triangles exceed the bound by a few per cent, so strands still have to be trimmed.
 
     Parameters
     ----------
