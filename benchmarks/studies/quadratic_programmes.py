@@ -4,7 +4,8 @@
 
 The calls of a programme are recorded while parts are planned or solved, then made again by each
 solver. Time is processor time of all calls together, the better of two runs; lines are those of
-the functions that solve, without signatures and docstrings. The columns "cost" and "worst" are
+the functions that solve, without signatures and docstrings; unknowns are those of the first
+call. The columns "cost" and "worst" are
 
     field    misfit of the gradients to the wanted ones; most excess of the bound 1 on their size
     heights  misfit to the wanted gradients; share of the volume outside the bounds on their size
