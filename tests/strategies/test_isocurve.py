@@ -11,6 +11,7 @@ import pytest
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.box import box_mesh
+from ccfem.cases import create_case
 from ccfem.cases.part_file import read_part
 from ccfem.fem.elasticity import solve
 from ccfem.fem.elasticity.problem import Problem, Support, Traction
@@ -84,6 +85,18 @@ def test_uniform_tension_gives_straight_equidistant_paths(strategy: Isocurve, an
     assert gaps.min() >= 1.0 - 1e-6
     assert gaps.max() < 1.12
     np.testing.assert_allclose(gaps, gaps.mean(), atol=0.02)
+
+
+def test_the_exact_solver_ends_where_the_bound_holds_almost_everywhere() -> None:
+    """A plate with a hole, pulled: ever more bounds are met with next to no force on them."""
+    case = create_case("open_hole")
+    field = next(iter(solve(case.problem).values()))
+    layers = Planar(count=1).cut(field.mesh)
+    exact, quick = (
+        plan(Isocurve(spacing=spacing), layers, field, case.machine).lengths.sum()
+        for spacing in ("cone", "constrained")
+    )
+    assert exact == pytest.approx(quick, rel=0.01)
 
 
 def test_hoop_tension_gives_concentric_circles() -> None:

@@ -1,7 +1,9 @@
 """Scalar fields: against fields whose gradient is known."""
 
 import numpy as np
+import osqp
 import pytest
+import scipy.sparse as sp
 from scipy.spatial import Delaunay
 
 from ccfem.paths.fields.fill import fill_laplacian, fill_screened
@@ -74,6 +76,50 @@ def test_constrained_field_keeps_the_width() -> None:
     assert steepest <= 1.0 / width * (1.0 + 1e-5)
     free = fit_weighted(surface, hoop(surface), density, ones)
     assert np.linalg.norm(surface.gradient(free), axis=1).max() > 1.0 / width
+
+
+def misfit(surface: Surface, values: np.ndarray, density: np.ndarray, width: float) -> float:
+    """What the fits make small, for hoop tension, weights of 1 and a spacing weight of 0.1."""
+    gradient, along = surface.gradient(values), hoop(surface)
+    across = np.column_stack([-along[:, 1], along[:, 0]])
+    uneven = np.einsum("td,td->t", gradient, across) - np.minimum(density, 1.0 / width)
+    astray = np.einsum("td,td->t", gradient, along)
+    return float(surface.areas @ (astray**2 + 0.1 * uneven**2))
+
+
+def within_polygons(surface: Surface, density: np.ndarray, width: float, reach: float) -> float:
+    """Least misfit, by OSQP, with gradients in a polygon of 16 sides, ``reach / width`` from 0."""
+    gradient, along = sp.csr_matrix(surface.gradient_matrix), hoop(surface)
+    count = np.repeat(np.arange(len(along)), 2), np.arange(2 * len(along))
+    turned = np.column_stack([-along[:, 1], along[:, 0]])
+    slope, rise = (sp.csr_matrix((way.ravel(), count)) @ gradient for way in (along, turned))
+    areas = sp.diags(surface.areas)
+    form = slope.T @ areas @ slope + 0.1 * rise.T @ areas @ rise
+    pull = 0.1 * rise.T @ (surface.areas * np.minimum(density, 1.0 / width))
+    sides = np.pi * np.arange(8) / 8
+    rows = sp.vstack([np.cos(a) * gradient[0::2] + np.sin(a) * gradient[1::2] for a in sides])
+    bound = np.full(rows.shape[0], reach / width)
+    accuracy = {"eps_abs": 1e-7, "eps_rel": 1e-7, "max_iter": 100_000, "verbose": False}
+    model = osqp.OSQP()
+    model.setup(sp.triu(form, format="csc"), -pull, rows.tocsc(), -bound, bound, **accuracy)
+    found = model.solve()
+    assert found.info.status == "solved"
+    return misfit(surface, found.x, density, width)
+
+
+def test_a_bounded_field_costs_what_quadratic_programmes_enclose() -> None:
+    """The disc of gradients contains one polygon, and another contains it."""
+    surface, width = annulus(size=1.5), 1.3
+    density = np.random.default_rng(0).uniform(0.2, 3.0, len(surface.triangles))
+    ones = np.ones(len(density))
+    exact, quick = (
+        misfit(surface, fit(surface, hoop(surface), density, ones, width), density, width)
+        for fit in (fit_cone, fit_constrained)
+    )
+    inner = within_polygons(surface, density, width, np.cos(np.pi / 16))
+    outer = within_polygons(surface, density, width, 1.0)
+    assert outer < exact < inner < 1.05 * outer
+    assert quick == pytest.approx(exact, rel=0.01)
 
 
 def test_the_unit_of_length_changes_no_field() -> None:

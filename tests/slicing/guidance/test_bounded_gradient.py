@@ -1,8 +1,15 @@
-"""Fields with bounds of their gradient: along one direction the nearest one is known."""
+"""Fields with bounds of their gradient: along one direction the nearest one is known.
+
+Where fields must only rise, the nearest one is that of a quadratic programme, which OSQP solves.
+"""
 
 import numpy as np
+import osqp
+import pytest
+import scipy.sparse as sp
 
 from ccfem.body.mesh import box_mesh
+from ccfem.fem.elasticity.assembly import cell_gradients
 from ccfem.slicing.guidance.bounded_gradient import Bounds
 from ccfem.slicing.guidance.height_field import height_field
 
@@ -44,3 +51,33 @@ def test_what_falls_is_raised_and_what_is_long_is_shortened():
     np.testing.assert_allclose(near[1], [1.568, 1.176, 0.0])
     np.testing.assert_allclose(near[2], [0.36062, 0.0, 0.36062], atol=1e-4)
     np.testing.assert_allclose(near[3], [0.01, 1.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("phase", [1.0, 2.0])
+def test_the_nearest_field_that_rises_is_that_of_a_quadratic_programme(phase):
+    mesh, least = box_mesh((12.0, 6.0, 6.0), (8, 4, 4)), 1e-3
+    turn = 1.9 * np.sin(mesh.points[mesh.corners].mean(axis=1)[:, 0] / 3.0 + phase)
+    wanted = np.column_stack([np.sin(turn), 0.0 * turn, np.cos(turn)])
+    plain = height_field(mesh, wanted, 0.0)
+    kept = height_field(mesh, wanted, 0.0, lengths=(least, 50.0))
+
+    count, volumes = len(turn), np.repeat(mesh.volumes, 3)
+    rows = np.repeat(np.arange(3 * count).reshape(count, 1, 3), 4, axis=1)
+    entries = (cell_gradients(mesh).ravel(), (rows.ravel(), np.repeat(mesh.corners.ravel(), 3)))
+    slope = sp.csr_matrix(entries)
+    form = sp.triu(slope.T @ sp.diags(volumes) @ slope, format="csc")
+    rise = sp.csc_matrix(sp.kron(sp.eye(count), plain.up[None]) @ slope)
+    model, low = osqp.OSQP(), np.full(count, 0.02 * least)
+    accuracy = {"eps_abs": 1e-6, "eps_rel": 1e-6, "max_iter": 100_000, "verbose": False}
+    pull = slope.T @ (volumes * wanted.ravel())
+    model.setup(form, -pull, rise, low, np.full(count, np.inf), **accuracy)
+    solved = model.solve()
+    assert solved.info.status == "solved"
+
+    def misfit(gradient):
+        return mesh.volumes @ ((gradient - wanted) ** 2).sum(axis=1)
+
+    best = misfit((slope @ solved.x).reshape(-1, 3))
+    assert misfit(kept.gradient) == pytest.approx(best, rel=1e-3)
+    assert best > 1.3 * misfit(plain.gradient)
+    assert (kept.gradient @ plain.up).min() > -least

@@ -3,7 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
+import osqp
 import pytest
+import scipy.sparse as sp
 import shapely
 
 from ccfem.base.errors import InputError
@@ -116,6 +118,35 @@ def test_a_pack_of_strands_gives_way_at_once_and_keeps_off_the_border(bent_beam)
             for other in strands[k + 1 :]:
                 assert strand.distance(other) > 0.98
             assert shapely.hausdorff_distance(strand, strand.simplify(0.05)) < 0.05
+
+
+@pytest.mark.parametrize(
+    "heights",
+    [
+        (1.0, 1.7, 2.4, 3.1, 3.8, 4.5),
+        (8.0, 8.7, 9.4, 10.1),
+        (8.0, 8.5, 9.7, 10.2, 11.0, 12.5),
+        (0.7, 1.2, 3.0, 3.4),
+    ],
+)
+def test_a_pack_of_strands_goes_where_a_quadratic_programme_says(bent_beam, heights):
+    """Straight strands: the least squared slides after which all distances are kept, by OSQP."""
+    layers = bent_beam[1][:1]
+    lines = strand_lines(straight(layers, *heights), layers, MACHINE)
+    slide = spacing(lines, layers, 1.0, 0.5).spread(np.zeros(len(lines.path)))
+    found = lines.slid(slide)
+    means = [path[:, 1].mean() for path in found]
+    count = len(heights)
+    # Each strand is a width above the one below it, and the first one half a width above the edge.
+    above = sp.eye(count, format="csc") - sp.eye(count, k=-1, format="csc")
+    low = np.r_[0.5, np.ones(count - 1)]
+    model = osqp.OSQP()
+    options = {"eps_abs": 1e-9, "eps_rel": 1e-9, "verbose": False}
+    square = sp.eye(count, format="csc")
+    model.setup(square, -np.array(heights), above, low, np.full(count, np.inf), **options)
+    solved = model.solve()
+    assert solved.info.status == "solved"
+    np.testing.assert_allclose(means, solved.x, atol=0.01)
 
 
 def test_what_is_far_enough_apart_stays(bent_beam):
