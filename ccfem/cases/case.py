@@ -10,22 +10,14 @@ from ccfem.base.checks import check_known, check_number
 from ccfem.base.display import Shown
 from ccfem.base.errors import Mistakes, shown
 from ccfem.body.mesh.face_places import BodyFaces
-from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.part_stress import PartStress
-from ccfem.fem.elasticity.problem import Force, Order, Problem, Support
+from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.support_kinds import AnySupport
-from ccfem.fem.materials import printed_pla
 from ccfem.machine.machine import Machine
 from ccfem.paths.placement.fibre_places import FibrePlaces
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.slicer import Slicer
 from ccfem.slicing.slicers.planar import Planar
-
-
-def pulled(mesh: TetMesh, force: tuple[float, float, float], order: Order) -> Problem:
-    """Make a part of printed PLA, held at patch ``support``; a force, N, pulls at ``load``."""
-    loads = {"pull": (Force("load", force),)}
-    return Problem(mesh, printed_pla(), (Support("support"),), loads, order=order)
 
 
 @dataclass(frozen=True)

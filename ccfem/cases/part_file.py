@@ -302,7 +302,7 @@ def read_part(path: str | os.PathLike[str]) -> Case:
     InputError
         With the name of the file, what was expected, what came and the cure.
     """
-    return _of_file(path, _case)
+    return _of_file(path, part_case)
 
 
 def faces_of_part(path: str | os.PathLike[str], angle: float = FEATURE_ANGLE) -> BodyFaces:
@@ -329,8 +329,11 @@ def _of_file(path: str | os.PathLike[str], take: Callable[[Mapping[str, Any], Pa
         ) from None
 
 
-def _case(content: Mapping[str, Any], path: Path) -> Case:
-    """Case of a part file's content; all mistakes come at once, if possible before meshing."""
+def part_case(content: Mapping[str, Any], path: Path, mesh: TetMesh | None = None) -> Case:
+    """Case of a part file's content; all mistakes come at once, if possible before meshing.
+
+    A mesh that is given takes the place of the one that the file names.
+    """
     found = Mistakes()
     part, unread = _readable(content, found)
     name, given = part.name or path.stem, _Values()
@@ -368,7 +371,9 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
         assert part.edge_length is not None
         check_before_meshing(surface, part.edge_length, rules, supports, loads, own, angle)
 
-    mesh, findings = part.read(path.parent, before, angle)
+    findings: tuple[str, ...] = ()
+    if mesh is None:
+        mesh, findings = part.read(path.parent, before, angle)
     for each, rule in rules.items():
         with found.noted():
             mesh = patches_from_rules(mesh, {each: rule})

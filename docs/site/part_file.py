@@ -6,9 +6,9 @@ from keys import keys, kinds
 
 from ccfem.cases import part_file as reader
 from ccfem.cases.part_fibre import FIBRE_REGIONS
+from ccfem.cases.part_file import REGIONS
 from ccfem.cases.part_keys import Part
 from ccfem.cases.part_loads import LOADS, SUPPORTS
-from ccfem.cases.part_file import REGIONS
 from ccfem.cases.part_tables import RULES
 from ccfem.fem.materials import isotropic, material_names, transversely_isotropic
 from ccfem.machine import GcodeProfile, Kinematics, Limits, Machine, Process, SpeedTable

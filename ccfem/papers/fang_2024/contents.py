@@ -10,7 +10,7 @@ import numpy as np
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
 from ccfem.base.progress import Progress, silent
-from ccfem.cases.t_bracket import t_bracket
+from ccfem.cases.shipped import t_bracket
 from ccfem.comparison.files import write_results
 from ccfem.comparison.plot.canvas import png
 from ccfem.comparison.plot.stack_page import space_picture, turning_page

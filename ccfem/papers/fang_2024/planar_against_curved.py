@@ -10,7 +10,7 @@ table of each load; into a folder it writes the whole reports.
 import sys
 from pathlib import Path
 
-from ccfem.cases.t_bracket import t_bracket
+from ccfem.cases.shipped import t_bracket
 from ccfem.comparison.engine import compare
 from ccfem.comparison.files import write_results
 from ccfem.comparison.result import Comparison

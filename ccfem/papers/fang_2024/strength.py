@@ -13,7 +13,7 @@ in that order.
 
 from collections.abc import Sequence
 
-from ccfem.cases.t_bracket import bolt_heads
+from ccfem.cases.bodies import bolt_heads
 from ccfem.fem.elasticity.problem import Bearing, Problem, Support
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.stress_field import StressField

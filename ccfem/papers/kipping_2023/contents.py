@@ -13,7 +13,7 @@ import shapely
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.progress import Progress, silent
 from ccfem.body.meshing import extrude
-from ccfem.cases.arm_bracket import HOLES
+from ccfem.cases.bodies import ARM_BRACKET_HOLES
 from ccfem.comparison.plot.canvas import png
 from ccfem.fem.elasticity.ball import BALL, ball_averages
 from ccfem.fem.elasticity.solve import solve
@@ -467,7 +467,7 @@ def on_pressing_supports(run: Chain) -> StressField:
     mesh = problem.mesh
     middle = mesh.points[mesh.boundary].mean(axis=1)
     up = mesh.facet_areas(mesh.boundary)[1][:, 2]
-    feet = [HOLES[name].point for name in ("foot_near", "foot_far")]
+    feet = [ARM_BRACKET_HOLES[name].point for name in ("foot_near", "foot_far")]
     near = [np.hypot(middle[:, 0] - x, middle[:, 1] - y) < _HEAD for x, y, _ in feet]
     thick = float(middle[(up > 0.99) & near[1], 2].max())
     heads = (up > 0.99) & (near[0] | near[1]) & (np.abs(middle[:, 2] - thick) < 1e-3)

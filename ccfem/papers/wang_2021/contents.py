@@ -11,8 +11,7 @@ import shapely
 from ccfem.base.csv_table import write_csv
 from ccfem.base.progress import Progress, silent
 from ccfem.base.tensor import in_plane, largest_in_plane
-from ccfem.cases.bridge import bridge_plate
-from ccfem.cases.designed import Hole, designed_case
+from ccfem.cases.designed import PLATES, Hole, designed_case
 from ccfem.geometry.medial_axis import medial_axis
 from ccfem.judging.evaluation.indices.curvature import sample_curvature
 from ccfem.judging.evaluation.indices.manufacture import sample_manufacture
@@ -131,7 +130,7 @@ def try_radii(study: Mapping[str, PlateStudy]) -> dict[tuple[str, float], Tried]
 
 def try_hole() -> PartStudy:
     """Lay the slicer's patterns on the full bridge with a hole in its middle."""
-    plate = replace(bridge_plate(), holes=(_HOLE,))
+    plate = replace(PLATES["bridge"], holes=(_HOLE,))
     return run_part(designed_case(plate, optimised=False), BASELINES, tested=False)
 
 

@@ -1,14 +1,13 @@
 """Five plates, optimised and full, under the load-dependent paths and those of other methods.
 
 T. Wang et al., Load-dependent path planning method for 3D printing of continuous fiber reinforced
-plastics, Composites Part A 140 (2021) 106181. The plates are `ccfem.cases.bridge` and its
-neighbours; lpp is strategy `svt`.
+plastics, Composites Part A 140 (2021) 106181. The plates are those of `ccfem.cases.designed`;
+lpp is strategy `svt`.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib import import_module
 from time import perf_counter
 from types import MappingProxyType
 from typing import Any
@@ -18,8 +17,7 @@ import numpy as np
 from ccfem.base.arrays import FloatArray
 from ccfem.base.progress import Progress, silent
 from ccfem.cases import Case, create_case
-from ccfem.cases.designed import ELEMENT_SIZE, DesignPlate
-from ccfem.cases.stored.build import DESIGNED
+from ccfem.cases.designed import ELEMENT_SIZE, PLATES, DesignPlate
 from ccfem.fem.elasticity import StressField, solve
 from ccfem.fem.topopt import Design
 from ccfem.geometry.polylines import resample, turning_angles
@@ -39,8 +37,6 @@ from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import stress_on
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create, named
-
-PLATES = DESIGNED
 
 PATTERNS: Mapping[str, tuple[str, dict[str, Any]]] = MappingProxyType(
     {
@@ -146,14 +142,8 @@ class PlateStudy:
     seconds: float
 
 
-def plate_of(name: str) -> DesignPlate:
-    """Plate of a name."""
-    plate: DesignPlate = getattr(import_module(f"ccfem.cases.{name}"), f"{name}_plate")()
-    return plate
-
-
 def run_study(
-    plates: Sequence[str] = PLATES,
+    plates: Sequence[str] = tuple(PLATES),
     patterns: Sequence[str] = tuple(PATTERNS),
     design: bool = True,
     progress: Progress = silent,
@@ -187,7 +177,7 @@ def run_plate(
 ) -> PlateStudy:
     """Optimise a plate if asked to, then solve, plan and judge both parts."""
     begun = perf_counter()
-    plate = plate_of(name)
+    plate = PLATES[name]
     found = plate.design() if design else None
     off = np.nan
     if found is not None:
