@@ -11,8 +11,6 @@ from matplotlib.figure import Figure
 
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.csv_table import write_csv
-from ccfem.base.progress import Progress, silent
-from ccfem.comparison.plot.canvas import save
 from ccfem.comparison.plot.colours import INK, OUTLINE
 from ccfem.judging.evaluation import Evaluation, evaluate
 from ccfem.judging.virtual_testing.specimen import Specimen
@@ -23,8 +21,15 @@ from ccfem.papers.chen_2021.loop import FOLDER
 from ccfem.papers.chen_2021.pipeline import STAGES, LayerStages
 from ccfem.papers.chen_2021.study import PARTS_AT_HAND, Model, Study, run_study
 from ccfem.papers.chen_2021.virtual_test import MATRIX_STRENGTH, authors_paths
-from ccfem.papers.contents import Contents, drawn_of
-from ccfem.papers.verdicts import Check, claim_table, judged
+from ccfem.papers.contents import (
+    Contents,
+    claim_table,
+    drawn_of,
+    judged,
+    table,
+    write_figures,
+    write_report,
+)
 from ccfem.papers.wang_2021.panels import bar, curves, lines_of, panels, section, title
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
@@ -33,14 +38,6 @@ from ccfem.slicing.layers.layer import Layer
 
 
 _PATH, _RING, _WRONG = "#0072b2", "#e69f00", "#b3261e"
-
-
-def draw_all(study: Study, folder: Path) -> list[str]:
-    """Draw every figure; the names of the files."""
-    made = figures(study)
-    for name, figure in made.items():
-        save(figure, folder / f"{name}.png")
-    return [f"{name}.png" for name in made]
 
 
 def figures(study: Study, number: int | None = None) -> dict[str, Figure]:
@@ -70,8 +67,8 @@ def _pipeline(model: Model) -> Figure:
     layer = stages.layer
     known = stages.directed
     figure, axes = panels([layer.plane.polygon] * 7, 4, 3.4)
-    for one in axes[:7]:
-        section(one, layer.plane.polygon)
+    for panel in axes[:7]:
+        section(panel, layer.plane.polygon)
     projected = known.tension.direction
     _arrows(axes[0], layer, _in_plane(vectors.raw, layer))
     title(axes[0], "(a) tension, signs as they come")
@@ -264,36 +261,30 @@ def _points(axes: Any, layer: Layer, values: FloatArray) -> Any:
 def write(study: Study, folder: Path) -> str:
     """Write everything into a folder; returns the table of claims."""
     folder.mkdir(parents=True, exist_ok=True)
-    found = quantities(study)
-    claims = claim_table(verdicts(found))
-    drawn = draw_all(study, folder)
-    write_csv(folder / "quantities.csv", ("quantity", "value"), found.items())
-    parts = [
-        "# Field-based toolpaths of Chen et al. (2021): ours beside theirs\n",
+    values = quantities(study)
+    claims = claim_table(judged(values, EXPECTED))
+    write_csv(folder / "quantities.csv", ("quantity", "value"), values.items())
+    introduction = (
+        "# Field-based toolpaths of Chen et al. (2021): ours beside theirs\n\n"
         "Written by `ccfem reproduce chen_2021`. The algorithm is the published one. "
-        f"Part: {study.loop.case.title}. {PARTS_AT_HAND}\n",
-        f"## Claims\n\n{claims}",
-        f"## Table 1: times\n\n{time_table(study)}",
-        f"## Table 2: fibre and stiffness\n\n{length_table(study, found)}",
-        "## Figures\n",
-        *(f"![{name}]({name})\n" for name in drawn),
-    ]
-    (folder / "report.md").write_text("\n".join(parts))
+        f"Part: {study.loop.case.title}. {PARTS_AT_HAND}\n"
+    )
+    sections = {
+        "Claims": claims,
+        "Table 1: times": time_table(study),
+        "Table 2: fibre and stiffness": length_table(study, values),
+    }
+    write_report(folder, introduction, sections, write_figures(figures(study), folder))
     return claims
-
-
-def write_all(folder: Path, progress: Progress = silent) -> None:
-    """Run the study, and write figures, tables and claims into a folder."""
-    print(write(run_study(progress=progress), folder))
 
 
 CONTENTS = Contents(
     title="Chen et al. 2021, field-based toolpaths",
     seconds=90.0,
     run=lambda progress: run_study(progress=progress),
-    whole=write_all,
+    whole=lambda folder, progress: print(write(run_study(progress=progress), folder)),
     tables={
-        "claims": lambda study: claim_table(verdicts(quantities(study()))),
+        "claims": lambda study: claim_table(judged(quantities(study()), EXPECTED)),
         "table1": lambda study: time_table(study()),
         "table2": lambda study: length_table(study(), quantities(study())),
     },
@@ -323,37 +314,30 @@ _PAPER_2 = {
 def time_table(study: Study) -> str:
     """Table 1 in Markdown: the paper's rows, then ours."""
     stages = tuple(f"{stage}, s a layer" for stage in STAGES)
-    heads = ("model", "cells", "layers", "orientation, s", "removal, s", *stages, "all, s")
-    lines = [_row(heads), "|---" * len(heads) + "|"]
-    for name, values in PAPER_1.items():
-        lines.append(_row((f"paper: {name}", *(f"{value:g}" for value in values))))
+    rows = [(f"paper: {name}", *(f"{v:g}" for v in values)) for name, values in PAPER_1.items()]
     for name, model in study.models.items():
         layers = np.array([each.seconds for each in model.stages])
-        times = (*model.vectors.seconds, *layers.mean(axis=0))
         whole = sum(model.vectors.seconds) + float(layers.sum())
+        times = (*model.vectors.seconds, *layers.mean(axis=0), whole)
         sizes = (str(len(model.stress.mesh.cells)), str(len(model.layers)))
-        lines.append(_row((f"here: {name}", *sizes, *(f"{t:.3f}" for t in (*times, whole)))))
-    return "\n".join(lines) + "\n"
+        rows.append((f"here: {name}", *sizes, *(f"{t:.3f}" for t in times)))
+    heads = ("model", "cells", "layers", "orientation, s", "removal, s", *stages, "all, s")
+    return table(heads, rows)
 
 
-def length_table(study: Study, found: Mapping[str, float]) -> str:
+def length_table(study: Study, values: Mapping[str, float]) -> str:
     """Table 2 in Markdown, of the Loop: fibre, and stiffness over that of the bare part."""
     rows = dict(_PAPER_2)
     for name, (paths, ratio) in study.compared.items():
         rows[f"here: {name}"] = (1e-3 * float(paths.lengths.sum()), ratio)
     for name in ("ours", "zigzag"):
-        if f"fibre of the authors' paths, m, {name}" in found:
+        if f"fibre of the authors' paths, m, {name}" in values:
             rows[f"their published paths, {name}, tested here"] = (
-                found[f"fibre of the authors' paths, m, {name}"],
-                found[f"stiffness ratio of the authors' paths, {name}"],
+                values[f"fibre of the authors' paths, m, {name}"],
+                values[f"stiffness ratio of the authors' paths, {name}"],
             )
-    lines = [_row(("Loop", "fibre, m", "stiffness ratio")), "|---|---|---|"]
-    lines += [_row((name, f"{a:.2f}", f"{b:.2f}")) for name, (a, b) in rows.items()]
-    return "\n".join(lines) + "\n"
-
-
-def _row(cells: tuple[str, ...]) -> str:
-    return f"| {' | '.join(cells)} |"
+    heads = ("Loop", "fibre, m", "stiffness ratio")
+    return table(heads, [(name, f"{a:.2f}", f"{b:.2f}") for name, (a, b) in rows.items()])
 
 
 # The quantities that the paper's claims are about, and the verdicts.
@@ -377,11 +361,6 @@ def quantities(study: Study) -> dict[str, float]:
     if os.environ.get(FOLDER) and loop.case.name == "chen_2021_loop":
         found |= _authors(loop)
     return found
-
-
-def verdicts(found: dict[str, float]) -> list[Check]:
-    """Judge every claim."""
-    return judged(found, EXPECTED)
 
 
 def agreement(model: Model) -> FloatArray:

@@ -66,50 +66,6 @@ def ratios(
     return zigzag, ours, ours / zigzag
 
 
-def main() -> None:
-    """Print the ratios and first-failure loads beside the physical ones."""
-    case = authors_loop()
-    field = solve(case.problem)["pull"]
-    specimen = Specimen.of(field)
-    strands = {name: cut_strands(authors_paths(name), field.mesh) for name in _FILES}
-    print("Loop, stiffness:             zigzag/none  ours/none  ours/zigzag")
-    print("physical, one specimen each       {:6.2f}     {:6.2f}       {:6.2f}".format(*PHYSICAL))
-    for mode in ("bonded", "tension"):
-        for rho in (2.15, 2.25, 4.0, 4.25):
-            found = ratios(specimen, strands, rho, mode)
-            text = "{:6.3f}     {:6.3f}       {:6.3f}".format(*found)
-            print(f"{mode:8} rho {rho:4.2f} mm^2          {text}")
-
-    carbon, area = named_material("c_fram"), case.machine.filament_area
-    smeared = [oriented_ratio(strands[name], field, carbon, area)[0] for name in strands]
-    text = "{:6.3f}     {:6.3f}       {:6.3f}".format(*smeared, smeared[1] / smeared[0])
-    rho = area / np.linalg.inv(carbon.stiffness)[0, 0] / specimen.modulus
-    print(f"smeared  rho {rho:4.2f} mm^2          {text}")
-
-    print(
-        "\nfirst failure, kN (tension only, rho 4, one matrix strength): predicted, measured peak"
-    )
-    index, _ = matrix_peak(field)
-    print(f"none    {MATRIX_STRENGTH / index:5.2f} {_PEAKS['none']:5.2f}  in the matrix")
-    brackets = {}
-    for name in ("zigzag", "ours"):
-        brackets[name] = virtual_bracket(strands[name], specimen, span=())
-        failure = first_failure(brackets[name].tension, matrix_strength=MATRIX_STRENGTH)
-        print(f"{name:7} {1e-3 * failure.load:5.2f} {_PEAKS[name]:5.2f}  in the {failure.what}")
-    said = {FIRST: "ours", SECOND: "zigzag"}
-    verdict = stiffer(brackets["ours"], brackets["zigzag"])
-    print(f"stiffer: {said.get(verdict, verdict)}")
-
-    bearing = replace(case.problem, loads={"bearing": (Bearing("load", (0.0, 0.0, 1000.0)),)})
-    pressed = virtual_test(strands["ours"], solve(bearing)["bearing"], span=())
-    print(f"ours/none under a bearing load on the same hole, rho 4, tension: {pressed.ratio:.3f}")
-    print(f"\n{HONEST_PROMISE}")
-
-
-if __name__ == "__main__":
-    main()
-
-
 # Oriented stiffness: fibres smeared over the cells, instead of bars in them.
 #
 # The stiffness of a transversely isotropic material is linear in ``a a`` and ``a a a a`` of its
@@ -263,3 +219,47 @@ def oriented_ratio(
     specimen = Specimen.of(part, backend)
     before = specimen.stiffness(part.displacement, part.strain_energy)
     return specimen.stiffness(after.displacement, after.strain_energy) / before, after
+
+
+def main() -> None:
+    """Print the ratios and first-failure loads beside the physical ones."""
+    case = authors_loop()
+    field = solve(case.problem)["pull"]
+    specimen = Specimen.of(field)
+    strands = {name: cut_strands(authors_paths(name), field.mesh) for name in _FILES}
+    print("Loop, stiffness:             zigzag/none  ours/none  ours/zigzag")
+    print("physical, one specimen each       {:6.2f}     {:6.2f}       {:6.2f}".format(*PHYSICAL))
+    for mode in ("bonded", "tension"):
+        for rho in (2.15, 2.25, 4.0, 4.25):
+            found = ratios(specimen, strands, rho, mode)
+            text = "{:6.3f}     {:6.3f}       {:6.3f}".format(*found)
+            print(f"{mode:8} rho {rho:4.2f} mm^2          {text}")
+
+    carbon, area = named_material("c_fram"), case.machine.filament_area
+    smeared = [oriented_ratio(strands[name], field, carbon, area)[0] for name in strands]
+    text = "{:6.3f}     {:6.3f}       {:6.3f}".format(*smeared, smeared[1] / smeared[0])
+    rho = area / np.linalg.inv(carbon.stiffness)[0, 0] / specimen.modulus
+    print(f"smeared  rho {rho:4.2f} mm^2          {text}")
+
+    print(
+        "\nfirst failure, kN (tension only, rho 4, one matrix strength): predicted, measured peak"
+    )
+    index, _ = matrix_peak(field)
+    print(f"none    {MATRIX_STRENGTH / index:5.2f} {_PEAKS['none']:5.2f}  in the matrix")
+    brackets = {}
+    for name in ("zigzag", "ours"):
+        brackets[name] = virtual_bracket(strands[name], specimen, span=())
+        failure = first_failure(brackets[name].tension, matrix_strength=MATRIX_STRENGTH)
+        print(f"{name:7} {1e-3 * failure.load:5.2f} {_PEAKS[name]:5.2f}  in the {failure.what}")
+    said = {FIRST: "ours", SECOND: "zigzag"}
+    verdict = stiffer(brackets["ours"], brackets["zigzag"])
+    print(f"stiffer: {said.get(verdict, verdict)}")
+
+    bearing = replace(case.problem, loads={"bearing": (Bearing("load", (0.0, 0.0, 1000.0)),)})
+    pressed = virtual_test(strands["ours"], solve(bearing)["bearing"], span=())
+    print(f"ours/none under a bearing load on the same hole, rho 4, tension: {pressed.ratio:.3f}")
+    print(f"\n{HONEST_PROMISE}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,6 +1,5 @@
 """What of Fang et al. 2024 can be made again."""
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,12 +22,11 @@ from ccfem.fem.elasticity.zone import ZONE, distance_from_patches
 from ccfem.geometry.locate import locate
 from ccfem.judging.virtual_testing.interlayer import layer_normals
 from ccfem.machine import Machine
-from ccfem.papers.contents import Contents
+from ccfem.papers.contents import Contents, table, write_claims
 from ccfem.papers.fang_2024.authors import authors_mesh, authors_stress, finer_mesh
 from ccfem.papers.fang_2024.measures import Strands
 from ccfem.papers.fang_2024.planar_against_curved import ROWS, against, failure_loads
 from ccfem.papers.fang_2024.t_bracket import PAPER_SECONDS, study, timed_chain
-from ccfem.papers.verdicts import Check, claim_table, judged
 from ccfem.paths.planning import plan
 from ccfem.paths.toolpaths import MATRIX
 from ccfem.printing.export.robot_waypoints import write_robot_waypoints
@@ -77,10 +75,7 @@ def write_all(
     found["170 k cells: seconds"] = finer["all, clock"]
     if "pull" in tests:
         found |= _failures_explained(tests["pull"], folder)
-    (folder / "quantities.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
-    claims = claim_table(verdicts(found))
-    (folder / "claims.md").write_text(claims, encoding="utf-8")
-    print(f"\n{claims}")
+    print(f"\n{write_claims(folder, found, EXPECTED)}")
 
 
 def _failures_explained(pulled: Comparison, folder: Path) -> dict[str, float]:
@@ -88,11 +83,11 @@ def _failures_explained(pulled: Comparison, folder: Path) -> dict[str, float]:
     where = {"walls fixed": openings(pulled), "bolts press": openings(pulled, pressing=True)}
     tensile = pulled.case.problem.material.interlayer_tensile
     assert tensile is not None
-    table = openings_table(where, tensile)
-    (folder / "where_layers_open.md").write_text(table, encoding="utf-8")
+    text = openings_table(where, tensile)
+    (folder / "where_layers_open.md").write_text(text, encoding="utf-8")
     title = f"Pull on the head: load that opens the layers, bond of {tensile:g} MPa"
     openings_picture(where, title, folder / "where_layers_open.png")
-    print(f"\n{table}", flush=True)
+    print(f"\n{text}", flush=True)
     return bonds_needed(where, tensile)
 
 
@@ -143,11 +138,6 @@ def _loads(load: str, compared: Comparison) -> dict[str, float]:
         ]
         found[f"{load}, {name}: joints linked"] = failure_loads(compared, "joints_linked")[name]
     return found
-
-
-def verdicts(found: Mapping[str, float]) -> list[Check]:
-    """Judge the claims of the paper by the quantities found."""
-    return judged(found, EXPECTED)
 
 
 # The field and its layers under other weights, thicknesses, terms of the joints, and meshes.
@@ -233,14 +223,14 @@ def _between(one: SpatialSlicing, other: SpatialSlicing) -> float:
     return min(found)
 
 
-def field_table(found: dict[str, float]) -> str:
+def field_table(figures: Mapping[str, float]) -> str:
     """Markdown table of the variants."""
     heads = (*COLUMNS, "thickness ratio", "pieces a layer", "layers")
-    lines = [f"| field | {' | '.join(heads)} |", "|---" * (len(heads) + 1) + "|"]
-    for name in (*VARIANTS, "84 k cells"):
-        values = [found.get(f"{name} {head}", np.nan) for head in heads]
-        lines.append(f"| {name} | {' | '.join(f'{value:.3g}' for value in values)} |")
-    return "\n".join(lines)
+    rows = [
+        (name, *(f"{figures.get(f'{name} {head}', np.nan):.3g}" for head in heads))
+        for name in (*VARIANTS, "84 k cells")
+    ]
+    return table(("field", *heads), rows)
 
 
 # What layers and strands on the T-bracket have to reach, in one table beside the authors' own.
@@ -313,21 +303,30 @@ def targets_table(
 ) -> str:
     """Markdown table: figure, ours, ours with ``even``, the authors', what is wanted, verdict."""
     ours, even, theirs = (strands[name].table() for name in ("winding", "winding, even", "authors"))
-    head = "| figure | winding | winding, even | authors, same stress | wanted | aim | verdict |"
-    lines = [head, "|---" * 7 + "|"]
-    lines += [_row(target, field[target.figure]) for target in _FIELD]
+    rows = [_row(target, field[target.figure]) for target in _FIELD]
     for target in _STRANDS:
         name = target.figure
-        lines.append(_row(target, ours[name], f"{even[name]:.3g}", f"{theirs[name]:.3g}"))
-    lines += [
+        rows.append(_row(target, ours[name], f"{even[name]:.3g}", f"{theirs[name]:.3g}"))
+    rows += [
         _row(target, seconds[target.figure], name=f"seconds: {target.figure}")
         for target in _SECONDS
     ]
-    lines.append(_row(_FINER, finer[_FINER.figure], name="seconds, 170 thousand cells: all, clock"))
-    return "\n".join(lines)
+    rows.append(_row(_FINER, finer[_FINER.figure], name="seconds, 170 thousand cells: all, clock"))
+    head = (
+        "figure",
+        "winding",
+        "winding, even",
+        "authors, same stress",
+        "wanted",
+        "aim",
+        "verdict",
+    )
+    return table(head, rows)
 
 
-def _row(target: _Target, ours: float, even: str = "", theirs: str = "", name: str = "") -> str:
+def _row(
+    target: _Target, ours: float, even: str = "", theirs: str = "", name: str = ""
+) -> tuple[str, ...]:
     met = target.low <= ours <= target.high
     if target.high == _INF:
         wanted = f"at least {target.low:g}"
@@ -340,8 +339,7 @@ def _row(target: _Target, ours: float, even: str = "", theirs: str = "", name: s
         aim = f"{target.aim:g}"
         reached = ours >= target.aim if target.high == _INF else ours <= target.aim
         verdict += ", aim reached" if reached else ", aim missed"
-    shown = name or target.figure
-    return f"| {shown} | {ours:.4g} | {even} | {theirs} | {wanted} | {aim} | {verdict} |"
+    return name or target.figure, f"{ours:.4g}", even, theirs, wanted, aim, verdict
 
 
 # Why the paper's order of failure loads comes out or not: the load that opens layers, by place.
@@ -425,18 +423,17 @@ def openings_table(found: dict[str, dict[str, Opening]], tensile: float) -> str:
     tensile : float, MPa
         Strength of the bond that the loads are for; that of shear goes with it.
     """
-    heads = [f"{place} opens at, kN" for place in PLACES]
-    lines = [f"| supports | slicing | {' | '.join(heads)} | paper | bond that explains it, MPa |"]
-    lines.append("|---" * (len(heads) + 4) + "|")
+    rows = []
     for supports, slicings in found.items():
         for slicing, opening in slicings.items():
             loads = [f"{opening.at(place):.2f}" for place in PLACES]
-            said, bond = "", ""
+            told, bond = "", ""
             if slicing in PAPER_LOADS:
                 place, load = PAPER_LOADS[slicing]
-                said, bond = f"{place} {load}", f"{_bond(slicing, opening, tensile):.1f}"
-            lines.append(f"| {supports} | {slicing} | {' | '.join(loads)} | {said} | {bond} |")
-    return "\n".join(lines)
+                told, bond = f"{place} {load}", f"{_bond(slicing, opening, tensile):.1f}"
+            rows.append((supports, slicing, *loads, told, bond))
+    heads = [f"{place} opens at, kN" for place in PLACES]
+    return table(("supports", "slicing", *heads, "paper", "bond that explains it, MPa"), rows)
 
 
 def bonds_needed(found: dict[str, dict[str, Opening]], tensile: float) -> dict[str, float]:

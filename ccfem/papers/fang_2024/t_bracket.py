@@ -15,6 +15,7 @@ import numpy as np
 
 from ccfem.fem.elasticity.part_stress import GivenStress, PartStress
 from ccfem.machine import Machine
+from ccfem.papers.contents import table
 from ccfem.papers.fang_2024.authors import (
     authors_layers,
     authors_mesh,
@@ -144,24 +145,24 @@ def _times(seconds: dict[str, float], cells: int) -> str:
     }
     head = f"{cells} cells, {seconds['layers']:.0f} layers"
     lines = [f"\n{head}; seconds of the paper on 85,119 cells, 45 layers\n"]
-    lines += ["| seconds | ours, clock | processors | paper |", "|---|---|---|---|"]
+    rows = []
     for name in ("stress lines", "field and layers", "strands", "matrix paths", "all"):
-        told = f"{theirs[name]:.2f}" if name in theirs else ""
+        published = f"{theirs[name]:.2f}" if name in theirs else ""
         clock, busy = seconds[f"{name}, clock"], seconds[f"{name}, processors"]
-        lines.append(f"| {name} | {clock:.2f} | {busy:.2f} | {told} |")
-    one = f"{seconds['slowest layer, processors']:.2f}"
-    median = seconds["median layer, processors"]
-    lines.append(f"| slowest layer (median {median:.2f}) | | {one} | {paper['a layer']:.2f} |")
-    lines.append(f"\nload of the machine before: {seconds['load of the machine before']:.1f}")
+        rows.append((name, f"{clock:.2f}", f"{busy:.2f}", published))
+    slowest = f"slowest layer (median {seconds['median layer, processors']:.2f})"
+    own = f"{seconds['slowest layer, processors']:.2f}"
+    rows.append((slowest, "", own, f"{paper['a layer']:.2f}"))
+    lines.append(table(("seconds", "ours, clock", "processors", "paper"), rows))
+    lines.append(f"load of the machine before: {seconds['load of the machine before']:.1f}")
     return "\n".join(lines)
 
 
 def study(stress: PartStress, sliced: SpatialSlicing) -> dict[str, Strands]:
     """Print the tables of field and strands; the strands' figures by name."""
     machine = Machine()
-    print("\n| field | ours |\n|---|---|")
-    for name, value in vars(sliced.quality).items():
-        print(f"| {name} | {value:.3f} |")
+    quality = [(name, f"{value:.3f}") for name, value in vars(sliced.quality).items()]
+    print(f"\n{table(('field', 'ours'), quality)}", end="")
     weight = sliced.region.weight
     found: dict[str, Strands] = {}
     for name, given in VARIANTS.items():
@@ -171,11 +172,8 @@ def study(stress: PartStress, sliced: SpatialSlicing) -> dict[str, Strands]:
     found["authors"] = measured(authors_strands(theirs), theirs, stress, weight)
     paths = plan(create("winding"), theirs, stress, machine)
     found["winding on the authors' layers"] = measured(paths, theirs, stress, weight)
-    names = list(next(iter(found.values())).table())
-    print("\n| strands | " + " | ".join(names) + " |\n" + "|---" * (len(names) + 1) + "|")
-    for name, figures in found.items():
-        values = " | ".join(f"{value:.3g}" for value in figures.table().values())
-        print(f"| {name} | {values} |")
+    rows = [(k, *(f"{v:.3g}" for v in row.table().values())) for k, row in found.items()]
+    print(f"\n{table(('strands', *found['authors'].table()), rows)}", end="")
     return found
 
 

@@ -1,6 +1,7 @@
 """The chain from stress to paths, stage by stage: seconds and what comes out (tables 1 and 2)."""
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from ccfem.cases import create_case
 from ccfem.cases.case import Case
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.papers.contents import table
 from ccfem.papers.kipping_2023.thickness import Distances, distances_below
 from ccfem.paths.planning import plan
 from ccfem.paths.toolpaths import Toolpaths
@@ -80,30 +82,29 @@ def chain(name: str) -> Chain:
     return Chain(case, stress, sliced, paths, support, distances_below(sliced.layers), seconds)
 
 
-def table_1(chains: dict[str, Chain]) -> str:
+def table_1(chains: Mapping[str, Chain]) -> str:
     """Parameters and properties of both parts, the paper's in brackets."""
-    head = (
-        "| part | cells | share of the peak | of cells critical | in regions | regions | layers |"
-    )
-    lines = [head, "|---" * 7 + "|"]
+    rows = []
     for part, run in chains.items():
-        cells, slicer = len(run.stress.mesh.cells), run.case.slicing
+        slicer, regions = run.case.slicing, run.sliced.regions
         assert isinstance(slicer, LoadOriented)
-        regions = run.sliced.regions
-        lines.append(
-            f"| {part} | {cells} ({PAPER_CELLS[part]}) | {slicer.share:g} "
-            f"({PAPER_SHARE[part]:g}) | "
-            f"{regions.critical.mean():.1%} | {(regions.region >= 0).mean():.1%} | "
-            f"{regions.count} | {len(run.sliced.layers)} |"
+        rows.append(
+            (
+                *(part, f"{len(run.stress.mesh.cells)} ({PAPER_CELLS[part]})"),
+                f"{slicer.share:g} ({PAPER_SHARE[part]:g})",
+                *(f"{regions.critical.mean():.1%}", f"{(regions.region >= 0).mean():.1%}"),
+                *(str(regions.count), str(len(run.sliced.layers))),
+            )
         )
-    return "\n".join(lines) + "\n"
+    shares = ("share of the peak", "of cells critical", "in regions")
+    return table(("part", "cells", *shares, "regions", "layers"), rows)
 
 
-def table_2(chains: dict[str, Chain]) -> str:
+def table_2(chains: Mapping[str, Chain]) -> str:
     """Seconds of each stage; the paper gives sums alone."""
     stages = list(next(iter(chains.values())).seconds)
-    lines = [f"| part | {' | '.join(stages)} | paper, all |", "|---" * (len(stages) + 2) + "|"]
-    for part, run in chains.items():
-        values = " | ".join(f"{run.seconds[stage]:.2f}" for stage in stages)
-        lines.append(f"| {part} | {values} | {PAPER_SECONDS[part]:g} |")
-    return "\n".join(lines) + "\n"
+    rows = [
+        (part, *(f"{run.seconds[stage]:.2f}" for stage in stages), f"{PAPER_SECONDS[part]:g}")
+        for part, run in chains.items()
+    ]
+    return table(("part", *stages, "paper, all"), rows)

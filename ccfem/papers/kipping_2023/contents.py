@@ -1,7 +1,5 @@
 """What of Kipping and Schueppstuhl 2023 can be made again."""
 
-import json
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,11 +20,10 @@ from ccfem.fem.elasticity.support_kinds import PressingSupport
 from ccfem.fem.materials import isotropic
 from ccfem.judging.virtual_testing.interlayer import interlayer, layer_normals
 from ccfem.machine import Machine
-from ccfem.papers.contents import Contents, WhenAsked
+from ccfem.papers.contents import Contents, WhenAsked, table, write_claims
 from ccfem.papers.kipping_2023.chain import PAPER_SECONDS, PARTS, Chain, chain, table_1, table_2
 from ccfem.papers.kipping_2023.figures import blank, part_figures, senses_figure
 from ccfem.papers.kipping_2023.thickness import distances_below
-from ccfem.papers.verdicts import Check, claim_table, judged
 from ccfem.paths.fields.chart import chart_of
 from ccfem.printing.support import support_columns
 from ccfem.slicing.layers.layer import Layer
@@ -36,10 +33,6 @@ from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies.fiso import Fiso
 
 # First in, spiral out on eight shapes, flat and bent to a radius of 25 mm.
-#
-# python -m ccfem.papers.kipping_2023.contents [FOLDER]
-#
-# prints the table; into a folder it draws the strands.
 
 
 WIDTH, BEND = 0.9, 25.0
@@ -152,32 +145,35 @@ def _longest_step(line: shapely.LineString, section: shapely.Polygon) -> float:
 
 def shapes_table() -> tuple[str, dict[tuple[str, bool], Strand]]:
     """Table in Markdown, and the strands by shape, flat and bent."""
-    head = ["shape", "", "paths", "coverage", "of the opened area", "crossings", "longest step"]
-    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
-    found = {}
-    for name in SHAPES:
-        for bent in (False, True):
-            one = found[name, bent] = measured(name, bent)
-            lines.append(
-                f"| {name} | {'bent' if bent else 'flat'} | {one.paths} | {one.coverage:.3f} | "
-                f"{one.coverage_opened:.3f} | {one.crossings} | {one.longest_step:.2f} |"
-            )
-    return "\n".join(lines) + "\n", found
+    strands = {(name, bent): measured(name, bent) for name in SHAPES for bent in (False, True)}
+    rows = [
+        (
+            *(name, "bent" if bent else "flat", str(strand.paths), f"{strand.coverage:.3f}"),
+            *(f"{strand.coverage_opened:.3f}", str(strand.crossings)),
+            f"{strand.longest_step:.2f}",
+        )
+        for (name, bent), strand in strands.items()
+    ]
+    head = ("shape", "", "paths", "coverage", "of the opened area", "crossings", "longest step")
+    return table(head, rows), strands
 
 
 def options_table() -> str:
     """Table of what the options cost in coverage, on the flat shapes."""
-    lines = ["| options | paths | mean coverage | least | crossings | longest step |"]
-    lines.append("|---" * 6 + "|")
+    rows = []
     for title, options in OPTIONS.items():
-        each = [measured(name, False, **options) for name in SHAPES]
-        coverage = [one.coverage for one in each]
-        lines.append(
-            f"| {title} | {sum(one.paths for one in each)} | {np.mean(coverage):.3f} | "
-            f"{min(coverage):.3f} | {sum(one.crossings for one in each)} | "
-            f"{max(one.longest_step for one in each):.2f} |"
+        strands = [measured(name, False, **options) for name in SHAPES]
+        coverage = [strand.coverage for strand in strands]
+        rows.append(
+            (
+                *(title, str(sum(strand.paths for strand in strands))),
+                *(f"{np.mean(coverage):.3f}", f"{min(coverage):.3f}"),
+                str(sum(strand.crossings for strand in strands)),
+                f"{max(strand.longest_step for strand in strands):.2f}",
+            )
         )
-    return "\n".join(lines) + "\n"
+    head = ("options", "paths", "mean coverage", "least", "crossings", "longest step")
+    return table(head, rows)
 
 
 def shapes_picture(strands: dict[tuple[str, bool], Strand]) -> bytes:
@@ -194,49 +190,34 @@ def shapes_picture(strands: dict[tuple[str, bool], Strand]) -> bytes:
     return png(figure)
 
 
-if __name__ == "__main__":
-    table, laid = shapes_table()
-    print(table)
-    print(options_table())
-    if len(sys.argv) > 1:
-        folder = Path(sys.argv[1])
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "figure_7.png").write_bytes(shapes_picture(laid))
-
-
 # The whole of the paper: its study, figures, tables and claims beside ours.
 
 
 def write_all(folder: Path, progress: Progress = silent) -> None:
     """Run the study, and write figures, tables and claims into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    chains: dict[str, Chain] = {}
-    for part, name in PARTS.items():
-        progress(f"planning part {part}", len(chains) / len(PARTS))
-        chains[part] = chain(name)
+    chains = dict(_run(progress))
     tables = [table_1(chains), table_2(chains), support_table(chains)]
     print("\n".join(tables), flush=True)
     trades = {part: trade(run) for part, run in chains.items()}
-    loads = {part: failure_loads(run) for part, run in chains.items()}
     pressed = on_pressing_supports(chains["B"])
-    loads["B, pressed"] = failure_loads(chains["B"], pressed)
+    loads = _loads(chains, pressed)
     shapes, strands = shapes_table()
     tables += [trade_table(trades), strength_table(loads), shapes, options_table()]
     print("\n".join(tables[3:]), flush=True)
-    pictures = {"figure_7.png": shapes_picture(strands), "trade.png": trade_picture(trades)}
     models = {"holes held": chains["B"].stress, "supports press": pressed}
-    pictures["sliding_B.png"] = sliding_picture(chains["B"], models)
-    pictures["figure_1_3.png"] = senses_figure()[0]
+    pictures = {
+        "figure_7.png": shapes_picture(strands),
+        "trade.png": trade_picture(trades),
+        "sliding_B.png": sliding_picture(chains["B"], models),
+        "figure_1_3.png": senses_figure()[0],
+    }
     for part, run in chains.items():
         pictures |= part_figures(part, run)
     for name, picture in pictures.items():
         (folder / name).write_bytes(picture)
     (folder / "tables.md").write_text("\n".join(tables), encoding="utf-8")
-    found = quantities(chains, trades, loads, strands)
-    (folder / "quantities.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
-    claims = claim_table(verdicts(found))
-    (folder / "claims.md").write_text(claims, encoding="utf-8")
-    print(claims)
+    print(write_claims(folder, quantities(chains, trades, loads, strands), EXPECTED))
 
 
 # What flatter layers cost: tension across layers over the blend, and the paper's own choices.
@@ -253,6 +234,9 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "as published": {"quantile": 1.0, "gap": 0.0, "blend": 0.0, "even": False},
 }
 """Parameters of `LoadOriented`."""
+
+Trades = Mapping[str, Mapping[str, Mapping[str, float]]]
+"""By part, variant and column."""
 
 COLUMNS = ("tension", "below z", "below the best plane", "angle", "tilt", "inverted", "in range")
 
@@ -281,21 +265,21 @@ def trade(run: Chain) -> dict[str, dict[str, float]]:
     return found
 
 
-def trade_table(found: dict[str, dict[str, dict[str, float]]]) -> str:
+def trade_table(trades: Trades) -> str:
     """Table in Markdown, by part and variant."""
-    lines = [f"| part | variant | {' | '.join(COLUMNS)} |", "|---" * (len(COLUMNS) + 2) + "|"]
-    for part, variants in found.items():
-        for name, figures in variants.items():
-            values = " | ".join(f"{figures[column]:.4g}" for column in COLUMNS)
-            lines.append(f"| {part} | {name} | {values} |")
-    return "\n".join(lines) + "\n"
+    rows = [
+        (part, name, *(f"{figures[column]:.4g}" for column in COLUMNS))
+        for part, variants in trades.items()
+        for name, figures in variants.items()
+    ]
+    return table(("part", "variant", *COLUMNS), rows)
 
 
-def trade_picture(found: dict[str, dict[str, dict[str, float]]]) -> bytes:
+def trade_picture(trades: Trades) -> bytes:
     """Draw the tension across layers over the blend."""
     figure = blank(6.0, 4.0)
     axes = figure.subplots()
-    for part, variants in found.items():
+    for part, variants in trades.items():
         rows = [v for name, v in variants.items() if set(VARIANTS[name]) <= {"blend"}]
         rows = sorted((v for v in rows if v["inverted"] == 0.0), key=lambda v: v["blend"])
         axes.plot([v["blend"] for v in rows], [v["tension"] for v in rows], "o-", label=part)
@@ -311,10 +295,16 @@ def _run(progress: Progress) -> Mapping[str, Chain]:
     return WhenAsked(tuple(PARTS), lambda part: chain(PARTS[part]), progress, "planning part")
 
 
-def _strength(chains: Mapping[str, Chain]) -> str:
+def _loads(
+    chains: Mapping[str, Chain], pressed: StressField
+) -> dict[str, dict[str, tuple[float, ...]]]:
+    """Failure loads by part, the arm bracket's a second time by the stress of pressing supports."""
     loads = {part: failure_loads(run) for part, run in chains.items()}
-    loads["B, pressed"] = failure_loads(chains["B"], on_pressing_supports(chains["B"]))
-    return strength_table(loads)
+    return {**loads, "B, pressed": failure_loads(chains["B"], pressed)}
+
+
+def _strength(chains: Mapping[str, Chain]) -> str:
+    return strength_table(_loads(chains, on_pressing_supports(chains["B"])))
 
 
 CONTENTS = Contents(
@@ -340,7 +330,7 @@ EXPECTED = Path(__file__).with_name("expected.toml")
 
 def quantities(
     chains: Mapping[str, Chain],
-    trades: Mapping[str, Mapping[str, Mapping[str, float]]],
+    trades: Trades,
     loads: Mapping[str, Mapping[str, tuple[float, ...]]],
     strands: Mapping[tuple[str, bool], Strand],
 ) -> dict[str, float]:
@@ -402,24 +392,23 @@ def _support(run: Chain) -> dict[str, float]:
 
 def support_table(chains: Mapping[str, Chain]) -> str:
     """Table of the support of each part: layers along the stress, and flat ones that carry 45."""
-    head = "| part | layers | mm^3 | contact mm^2 | part mm^3 | number | 0.2 to 0.5 mm | inverted |"
-    lines = [head, "|---" * 8 + "|"]
+    rows = []
     for part, run in chains.items():
-        mesh, own = run.stress.mesh, _support(run)
-        flat = support_columns(mesh, angle=45.0)
-        lines += [
-            f"| {part} | load-oriented | {own['mm^3']:.0f} | {own['contact mm^2']:.0f} | "
-            f"{mesh.volumes.sum():.0f} | {own['layers']:.0f} | {own['in range']:.1%} | "
-            f"{own['inverted']:.2%} |",
-            f"| {part} | flat, over 45 degrees | {flat.volume:.0f} | {flat.contact:.0f} | "
-            f"{mesh.volumes.sum():.0f} | | | |",
+        mesh, support = run.stress.mesh, _support(run)
+        flat, volume = support_columns(mesh, angle=45.0), f"{mesh.volumes.sum():.0f}"
+        rows += [
+            (
+                *(part, "load-oriented", f"{support['mm^3']:.0f}"),
+                *(f"{support['contact mm^2']:.0f}", volume, f"{support['layers']:.0f}"),
+                *(f"{support['in range']:.1%}", f"{support['inverted']:.2%}"),
+            ),
+            (
+                *(part, "flat, over 45 degrees", f"{flat.volume:.0f}", f"{flat.contact:.0f}"),
+                *(volume, "", "", ""),
+            ),
         ]
-    return "\n".join(lines) + "\n"
-
-
-def verdicts(found: Mapping[str, float]) -> list[Check]:
-    """Judge the claims by the quantities found."""
-    return judged(found, EXPECTED)
+    head = ("part", "layers", "mm^3", "contact mm^2", "part mm^3", "number", "0.2 to 0.5 mm")
+    return table((*head, "inverted"), rows)
 
 
 # What the layers are worth: load at which they come apart, flat beside load-oriented.
@@ -515,14 +504,14 @@ def _tractions(
     return opening, np.linalg.norm(traction - opening[:, None] * normal, axis=1)
 
 
-def strength_table(loads: dict[str, dict[str, tuple[float, ...]]]) -> str:
+def strength_table(loads: Mapping[str, Mapping[str, tuple[float, ...]]]) -> str:
     """Table in Markdown, by part and slicing; a load for each zone, 3, 1.5 and 0 mm."""
-    heads = ("S 18 MPa", "S 35 MPa", "opening alone")
-    lines = [f"| part | layers | {' | '.join(heads)} | over flat |", "|---" * 6 + "|"]
-    for part, found in loads.items():
-        flat = np.array(found["flat, z"])
-        for name, values in found.items():
-            told = [f"{a:.0f}, {b:.0f}, {c:.0f} N" for a, b, c in np.reshape(values, (-1, 3))]
+    rows = []
+    for part, slicings in loads.items():
+        flat = slicings["flat, z"]
+        for name, values in slicings.items():
+            zones = [f"{a:.0f}, {b:.0f}, {c:.0f} N" for a, b, c in np.reshape(values, (-1, 3))]
             gain = ", ".join(f"{values[k] / flat[k]:.2f}" for k in (0, 3, 6))
-            lines.append(f"| {part} | {name} | {' | '.join(told)} | {gain} |")
-    return "\n".join(lines) + "\n"
+            rows.append((part, name, *zones, gain))
+    head = ("part", "layers", "S 18 MPa", "S 35 MPa", "opening alone", "over flat")
+    return table(head, rows)

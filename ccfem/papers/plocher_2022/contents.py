@@ -24,13 +24,19 @@ from ccfem.judging.evaluation.indices.sinuosity import (
 )
 from ccfem.judging.evaluation.indices.stiffness_alignment import agreement
 from ccfem.judging.evaluation.plane_paths import plane_paths
-from ccfem.papers.contents import Contents
+from ccfem.papers.contents import (
+    Contents,
+    claim_table,
+    judged,
+    table,
+    write_figures,
+    write_report,
+)
 from ccfem.papers.plocher_2022.fibre_map import fibre_map
-from ccfem.papers.plocher_2022.figures import draw_all, figures
+from ccfem.papers.plocher_2022.figures import figures
 from ccfem.papers.plocher_2022.plane_study import laid_plate, print_seconds, reduced_stiffness
 from ccfem.papers.plocher_2022.plates import Plate, five_holes, single_hole
 from ccfem.papers.plocher_2022.study import MATERIALS, RASTER, CaseStudy, machine_of, run_study
-from ccfem.papers.verdicts import Check, claim_table, judged
 from ccfem.paths.planning import plan
 from ccfem.paths.raster.patterns import concentric_regions, medial_regions
 from ccfem.paths.raster.raster_plan import raster_plan
@@ -59,42 +65,38 @@ def write_all(folder: Path, progress: Progress = silent) -> None:
     study = run_study(progress=progress)
     raster = run_study(patterns=RASTER, known=study, progress=progress)
     tried = try_variants()
-    found = quantities(study) | raster_quantities(raster) | variant_quantities(tried)
-    checks = verdicts(found)
+    values = quantities(study) | raster_quantities(raster) | variant_quantities(tried)
+    claims = claim_table(judged(values, EXPECTED))
     computed = perf_counter() - begun
-    drawn = draw_all(study, raster, folder)
+    drawn = write_figures(figures(study, raster), folder)
     rows = [
-        [name, mode, pattern, k, f"{v:.8g}"]
+        [name, mode, pattern, index, f"{value:.8g}"]
         for mode, cases in (("polyline", study), ("raster", raster))
         for name, case in cases.items()
-        for pattern, one in case.patterns.items()
-        for k, v in one.values.items()
+        for pattern, paths in case.patterns.items()
+        for index, value in paths.values.items()
     ]
     write_csv(folder / "results.csv", ("case", "mode", "pattern", "index", "value"), rows)
-    parts = [
-        "# Infill patterns of Plocher, Wioland and Panesar (2022): ours beside theirs\n",
-        "Written by `ccfem reproduce plocher_2022`.\n",
-        f"Study {computed:.1f} s, figures {perf_counter() - begun - computed:.1f} s.\n",
-        "## Claims\n",
-        claim_table(checks),
-        *(
-            f"## Case {name}, polylines\n\n{result_table(study[name])}\n"
-            f"## Case {name}, pixels\n\n{result_table(raster[name])}"
-            for name in study
-        ),
-        f"## Pixels beside a prototype (in brackets)\n\n{prototype_table(raster)}",
-        PROTOTYPE_NOTE,
-        f"## Rings of pixels by metric: SI of raw pixels\n\n{metric_table(raster)}",
-        f"## Ranks of PI\n\n{rank_table(found)}",
-        f"## Variants tried\n\n{variant_table(tried)}",
-        f"## Table 2: indices\n\n{index_table()}",
-        f"## Table 3: cases\n\n{case_table(study)}",
-        f"## Table 5: materials\n\n{material_table()}",
-        "## Figures\n",
-        *(f"![{name}]({name})\n" for name in drawn),
-    ]
-    (folder / "report.md").write_text("\n".join(parts))
-    print(claim_table(checks))
+    introduction = (
+        "# Infill patterns of Plocher, Wioland and Panesar (2022): ours beside theirs\n\n"
+        "Written by `ccfem reproduce plocher_2022`.\n\n"
+        f"Study {computed:.1f} s, figures {perf_counter() - begun - computed:.1f} s.\n"
+    )
+    sections = {"Claims": claims}
+    for name in study:
+        sections[f"Case {name}, polylines"] = result_table(study[name])
+        sections[f"Case {name}, pixels"] = result_table(raster[name])
+    sections |= {
+        "Pixels beside a prototype (in brackets)": f"{prototype_table(raster)}\n{PROTOTYPE_NOTE}",
+        "Rings of pixels by metric: SI of raw pixels": metric_table(raster),
+        "Ranks of PI": rank_table(values),
+        "Variants tried": variant_table(tried),
+        "Table 2: indices": index_table(),
+        "Table 3: cases": case_table(study),
+        "Table 5: materials": material_table(),
+    }
+    write_report(folder, introduction, sections, drawn)
+    print(claims)
     print(f"report.md: {perf_counter() - begun:.1f} s")
 
 
@@ -184,34 +186,30 @@ def variant_quantities(tried: Mapping[str, Tried]) -> dict[str, float]:
 
 def metric_table(cases: Mapping[str, CaseStudy]) -> str:
     """Markdown table: rings of pixels by three metrics, SI of their raw pixels, mean of paths."""
-    lines = ["| case | rings by | concentric | mat | paths, concentric | mat |", "|" + "---|" * 6]
+    rows = []
     for name, case in cases.items():
         (made,) = case.patterns["concentric"].raster
         for metric in ("euclid", "cross", "square"):
-            winding, count = [], []
+            winding = []
             for regions_of in (concentric_regions, medial_regions):
-                regions = regions_of(made.raster.mask, metric=metric)
-                traced = raster_plan(made.raster, regions)
-                found = path_sinuosity(*pack(traced.chains), made.raster.pixel)
-                winding.append(f"{found.mean():.3f}")
-                count.append(str(len(found)))
-            lines.append(f"| {' | '.join([name, metric, *winding, *count])} |")
-    return "\n".join(lines) + "\n"
+                traced = raster_plan(made.raster, regions_of(made.raster.mask, metric=metric))
+                winding.append(path_sinuosity(*pack(traced.chains), made.raster.pixel))
+            means = [f"{sinuosity.mean():.3f}" for sinuosity in winding]
+            rows.append([name, metric, *means, *(str(len(sinuosity)) for sinuosity in winding)])
+    return table(("case", "rings by", "concentric", "mat", "paths, concentric", "mat"), rows)
 
 
 def variant_table(tried: Mapping[str, Tried]) -> str:
     """Markdown table of all variants."""
-    lines = [
-        "| variant | agreement, % | energy C, 1e-6 N mm | stress p99.9 C, MPa | print, s | "
-        "> 40 mm, % |",
-        "|---|---|---|---|---|---|",
+    head = ("variant", "agreement, %", "energy C, 1e-6 N mm", "stress p99.9 C, MPa", "print, s")
+    rows = [
+        (
+            *(name, f"{variant.agreement:.1f}", f"{variant.energy:.1f}", f"{variant.stress:.3f}"),
+            *(f"{variant.print_seconds:.0f}", f"{variant.over_40:.0f}"),
+        )
+        for name, variant in tried.items()
     ]
-    lines += [
-        f"| {name} | {found.agreement:.1f} | {found.energy:.1f} | {found.stress:.3f} | "
-        f"{found.print_seconds:.0f} | {found.over_40:.0f} |"
-        for name, found in tried.items()
-    ]
-    return "\n".join(lines) + "\n"
+    return table((*head, "> 40 mm, %"), rows)
 
 
 _Both = tuple[Mapping[str, CaseStudy], Mapping[str, CaseStudy]]
@@ -225,7 +223,7 @@ def _run(progress: Progress) -> _Both:
 
 def _claims(study: _Both) -> str:
     """Claims, but for those that need the variants, which take as long again."""
-    return claim_table(verdicts(quantities(study[0]) | raster_quantities(study[1])))
+    return claim_table(judged(quantities(study[0]) | raster_quantities(study[1]), EXPECTED))
 
 
 CONTENTS = Contents(
@@ -383,11 +381,6 @@ def _ranks(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
     return found
 
 
-def verdicts(found: Mapping[str, float]) -> list[Check]:
-    """Judge every check of `expected.toml` by the quantities found."""
-    return judged(found, EXPECTED)
-
-
 # Tables of a run, in Markdown.
 
 
@@ -427,11 +420,6 @@ ROWS = {
 }
 
 
-def _table(head: list[str], rows: list[list[str]]) -> str:
-    lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
-    return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)]) + "\n"
-
-
 def result_table(case: CaseStudy) -> str:
     """Every index of every pattern on one plate."""
     known = set.intersection(*(set(one.values) for one in case.patterns.values()))
@@ -440,7 +428,7 @@ def result_table(case: CaseStudy) -> str:
         for index, (title, form) in ROWS.items()
         if index in known
     ]
-    return _table(["index", *case.patterns], rows)
+    return table(["index", *case.patterns], rows)
 
 
 def prototype_table(raster: Mapping[str, CaseStudy], path: Path = PROTOTYPE) -> str:
@@ -456,7 +444,7 @@ def prototype_table(raster: Mapping[str, CaseStudy], path: Path = PROTOTYPE) -> 
                 f"{form.format(case.value(pattern, index))} ({value:g})" for pattern, value in pairs
             ]
             rows.append([name, title, *cells])
-    return _table(["case", "index", *next(iter(raster.values())).patterns], rows)
+    return table(["case", "index", *next(iter(raster.values())).patterns], rows)
 
 
 def rank_table(found: Mapping[str, float]) -> str:
@@ -471,7 +459,7 @@ def rank_table(found: Mapping[str, float]) -> str:
                 about = [reading if reading != "PI" else "PI weighted", f"{key}-FRAM"]
                 patterns = "all five" if not suffix else suffix.strip()
                 rows.append([*about, patterns, *(f"{rank:.2f}" for rank in ranks)])
-    return _table([*head, *(f"case {name}" for name in cases)], rows)
+    return table([*head, *(f"case {name}" for name in cases)], rows)
 
 
 def index_table() -> str:
@@ -488,7 +476,7 @@ def index_table() -> str:
     )
     columns = {column.name: column for column in COLUMNS}
     rows = [[n, columns[n].unit, columns[n].formula, columns[n].range] for n in names]
-    return _table(["index", "unit", "what", "range"], rows)
+    return table(["index", "unit", "what", "range"], rows)
 
 
 def case_table(study: Mapping[str, CaseStudy]) -> str:
@@ -509,7 +497,7 @@ def case_table(study: Mapping[str, CaseStudy]) -> str:
             ]
         )
     head = ["case", "plate", "box, mm", "area, mm^2", "elements", "bead, mm", "all patterns, s"]
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def material_table() -> str:
@@ -529,4 +517,4 @@ def material_table() -> str:
                 material.source,
             ]
         )
-    return _table(["material", "E1, GPa", "E2", "G12", "nu12", "E1/E2", "source"], rows)
+    return table(["material", "E1, GPa", "E2", "G12", "nu12", "E1/E2", "source"], rows)

@@ -1,7 +1,6 @@
 """Figures of the paper that are computations, redrawn from a run."""
 
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,6 @@ from matplotlib.figure import Figure
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.tensor import strongest_in_plane
-from ccfem.comparison.plot.canvas import save
 from ccfem.comparison.plot.colours import INK, OUTLINE, SECTION, scale
 from ccfem.fem.materials import named_material
 from ccfem.fem.plates import rotate_plane, stack_plane
@@ -132,16 +130,6 @@ SPOKES = {
     "CPU time": ("cpu_with_fe", "low"),
     "print time": ("print", "low"),
 }
-
-
-def draw_all(
-    study: Mapping[str, CaseStudy], raster: Mapping[str, CaseStudy], folder: Path
-) -> list[str]:
-    """Draw every figure that the cases run allow; the names of the files."""
-    made = figures(study, raster)
-    for name, figure in made.items():
-        save(figure, folder / f"{name}.png")
-    return [f"{name}.png" for name in made]
 
 
 def figures(

@@ -18,9 +18,15 @@ from ccfem.judging.evaluation.indices.manufacture import sample_manufacture
 from ccfem.judging.evaluation.indices.matching import READINGS, THRESHOLDS, matching_rate
 from ccfem.judging.evaluation.plane_paths import PlanePaths, plane_paths
 from ccfem.machine import SpeedTable
-from ccfem.papers.contents import Contents
-from ccfem.papers.verdicts import Check, claim_table, judged
-from ccfem.papers.wang_2021.figures import draw_all, figures
+from ccfem.papers.contents import (
+    Contents,
+    claim_table,
+    judged,
+    table,
+    write_figures,
+    write_report,
+)
+from ccfem.papers.wang_2021.figures import figures
 from ccfem.papers.wang_2021.study import (
     BASELINES,
     LIMIT,
@@ -47,41 +53,40 @@ def write_all(folder: Path, progress: Progress = silent) -> None:
     begun = perf_counter()
     study = run_study(progress=progress)
     tried = try_radii(study)
-    found = quantities(study) | variant_quantities(tried, try_hole())
-    checks = verdicts(found)
+    values = quantities(study) | variant_quantities(tried, try_hole())
+    claims = claim_table(judged(values, EXPECTED))
     computed = perf_counter() - begun
-    drawn = draw_all(study, folder)
+    drawn = write_figures(figures(study), folder)
     rates = [
-        [name, which, pattern, reading, *(f"{v:.6g}" for v in one.rates[reading])]
+        [name, which, pattern, reading, *(f"{v:.6g}" for v in paths.rates[reading])]
         for name, plate in study.items()
         for which, part in (("optimised", plate.optimised), ("full", plate.original))
-        for pattern, one in part.patterns.items()
+        for pattern, paths in part.patterns.items()
         for reading in READINGS
     ]
     columns = ["plate", "part", "pattern", "reading", *(f"{t:g}" for t in THRESHOLDS)]
     write_csv(folder / "rates.csv", columns, rates)
-    write_csv(folder / "quantities.csv", ("quantity", "value"), found.items())
-    parts = [
-        "# Load-dependent paths of Wang et al. (2021): ours beside theirs\n",
+    write_csv(folder / "quantities.csv", ("quantity", "value"), values.items())
+    introduction = (
+        "# Load-dependent paths of Wang et al. (2021): ours beside theirs\n\n"
         "Written by `ccfem reproduce wang_2021`. lpp is strategy `svt`; lpp uncrossed "
         "ends its strands in the middle of a joint. The slicer's patterns and lpp uncrossed are "
-        "laid by this project too.\n",
+        "laid by this project too.\n\n"
         "The cantilever, the M-shape and the L-shape are optimised here under loads as in the "
         "paper, which gives no measures: their outlines are ours. The M-shape hangs its load "
         "between its feet, so that members are in tension and in compression, as the paper's are. "
-        "`eqs` is our reading of a method that the paper shows in pictures alone.\n",
-        f"Study {computed:.1f} s, figures {perf_counter() - begun - computed:.1f} s.\n",
-        "## Claims\n",
-        claim_table(checks),
-        f"## Plates\n\n{plate_table(study)}",
-        *(f"## {name}\n\n{result_table(plate)}" for name, plate in study.items()),
-        f"## Radius of the turns\n\n{variant_table(tried)}",
-        f"## Table 2: speeds\n\n{speed_table()}",
-        "## Figures\n",
-        *(f"![{name}]({name})\n" for name in drawn),
-    ]
-    (folder / "report.md").write_text("\n".join(parts))
-    print(claim_table(checks))
+        "`eqs` is our reading of a method that the paper shows in pictures alone.\n\n"
+        f"Study {computed:.1f} s, figures {perf_counter() - begun - computed:.1f} s.\n"
+    )
+    sections = {
+        "Claims": claims,
+        "Plates": plate_table(study),
+        **{name: result_table(plate) for name, plate in study.items()},
+        "Radius of the turns": variant_table(tried),
+        "Table 2: speeds": speed_table(),
+    }
+    write_report(folder, introduction, sections, drawn)
+    print(claims)
     print(f"report.md: {perf_counter() - begun:.1f} s")
 
 
@@ -151,17 +156,15 @@ def variant_quantities(
 
 def variant_table(tried: Mapping[tuple[str, float], Tried]) -> str:
     """Markdown table of all radii."""
-    lines = [
-        "| plate | tightest turn, mm | vertices below 0.26 / mm, % | length below, % | "
-        "length, mm | time, s |",
-        "|---|---|---|---|---|---|",
+    head = ("plate", "tightest turn, mm", "vertices below 0.26 / mm, %")
+    rows = [
+        (
+            *(name, f"{radius:g}", f"{lpp.vertices:.1f}", f"{lpp.length_share:.1f}"),
+            *(f"{lpp.length:.0f}", f"{lpp.seconds:.0f}"),
+        )
+        for (name, radius), lpp in tried.items()
     ]
-    lines += [
-        f"| {name} | {radius:g} | {one.vertices:.1f} | {one.length_share:.1f} | {one.length:.0f} | "
-        f"{one.seconds:.0f} |"
-        for (name, radius), one in tried.items()
-    ]
-    return "\n".join(lines) + "\n"
+    return table((*head, "length below, %", "length, mm", "time, s"), rows)
 
 
 CONTENTS = Contents(
@@ -170,7 +173,7 @@ CONTENTS = Contents(
     run=lambda progress: run_study(progress=progress),
     whole=write_all,
     tables={
-        "claims": lambda study: claim_table(verdicts(quantities(study()))),
+        "claims": lambda study: claim_table(judged(quantities(study()), EXPECTED)),
         "table2": lambda study: speed_table(),
         "plates": lambda study: plate_table(study()),
     },
@@ -234,11 +237,6 @@ def _value(pattern: PatternStudy, row: str) -> float | None:
     }[row]
 
 
-def _table(head: list[str], rows: list[list[str]]) -> str:
-    lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
-    return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)]) + "\n"
-
-
 def result_table(plate: PlateStudy) -> str:
     """Every index of every pattern, on the optimised part and on the full plate."""
     columns = dict(plate.optimised.patterns)
@@ -247,7 +245,7 @@ def result_table(plate: PlateStudy) -> str:
     for row, text in ROWS.items():
         values = [_value(pattern, row) for pattern in columns.values()]
         rows.append([text, *("" if v is None else f"{v:.4g}" for v in values)])
-    return _table(["index", *columns], rows)
+    return table(["index", *columns], rows)
 
 
 def plate_table(study: Mapping[str, PlateStudy]) -> str:
@@ -289,20 +287,20 @@ def plate_table(study: Mapping[str, PlateStudy]) -> str:
         "part, N mm",
         "all patterns, s",
     ]
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def speed_table() -> str:
     """Table 2: which speed a piece of the path gets."""
-    table = SpeedTable()
-    slow, middle, fast = (f"{speed:g} mm/s" for speed in table.speed)
-    (high, low), (short, long), (sharp, flat) = table.curvature, table.length, table.angle
+    speeds = SpeedTable()
+    slow, middle, fast = (f"{speed:g} mm/s" for speed in speeds.speed)
+    (high, low), (short, long), (sharp, flat) = speeds.curvature, speeds.length, speeds.angle
     rows = [
         ["curvature, 1/mm", f"> {high:g}", f"{low:g} to {high:g}", f"< {low:g}"],
         ["length, mm", f"< {short:g}", f"{short:g} to {long:g}", f"> {long:g}"],
         ["angle, degrees", f"< {sharp:g}", f"{sharp:g} to {flat:g}", f">= {flat:g}"],
     ]
-    return _table(["piece", slow, middle, fast], rows)
+    return table(["piece", slow, middle, fast], rows)
 
 
 # The claims of the paper beside ours: every quantity is computed from a run.
@@ -327,11 +325,6 @@ def quantities(study: Mapping[str, PlateStudy]) -> dict[str, float]:
         for rule in (_design, _stresses, _curvatures, _rates, _leads, _fill, _tested):
             found |= {f"{key} {name}": value for key, value in rule(plate).items()}
     return found
-
-
-def verdicts(found: Mapping[str, float]) -> list[Check]:
-    """Judge every check of `expected.toml` by the quantities found."""
-    return judged(found, EXPECTED)
 
 
 def _speeds() -> dict[str, float]:

@@ -1,7 +1,6 @@
 """Figures of the paper that are computations, redrawn from a run."""
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,7 +8,6 @@ import shapely
 from matplotlib.figure import Figure
 from scipy.spatial import Voronoi
 
-from ccfem.comparison.plot.canvas import save
 from ccfem.comparison.plot.colours import INK, OUTLINE, palette
 from ccfem.geometry.medial_axis import medial_axis
 from ccfem.judging.evaluation.indices.matching import THRESHOLDS
@@ -38,14 +36,6 @@ _MOST = 4.0
 """End of the colour scale of curvature, 1/mm."""
 _FAINT = "#b5bac1"
 _OTHERS = ("streamline", "offset", "eqs")
-
-
-def draw_all(study: Mapping[str, PlateStudy], folder: Path) -> list[str]:
-    """Draw every figure that the plates and patterns run allow; the names of the files."""
-    made = figures(study)
-    for name, figure in made.items():
-        save(figure, folder / f"{name}.png")
-    return [f"{name}.png" for name in made]
 
 
 def figures(study: Mapping[str, PlateStudy], number: int | None = None) -> dict[str, Figure]:
