@@ -89,14 +89,14 @@ class Case(Shown):
 
 def check_name(name: str, title: str) -> None:
     """Refuse a name that cannot be that of a folder, and a title that cannot be printed."""
-    found = Mistakes()
+    mistakes = Mistakes()
     if not re.fullmatch(r"\w[\w .+-]{0,79}", name):
-        found.lines.append(
+        mistakes.lines.append(
             "the name of a case must have letters, digits, spaces and ._+- alone, at most 80, "
             f"and begin with a letter or digit; got {name[:90]!r}: rename it"
         )
     if not title.isprintable():
-        found.lines.append(
+        mistakes.lines.append(
             f"the title of a case must be one printable line; got {shown(title)}: rewrite it"
         )
-    found.complain()
+    mistakes.complain()

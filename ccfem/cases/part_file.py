@@ -234,6 +234,7 @@ them with a minus ("-z"), or three numbers.
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -334,87 +335,88 @@ def part_case(content: Mapping[str, Any], path: Path, mesh: TetMesh | None = Non
 
     A mesh that is given takes the place of the one that the file names.
     """
-    found = Mistakes()
-    part, unread = _readable(content, found)
+    mistakes = Mistakes()
+    part, unread = _readable(content, mistakes)
     name, given = part.name or path.stem, _Values()
-    with found.noted():
+    with mistakes.noted():
         check_name(name, part.title or name)
-    with found.noted():
+    with mistakes.noted():
         given.build = unit_vector(part.build, "build")
-    with found.noted():
+    with mistakes.noted():
         given.slicing = slicing_of(part)
-    with found.noted():
+    with mistakes.noted():
         given.machine = machine_from(part.machine)
     if "material" not in unread:
-        with found.noted():
+        with mistakes.noted():
             given.material = material_of(part.material)
     if part.fibre is not None:
-        with found.noted():
+        with mistakes.noted():
             given.fibre = fibre_of(part.fibre, path.parent)
-    check_strategies(part.strategies, found)
-    rules = rules_of(part.patches, found)
+    check_strategies(part.strategies, mistakes)
+    rules = rules_of(part.patches, mistakes)
     readable = "supports" not in unread
-    supports, own = supports_of(part.supports, part.loads, found) if readable else ((), {})
-    others = alternative_supports_of(part.alternative_supports, found)
-    loads = loads_of(part.loads, found) if "loads" not in unread else {}
-    combinations = combinations_of(part.combinations, part.loads, found)
-    weights = weights_of(part.weights, {**part.loads, **part.combinations}, found)
-    regions = region_rules_of(part.regions, found)
-    with found.noted():
+    supports, case_supports = (
+        supports_of(part.supports, part.loads, mistakes) if readable else ((), {})
+    )
+    others = alternative_supports_of(part.alternative_supports, mistakes)
+    loads = loads_of(part.loads, mistakes) if "loads" not in unread else {}
+    combinations = combinations_of(part.combinations, part.loads, mistakes)
+    weights = weights_of(part.weights, {**part.loads, **part.combinations}, mistakes)
+    regions = region_rules_of(part.regions, mistakes)
+    with mistakes.noted():
         part.check(path.parent)
-    found.complain()
+    mistakes.complain()
 
-    rules, angle = _on_body(rules, part, path.parent, found)
-    found.complain()
+    rules, angle = _on_body(rules, part, path.parent, mistakes)
+    mistakes.complain()
 
     def before(surface: Surface) -> None:
         assert part.edge_length is not None
-        check_before_meshing(surface, part.edge_length, rules, supports, loads, own, angle)
+        check_before_meshing(
+            surface, part.edge_length, rules, supports, loads, case_supports, angle
+        )
 
     findings: tuple[str, ...] = ()
     if mesh is None:
         mesh, findings = part.read(path.parent, before, angle)
-    for each, rule in rules.items():
-        with found.noted():
-            mesh = patches_from_rules(mesh, {each: rule})
-    found.complain()
+    for patch, rule in rules.items():
+        with mistakes.noted():
+            mesh = patches_from_rules(mesh, {patch: rule})
+    mistakes.complain()
     near = patches_of_fibre(given.fibre)
-    for each in near:
-        mesh.patch(each)
-    held = (*supports, *others, *(each for some in own.values() for each in some))
+    for patch in near:
+        mesh.patch(patch)
+    held = (*supports, *others, *chain.from_iterable(case_supports.values()))
     bare = without_faces(mesh, (*rules, *near, *patches_in_use(held, loads)))
-    body = numbered_faces(mesh) if len(bare.patches) < len(mesh.patches) else None
-    mesh = bare
-    build, slicing, machine, material = given.whole()
-    findings = (*findings, *about_patches(mesh, rules))
+    x, y, z = given.build.tolist()
     return Case(
         name=name,
         title=part.title or name,
         problem=Problem(
-            mesh,
-            material,
+            bare,
+            given.material,
             supports,
             loads,
-            regions=regions_of(mesh, regions),
+            regions=regions_of(bare, regions),
             combinations=combinations,
             order=part.order,
-            case_supports=own,
+            case_supports=case_supports,
         ),
-        build=(float(build[0]), float(build[1]), float(build[2])),
-        slicing=slicing,
-        machine=machine,
+        build=(x, y, z),
+        slicing=given.slicing,
+        machine=given.machine,
         parameters=part.strategies,
         source=part.source,
-        findings=findings,
+        findings=(*findings, *about_patches(bare, rules)),
         alternative_supports=others,
         fibre=given.fibre,
         weights=weights,
-        body=body,
+        body=numbered_faces(mesh) if len(bare.patches) < len(mesh.patches) else None,
     )
 
 
 def _on_body(
-    rules: Mapping[str, PatchRule], part: Part, folder: Path, found: Mistakes
+    rules: Mapping[str, PatchRule], part: Part, folder: Path, mistakes: Mistakes
 ) -> tuple[dict[str, PatchRule], float]:
     """Rules for faces looked up on the surface before it is meshed, and its feature angle.
 
@@ -439,7 +441,7 @@ def _on_body(
     assert part.edge_length is not None
     check_edge_length(Surface(body.points, body.triangles), part.edge_length)
     for name, rule in faces.items():
-        with found.noted():
+        with mistakes.noted():
             try:
                 rule.numbers_on(body)
             except InputError as error:
@@ -447,28 +449,21 @@ def _on_body(
     return {**rules, **{name: OnBody(rule, body) for name, rule in faces.items()}}, angle
 
 
-@dataclass
 class _Values:
-    """What the sections of a part file give."""
+    """What the sections of a part file give; none is missing where there was no mistake."""
 
-    build: FloatArray | None = None
-    slicing: Slicer | None = None
-    machine: Machine | None = None
-    material: Material | None = None
+    build: FloatArray
+    slicing: Slicer
+    machine: Machine
+    material: Material
     fibre: FibrePlaces | None = None
 
-    def whole(self) -> tuple[FloatArray, Slicer, Machine, Material]:
-        """All of them; none is missing where there was no mistake."""
-        found = (self.build, self.slicing, self.machine, self.material)
-        assert all(each is not None for each in found)
-        return found  # type: ignore[return-value]
 
-
-def _readable(content: Mapping[str, Any], found: Mistakes) -> tuple[Part, set[str]]:
+def _readable(content: Mapping[str, Any], mistakes: Mistakes) -> tuple[Part, set[str]]:
     """Take of a part file what reads; the rest is noted, and named."""
     good = {}
     for key, value in content.items():
-        with found.noted():
+        with mistakes.noted():
             from_table(Part, {key: value}, "the part file")
             good[key] = value
     return from_table(Part, good, "the part file"), set(content) - set(good)
@@ -498,12 +493,12 @@ REGIONS: dict[str, Callable[..., CellRule]] = {"box": CellBox, "cylinder": CellC
 
 
 def region_rules_of(
-    tables: Mapping[str, Any], found: Mistakes
+    tables: Mapping[str, Any], mistakes: Mistakes
 ) -> dict[str, tuple[Material, CellRule]]:
     """Materials and rules of the tables [regions.NAME]; what is wrong is noted."""
     rules = {}
     for name, table in tables.items():
-        with found.noted():
+        with mistakes.noted():
             rules[name] = _region(f"regions.{name}", table)
     return rules
 
@@ -531,7 +526,7 @@ def regions_of(mesh: TetMesh, rules: Mapping[str, tuple[Material, CellRule]]) ->
         For a region without a cell, and for two that share some.
     """
     owner = np.full(len(mesh.cells), -1)
-    names, found = list(rules), []
+    names, chosen = list(rules), []
     for k, (name, (material, rule)) in enumerate(rules.items()):
         try:
             cells = rule(mesh)
@@ -545,8 +540,8 @@ def regions_of(mesh: TetMesh, rules: Mapping[str, tuple[Material, CellRule]]) ->
                 "their border so that each cell is in one of them"
             )
         owner[cells] = k
-        found.append(Region(material, cells))
-    return tuple(found)
+        chosen.append(Region(material, cells))
+    return tuple(chosen)
 
 
 # What can be known of patches and supports before a surface is meshed, which may take minutes.
@@ -581,7 +576,7 @@ def check_before_meshing(
         For rules that choose nothing, unknown patches, loads that their patch cannot take, and
         motions that no support hinders.
     """
-    found = Mistakes()
+    mistakes = Mistakes()
     points, triangles, origin = refined(surface.points, surface.triangles, 0.5 * edge_length)
     groups = {
         face_name(k): triangles[np.isin(origin, face.facets)]
@@ -589,21 +584,20 @@ def check_before_meshing(
     }
     shell = Shell(points, triangles, groups)
     for name, rule in rules.items():
-        with found.noted():
+        with mistakes.noted():
             shell = patches_from_rules(shell, {name: rule})
-    own = [support for each in case_supports.values() for support in each]
-    for name in set(patches_in_use((*supports, *own), loads)) - set(rules):
-        with found.noted():
+    holding = (*supports, *chain.from_iterable(case_supports.values()))
+    for name in set(patches_in_use(holding, loads)) - set(rules):
+        with mistakes.noted():
             shell.patch(name)
-    found.complain()
+    mistakes.complain()
     sets = [(*supports, *case_supports.get(name, ())) for name in loads] or [supports]
-    for k, one in enumerate(sets):
-        if one not in sets[:k]:
-            with found.noted():
-                held(_Outline(shell, shell, one, loads))
-    for those in loads.values():
-        for load in those:
-            if isinstance(load, SurfaceLoad) and not isinstance(load, PointForce):
-                with found.noted():
-                    nodal_forces(shell, load)
-    found.complain()
+    for k, together in enumerate(sets):
+        if together not in sets[:k]:
+            with mistakes.noted():
+                held(_Outline(shell, shell, together, loads))
+    for load in chain.from_iterable(loads.values()):
+        if isinstance(load, SurfaceLoad) and not isinstance(load, PointForce):
+            with mistakes.noted():
+                nodal_forces(shell, load)
+    mistakes.complain()

@@ -196,8 +196,8 @@ def judged(quantities: Mapping[str, float], path: Path) -> list[Check]:
                 verdict = "undecided" if near else "reproduced" if inside else "differs"
             about = (claim["id"], claim["text"], claim["source"])
             why = claim["why"] if verdict != "reproduced" else ""
-            said = (check["quantity"], check["paper"], low, high, claim["tolerance"])
-            checks.append(Check(*about, *said, ours, verdict, why))
+            stated = (check["quantity"], check["paper"], low, high, claim["tolerance"])
+            checks.append(Check(*about, *stated, ours, verdict, why))
     return checks
 
 

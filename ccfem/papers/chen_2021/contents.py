@@ -101,11 +101,11 @@ def _connection(model: Model) -> Figure:
         ([(stages.led, _PATH), (stages.rings, _RING)], "(d), (e) cut back and led round"),
         ([(_lines(stages.paths, layer), _PATH)], f"(f) joined: {len(stages.paths)} paths"),
     ]
-    for one, (drawn, text) in zip(axes, steps, strict=False):
-        section(one, layer.plane.polygon)
+    for panel, (drawn, text) in zip(axes, steps, strict=False):
+        section(panel, layer.plane.polygon)
         for lines, colour in drawn:
-            lines_of(one, lines, colour, 0.7)
-        title(one, text)
+            lines_of(panel, lines, colour, 0.7)
+        title(panel, text)
     return figure
 
 
@@ -113,13 +113,13 @@ def _layers(model: Model) -> Figure:
     """Paths of six layers of a part whose section changes."""
     chosen = np.unique(np.linspace(0, len(model.stages) - 1, 8).astype(int)[1:-1])
     outlines = [model.stages[k].layer.plane.polygon for k in chosen]
-    whole = shapely.union_all([each.layer.plane.polygon for each in model.stages]).bounds
+    whole = shapely.union_all([stage.layer.plane.polygon for stage in model.stages]).bounds
     figure, axes = panels(outlines, 3, 3.6, box=whole)
-    for one, k in zip(axes, chosen, strict=False):
+    for panel, k in zip(axes, chosen, strict=False):
         stages = model.stages[k]
-        section(one, stages.layer.plane.polygon)
-        lines_of(one, _lines(stages.paths, stages.layer), _PATH, 0.7)
-        title(one, f"layer {k + 1} of {len(model.layers)}")
+        section(panel, stages.layer.plane.polygon)
+        lines_of(panel, _lines(stages.paths, stages.layer), _PATH, 0.7)
+        title(panel, f"layer {k + 1} of {len(model.layers)}")
     return figure
 
 
@@ -128,8 +128,8 @@ def _pushed(study: Study) -> Figure:
     stages = _middle(study.models["Loop, pushed"])
     layer = stages.layer
     figure, axes = panels([layer.plane.polygon] * 3, 3, 3.6)
-    for one in axes:
-        section(one, layer.plane.polygon)
+    for panel in axes:
+        section(panel, layer.plane.polygon)
     size = np.clip(stages.directed.size / stages.directed.cap, 0.0, 1.0)
     bar(figure, axes[0], _faces(axes[0], layer, size), "share of the largest stress")
     _arrows(axes[0], layer, stages.directed.direction)
@@ -144,13 +144,13 @@ def _pushed(study: Study) -> Figure:
 def _histograms(study: Study) -> Figure:
     """Products of neighbouring vectors once they are oriented."""
     figure, axes = curves(len(study.models), [("v . v*", "share of pairs, %")] * len(study.models))
-    for one, (name, model) in zip(axes, study.models.items(), strict=True):
+    for panel, (name, model) in zip(axes, study.models.items(), strict=True):
         products = agreement(model)
         share = np.full(len(products), 100.0 / len(products))
-        one.hist(products, np.linspace(-1.0, 1.0, 41), weights=share, color=_PATH)
-        one.axvline(0.5, color=_WRONG, lw=1.0)
-        one.set_yscale("log")
-        title(one, f"{name}; red: eta = 0.5")
+        panel.hist(products, np.linspace(-1.0, 1.0, 41), weights=share, color=_PATH)
+        panel.axvline(0.5, color=_WRONG, lw=1.0)
+        panel.set_yscale("log")
+        title(panel, f"{name}; red: eta = 0.5")
     return figure
 
 
@@ -159,10 +159,10 @@ def _powers(study: Study) -> Figure:
     layer = _middle(study.loop).layer
     index = layer.index
     figure, axes = panels([layer.plane.polygon] * len(study.powers), len(study.powers), 3.2)
-    for one, (power, paths) in zip(axes, study.powers.items(), strict=True):
-        section(one, layer.plane.polygon)
-        lines_of(one, _lines(paths.select(paths.layer == index), layer), _PATH, 0.7)
-        title(one, f"p = {power:g}: {1e-3 * paths.lengths.sum():.1f} m in all layers")
+    for panel, (power, paths) in zip(axes, study.powers.items(), strict=True):
+        section(panel, layer.plane.polygon)
+        lines_of(panel, _lines(paths.select(paths.layer == index), layer), _PATH, 0.7)
+        title(panel, f"p = {power:g}: {1e-3 * paths.lengths.sum():.1f} m in all layers")
     return figure
 
 
@@ -172,10 +172,10 @@ def _processing(study: Study) -> Figure:
     index = layer.index
     figure, axes = panels([layer.plane.polygon] * 2, 2, 3.6)
     shown = (("(a) without", study.unprocessed), ("(b) with", study.loop.paths))
-    for one, (text, paths) in zip(axes, shown, strict=True):
-        section(one, layer.plane.polygon)
-        lines_of(one, _lines(paths.select(paths.layer == index), layer), _PATH, 0.7)
-        title(one, f"{text} orientation and filter")
+    for panel, (text, paths) in zip(axes, shown, strict=True):
+        section(panel, layer.plane.polygon)
+        lines_of(panel, _lines(paths.select(paths.layer == index), layer), _PATH, 0.7)
+        title(panel, f"{text} orientation and filter")
     return figure
 
 
@@ -183,11 +183,11 @@ def _turns(study: Study) -> Figure:
     """How far principal directions turn."""
     labels = ("turned by, degrees", "share of the cells, %")
     figure, axes = curves(2, [labels] * 2)
-    for one, text, which in zip(axes, ("in space", "against the material"), (0, 1), strict=True):
+    for panel, text, which in zip(axes, ("in space", "against the material"), (0, 1), strict=True):
         for (stop, turned), colour in zip(study.turns.items(), (_PATH, _RING), strict=True):
             angles = turned[which]
             share = np.full(len(angles), 100.0 / len(angles))
-            one.hist(
+            panel.hist(
                 angles,
                 np.linspace(0.0, 45.0, 46),
                 weights=share,
@@ -195,8 +195,8 @@ def _turns(study: Study) -> Figure:
                 alpha=0.7,
                 label=f"{stop:g} mm",
             )
-        one.legend(fontsize=7, frameon=False)
-        title(one, f"(d) {text}")
+        panel.legend(fontsize=7, frameon=False)
+        title(panel, f"(d) {text}")
     return figure
 
 
@@ -316,7 +316,7 @@ def time_table(study: Study) -> str:
     stages = tuple(f"{stage}, s a layer" for stage in STAGES)
     rows = [(f"paper: {name}", *(f"{v:g}" for v in values)) for name, values in PAPER_1.items()]
     for name, model in study.models.items():
-        layers = np.array([each.seconds for each in model.stages])
+        layers = np.array([stages_of_layer.seconds for stages_of_layer in model.stages])
         whole = sum(model.vectors.seconds) + float(layers.sum())
         times = (*model.vectors.seconds, *layers.mean(axis=0), whole)
         sizes = (str(len(model.stress.mesh.cells)), str(len(model.layers)))
@@ -351,16 +351,16 @@ _VALLEY = (0.3, 0.7)
 def quantities(study: Study) -> dict[str, float]:
     """Every number that `expected.toml` names, as far as the run has it."""
     loop = study.loop
-    found = _times(study) | _vectors(study) | _paths(study)
+    values = _times(study) | _vectors(study) | _paths(study)
     for stop, turned in study.turns.items():
         at = f"at {stop:g} mm, %"
-        found[f"turned by more than 10 degrees in space {at}"] = _over_ten(turned.in_space)
-        found[f"turned by more than 10 degrees against the material {at}"] = _over_ten(
+        values[f"turned by more than 10 degrees in space {at}"] = _over_ten(turned.in_space)
+        values[f"turned by more than 10 degrees against the material {at}"] = _over_ten(
             turned.in_material
         )
     if os.environ.get(FOLDER) and loop.case.name == "chen_2021_loop":
-        found |= _authors(loop)
-    return found
+        values |= _authors(loop)
+    return values
 
 
 def agreement(model: Model) -> FloatArray:
@@ -377,99 +377,101 @@ def _over_ten(angles: FloatArray) -> float:
 
 def _times(study: Study) -> dict[str, float]:
     """Table 1."""
-    found = {}
+    values = {}
     for name, model in study.models.items():
-        layers = np.array([each.seconds for each in model.stages])
+        layers = np.array([stages.seconds for stages in model.stages])
         orientation, removal = model.vectors.seconds
-        found[f"cells {name}"] = float(len(model.stress.mesh.cells))
-        found[f"layers {name}"] = float(len(model.layers))
-        found[f"seconds of orientation {name}"] = orientation
-        found[f"seconds of removal {name}"] = removal
-        found[f"seconds of planning {name}"] = orientation + removal + float(layers.sum())
-        found[f"extraction, % of a layer {name}"] = 100.0 * float(layers[:, 2].sum() / layers.sum())
-    return found
+        values[f"cells {name}"] = float(len(model.stress.mesh.cells))
+        values[f"layers {name}"] = float(len(model.layers))
+        values[f"seconds of orientation {name}"] = orientation
+        values[f"seconds of removal {name}"] = removal
+        values[f"seconds of planning {name}"] = orientation + removal + float(layers.sum())
+        values[f"extraction, % of a layer {name}"] = 100.0 * float(
+            layers[:, 2].sum() / layers.sum()
+        )
+    return values
 
 
 def _vectors(study: Study) -> dict[str, float]:
     """Figures 7 and 8."""
-    found = {}
+    values = {}
     for name, model in study.models.items():
         products = agreement(model)
         low, high = _VALLEY
         between = (products > low) & (products < high)
-        found[f"pairs in the valley about eta, % {name}"] = 100.0 * float(between.mean())
+        values[f"pairs in the valley about eta, % {name}"] = 100.0 * float(between.mean())
     pulled, pushed = (study.models[name].vectors for name in ("Loop", "Loop, pushed"))
     both = pulled.unfiltered.defined & pushed.unfiltered.defined
     cosine = np.abs(np.einsum("mi,mi->m", pulled.oriented[both], pushed.oriented[both]))
-    found["median angle between tension of pull and push"] = float(
+    values["median angle between tension of pull and push"] = float(
         np.degrees(np.median(np.arccos(np.clip(cosine, 0.0, 1.0))))
     )
-    return found
+    return values
 
 
 def _paths(study: Study) -> dict[str, float]:
     """Figures 5, 6, 9 and 10, and table 2."""
     loop = study.loop
-    curves = sum(len(each.curves.lines()) for each in loop.stages)
-    found = {
+    curves = sum(len(evaluation.curves.lines()) for evaluation in loop.stages)
+    values = {
         "isocurves over paths": curves / len(loop.paths),
         "shortest path, mm": float(loop.paths.lengths.min()),
     }
     if "lifting_eye" in study.models:
         stages = study.models["lifting_eye"].stages
-        lengths = [float(each.paths.lengths.sum()) for each in stages]
+        lengths = [float(evaluation.paths.lengths.sum()) for evaluation in stages]
         changes = np.abs(np.diff(lengths)) / max(lengths)
-        found["layers unlike the one below, %"] = 100.0 * float((changes > 1e-3).mean())
+        values["layers unlike the one below, %"] = 100.0 * float((changes > 1e-3).mean())
     by_power = {power: _judged(loop, paths) for power, paths in study.powers.items()}
     low, high = min(by_power), max(by_power)
-    for power, each in by_power.items():
-        found[f"fibre, m, p = {power:g}"] = 1e-3 * each.total["fibre_length"]
-    found["fibre at the largest p over that at p = 0"] = (
-        found[f"fibre, m, p = {high:g}"] / found[f"fibre, m, p = {low:g}"]
+    for power, evaluation in by_power.items():
+        values[f"fibre, m, p = {power:g}"] = 1e-3 * evaluation.total["fibre_length"]
+    values["fibre at the largest p over that at p = 0"] = (
+        values[f"fibre, m, p = {high:g}"] / values[f"fibre, m, p = {low:g}"]
     )
-    found["median over least spacing, largest p over p = 0"] = _spread(by_power[high]) / _spread(
+    values["median over least spacing, largest p over p = 0"] = _spread(by_power[high]) / _spread(
         by_power[low]
     )
     with_it, without = by_power[1.0], _judged(loop, study.unprocessed)
-    found["nearer than W, %"] = 100.0 * with_it.total["spacing_below"]
-    found["within 10 degrees with processing, %"] = 100.0 * with_it.total["aligned_10"]
-    found["within 10 degrees without processing, %"] = 100.0 * without.total["aligned_10"]
-    found["curvature without over with processing"] = (
+    values["nearer than W, %"] = 100.0 * with_it.total["spacing_below"]
+    values["within 10 degrees with processing, %"] = 100.0 * with_it.total["aligned_10"]
+    values["within 10 degrees without processing, %"] = 100.0 * without.total["aligned_10"]
+    values["curvature without over with processing"] = (
         without.total["curvature_95"] / with_it.total["curvature_95"]
     )
     for name, (paths, ratio) in study.compared.items():
-        found[f"fibre, m, {name}"] = 1e-3 * float(paths.lengths.sum())
-        found[f"stiffness ratio, {name}"] = ratio
-    found["stiffness of the algorithm over contour_zigzag"] = (
-        found["stiffness ratio, the paper's algorithm"] / found["stiffness ratio, contour_zigzag"]
+        values[f"fibre, m, {name}"] = 1e-3 * float(paths.lengths.sum())
+        values[f"stiffness ratio, {name}"] = ratio
+    values["stiffness of the algorithm over contour_zigzag"] = (
+        values["stiffness ratio, the paper's algorithm"] / values["stiffness ratio, contour_zigzag"]
     )
-    return found
+    return values
 
 
 def _judged(model: Model, paths: Toolpaths) -> Evaluation:
     return evaluate(paths, model.layers, model.stress, model.case.machine)
 
 
-def _spread(each: Evaluation) -> float:
+def _spread(evaluation: Evaluation) -> float:
     """Median distance to the next strand over the fifth percentile."""
-    return each.total["spacing_50"] / each.total["spacing_5"]
+    return evaluation.total["spacing_50"] / evaluation.total["spacing_5"]
 
 
 def _authors(loop: Model) -> dict[str, float]:
     """Measure the authors' own paths for the Loop."""
     specimen = Specimen.of(loop.stress)
-    found, failure = {}, {}
+    values, failure = {}, {}
     for name in STATED:
         paths = authors_paths(name)
-        found[f"fibre of the authors' paths, m, {name}"] = 1e-3 * float(paths.lengths.sum())
+        values[f"fibre of the authors' paths, m, {name}"] = 1e-3 * float(paths.lengths.sum())
         tested = virtual_test(paths, specimen, span=())
-        found[f"stiffness ratio of the authors' paths, {name}"] = tested.ratio
+        values[f"stiffness ratio of the authors' paths, {name}"] = tested.ratio
         failure[name] = first_failure(tested, matrix_strength=MATRIX_STRENGTH).load
     ratio = "stiffness ratio of the authors' paths"
-    found["stiffness of the authors' paths over their zigzag"] = (
-        found[f"{ratio}, ours"] / found[f"{ratio}, zigzag"]
+    values["stiffness of the authors' paths over their zigzag"] = (
+        values[f"{ratio}, ours"] / values[f"{ratio}, zigzag"]
     )
-    found["first failure of the authors' paths over their zigzag"] = (
+    values["first failure of the authors' paths over their zigzag"] = (
         failure["ours"] / failure["zigzag"]
     )
-    return found
+    return values

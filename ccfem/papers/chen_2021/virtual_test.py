@@ -134,41 +134,6 @@ def oriented_stiffness(fourth: FloatArray, fibre: Material) -> FloatArray:
     return isotropic + alpha * crossed + 2.0 * (along - transverse) * both + beta * fourth
 
 
-def mix(directions: FloatArray, share: FloatArray, fibre: Material, matrix: Material) -> FloatArray:
-    """Stiffness of pixels, or cells, with one fibre direction each.
-
-    Parameters
-    ----------
-    directions : (..., 3) array
-        Along the fibre; normalised here, sign free.
-    share : (...,) array in [0, 1]
-        Volume share of the fibre.
-
-    Returns
-    -------
-    (..., 6, 6) array, MPa
-    """
-    share = np.asarray(share, dtype=np.float64)
-    if not ((share >= 0.0) & (share <= 1.0)).all():
-        raise InputError(
-            f"the share of fibre must be within [0, 1]; got {share.min():.4g} to {share.max():.4g}"
-        )
-    a = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
-    m = to_voigt(a[..., :, None] * a[..., None, :])
-    smeared = oriented_stiffness(m[..., :, None] * m[..., None, :], fibre)
-    return matrix.stiffness + share[..., None, None] * (smeared - matrix.stiffness)
-
-
-def to_plane_stress(stiffness: FloatArray) -> FloatArray:
-    """Condense stiffness (..., 6, 6) to plane stress (..., 3, 3) in 11, 22, 12, MPa."""
-    kept, free = np.array([0, 1, 5]), np.array([2, 3, 4])
-    inner = stiffness[..., free[:, None], free]
-    across = stiffness[..., free[:, None], kept]
-    return stiffness[..., kept[:, None], kept] - np.swapaxes(across, -1, -2) @ np.linalg.solve(
-        inner, across
-    )
-
-
 def oriented_problem(problem: Problem, strands: Strands, fibre: Material, area: float) -> Problem:
     """Return the problem with the stiffness of fibre and matrix mixed in each cell.
 
@@ -231,8 +196,8 @@ def main() -> None:
     print("physical, one specimen each       {:6.2f}     {:6.2f}       {:6.2f}".format(*PHYSICAL))
     for mode in ("bonded", "tension"):
         for rho in (2.15, 2.25, 4.0, 4.25):
-            found = ratios(specimen, strands, rho, mode)
-            text = "{:6.3f}     {:6.3f}       {:6.3f}".format(*found)
+            triple = ratios(specimen, strands, rho, mode)
+            text = "{:6.3f}     {:6.3f}       {:6.3f}".format(*triple)
             print(f"{mode:8} rho {rho:4.2f} mm^2          {text}")
 
     carbon, area = named_material("c_fram"), case.machine.filament_area
@@ -251,9 +216,9 @@ def main() -> None:
         brackets[name] = virtual_bracket(strands[name], specimen, span=())
         failure = first_failure(brackets[name].tension, matrix_strength=MATRIX_STRENGTH)
         print(f"{name:7} {1e-3 * failure.load:5.2f} {_PEAKS[name]:5.2f}  in the {failure.what}")
-    said = {FIRST: "ours", SECOND: "zigzag"}
+    names = {FIRST: "ours", SECOND: "zigzag"}
     verdict = stiffer(brackets["ours"], brackets["zigzag"])
-    print(f"stiffer: {said.get(verdict, verdict)}")
+    print(f"stiffer: {names.get(verdict, verdict)}")
 
     bearing = replace(case.problem, loads={"bearing": (Bearing("load", (0.0, 0.0, 1000.0)),)})
     pressed = virtual_test(strands["ours"], solve(bearing)["bearing"], span=())

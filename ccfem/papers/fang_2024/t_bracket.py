@@ -62,8 +62,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
 def _timed(work: Callable[[], Any]) -> tuple[Any, float, float]:
     """Return a result, seconds on the clock and those of all processors."""
     start, busy = time.perf_counter(), time.process_time()
-    found = work()
-    return found, time.perf_counter() - start, time.process_time() - busy
+    result = work()
+    return result, time.perf_counter() - start, time.process_time() - busy
 
 
 class Chain(NamedTuple):
@@ -118,21 +118,21 @@ def _fresh(stress: PartStress) -> GivenStress:
 
 
 def _single_layers(
-    stress: PartStress, laid: set[int], strategy: Strategy, machine: Machine
+    stress: PartStress, with_fibre: set[int], strategy: Strategy, machine: Machine
 ) -> list[float]:
     """Seconds of processor of each layer with fibre, strands and matrix, planned alone."""
     layers = Spatial().slice(stress, BUILD).layers
     assert isinstance(strategy, PartStrategy)
     planner = strategy.for_part(stress, layers, machine)
-    found: list[float] = []
-    for layer in (one for one in layers if one.index in laid):
+    seconds: list[float] = []
+    for layer in (one for one in layers if one.index in with_fibre):
 
         def work(one: Layer = layer) -> None:
             planner(one, stress_on(one, stress), machine)
             layer_matrix([one], machine)
 
-        found.append(_timed(work)[2])
-    return found
+        seconds.append(_timed(work)[2])
+    return seconds
 
 
 def _times(seconds: dict[str, float], cells: int) -> str:
@@ -151,8 +151,8 @@ def _times(seconds: dict[str, float], cells: int) -> str:
         clock, busy = seconds[f"{name}, clock"], seconds[f"{name}, processors"]
         rows.append((name, f"{clock:.2f}", f"{busy:.2f}", published))
     slowest = f"slowest layer (median {seconds['median layer, processors']:.2f})"
-    own = f"{seconds['slowest layer, processors']:.2f}"
-    rows.append((slowest, "", own, f"{paper['a layer']:.2f}"))
+    busiest = f"{seconds['slowest layer, processors']:.2f}"
+    rows.append((slowest, "", busiest, f"{paper['a layer']:.2f}"))
     lines.append(table(("seconds", "ours, clock", "processors", "paper"), rows))
     lines.append(f"load of the machine before: {seconds['load of the machine before']:.1f}")
     return "\n".join(lines)
@@ -164,17 +164,17 @@ def study(stress: PartStress, sliced: SpatialSlicing) -> dict[str, Strands]:
     quality = [(name, f"{value:.3f}") for name, value in vars(sliced.quality).items()]
     print(f"\n{table(('field', 'ours'), quality)}", end="")
     weight = sliced.region.weight
-    found: dict[str, Strands] = {}
+    strands: dict[str, Strands] = {}
     for name, given in VARIANTS.items():
         paths = plan(create("winding", given), sliced.layers, stress, machine)
-        found[name] = measured(paths, sliced.layers, stress, weight)
+        strands[name] = measured(paths, sliced.layers, stress, weight)
     theirs = authors_layers(stress)
-    found["authors"] = measured(authors_strands(theirs), theirs, stress, weight)
+    strands["authors"] = measured(authors_strands(theirs), theirs, stress, weight)
     paths = plan(create("winding"), theirs, stress, machine)
-    found["winding on the authors' layers"] = measured(paths, theirs, stress, weight)
-    rows = [(k, *(f"{v:.3g}" for v in row.table().values())) for k, row in found.items()]
-    print(f"\n{table(('strands', *found['authors'].table()), rows)}", end="")
-    return found
+    strands["winding on the authors' layers"] = measured(paths, theirs, stress, weight)
+    rows = [(k, *(f"{v:.3g}" for v in row.table().values())) for k, row in strands.items()]
+    print(f"\n{table(('strands', *strands['authors'].table()), rows)}", end="")
+    return strands
 
 
 if __name__ == "__main__":

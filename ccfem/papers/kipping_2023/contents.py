@@ -245,14 +245,14 @@ def trade(run: Chain) -> dict[str, dict[str, float]]:
     """Figures of the variants by name: `COLUMNS`."""
     slicer = run.case.slicing
     assert isinstance(slicer, LoadOriented)
-    found = {}
+    figures = {}
     for name, given in VARIANTS.items():
         sliced = run.sliced if name == "default" else replace(slicer, **given).slice(run.stress)
         across = sliced.across.tension
         gradient = sliced.field.gradient
         cosine = gradient @ sliced.field.up / np.linalg.norm(gradient, axis=1)
         tilt = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
-        found[name] = {
+        figures[name] = {
             "tension": across,
             "below z": 1.0 - across / sliced.across_build.tension,
             "below the best plane": 1.0 - across / sliced.across_best.tension,
@@ -262,7 +262,7 @@ def trade(run: Chain) -> dict[str, dict[str, float]]:
             "in range": distances_below(sliced.layers).within(slicer.thinnest, slicer.thickest),
             "blend": sliced.field.blend,
         }
-    return found
+    return figures
 
 
 def trade_table(trades: Trades) -> str:
@@ -335,30 +335,30 @@ def quantities(
     strands: Mapping[tuple[str, bool], Strand],
 ) -> dict[str, float]:
     """Every quantity that `expected.toml` may name."""
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     for part, run in chains.items():
-        found |= {f"{part}: seconds, {name}": value for name, value in run.seconds.items()}
-        found[f"{part}: time over the paper's"] = run.seconds["all"] / PAPER_SECONDS[part]
-        found[f"{part}: inverted"] = run.sliced.inverted
-        found[f"{part}: thickness"] = run.distances.mean
-        found[f"{part}: with a layer below"] = run.distances.covered
-        found[f"{part}: paths"] = float(len(run.paths))
+        values |= {f"{part}: seconds, {name}": value for name, value in run.seconds.items()}
+        values[f"{part}: time over the paper's"] = run.seconds["all"] / PAPER_SECONDS[part]
+        values[f"{part}: inverted"] = run.sliced.inverted
+        values[f"{part}: thickness"] = run.distances.mean
+        values[f"{part}: with a layer below"] = run.distances.covered
+        values[f"{part}: paths"] = float(len(run.paths))
         layers = len(np.unique(run.paths.layer))
-        found[f"{part}: layers with paths"] = float(layers)
-        found |= {f"{part}: support, {name}": v for name, v in _support(run).items()}
+        values[f"{part}: layers with paths"] = float(layers)
+        values |= {f"{part}: support, {name}": v for name, v in _support(run).items()}
         for name, figures in trades[part].items():
-            found |= {f"{part}, {name}: {key}": value for key, value in figures.items()}
-    for part, each in loads.items():
-        flat, ours = each["flat, z"], each["load-oriented"]
-        found[f"{part}: failure load over flat"] = ours[0] / flat[0]
-        found[f"{part}: failure load over flat, bond strong in shear"] = ours[3] / flat[3]
-        found[f"{part}: failure load over flat, by opening"] = ours[6] / flat[6]
-    found["strands: most paths"] = float(max(s.paths for s in strands.values()))
-    found["strands: least coverage"] = min(s.coverage for s in strands.values())
-    found["strands: least coverage, opened"] = min(s.coverage_opened for s in strands.values())
-    found["strands: crossings"] = float(sum(s.crossings for s in strands.values()))
-    found["strands: longest step"] = max(s.longest_step for s in strands.values())
-    return found
+            values |= {f"{part}, {name}: {key}": value for key, value in figures.items()}
+    for part, slicings in loads.items():
+        flat, ours = slicings["flat, z"], slicings["load-oriented"]
+        values[f"{part}: failure load over flat"] = ours[0] / flat[0]
+        values[f"{part}: failure load over flat, bond strong in shear"] = ours[3] / flat[3]
+        values[f"{part}: failure load over flat, by opening"] = ours[6] / flat[6]
+    values["strands: most paths"] = float(max(s.paths for s in strands.values()))
+    values["strands: least coverage"] = min(s.coverage for s in strands.values())
+    values["strands: least coverage, opened"] = min(s.coverage_opened for s in strands.values())
+    values["strands: crossings"] = float(sum(s.crossings for s in strands.values()))
+    values["strands: longest step"] = max(s.longest_step for s in strands.values())
+    return values
 
 
 def _support(run: Chain) -> dict[str, float]:
@@ -439,15 +439,15 @@ def failure_loads(run: Chain, stress: StressField | None = None) -> dict[str, tu
     Three loads for each of `SHEAR`. The part is without fibre: what the layers alone are worth.
     All are judged by one stress, by default that which the layers were made for.
     """
-    found: dict[str, tuple[float, ...]] = {}
+    loads: dict[str, tuple[float, ...]] = {}
     for name, layers in _slicings(run).items():
-        told: list[float] = []
+        of_slicing: list[float] = []
         for shear in SHEAR:
             bond = isotropic(3500.0, 0.35, interlayer_tensile=TENSILE, interlayer_shear=shear)
             judged = interlayer(run.stress if stress is None else stress, layers, bond)
-            told += [_LOAD / max(index, 1e-12) for index in judged.zone_indices]
-        found[name] = tuple(told)
-    return found
+            of_slicing += [_LOAD / max(index, 1e-12) for index in judged.zone_indices]
+        loads[name] = tuple(of_slicing)
+    return loads
 
 
 def on_pressing_supports(run: Chain) -> StressField:
@@ -474,7 +474,7 @@ def sliding_picture(run: Chain, models: dict[str, StressField]) -> bytes:
     centre = mesh.points[mesh.corners].mean(axis=1)
     middle = 0.5 * (mesh.points[:, 1].min() + mesh.points[:, 1].max())
     shown = np.flatnonzero(np.abs(centre[:, 1] - middle) < 3.0)
-    slicings = {name: each for name, each in _slicings(run).items() if "best" not in name}
+    slicings = {name: layers for name, layers in _slicings(run).items() if "best" not in name}
     figure, row = blank(14.0, 3.2 * len(slicings) * len(models)), 0
     for model, stress in models.items():
         for name, layers in slicings.items():

@@ -50,7 +50,7 @@ def part_figures(name: str, run: "Chain") -> dict[str, bytes]:
     centre = mesh.points[mesh.corners].mean(axis=1)
     inside = _some(np.flatnonzero(sliced.regions.region >= 0))
     least = np.linalg.eigh(run.stress.stress[inside])[1][:, :, 0]
-    found = {}
+    pictures = {}
     figure = blank(18.0, 6.0)
     axes = _space(figure, 1, "critical regions", mesh.points)
     axes.scatter(*centre[inside].T, c=sliced.regions.region[inside], s=3, cmap="tab10")
@@ -60,7 +60,7 @@ def part_figures(name: str, run: "Chain") -> dict[str, bytes]:
     ):
         axes = _space(figure, place, title, mesh.points)
         axes.quiver(*centre[inside].T, *arrows.T, length=2.0, lw=0.5)
-    found[f"figure_2_{name}.png"] = png(figure)
+    pictures[f"figure_2_{name}.png"] = png(figure)
     figure = blank(18.0, 6.0)
     every = _some(np.arange(len(centre)))
     axes = _space(figure, 1, "vectors in the whole part", mesh.points)
@@ -71,7 +71,7 @@ def part_figures(name: str, run: "Chain") -> dict[str, bytes]:
     axes = _space(figure, 3, "every tenth layer", mesh.points)
     for layer in sliced.layers[::10]:
         axes.plot_trisurf(*layer.points.T, triangles=layer.triangles, lw=0.0, alpha=0.8)
-    found[f"figure_4_5_{name}.png"] = png(figure)
+    pictures[f"figure_4_5_{name}.png"] = png(figure)
     figure = blank(18.0, 6.0)
     both = np.concatenate([mesh.points, run.support.columns.mesh.points])
     axes = _space(figure, 1, "every sixth layer, and every third of the support", both)
@@ -88,8 +88,8 @@ def part_figures(name: str, run: "Chain") -> dict[str, bytes]:
             points, offsets = resample(paths.points, paths.offsets, 0.3)
             for line in np.split(points, offsets[1:-1]):
                 axes.plot(*line.T, lw=0.6)
-    found[f"figure_6_8_{name}.png"] = png(figure)
-    return found
+    pictures[f"figure_6_8_{name}.png"] = png(figure)
+    return pictures
 
 
 def senses_figure() -> tuple[bytes, float, float]:
@@ -108,12 +108,12 @@ def senses_figure() -> tuple[bytes, float, float]:
     for place, sense in ((1, 1.0), (2, -1.0)):
         turned = direction * np.where(region == 1, sense, 1.0)[:, None]
         regions = StressRegions(region >= 0, region, turned, np.ones(len(centre)))
-        found = normal_field(mesh, regions, up)
-        energies.append(found.energy)
+        normals = normal_field(mesh, regions, up)
+        energies.append(normals.energy)
         axes = _space(figure, place, f"field, one region given with {sense:+.0f}", mesh.points)
-        axes.quiver(*centre[middle].T, *found.direction[middle].T, length=0.8, lw=0.6)
+        axes.quiver(*centre[middle].T, *normals.direction[middle].T, length=0.8, lw=0.6)
         if sense > 0.0:
-            values = height_field(mesh, found.direction).values
+            values = height_field(mesh, normals.direction).values
             axes = _space(figure, 3, "field", mesh.points)
             axes.scatter(*mesh.points.T, c=values, s=12)
     return png(figure), energies[0], energies[1]

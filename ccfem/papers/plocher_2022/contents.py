@@ -154,13 +154,13 @@ def try_variant(plate: Plate, strategy: str, parameters: dict[str, Any]) -> Trie
     toolpaths = plan(create(strategy, parameters), layers, stress, machine_of(plate))
     paths = [plane_paths(toolpaths, layer) for layer in layers]
     maps = [fibre_map(p, plate.mesh.centres, plate.bead) for p in paths]
-    laid = laid_plate(plate.problem(stiffness), np.stack([m.angle for m in maps]), stiffness)
+    solved = laid_plate(plate.problem(stiffness), np.stack([m.angle for m in maps]), stiffness)
     direction, defined = strongest_direction(plate.isotropic_field)
     winding = sinuosity_indices(sample_sinuosity(paths[0], plate.bead))
     return Tried(
         100.0 * float(np.mean([agreement(m.angle - direction)[defined] for m in maps])),
-        1e6 * laid.strain_energy,
-        laid.stress,
+        1e6 * solved.strain_energy,
+        solved.stress,
         float(np.mean([print_seconds(p) for p in paths])),
         100.0 * winding["over_40_count"],
     )
@@ -256,54 +256,54 @@ def quantities(study: Mapping[str, CaseStudy]) -> dict[str, float]:
 
     Orders that hold are 1, others 0.
     """
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     for name, case in study.items():
         have = set(case.patterns)
         for rule in (_agreement, _energy, _stress, _printing, _sensitivity, _mixed, _ranks):
-            found |= rule(case, name, have)
-    return found
+            values |= rule(case, name, have)
+    return values
 
 
 def raster_quantities(raster: Mapping[str, CaseStudy]) -> dict[str, float]:
     """Quantities of paths of pixels: their names start with "raster"."""
-    found = {f"raster {name}": value for name, value in quantities(raster).items()}
+    values = {f"raster {name}": value for name, value in quantities(raster).items()}
     for name, case in raster.items():
         winding = [case.value(p, "si_raw_mean") for p in case.patterns]
         spread = 100.0 * (max(winding) / min(winding) - 1.0)
-        found[f"raster range of sinuosity of raw pixels {name}, %"] = spread
-    return found
+        values[f"raster range of sinuosity of raw pixels {name}, %"] = spread
+    return values
 
 
 def _agreement(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
-    found = {f"agreement {p} {name}": case.value(p, "agreement") for p in have}
+    values = {f"agreement {p} {name}": case.value(p, "agreement") for p in have}
     if have >= {"mat", "concentric"}:
         less = case.value("mat", "agreement") - case.value("concentric", "agreement")
-        found[f"agreement mat less concentric {name}"] = less
-    return found
+        values[f"agreement mat less concentric {name}"] = less
+    return values
 
 
 def _energy(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
     ratio = {p: case.value(p, "ratio_C") for p in have}
     soft = {p: case.value(p, "energy_S") for p in have}
-    found = {
+    values = {
         f"least energy ratio C {name}": min(ratio.values()),
         f"range of energy {name} S, %": 100.0 * (max(soft.values()) / min(soft.values()) - 1.0),
     }
     if have >= {"mps", "grid 45"}:
-        found[f"energy grid 45 over mps {name}"] = ratio["grid 45"] / ratio["mps"]
+        values[f"energy grid 45 over mps {name}"] = ratio["grid 45"] / ratio["mps"]
         drop = 1.0 - case.value("mps", "stress_C") / case.value("grid 45", "stress_C")
-        found[f"stress drop mps {name}"] = 100.0 * drop
+        values[f"stress drop mps {name}"] = 100.0 * drop
     if have >= {"mps", "grid 45", "grid 0", "concentric", "mat"}:
         middle = [ratio[p] for p in ("grid 0", "concentric", "mat")]
         holds = ratio["mps"] < min(middle) and max(middle) < ratio["grid 45"]
-        found[f"order of energies {name}"] = float(holds)
+        values[f"order of energies {name}"] = float(holds)
     if have >= {"mps", "concentric", "mat"}:
         for key, suffix in (("ratio_C", ""), ("ratio_off_peaks_C", " off peaks")):
             order = [case.value(p, key) for p in ("mps", "concentric", "mat")]
             best = min(case.value(p, key) for p in have)
             holds = order == sorted(order) and order[0] == best
-            found[f"order on {name} C{suffix}"] = float(holds)
-    return found
+            values[f"order on {name} C{suffix}"] = float(holds)
+    return values
 
 
 def _stress(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
@@ -317,31 +317,31 @@ def _stress(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
 
 
 def _printing(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
-    found = {}
+    values = {}
     if have >= {"mps", "concentric"}:
         seconds = case.value("mps", "cpu_with_fe") / case.value("concentric", "cpu_with_fe")
-        found[f"cpu mps over concentric {name}, %"] = 100.0 * (seconds - 1.0)
+        values[f"cpu mps over concentric {name}, %"] = 100.0 * (seconds - 1.0)
     if have >= {"grid 45", "concentric"}:
         longer = case.value("grid 45", "print") / case.value("concentric", "print") - 1.0
-        found[f"print time grid 45 over concentric {name}, %"] = 100.0 * longer
+        values[f"print time grid 45 over concentric {name}, %"] = 100.0 * longer
     if "concentric" in have and len(have) > 1:
         for key, label in (("cpu_with_fe", "cpu"), ("print", "print time")):
             others = min(case.value(p, key) for p in have - {"concentric"})
-            found[f"{label} concentric over least other {name}"] = (
+            values[f"{label} concentric over least other {name}"] = (
                 case.value("concentric", key) / others
             )
         long = {p: case.value(p, "over_40") for p in have}
         holds = long["concentric"] == max(long.values())
-        found[f"concentric longest {name}"] = float(holds)
+        values[f"concentric longest {name}"] = float(holds)
     winding = {p: case.value(p, "si") for p in have}
-    found[f"range of sinuosity {name}, %"] = 100.0 * (
+    values[f"range of sinuosity {name}, %"] = 100.0 * (
         max(winding.values()) / min(winding.values()) - 1.0
     )
     grids = [winding[p] for p in have if p.startswith("grid")]
     if grids:
         holds = min(grids) <= min(winding.values()) + _STRAIGHT
-        found[f"grid straightest {name}"] = float(holds)
-    return found
+        values[f"grid straightest {name}"] = float(holds)
+    return values
 
 
 def _sensitivity(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
@@ -352,19 +352,19 @@ def _sensitivity(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]
 
 
 def _mixed(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     if "grid 45" not in have:
-        return found
+        return values
     energy = {p: case.value(p, "energy_mixed") for p in have}
-    found[f"grid 45 softest mixed {name}"] = float(energy["grid 45"] == max(energy.values()))
+    values[f"grid 45 softest mixed {name}"] = float(energy["grid 45"] == max(energy.values()))
     for p in have - {"grid 45"}:
         drop = 1.0 - case.value(p, "stress_mixed") / case.value("grid 45", "stress_mixed")
-        found[f"mixed stress drop {p} {name}"] = 100.0 * drop
-    return found
+        values[f"mixed stress drop {p} {name}"] = 100.0 * drop
+    return values
 
 
 def _ranks(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
-    found = {}
+    values = {}
     for key in case.benchmarks:
         for reading in ("weighted", "literal", "harmonic"):
             label = "PI" if reading == "weighted" else f"PI {reading}"
@@ -374,11 +374,11 @@ def _ranks(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
                 index = [case.value(p, f"pi_{reading}_{key}") for p in sorted(patterns)]
                 stiff = [1.0 / case.value(p, f"energy_{key}") for p in sorted(patterns)]
                 rank = float(spearmanr(index, stiff).statistic)
-                found[f"rank of {label} {key} {name}{suffix}"] = rank
+                values[f"rank of {label} {key} {name}{suffix}"] = rank
                 far = [1.0 / case.value(p, f"ratio_off_peaks_{key}") for p in sorted(patterns)]
                 rank = float(spearmanr(index, far).statistic)
-                found[f"rank of {label} {key} {name}{suffix}, off peaks"] = rank
-    return found
+                values[f"rank of {label} {key} {name}{suffix}, off peaks"] = rank
+    return values
 
 
 # Tables of a run, in Markdown.
@@ -422,7 +422,7 @@ ROWS = {
 
 def result_table(case: CaseStudy) -> str:
     """Every index of every pattern on one plate."""
-    known = set.intersection(*(set(one.values) for one in case.patterns.values()))
+    known = set.intersection(*(set(pattern.values) for pattern in case.patterns.values()))
     rows = [
         [title, *(form.format(case.value(pattern, index)) for pattern in case.patterns)]
         for index, (title, form) in ROWS.items()
@@ -447,15 +447,15 @@ def prototype_table(raster: Mapping[str, CaseStudy], path: Path = PROTOTYPE) -> 
     return table(["case", "index", *next(iter(raster.values())).patterns], rows)
 
 
-def rank_table(found: Mapping[str, float]) -> str:
+def rank_table(values: Mapping[str, float]) -> str:
     """Rank correlation (Spearman) of PI with the stiffness of the patterns, by reading."""
     head = ["reading of PI", "material", "patterns"]
-    cases = [name for name in ("I", "II", "III") if f"rank of PI C {name}" in found]
+    cases = [name for name in ("I", "II", "III") if f"rank of PI C {name}" in values]
     rows = []
     for reading in ("PI", "PI literal", "PI harmonic"):
         for key in MATERIALS:
             for suffix in ("", " without 0/90"):
-                ranks = [found[f"rank of {reading} {key} {name}{suffix}"] for name in cases]
+                ranks = [values[f"rank of {reading} {key} {name}{suffix}"] for name in cases]
                 about = [reading if reading != "PI" else "PI weighted", f"{key}-FRAM"]
                 patterns = "all five" if not suffix else suffix.strip()
                 rows.append([*about, patterns, *(f"{rank:.2f}" for rank in ranks)])

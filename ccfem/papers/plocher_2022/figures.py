@@ -49,9 +49,9 @@ def plates_grid(
     FigureCanvasAgg(figure)
     axes = figure.subplots(rows, columns, squeeze=False)
     figure.subplots_adjust(0.01, 0.01, 0.99, 1.0 - 0.25 / (rows * height), 0.03, 0.18)
-    for one in axes.flat:
-        one.set_axis_off()
-        one.set_aspect("equal")
+    for panel in axes.flat:
+        panel.set_axis_off()
+        panel.set_aspect("equal")
     return figure, axes
 
 
@@ -104,9 +104,9 @@ def plain(columns: int, width: float = 4.4, height: float = 3.2) -> tuple[Figure
     FigureCanvasAgg(figure)
     axes = figure.subplots(1, columns, squeeze=False)[0]
     figure.subplots_adjust(0.14 / columns, 0.2, 0.98, 0.88, 0.28)
-    for one in axes:
-        one.spines[["top", "right"]].set_visible(False)
-        one.tick_params(labelsize=7, colors=INK)
+    for panel in axes:
+        panel.spines[["top", "right"]].set_visible(False)
+        panel.tick_params(labelsize=7, colors=INK)
     return figure, axes
 
 
@@ -115,8 +115,8 @@ def polar(columns: int) -> tuple[Figure, Any]:
     figure = Figure(figsize=(3.6 * columns, 4.0), dpi=130.0, facecolor="white")
     FigureCanvasAgg(figure)
     axes = [figure.add_subplot(1, columns, k + 1, projection="polar") for k in range(columns)]
-    for one in axes:
-        one.tick_params(labelsize=6)
+    for panel in axes:
+        panel.tick_params(labelsize=6)
     figure.subplots_adjust(0.08, 0.1, 0.92, 0.82, 0.35)
     return figure, axes
 
@@ -201,14 +201,14 @@ def _patterns(study: Mapping[str, CaseStudy]) -> Figure:
         strokes(top, case)
         title(top, f"case {case.plate.name}: direction of the largest stress (benchmark)")
         for row, name in enumerate(names, start=1):
-            one, found = axes[row, column], case.patterns[name]
-            section(one, case.plate)
-            for paths, colour in zip(found.paths, (COLOURS[name], INK), strict=False):
-                one.add_collection(LineCollection(_lines(paths), colors=colour, linewidths=0.45))
+            panel, pattern = axes[row, column], case.patterns[name]
+            section(panel, case.plate)
+            for paths, colour in zip(pattern.paths, (COLOURS[name], INK), strict=False):
+                panel.add_collection(LineCollection(_lines(paths), colors=colour, linewidths=0.45))
             title(
-                one,
-                f"{name}: agreement {found.values['agreement']:.1f} %, "
-                f"energy {found.values['ratio_C']:.2f} x benchmark (C-FRAM)",
+                panel,
+                f"{name}: agreement {pattern.values['agreement']:.1f} %, "
+                f"energy {pattern.values['ratio_C']:.2f} x benchmark (C-FRAM)",
             )
     return figure
 
@@ -225,12 +225,12 @@ def _medial_axis(case: CaseStudy) -> Figure:
         ("three shells, and the medial axis of the rest", np.where(axis, 2.0, first)),
         ("shells, rings round the medial axis, concentric rest", domain),
     )
-    for one, (heading, pixels) in zip(axes[:, 0], panels, strict=False):
+    for panel, (heading, pixels) in zip(axes[:, 0], panels, strict=False):
         height, width = (made.raster.pixel * n for n in pixels.shape)
         x, y = made.raster.origin
-        one.imshow(pixels, cmap=scale("field"), extent=(x, x + width, y, y + height))
-        section(one, case.plate, filled=False)
-        title(one, f"case {case.plate.name}: {heading}")
+        panel.imshow(pixels, cmap=scale("field"), extent=(x, x + width, y, y + height))
+        section(panel, case.plate, filled=False)
+        title(panel, f"case {case.plate.name}: {heading}")
     section(axes[2, 0], case.plate)
     axes[2, 0].add_collection(
         LineCollection(_lines(case.patterns["mat"].paths[0]), colors=COLOURS["mat"], lw=0.6)
@@ -244,16 +244,16 @@ def _simplification(case: CaseStudy) -> Figure:
     figure, axes = plain(1, 5.0, 4.2)
     (made,) = case.patterns["concentric"].raster
     bead = made.raster.pixel
-    one = axes[0]
+    panel = axes[0]
     lines = made.lines()
-    one.add_collection(LineCollection(made.chains, colors=OUTLINE, linewidths=1.0, alpha=0.7))
-    one.add_collection(LineCollection(lines, colors=COLOURS["concentric"], linewidths=1.2))
-    one.plot(*np.array([line[0] for line in lines]).T, "o", color=INK, ms=3.5)
-    one.plot(*made.raster.centres(np.argwhere(made.paths.isolated)).T, "x", color=INK, ms=3.5)
-    one.set_xlim(0.0, 40.0 * bead)
-    one.set_ylim(0.0, 0.5 * bead * case.plate.mask.shape[0] + 4.0 * bead)
-    one.set_aspect("equal")
-    one.set_title(
+    panel.add_collection(LineCollection(made.chains, colors=OUTLINE, linewidths=1.0, alpha=0.7))
+    panel.add_collection(LineCollection(lines, colors=COLOURS["concentric"], linewidths=1.2))
+    panel.plot(*np.array([line[0] for line in lines]).T, "o", color=INK, ms=3.5)
+    panel.plot(*made.raster.centres(np.argwhere(made.paths.isolated)).T, "x", color=INK, ms=3.5)
+    panel.set_xlim(0.0, 40.0 * bead)
+    panel.set_ylim(0.0, 0.5 * bead * case.plate.mask.shape[0] + 4.0 * bead)
+    panel.set_aspect("equal")
+    panel.set_title(
         "concentric: pixels (grey), made straight, starts (dots), isolated (x)",
         size=8,
         loc="left",
@@ -262,9 +262,9 @@ def _simplification(case: CaseStudy) -> Figure:
     return figure
 
 
-def _agreement_of(case: CaseStudy, found: PatternStudy) -> FloatArray:
+def _agreement_of(case: CaseStudy, pattern: PatternStudy) -> FloatArray:
     direction = case.benchmarks["C"].direction
-    return 100.0 * np.mean([agreement(m.angle - direction) for m in found.maps], axis=0)
+    return 100.0 * np.mean([agreement(m.angle - direction) for m in pattern.maps], axis=0)
 
 
 def _maps(study: Mapping[str, CaseStudy], values_of: Any, limits: Any, label: str) -> Figure:
@@ -273,8 +273,8 @@ def _maps(study: Mapping[str, CaseStudy], values_of: Any, limits: Any, label: st
     figure, axes = plates_grid(len(names), len(cases), [c.plate for c in cases])
     for column, case in enumerate(cases):
         for row, name in enumerate(names):
-            found = case.patterns[name]
-            values = values_of(case, found)
+            pattern = case.patterns[name]
+            values = values_of(case, pattern)
             drawn = image(axes[row, column], case.plate, values, scale("field"), limits)
             title(axes[row, column], f"case {case.plate.name}, {name}: mean {values.mean():.1f} %")
     bar = figure.colorbar(drawn, ax=axes[:, -1], shrink=0.4, pad=0.01)
@@ -291,8 +291,8 @@ def _energies(study: Mapping[str, CaseStudy], key: str = "C") -> Figure:
     for column, case in enumerate(cases):
         best = case.benchmarks[key].laid
         for row, name in enumerate(names):
-            laid = best if name == "benchmark" else case.patterns[name].laid[key]
-            density = laid.field.energy_density / best.field.energy_density.mean()
+            solved = best if name == "benchmark" else case.patterns[name].laid[key]
+            density = solved.field.energy_density / best.field.energy_density.mean()
             drawn = image(
                 axes[row, column],
                 case.plate,
@@ -300,7 +300,7 @@ def _energies(study: Mapping[str, CaseStudy], key: str = "C") -> Figure:
                 scale("stress"),
                 (-1.0, 1.3),
             )
-            ratio = laid.strain_energy / best.strain_energy
+            ratio = solved.strain_energy / best.strain_energy
             title(
                 axes[row, column],
                 f"case {case.plate.name}, {key}-FRAM, {name}: sum {ratio:.2f} x benchmark",
@@ -317,15 +317,15 @@ def _long_and_short(study: Mapping[str, CaseStudy]) -> Figure:
     figure, axes = plates_grid(len(names), len(cases), [c.plate for c in cases], 3.6)
     for column, case in enumerate(cases):
         for row, name in enumerate(names):
-            one, found = axes[row, column], case.patterns[name]
-            section(one, case.plate)
-            for paths in found.paths:
+            panel, pattern = axes[row, column], case.patterns[name]
+            section(panel, case.plate)
+            for paths in pattern.paths:
                 colours = np.where(paths.lengths > LONG, INK, COLOURS["concentric"])
-                one.add_collection(
+                panel.add_collection(
                     LineCollection(_lines(paths), colors=list(colours), linewidths=0.4)
                 )
-            share = found.values["over_40"]
-            title(one, f"case {case.plate.name}, {name}: {share:.0f} % over 40 mm (dark)")
+            share = pattern.values["over_40"]
+            title(panel, f"case {case.plate.name}, {name}: {share:.0f} % over 40 mm (dark)")
     return figure
 
 
@@ -369,8 +369,8 @@ def _mixed_bars(study: Mapping[str, CaseStudy]) -> Figure:
 def _sensitivity(study: Mapping[str, CaseStudy]) -> Figure:
     figure, axes = plain(2)
     angle = np.radians(np.linspace(0.0, 90.0, 181))
-    for one, (key, name) in zip(axes, MATERIALS.items(), strict=True):
-        one.plot(
+    for panel, (key, name) in zip(axes, MATERIALS.items(), strict=True):
+        panel.plot(
             np.degrees(angle),
             OffAxis(named_material(name))(angle),
             color=OUTLINE,
@@ -380,12 +380,12 @@ def _sensitivity(study: Mapping[str, CaseStudy]) -> Figure:
         for case, colour in zip(study.values(), (COLOURS["mps"], COLOURS["grid 45"]), strict=False):
             curve = case.benchmarks[key].curve
             label = f"case {case.plate.name}"
-            one.plot(np.degrees(angle), curve(angle), color=colour, lw=1.1, label=label)
-            one.plot(curve.angles, curve.values, "o", color=colour, ms=3.0)
-        one.set_title(f"{key}-FRAM: f; grey: uniform tension", size=8, loc="left", color=INK)
-        one.set_xlabel("fibre turned from the principal direction, degrees", size=7.5)
-        one.set_ylim(0.0, 1.05)
-        one.legend(fontsize=7, frameon=False)
+            panel.plot(np.degrees(angle), curve(angle), color=colour, lw=1.1, label=label)
+            panel.plot(curve.angles, curve.values, "o", color=colour, ms=3.0)
+        panel.set_title(f"{key}-FRAM: f; grey: uniform tension", size=8, loc="left", color=INK)
+        panel.set_xlabel("fibre turned from the principal direction, degrees", size=7.5)
+        panel.set_ylim(0.0, 1.05)
+        panel.legend(fontsize=7, frameon=False)
     return figure
 
 
@@ -460,12 +460,12 @@ def layups() -> Figure:
     """Figure 7 f and g: modulus over the direction of the load, of layers and of materials."""
     figure, axes = polar(len(MATERIALS))
     angle = np.linspace(0.0, 2.0 * np.pi, 361)
-    for one, (key, material) in zip(axes, MATERIALS.items(), strict=True):
+    for panel, (key, material) in zip(axes, MATERIALS.items(), strict=True):
         for name, (layup, colour) in LAYUPS.items():
             modulus = 1e-3 * layup_moduli(angle, layup, material)
-            one.plot(angle, modulus, color=colour, lw=1.2, label=name)
-        one.set_title(f"{key}-FRAM: modulus, GPa", size=8, pad=12.0)
-        one.legend(loc="lower center", bbox_to_anchor=(0.5, -0.22), ncols=3, fontsize=6.5,
+            panel.plot(angle, modulus, color=colour, lw=1.2, label=name)
+        panel.set_title(f"{key}-FRAM: modulus, GPa", size=8, pad=12.0)
+        panel.legend(loc="lower center", bbox_to_anchor=(0.5, -0.22), ncols=3, fontsize=6.5,
                    frameon=False)  # fmt: skip
     return figure
 

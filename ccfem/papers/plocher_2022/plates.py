@@ -7,14 +7,13 @@ load. The loading axis is x.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import shapely
 from scipy import ndimage
 
-from ccfem.base.arrays import BoolArray, FloatArray, read_only
+from ccfem.base.arrays import BoolArray, FloatArray, freeze
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import TetMesh
 from ccfem.body.meshing import extrude
@@ -67,8 +66,7 @@ class Plate:
     peaks: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mask", read_only(self.mask, np.bool_))
-        object.__setattr__(self, "points", MappingProxyType(dict(self.points)))
+        freeze(self, mask=bool, points=dict)
 
     @cached_property
     def mesh(self) -> PlaneMesh:
@@ -296,13 +294,7 @@ class BendingBeam:
     design: Design
 
     def __post_init__(self) -> None:
-        for name, dtype in (
-            ("mask", np.bool_),
-            ("density", np.float64),
-            ("supports", np.float64),
-            ("loads", np.float64),
-        ):
-            object.__setattr__(self, name, read_only(getattr(self, name), dtype))
+        freeze(self, mask=bool, density=float, supports=float, loads=float)
 
 
 def three_point_bending_problem(size: float = 1.0) -> PlaneProblem:

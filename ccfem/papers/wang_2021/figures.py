@@ -59,13 +59,13 @@ def figures(study: Mapping[str, PlateStudy], number: int | None = None) -> dict[
         add(f"figure_{maps}_{name}_curvature", _curvature_maps, name)
         add(f"figure_{maps}_{name}_curvature_shares", _curvature_shares, name)
         add(f"figure_{rates}_{name}_matching", _matching, name)
-    for name, others, own in (
+    for name, others, lpp_number in (
         ("cantilever", 12, 13),
         ("m_shape", 14, 15),
         ("l_shape", 16, 17),
     ):
         add(f"figure_{others}_{name}_other_methods", _other_methods, name)
-        add(f"figure_{own}_{name}_lpp", _lpp, name, lpp=True)
+        add(f"figure_{lpp_number}_{name}_lpp", _lpp, name, lpp=True)
     return drawn_of(made, number)
 
 
@@ -99,13 +99,13 @@ def _stresses(plate: PlateStudy) -> Figure:
     section(axes[0], domain)
     show_load(axes[0], plate.plate)
     title(axes[0], "(a) load and supports")
-    for one, part, text in (
+    for panel, part, text in (
         (axes[1], plate.original, "(b) stress of the full plate: blue pulled, green pressed"),
         (axes[2], plate.optimised, "(c) stress of the optimised part"),
     ):
-        section(one, part.layer.plane.polygon)
-        strokes(one, part)
-        title(one, text)
+        section(panel, part.layer.plane.polygon)
+        strokes(panel, part)
+        title(panel, text)
     return figure
 
 
@@ -131,13 +131,13 @@ def _process(plate: PlateStudy) -> Figure:
     lpp = plate.optimised.patterns["lpp"]
     box = shapely.union(plate.plate.domain, shapely.MultiPoint(lpp.paths.points)).bounds
     figure, axes = panels([plate.plate.domain] * 4, 2, box=box)
-    for one, part, text in (
+    for panel, part, text in (
         (axes[0], plate.original, "(a) load and stress of the full plate"),
         (axes[1], plate.optimised, "(b) stress of the optimised part"),
     ):
-        section(one, part.layer.plane.polygon)
-        strokes(one, part)
-        title(one, text)
+        section(panel, part.layer.plane.polygon)
+        strokes(panel, part)
+        title(panel, text)
     show_load(axes[0], plate.plate)
     section(axes[2], plate.optimised.layer.plane.polygon)
     _main_paths(axes[2], plate)
@@ -152,10 +152,10 @@ def _main_paths(axes: Any, plate: PlateStudy) -> None:
     """Draw main load paths as `svt` joins them, one colour each."""
     part, svt = plate.optimised, Svt()
     members = frame(part.layer.plane.polygon, 0.5 * part.machine.fibre_width)
-    found = main_paths(members, part.stress, Criterion(turn=svt.turn), svt.width_ratio)
-    names = [str(k) for k in range(len(found))]
-    for one, colour in zip(found, palette(names).values(), strict=True):
-        lines_of(axes, [np.concatenate([m.points for m in one.members])], colour, 2.0)
+    joined = main_paths(members, part.stress, Criterion(turn=svt.turn), svt.width_ratio)
+    names = [str(k) for k in range(len(joined))]
+    for main_path, colour in zip(joined, palette(names).values(), strict=True):
+        lines_of(axes, [np.concatenate([m.points for m in main_path.members])], colour, 2.0)
 
 
 def _compared(plate: PlateStudy) -> dict[str, tuple[Any, PatternStudy]]:
@@ -172,14 +172,14 @@ def _compared(plate: PlateStudy) -> dict[str, tuple[Any, PatternStudy]]:
 def _curvature_maps(plate: PlateStudy) -> Figure:
     """Places of four patterns that curve by more than 0.26 / mm, every half millimetre."""
     shown = _compared(plate)
-    box = shapely.union_all([shapely.MultiPoint(one.paths.points) for _, one in shown.values()])
+    box = shapely.union_all([shapely.MultiPoint(panel.paths.points) for _, panel in shown.values()])
     figure, axes = panels([box] * len(shown), 2, 5.0)
-    for letter, one, (name, (polygon, pattern)) in zip("abcd", axes, shown.items(), strict=False):
-        section(one, polygon)
-        path(one, pattern, _FAINT, _FAINT)
+    for letter, panel, (name, (polygon, pattern)) in zip("abcd", axes, shown.items(), strict=False):
+        section(panel, polygon)
+        path(panel, pattern, _FAINT, _FAINT)
         order = np.argsort(pattern.curvature, kind="stable")
         order = order[pattern.curvature[order] > LIMIT]
-        drawn = one.scatter(
+        drawn = panel.scatter(
             *pattern.places[order].T,
             c=pattern.curvature[order],
             s=3.0,
@@ -191,7 +191,7 @@ def _curvature_maps(plate: PlateStudy) -> Figure:
         )
         share, vertices = (100.0 * (c < LIMIT).mean() for c in (pattern.curvature, pattern.native))
         text = f"below {LIMIT} / mm: {share:.0f} % of the length, {vertices:.0f} % of the vertices"
-        title(one, f"({letter}) {name}, {text}")
+        title(panel, f"({letter}) {name}, {text}")
     bar(figure, axes, drawn, "curvature, 1/mm")
     return figure
 
@@ -203,18 +203,18 @@ def _curvature_shares(plate: PlateStudy) -> Figure:
         "at the vertices as planned, links too",
     )
     figure, axes = curves(2, [("curvature, 1/mm", "share below it, %")] * 2)
-    for one, reading, text in zip(axes, ("curvature", "native"), texts, strict=True):
+    for panel, reading, text in zip(axes, ("curvature", "native"), texts, strict=True):
         for name, (_, pattern) in _compared(plate).items():
             values = np.sort(getattr(pattern, reading))
             share = 100.0 * np.arange(1, len(values) + 1) / max(len(values), 1)
-            one.step(
+            panel.step(
                 np.maximum(values, 0.005), share, where="post", color=COLOURS[name], label=name
             )
-        one.axvline(LIMIT, color=OUTLINE, lw=0.8, ls="--")
-        one.set_xscale("log")
-        one.set_xlim(0.005, 6.0)
-        one.set_ylim(0.0, 101.0)
-        one.set_title(text, size=8, loc="left", color=INK)
+        panel.axvline(LIMIT, color=OUTLINE, lw=0.8, ls="--")
+        panel.set_xscale("log")
+        panel.set_xlim(0.005, 6.0)
+        panel.set_ylim(0.0, 101.0)
+        panel.set_title(text, size=8, loc="left", color=INK)
     axes[0].legend(fontsize=7, frameon=False, loc="lower right")
     return figure
 
@@ -227,18 +227,20 @@ def _matching(plate: PlateStudy) -> Figure:
         (axes[0], plate.original, f"{name}: the slicer's patterns on the full plate"),
         (axes[1], plate.optimised, f"{name}: all patterns on the optimised part"),
     )
-    for one, part, text in sides:
-        own = [p for p in ("lpp", "lpp uncrossed") if p in plate.optimised.patterns]
-        shown = {p: plate.optimised.patterns[p] for p in own}
+    for panel, part, text in sides:
+        lpp_names = [p for p in ("lpp", "lpp uncrossed") if p in plate.optimised.patterns]
+        shown = {p: plate.optimised.patterns[p] for p in lpp_names}
         shown |= {p: part.patterns[p] for p in BASELINES if p in part.patterns}
         for label, pattern in shown.items():
             style = "--" if label == "lpp uncrossed" else "-"
             rate = 100.0 * pattern.rates["strands"]
-            one.plot(THRESHOLDS, rate, style, color=COLOURS[label], marker="o", ms=2.5, label=label)
-        one.plot([0.0, 90.0], [0.0, 100.0], color=OUTLINE, lw=0.8, ls=":")
-        one.set_xlim(0.0, 90.0)
-        one.set_ylim(0.0, 101.0)
-        one.set_title(text, size=8, loc="left", color=INK)
+            panel.plot(
+                THRESHOLDS, rate, style, color=COLOURS[label], marker="o", ms=2.5, label=label
+            )
+        panel.plot([0.0, 90.0], [0.0, 100.0], color=OUTLINE, lw=0.8, ls=":")
+        panel.set_xlim(0.0, 90.0)
+        panel.set_ylim(0.0, 101.0)
+        panel.set_title(text, size=8, loc="left", color=INK)
     axes[1].legend(fontsize=7, frameon=False, loc="lower right")
     return figure
 
@@ -252,13 +254,13 @@ def _other_methods(plate: PlateStudy) -> Figure:
     section(axes[0], part.layer.plane.polygon)
     show_load(axes[0], plate.plate)
     title(axes[0], "(a) load and supports; outline ours")
-    for letter, one, name in zip("bcd", axes[1:], have, strict=False):
-        section(one, part.layer.plane.polygon)
-        path(one, part.patterns[name], COLOURS[name])
+    for letter, panel, name in zip("bcd", axes[1:], have, strict=False):
+        section(panel, part.layer.plane.polygon)
+        path(panel, part.patterns[name], COLOURS[name])
         total = part.patterns[name].total
         text = f"{total['paths']:.0f} pieces, {100.0 * total['coverage']:.0f} % covered"
         reading = ", our reading" if name == "eqs" else ""
-        title(one, f"({letter}) {name}{reading}: {text}")
+        title(panel, f"({letter}) {name}{reading}: {text}")
     return figure
 
 
@@ -268,8 +270,8 @@ def _lpp(plate: PlateStudy) -> Figure:
     lpp = part.patterns["lpp"]
     box = shapely.union(part.layer.plane.polygon, shapely.MultiPoint(lpp.paths.points)).bounds
     figure, axes = panels([part.layer.plane.polygon] * 2, 2, box=box)
-    for one in axes[:2]:
-        section(one, part.layer.plane.polygon)
+    for panel in axes[:2]:
+        section(panel, part.layer.plane.polygon)
     strokes(axes[0], part, 45)
     axis = frame(part.layer.plane.polygon, 0.5 * part.machine.fibre_width)
     lines_of(axes[0], [member.points for member in axis.members], INK, 1.2)

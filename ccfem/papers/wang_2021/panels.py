@@ -49,12 +49,12 @@ def panels(
     FigureCanvasAgg(figure)
     axes = list(figure.subplots(rows, columns, squeeze=False).flat)
     figure.subplots_adjust(0.005, 0.005, 0.995, 1.0 - 0.28 / (rows * height), 0.02, 0.3 / height)
-    for k, one in enumerate(axes):
-        one.set_axis_off()
-        one.set_aspect("equal")
+    for k, panel in enumerate(axes):
+        panel.set_axis_off()
+        panel.set_aspect("equal")
         if k < len(shapes):
-            one.set_xlim(boxes[k, 0] - margin, boxes[k, 2] + margin)
-            one.set_ylim(boxes[k, 1] - margin, boxes[k, 3] + margin)
+            panel.set_xlim(boxes[k, 0] - margin, boxes[k, 2] + margin)
+            panel.set_ylim(boxes[k, 1] - margin, boxes[k, 3] + margin)
     return figure, axes
 
 
@@ -118,8 +118,8 @@ def path(axes: Any, pattern: PatternStudy, colour: str = STRAND, link: str = LIN
     """Draw the paths of a pattern, its links in their own colour, start and end marked if one."""
     paths = pattern.paths
     steps, mask = _steps(pattern)
-    for kind, own in ((~mask, colour), (mask, link)):
-        axes.add_collection(LineCollection(list(steps[kind]), colors=own, lw=0.45, zorder=2.0))
+    for kind, stroke in ((~mask, colour), (mask, link)):
+        axes.add_collection(LineCollection(list(steps[kind]), colors=stroke, lw=0.45, zorder=2.0))
     if len(paths) == 1:
         axes.plot(*paths.points[0], "o", color=INK, ms=4.0, zorder=3.0)
         axes.plot(*paths.points[-1], "s", color=INK, ms=4.0, zorder=3.0)
@@ -133,11 +133,11 @@ def by_level(axes: Any, pattern: PatternStudy, values: FloatArray, unit: str) ->
     levels = np.unique(kept)
     colours = palette(map(str, levels)).values()
     for level, colour in zip(levels, colours, strict=True):
-        one = kept == level
-        share = 100.0 * length[one].sum() / length.sum()
+        at_level = kept == level
+        share = 100.0 * length[at_level].sum() / length.sum()
         label = f"{level:g} {unit}: {share:.0f} % of the length"
         lines = LineCollection(
-            list(steps[one]), colors=colour, lw=0.8, zorder=2.0, label=label, capstyle="round"
+            list(steps[at_level]), colors=colour, lw=0.8, zorder=2.0, label=label, capstyle="round"
         )
         axes.add_collection(lines)
     axes.legend(fontsize=6, frameon=False, loc="upper right")
@@ -174,10 +174,10 @@ def curves(count: int, labels: Sequence[tuple[str, str]]) -> tuple[Figure, list[
     FigureCanvasAgg(figure)
     axes = list(figure.subplots(1, count, squeeze=False)[0])
     figure.subplots_adjust(0.12 / count, 0.14, 0.99, 0.9, 0.22)
-    for one, (across, up) in zip(axes, labels, strict=True):
-        one.spines[["top", "right"]].set_visible(False)
-        one.tick_params(labelsize=7, colors=INK)
-        one.set_xlabel(across, size=8, color=INK)
-        one.set_ylabel(up, size=8, color=INK)
-        one.grid(color=OUTLINE, alpha=0.2, lw=0.5)
+    for panel, (across, up) in zip(axes, labels, strict=True):
+        panel.spines[["top", "right"]].set_visible(False)
+        panel.tick_params(labelsize=7, colors=INK)
+        panel.set_xlabel(across, size=8, color=INK)
+        panel.set_ylabel(up, size=8, color=INK)
+        panel.grid(color=OUTLINE, alpha=0.2, lw=0.5)
     return figure, axes

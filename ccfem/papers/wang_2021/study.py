@@ -178,10 +178,10 @@ def run_plate(
     """Optimise a plate if asked to, then solve, plan and judge both parts."""
     begun = perf_counter()
     plate = PLATES[name]
-    found = plate.design() if design else None
+    new_design = plate.design() if design else None
     off = np.nan
-    if found is not None:
-        outline = plate.outline(found)
+    if new_design is not None:
+        outline = plate.outline(new_design)
         off = outline.symmetric_difference(plate.part).area / outline.area
     optimised, original = (
         run_part(
@@ -191,7 +191,7 @@ def run_plate(
         )
         for whole in (True, False)
     )
-    return PlateStudy(plate, optimised, original, found, off, perf_counter() - begun)
+    return PlateStudy(plate, optimised, original, new_design, off, perf_counter() - begun)
 
 
 def run_part(case: Case, patterns: Sequence[str], tested: bool) -> PartStudy:
@@ -201,8 +201,8 @@ def run_part(case: Case, patterns: Sequence[str], tested: bool) -> PartStudy:
     (layer,) = Planar(count=1).cut(case.problem.mesh)
     stress = stress_on(layer, field)
     specimen = Specimen.of(field) if tested else None
-    found = {p: _run_pattern(p, layer, field, machine, specimen) for p in patterns}
-    return PartStudy(case, machine, field, layer, stress, MappingProxyType(found))
+    studies = {p: _run_pattern(p, layer, field, machine, specimen) for p in patterns}
+    return PartStudy(case, machine, field, layer, stress, MappingProxyType(studies))
 
 
 def _run_pattern(
