@@ -4,6 +4,7 @@ import os
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
+from string import Template
 
 import numpy as np
 
@@ -66,7 +67,8 @@ def new_part(
     faces, edge = listing.faces, listing.size / 25.0
     held = max(range(len(faces)), key=lambda k: (_faces_down(faces[k]), faces[k].area))
     feet = _beside(faces, held, 1e-3 * listing.size)
-    centre = np.average([faces[k].centre for k in feet], axis=0, weights=_areas(faces, feet))
+    areas = [max(faces[k].area, 1e-300) for k in feet]
+    centre = np.average([faces[k].centre for k in feet], axis=0, weights=areas)
     away = [float(np.linalg.norm(face.centre - centre)) for face in faces]
     others = [k for k in range(len(faces)) if k not in feet]
     meshable = [k for k in others if faces[k].area > edge**2]
@@ -97,10 +99,6 @@ def _beside(faces: Sequence[Face], held: int, reach: float) -> list[int]:
             and abs((face.centre - foot.centre) @ foot.direction) <= reach
         )
     ]
-
-
-def _areas(faces: Sequence[Face], chosen: Sequence[int]) -> list[float]:
-    return [max(faces[k].area, 1e-300) for k in chosen]
 
 
 def _faces_down(face: Face) -> bool:
@@ -136,40 +134,15 @@ def _text(
     more = len(listing.faces) - len(listed)
     if more > 0:
         listed.append(f"#   and {more} smaller ones: ccfem faces {path}")
-    name = "".join(c if c.isalnum() or c in "-_" else "_" for c in body.stem)
-    return "\n".join(
-        [
-            f"# A part file for {path}: change what is marked, then",
-            "#",
-            "#     ccfem check FILE.toml      what is known before a solve",
-            "#     ccfem compare FILE.toml    plan by several strategies, say which is best",
-            "#",
-            "# All keys are described in ccfem/cases/part_file.py; `ccfem example` has more parts.",
-            "",
-            f'name = "{name}"',
-            *given,
-            'build = "z"                  # CHANGE: direction of printing',
-            "layers = 12                  # CHANGE: layers of fibre",
-            'material = "pla"             # CHANGE: or a table with modulus and poisson',
-            "",
-            "# Faces:",
-            *listed,
-            "",
-            "[patches.held]               # CHANGE: what is fixed",
-            *_rule(listing, held),
-            "",
-            "[patches.pulled]             # CHANGE: where the load acts",
-            *_rule(listing, [pulled]),
-            "",
-            "[[supports]]",
-            'patch = "held"',
-            "",
-            "[[loads.pull]]",
-            'kind = "force"',
-            'patch = "pulled"',
-            f"vector = [{', '.join(f'{x + 0.0:.1f}' for x in pull)}]   # CHANGE: N",
-            "",
-        ]
+    template = Template(files(__package__).joinpath("new_part.toml").read_text(encoding="utf-8"))
+    return template.substitute(
+        path=path,
+        name="".join(c if c.isalnum() or c in "-_" else "_" for c in body.stem),
+        body="\n".join(given),
+        faces="\n".join(listed),
+        held="\n".join(_rule(listing, held)),
+        pulled="\n".join(_rule(listing, [pulled])),
+        pull=", ".join(f"{x + 0.0:.1f}" for x in pull),
     )
 
 
@@ -193,8 +166,8 @@ def _rule(listing: BodyFaces, chosen: Sequence[int]) -> list[str]:
 
 def examples() -> dict[str, str]:
     """Return the text of each example by its name."""
-    files_there = files("ccfem.cases").joinpath("examples").iterdir()
-    texts = {file.name: file.read_text(encoding="utf-8") for file in files_there}
+    folder = files("ccfem.cases").joinpath("examples")
+    texts = {file.name: file.read_text(encoding="utf-8") for file in folder.iterdir()}
     return {k.removesuffix(".toml"): texts[k] for k in sorted(texts) if k.endswith(".toml")}
 
 

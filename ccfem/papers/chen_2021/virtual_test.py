@@ -26,6 +26,7 @@ from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.judging.virtual_testing.strands import Strands, cut_strands
 from ccfem.judging.virtual_testing.strength import first_failure, matrix_peak
 from ccfem.judging.virtual_testing.virtual_test import virtual_bracket, virtual_test
+from ccfem.papers.chen_2021.authors import PATHS
 from ccfem.papers.chen_2021.loop import LAYERS_TABLE_2, authors_folder, authors_loop
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.export.waypoints import read_waypoints
@@ -43,12 +44,10 @@ _HEIGHT = 10.0
 _FRAME = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """Axes of the tool, X, Y and Z, in the frame of the mesh."""
 
-_FILES = {"zigzag": "GcodeGenerater_Zigzag_Contour_raw.txt", "ours": "GcodeGenerater_Ours_raw.txt"}
-
 
 def authors_paths(name: str, layers: int = LAYERS_TABLE_2) -> Toolpaths:
     """Paths of the authors' first `layers` layers, "ours" or "zigzag", evenly over the height."""
-    paths = read_waypoints(authors_folder() / "Loop" / _FILES[name], _FRAME)
+    paths = read_waypoints(authors_folder() / "Loop" / PATHS[name], _FRAME)
     paths = paths.select(paths.layer < layers)
     points = np.array(paths.points)
     points[:, 1] = (np.repeat(paths.layer, np.diff(paths.offsets)) + 0.5) * _HEIGHT / layers
@@ -191,7 +190,7 @@ def main() -> None:
     case = authors_loop()
     field = solve(case.problem)["pull"]
     specimen = Specimen.of(field)
-    strands = {name: cut_strands(authors_paths(name), field.mesh) for name in _FILES}
+    strands = {name: cut_strands(authors_paths(name), field.mesh) for name in ("zigzag", "ours")}
     print("Loop, stiffness:             zigzag/none  ours/none  ours/zigzag")
     print("physical, one specimen each       {:6.2f}     {:6.2f}       {:6.2f}".format(*PHYSICAL))
     for mode in ("bonded", "tension"):
