@@ -179,9 +179,9 @@ def two_load_plate(
     if not both_ways:
         return case
     loads = case.problem.loads
-    back = tuple(
-        replace(load, vector=tuple(-x for x in load.vector))
-        for load in loads["shear"]
-        if isinstance(load, Force)
-    )
-    return replace(case, problem=replace(case.problem, loads={**loads, "shear_back": back}))
+    back: list[Force] = []
+    for load in loads["shear"]:
+        assert isinstance(load, Force)
+        x, y, z = load.vector
+        back.append(replace(load, vector=(-x, -y, -z)))
+    return replace(case, problem=replace(case.problem, loads={**loads, "shear_back": tuple(back)}))

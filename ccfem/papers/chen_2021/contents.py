@@ -30,9 +30,12 @@ from ccfem.papers.contents import (
     write_figures,
     write_report,
 )
-from ccfem.papers.wang_2021.panels import bar, curves, lines_of, panels, section, title
+from ccfem.papers.panels import bar, curves, lines_of, panels, section, title
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
+
+EXPECTED = Path(__file__).with_name("expected.toml")
+"""Claims of the paper, with the ranges that count as reproduced."""
 
 # Figures 4 to 10 and 14 of the paper, redrawn from a run.
 
@@ -102,10 +105,9 @@ def _connection(model: Model) -> Figure:
         ([(_lines(stages.paths, layer), _PATH)], f"(f) joined: {len(stages.paths)} paths"),
     ]
     for panel, (drawn, text) in zip(axes, steps, strict=False):
-        section(panel, layer.plane.polygon)
+        section(panel, layer.plane.polygon, text)
         for lines, colour in drawn:
             lines_of(panel, lines, colour, 0.7)
-        title(panel, text)
     return figure
 
 
@@ -117,9 +119,8 @@ def _layers(model: Model) -> Figure:
     figure, axes = panels(outlines, 3, 3.6, box=whole)
     for panel, k in zip(axes, chosen, strict=False):
         stages = model.stages[k]
-        section(panel, stages.layer.plane.polygon)
+        section(panel, stages.layer.plane.polygon, f"layer {k + 1} of {len(model.layers)}")
         lines_of(panel, _lines(stages.paths, stages.layer), _PATH, 0.7)
-        title(panel, f"layer {k + 1} of {len(model.layers)}")
     return figure
 
 
@@ -143,7 +144,7 @@ def _pushed(study: Study) -> Figure:
 
 def _histograms(study: Study) -> Figure:
     """Products of neighbouring vectors once they are oriented."""
-    figure, axes = curves(len(study.models), [("v . v*", "share of pairs, %")] * len(study.models))
+    figure, axes = curves([("v . v*", "share of pairs, %")] * len(study.models))
     for panel, (name, model) in zip(axes, study.models.items(), strict=True):
         products = agreement(model)
         share = np.full(len(products), 100.0 / len(products))
@@ -160,9 +161,12 @@ def _powers(study: Study) -> Figure:
     index = layer.index
     figure, axes = panels([layer.plane.polygon] * len(study.powers), len(study.powers), 3.2)
     for panel, (power, paths) in zip(axes, study.powers.items(), strict=True):
-        section(panel, layer.plane.polygon)
+        section(
+            panel,
+            layer.plane.polygon,
+            f"p = {power:g}: {1e-3 * paths.lengths.sum():.1f} m in all layers",
+        )
         lines_of(panel, _lines(paths.select(paths.layer == index), layer), _PATH, 0.7)
-        title(panel, f"p = {power:g}: {1e-3 * paths.lengths.sum():.1f} m in all layers")
     return figure
 
 
@@ -173,16 +177,15 @@ def _processing(study: Study) -> Figure:
     figure, axes = panels([layer.plane.polygon] * 2, 2, 3.6)
     shown = (("(a) without", study.unprocessed), ("(b) with", study.loop.paths))
     for panel, (text, paths) in zip(axes, shown, strict=True):
-        section(panel, layer.plane.polygon)
+        section(panel, layer.plane.polygon, f"{text} orientation and filter")
         lines_of(panel, _lines(paths.select(paths.layer == index), layer), _PATH, 0.7)
-        title(panel, f"{text} orientation and filter")
     return figure
 
 
 def _turns(study: Study) -> Figure:
     """How far principal directions turn."""
     labels = ("turned by, degrees", "share of the cells, %")
-    figure, axes = curves(2, [labels] * 2)
+    figure, axes = curves([labels] * 2)
     for panel, text, which in zip(axes, ("in space", "against the material"), (0, 1), strict=True):
         for (stop, turned), colour in zip(study.turns.items(), (_PATH, _RING), strict=True):
             angles = turned[which]

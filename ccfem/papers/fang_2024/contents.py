@@ -14,19 +14,18 @@ from ccfem.comparison.files import write_results
 from ccfem.comparison.plot.canvas import png
 from ccfem.comparison.plot.stack_page import space_picture, turning_page
 from ccfem.comparison.result import Comparison
-from ccfem.fem.elasticity.ball import BALL, ball_averages
 from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.fem.elasticity.zone import ZONE, distance_from_patches
 from ccfem.geometry.locate import locate
-from ccfem.judging.virtual_testing.interlayer import layer_normals
 from ccfem.machine import Machine
 from ccfem.papers.contents import Contents, table, write_claims
 from ccfem.papers.fang_2024.authors import authors_mesh, authors_stress, finer_mesh
 from ccfem.papers.fang_2024.measures import Strands
 from ccfem.papers.fang_2024.planar_against_curved import ROWS, against, failure_loads
 from ccfem.papers.fang_2024.t_bracket import PAPER_SECONDS, study, timed_chain
+from ccfem.papers.layer_traction import layer_traction
 from ccfem.paths.planning import plan
 from ccfem.paths.toolpaths import MATRIX
 from ccfem.printing.export.robot_waypoints import write_robot_waypoints
@@ -34,6 +33,9 @@ from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.spatial import Spatial, SpatialSlicing
 from ccfem.strategies import create
 from ccfem.strategies.winding_curves.piece import pieces_with_joints
+
+EXPECTED = Path(__file__).with_name("expected.toml")
+"""Claims of the paper, with the ranges that count as reproduced."""
 
 # The whole of the paper: its study, figures, tables and claims beside ours.
 
@@ -92,9 +94,6 @@ def _failures_explained(pulled: Comparison, folder: Path) -> dict[str, float]:
 
 
 # The claims of the paper beside ours: every quantity is computed from a run.
-
-
-EXPECTED = Path(__file__).with_name("expected.toml")
 
 
 def quantities(
@@ -403,16 +402,11 @@ def _opening(stress: StressField, layers: tuple[Layer, ...], force: float) -> Op
     mesh, material = stress.mesh, stress.problem.material
     middle = mesh.points[mesh.corners].mean(axis=1)
     judged = np.flatnonzero(distance_from_patches(stress.problem, stress.case, middle, ZONE) > ZONE)
-    values = stress.stress.reshape(-1, 9)
-    tensor = ball_averages(middle, values, mesh.volumes, judged, BALL).reshape(-1, 3, 3)
-    normal = layer_normals(layers, middle[judged])
-    traction = np.einsum("mij,mj->mi", tensor, normal)
-    across = np.einsum("mi,mi->m", traction, normal)
-    along = np.linalg.norm(traction - across[:, None] * normal, axis=1)
+    opening, sliding = layer_traction(stress, layers, judged)
     tensile = material.interlayer_tensile
     assert tensile is not None
     shear = tensile if material.interlayer_shear is None else material.interlayer_shear
-    index = np.hypot(np.maximum(across, 0.0) / tensile, along / shear)
+    index = np.hypot(np.maximum(opening, 0.0) / tensile, sliding / shear)
     return Opening(middle[judged], 1e-3 * force / np.maximum(index, 1e-9))
 
 
@@ -455,13 +449,12 @@ def _bond(slicing: str, opening: Opening, tensile: float) -> float:
 
 def openings_picture(by_supports: dict[str, dict[str, Opening]], title: str, file: Path) -> None:
     """Draw, seen along z, the least load that opens layers along each line of sight."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.colors import LogNorm
-    from matplotlib.figure import Figure
+
+    from ccfem.papers.panels import canvas
 
     columns = max(len(slicings) for slicings in by_supports.values())
-    figure = Figure(figsize=(4.0 * columns, 2.6 * len(by_supports) + 0.4), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = canvas(4.0 * columns, 2.6 * len(by_supports) + 0.4, layout="constrained")
     grid = figure.subplots(len(by_supports), columns, squeeze=False)
     shades = None
     for row, (supports, slicings) in zip(grid, by_supports.items(), strict=True):

@@ -8,22 +8,23 @@ from typing import Any, cast
 import numpy as np
 import shapely
 
-from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.arrays import FloatArray
 from ccfem.base.progress import Progress, silent
 from ccfem.body.meshing import extrude
 from ccfem.cases.bodies import ARM_BRACKET_HOLES
 from ccfem.comparison.plot.canvas import png
-from ccfem.fem.elasticity.ball import BALL, ball_averages
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.fem.elasticity.support_kinds import PressingSupport
 from ccfem.fem.materials import isotropic
-from ccfem.judging.virtual_testing.interlayer import interlayer, layer_normals
+from ccfem.judging.virtual_testing.interlayer import interlayer
 from ccfem.machine import Machine
 from ccfem.papers.contents import Contents, WhenAsked, table, write_claims
 from ccfem.papers.kipping_2023.chain import PAPER_SECONDS, PARTS, Chain, chain, table_1, table_2
-from ccfem.papers.kipping_2023.figures import blank, part_figures, senses_figure
+from ccfem.papers.kipping_2023.figures import part_figures, senses_figure
 from ccfem.papers.kipping_2023.thickness import distances_below
+from ccfem.papers.layer_traction import layer_traction
+from ccfem.papers.panels import canvas
 from ccfem.paths.fields.chart import chart_of
 from ccfem.printing.support import support_columns
 from ccfem.slicing.layers.layer import Layer
@@ -31,6 +32,9 @@ from ccfem.slicing.layers.layer_stress import LayerStress
 from ccfem.slicing.slicers.load_oriented import LoadOriented
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies.fiso import Fiso
+
+EXPECTED = Path(__file__).with_name("expected.toml")
+"""Claims of the paper, with the ranges that count as reproduced."""
 
 # First in, spiral out on eight shapes, flat and bent to a radius of 25 mm.
 
@@ -178,7 +182,7 @@ def options_table() -> str:
 
 def shapes_picture(strands: dict[tuple[str, bool], Strand]) -> bytes:
     """Draw the flat ones."""
-    figure = blank(20.0, 10.0)
+    figure = canvas(20.0, 10.0, layout="tight")
     for axes, name in zip(figure.subplots(2, 4).flat, SHAPES, strict=True):
         for line in strands[name, False].lines:
             axes.plot(*line.T, lw=0.8)
@@ -277,7 +281,7 @@ def trade_table(trades: Trades) -> str:
 
 def trade_picture(trades: Trades) -> bytes:
     """Draw the tension across layers over the blend."""
-    figure = blank(6.0, 4.0)
+    figure = canvas(6.0, 4.0, layout="tight")
     axes = figure.subplots()
     for part, variants in trades.items():
         rows = [v for name, v in variants.items() if set(VARIANTS[name]) <= {"blend"}]
@@ -323,9 +327,6 @@ CONTENTS = Contents(
 
 
 # The claims of the paper beside ours: every quantity is computed from a run.
-
-
-EXPECTED = Path(__file__).with_name("expected.toml")
 
 
 def quantities(
@@ -475,10 +476,10 @@ def sliding_picture(run: Chain, models: dict[str, StressField]) -> bytes:
     middle = 0.5 * (mesh.points[:, 1].min() + mesh.points[:, 1].max())
     shown = np.flatnonzero(np.abs(centre[:, 1] - middle) < 3.0)
     slicings = {name: layers for name, layers in _slicings(run).items() if "best" not in name}
-    figure, row = blank(14.0, 3.2 * len(slicings) * len(models)), 0
+    figure, row = canvas(14.0, 3.2 * len(slicings) * len(models), layout="tight"), 0
     for model, stress in models.items():
         for name, layers in slicings.items():
-            opening, sliding = _tractions(stress, layers, centre, shown)
+            opening, sliding = layer_traction(stress, layers, shown)
             for column, (what, values) in enumerate(
                 {"across the layers": opening, "along the layers": sliding}.items()
             ):
@@ -490,18 +491,6 @@ def sliding_picture(run: Chain, models: dict[str, StressField]) -> bytes:
                 figure.colorbar(dots, ax=axes, shrink=0.7)
             row += 1
     return png(figure)
-
-
-def _tractions(
-    stress: StressField, layers: Sequence[Layer], centre: FloatArray, shown: IntArray
-) -> tuple[FloatArray, FloatArray]:
-    """Traction across layers, positive where it opens them, and along them, at some cells."""
-    every = stress.stress.reshape(-1, 9)
-    tensor = ball_averages(centre, every, stress.mesh.volumes, shown, BALL).reshape(-1, 3, 3)
-    normal = layer_normals(layers, centre[shown])
-    traction = np.einsum("mij,mj->mi", tensor, normal)
-    opening = np.einsum("mi,mi->m", traction, normal)
-    return opening, np.linalg.norm(traction - opening[:, None] * normal, axis=1)
 
 
 def strength_table(loads: Mapping[str, Mapping[str, tuple[float, ...]]]) -> str:

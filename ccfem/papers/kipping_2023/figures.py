@@ -8,6 +8,7 @@ from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.body.mesh import box_mesh
 from ccfem.comparison.plot.canvas import png
 from ccfem.geometry.polylines import resample
+from ccfem.papers.panels import canvas
 from ccfem.slicing.guidance.height_field import height_field
 from ccfem.slicing.guidance.normal_field import normal_field
 from ccfem.slicing.guidance.stress_regions import StressRegions
@@ -19,16 +20,6 @@ if TYPE_CHECKING:
 
 _MOST = 4000
 """Points or arrows that are drawn."""
-
-
-def blank(width: float, height: float) -> "Figure":
-    """Make an empty figure, inches."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="tight")
-    FigureCanvasAgg(figure)
-    return figure
 
 
 def _space(figure: "Figure", place: int, title: str, points: FloatArray) -> Any:
@@ -51,7 +42,7 @@ def part_figures(name: str, run: "Chain") -> dict[str, bytes]:
     inside = _some(np.flatnonzero(sliced.regions.region >= 0))
     least = np.linalg.eigh(run.stress.stress[inside])[1][:, :, 0]
     pictures = {}
-    figure = blank(18.0, 6.0)
+    figure = canvas(18.0, 6.0, layout="tight")
     axes = _space(figure, 1, "critical regions", mesh.points)
     axes.scatter(*centre[inside].T, c=sliced.regions.region[inside], s=3, cmap="tab10")
     for place, title, arrows in (
@@ -61,7 +52,7 @@ def part_figures(name: str, run: "Chain") -> dict[str, bytes]:
         axes = _space(figure, place, title, mesh.points)
         axes.quiver(*centre[inside].T, *arrows.T, length=2.0, lw=0.5)
     pictures[f"figure_2_{name}.png"] = png(figure)
-    figure = blank(18.0, 6.0)
+    figure = canvas(18.0, 6.0, layout="tight")
     every = _some(np.arange(len(centre)))
     axes = _space(figure, 1, "vectors in the whole part", mesh.points)
     axes.quiver(*centre[every].T, *sliced.normals.direction[every].T, length=2.0, lw=0.5)
@@ -72,7 +63,7 @@ def part_figures(name: str, run: "Chain") -> dict[str, bytes]:
     for layer in sliced.layers[::10]:
         axes.plot_trisurf(*layer.points.T, triangles=layer.triangles, lw=0.0, alpha=0.8)
     pictures[f"figure_4_5_{name}.png"] = png(figure)
-    figure = blank(18.0, 6.0)
+    figure = canvas(18.0, 6.0, layout="tight")
     both = np.concatenate([mesh.points, run.support.columns.mesh.points])
     axes = _space(figure, 1, "every sixth layer, and every third of the support", both)
     for layer in run.support.layers[::3]:
@@ -103,7 +94,7 @@ def senses_figure() -> tuple[bytes, float, float]:
     direction[region == 0] = (np.sin(tilt), 0.0, np.cos(tilt))
     direction[region == 1] = (-np.sin(tilt), 0.0, np.cos(tilt))
     up = np.array([0.0, 0.0, 1.0])
-    figure, energies = blank(18.0, 6.0), []
+    figure, energies = canvas(18.0, 6.0, layout="tight"), []
     middle = np.abs(centre[:, 1] - 5.0) < 0.7
     for place, sense in ((1, 1.0), (2, -1.0)):
         turned = direction * np.where(region == 1, sense, 1.0)[:, None]

@@ -42,6 +42,9 @@ from ccfem.paths.raster.patterns import concentric_regions, medial_regions
 from ccfem.paths.raster.raster_plan import raster_plan
 from ccfem.strategies import create
 
+EXPECTED = Path(__file__).with_name("expected.toml")
+"""Claims of the paper, with the ranges that count as reproduced."""
+
 # The whole of the paper: its study, figures, tables and claims beside ours.
 
 
@@ -243,9 +246,6 @@ CONTENTS = Contents(
 
 
 # The claims of the paper beside ours: every quantity is computed from a run.
-
-
-EXPECTED = Path(__file__).with_name("expected.toml")
 
 _STRAIGHT = 0.002
 """Sinuosities no further apart are equal."""

@@ -4,20 +4,21 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.tensor import strongest_in_plane
-from ccfem.comparison.plot.colours import INK, OUTLINE, SECTION, scale
+from ccfem.comparison.plot.colours import INK, OUTLINE, scale
 from ccfem.fem.materials import named_material
 from ccfem.fem.plates import rotate_plane, stack_plane
 from ccfem.judging.evaluation.indices.sinuosity import LONG
 from ccfem.judging.evaluation.indices.stiffness_alignment import agreement
 from ccfem.judging.evaluation.plane_paths import PlanePaths
 from ccfem.judging.evaluation.sensitivity import OffAxis
+from ccfem.papers import panels
 from ccfem.papers.contents import drawn_of
+from ccfem.papers.panels import bar, canvas, title
 from ccfem.papers.plocher_2022.plane_study import laid_plate, reduced_stiffness, turned_energies
 from ccfem.papers.plocher_2022.plates import Plate
 from ccfem.papers.plocher_2022.radar import draw_radar
@@ -45,8 +46,7 @@ def plates_grid(
     """Figure with one picture of a plate a place; the plates of a column have one shape."""
     shares = [plate.mask.shape[0] / plate.mask.shape[1] for plate in plates]
     height = width * max(shares) + 0.28
-    figure = Figure(figsize=(columns * width, rows * height), dpi=130.0, facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = canvas(columns * width, rows * height, dpi=130.0)
     axes = figure.subplots(rows, columns, squeeze=False)
     figure.subplots_adjust(0.01, 0.01, 0.99, 1.0 - 0.25 / (rows * height), 0.03, 0.18)
     for panel in axes.flat:
@@ -55,21 +55,11 @@ def plates_grid(
     return figure, axes
 
 
-def section(axes: Any, plate: Plate, filled: bool = True) -> None:
-    """Outline of a plate, filled or not, and the limits of its picture."""
-    from matplotlib.patches import PathPatch
-    from matplotlib.path import Path as Outline
-
-    rings = [np.asarray(r.coords) for r in (plate.polygon.exterior, *plate.polygon.interiors)]
-    outline = Outline.make_compound_path(*[Outline(ring[:, :2], closed=True) for ring in rings])
-    axes.add_patch(PathPatch(outline, fc=SECTION if filled else "none", ec=OUTLINE, lw=0.4))
+def section(axes: Any, plate: Plate, text: str = "", filled: bool = True) -> None:
+    """Outline of a plate, filled or not, with the limits of its picture and a heading if any."""
+    panels.section(axes, plate.polygon, text, filled, width=0.4)
     axes.set_xlim(-1.0, plate.mask.shape[1] * plate.bead + 1.0)
     axes.set_ylim(-1.0, plate.mask.shape[0] * plate.bead + 1.0)
-
-
-def title(axes: Any, text: str) -> None:
-    """Line of text above a picture."""
-    axes.set_title(text, size=7.5, color=INK, loc="left", pad=2.0)
 
 
 def strokes(axes: Any, case: CaseStudy, every: int = 3) -> None:
@@ -100,8 +90,7 @@ def image(axes: Any, plate: Plate, values: FloatArray, colours: Any, limits: Any
 
 def plain(columns: int, width: float = 4.4, height: float = 3.2) -> tuple[Figure, Any]:
     """Figure with diagrams side by side."""
-    figure = Figure(figsize=(columns * width, height), dpi=130.0, facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = canvas(columns * width, height, dpi=130.0)
     axes = figure.subplots(1, columns, squeeze=False)[0]
     figure.subplots_adjust(0.14 / columns, 0.2, 0.98, 0.88, 0.28)
     for panel in axes:
@@ -112,8 +101,7 @@ def plain(columns: int, width: float = 4.4, height: float = 3.2) -> tuple[Figure
 
 def polar(columns: int) -> tuple[Figure, Any]:
     """Figure with polar diagrams side by side."""
-    figure = Figure(figsize=(3.6 * columns, 4.0), dpi=130.0, facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = canvas(3.6 * columns, 4.0, dpi=130.0)
     axes = [figure.add_subplot(1, columns, k + 1, projection="polar") for k in range(columns)]
     for panel in axes:
         panel.tick_params(labelsize=6)
@@ -197,19 +185,20 @@ def _patterns(study: Mapping[str, CaseStudy]) -> Figure:
     figure, axes = plates_grid(len(names) + 1, len(cases), [c.plate for c in cases])
     for column, case in enumerate(cases):
         top = axes[0, column]
-        section(top, case.plate)
+        section(
+            top, case.plate, f"case {case.plate.name}: direction of the largest stress (benchmark)"
+        )
         strokes(top, case)
-        title(top, f"case {case.plate.name}: direction of the largest stress (benchmark)")
         for row, name in enumerate(names, start=1):
             panel, pattern = axes[row, column], case.patterns[name]
-            section(panel, case.plate)
-            for paths, colour in zip(pattern.paths, (COLOURS[name], INK), strict=False):
-                panel.add_collection(LineCollection(_lines(paths), colors=colour, linewidths=0.45))
-            title(
+            section(
                 panel,
+                case.plate,
                 f"{name}: agreement {pattern.values['agreement']:.1f} %, "
                 f"energy {pattern.values['ratio_C']:.2f} x benchmark (C-FRAM)",
             )
+            for paths, colour in zip(pattern.paths, (COLOURS[name], INK), strict=False):
+                panel.add_collection(LineCollection(_lines(paths), colors=colour, linewidths=0.45))
     return figure
 
 
@@ -221,21 +210,19 @@ def _medial_axis(case: CaseStudy) -> Figure:
     axis = skeleton(inside)
     first = np.where(made.raster.mask, np.where(inside, 1.0, 0.0), np.nan)
     domain = np.where(made.raster.mask, made.regions.domain, np.nan)
-    panels = (
+    shown = (
         ("three shells, and the medial axis of the rest", np.where(axis, 2.0, first)),
         ("shells, rings round the medial axis, concentric rest", domain),
     )
-    for panel, (heading, pixels) in zip(axes[:, 0], panels, strict=False):
+    for panel, (heading, pixels) in zip(axes[:, 0], shown, strict=False):
         height, width = (made.raster.pixel * n for n in pixels.shape)
         x, y = made.raster.origin
         panel.imshow(pixels, cmap=scale("field"), extent=(x, x + width, y, y + height))
-        section(panel, case.plate, filled=False)
-        title(panel, f"case {case.plate.name}: {heading}")
-    section(axes[2, 0], case.plate)
+        section(panel, case.plate, f"case {case.plate.name}: {heading}", filled=False)
+    section(axes[2, 0], case.plate, f"case {case.plate.name}: paths of mat")
     axes[2, 0].add_collection(
         LineCollection(_lines(case.patterns["mat"].paths[0]), colors=COLOURS["mat"], lw=0.6)
     )
-    title(axes[2, 0], f"case {case.plate.name}: paths of mat")
     return figure
 
 
@@ -277,9 +264,7 @@ def _maps(study: Mapping[str, CaseStudy], values_of: Any, limits: Any, label: st
             values = values_of(case, pattern)
             drawn = image(axes[row, column], case.plate, values, scale("field"), limits)
             title(axes[row, column], f"case {case.plate.name}, {name}: mean {values.mean():.1f} %")
-    bar = figure.colorbar(drawn, ax=axes[:, -1], shrink=0.4, pad=0.01)
-    bar.set_label(label, size=7)
-    bar.ax.tick_params(labelsize=6)
+    bar(figure, axes[:, -1], drawn, label, shrink=0.4, aspect=20)
     return figure
 
 
@@ -305,9 +290,8 @@ def _energies(study: Mapping[str, CaseStudy], key: str = "C") -> Figure:
                 axes[row, column],
                 f"case {case.plate.name}, {key}-FRAM, {name}: sum {ratio:.2f} x benchmark",
             )
-    bar = figure.colorbar(drawn, ax=axes[:, -1], shrink=0.4, pad=0.01)
-    bar.set_label("log10 of density over mean of benchmark", size=7)
-    bar.ax.tick_params(labelsize=6)
+    label = "log10 of density over mean of benchmark"
+    bar(figure, axes[:, -1], drawn, label, shrink=0.4, aspect=20)
     return figure
 
 
@@ -394,8 +378,7 @@ def _radars(
 ) -> Figure:
     """Radar of all indices; `instead` names other values for some."""
     chosen = SPOKES | dict(instead or {})
-    figure = Figure(figsize=(5.0 * len(study), 4.4), dpi=130.0, facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = canvas(5.0 * len(study), 4.4, dpi=130.0)
     spokes = {title: better for title, (_, better) in chosen.items()}
     for k, (name, case) in enumerate(study.items()):
         axes = figure.add_axes(((k + 0.16) / len(study), 0.13, 0.68 / len(study), 0.74))
@@ -434,13 +417,12 @@ def benchmark_fields(study: Mapping[str, CaseStudy]) -> Figure:
         image(axes[0, column], plate, largest, scale("stress"), (0.0, limit))
         title(axes[0, column], f"case {name}: largest stress, 0 to {limit:.3g} MPa")
         near = axes[1, column]
-        section(near, plate)
+        section(near, plate, f"case {name}: its direction at a hole (blue: compression)")
         strokes(near, case, every=1)
         hole = min(plate.polygon.interiors, key=lambda ring: ring.centroid.x)
         x, y, reach = hole.centroid.x, hole.centroid.y, 1.3 * np.ptp(np.asarray(hole.coords)[:, 0])
         near.set_xlim(x - 2.0 * reach, x + 2.0 * reach)
         near.set_ylim(y - reach, y + reach)
-        title(near, f"case {name}: its direction at a hole (blue: compression)")
         density = case.benchmarks["C"].laid.field.energy_density
         limit = float(np.percentile(density, 99.5))
         image(axes[2, column], plate, density, scale("stress"), (0.0, limit))
@@ -484,7 +466,7 @@ def turned_fibre(case: CaseStudy) -> Figure:
     quarter = np.where(away[:, 0] * away[:, 1] > 0.0, 1.0, -1.0)
     image(axes[0], plate, quarter, "coolwarm", (-2.0, 2.0))
     axes[0].set_aspect("equal")
-    _heading(axes[0], "a: senses of the turn")
+    title(axes[0], "a: senses of the turn")
     problem = plate.isotropic_field.problem
     for side, label, colour in ((quarter, "mirrored", INK), (1.0, "one sense", COLOURS["mps"])):
         curve = turned_energies(problem, best.direction, stiffness, side)
@@ -500,7 +482,7 @@ def turned_fibre(case: CaseStudy) -> Figure:
         )  # fmt: skip
     axes[1].set_xlabel("fibre turned, degrees", size=7.5)
     axes[1].legend(fontsize=6.5, frameon=False)
-    _heading(axes[1], "b: energy and stress (p99.9) over the benchmark's")
+    title(axes[1], "b: energy and stress (p99.9) over the benchmark's")
     share = np.sort(best.laid.field.cell_energy)[::-1]
     share = np.minimum(share / np.quantile(share, 0.995), 1.0)
     cells = np.linspace(0.0, 100.0, len(share))
@@ -508,11 +490,11 @@ def turned_fibre(case: CaseStudy) -> Figure:
         axes[2].plot(cells, share**power, color=colour, lw=1.2, label=f"p = {power}")
     axes[2].set_xlabel("cells by their energy, %", size=7.5)
     axes[2].legend(fontsize=7, frameon=False)
-    _heading(axes[2], "d: weight of a cell, its energy to the power p")
+    title(axes[2], "d: weight of a cell, its energy to the power p")
     index = {name: case.value(name, "pi_weighted_C") for name in case.patterns}
     axes[3].bar(list(index), list(index.values()), color=[COLOURS[n] for n in index], width=0.65)
     axes[3].tick_params(axis="x", labelrotation=30)
-    _heading(axes[3], "e: index PI of the patterns")
+    title(axes[3], "e: index PI of the patterns")
     return figure
 
 
@@ -529,7 +511,3 @@ def shear(case: CaseStudy) -> Figure:
         "direction of the largest stress (red: tension, blue: compression)",
     )
     return figure
-
-
-def _heading(axes: Any, text: str) -> None:
-    axes.set_title(text, size=8, loc="left", color=INK)

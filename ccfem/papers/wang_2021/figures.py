@@ -12,19 +12,8 @@ from ccfem.comparison.plot.colours import INK, OUTLINE, palette
 from ccfem.geometry.medial_axis import medial_axis
 from ccfem.judging.evaluation.indices.matching import THRESHOLDS
 from ccfem.papers.contents import drawn_of
-from ccfem.papers.wang_2021.panels import (
-    COLOURS,
-    bar,
-    by_level,
-    curves,
-    lines_of,
-    panels,
-    path,
-    section,
-    show_load,
-    strokes,
-    title,
-)
+from ccfem.papers.panels import bar, curves, lines_of, panels, section, title
+from ccfem.papers.wang_2021.panels import COLOURS, by_level, path, show_load, strokes
 from ccfem.papers.wang_2021.study import BASELINES, LIMIT, PatternStudy, PlateStudy
 from ccfem.paths.linking.print_speed import step_speeds
 from ccfem.strategies.stress_tracing.criterion import Criterion
@@ -81,14 +70,12 @@ def _voronoi(plate: PlateStudy) -> Figure:
     points = np.unique(shapely.get_coordinates(np.concatenate(sites)), axis=0)
     diagram = Voronoi(points)
     ridges = [diagram.vertices[ridge] for ridge in diagram.ridge_vertices if min(ridge) >= 0]
-    section(axes[0], polygon)
+    section(axes[0], polygon, "(a) points of the border every 2 mm, and their Voronoi diagram")
     lines_of(axes[0], ridges, OUTLINE, 0.4)
     axes[0].plot(*points.T, "o", color="#e69f00", ms=2.0, zorder=3.0)
-    title(axes[0], "(a) points of the border every 2 mm, and their Voronoi diagram")
     axis = medial_axis(polygon, 0.5 * part.machine.fibre_width, object_angle=None, arc_chord=1.6)
-    section(axes[1], polygon)
+    section(axes[1], polygon, "(b) medial axis")
     lines_of(axes[1], [segment.points for segment in axis.segments], INK, 1.2)
-    title(axes[1], "(b) medial axis")
     return figure
 
 
@@ -96,16 +83,14 @@ def _stresses(plate: PlateStudy) -> Figure:
     """Load, stress of the full plate, and stress of the optimised part."""
     domain = plate.plate.domain
     figure, axes = panels([domain] * 3, 1, 7.0)
-    section(axes[0], domain)
+    section(axes[0], domain, "(a) load and supports")
     show_load(axes[0], plate.plate)
-    title(axes[0], "(a) load and supports")
     for panel, part, text in (
         (axes[1], plate.original, "(b) stress of the full plate: blue pulled, green pressed"),
         (axes[2], plate.optimised, "(c) stress of the optimised part"),
     ):
-        section(panel, part.layer.plane.polygon)
+        section(panel, part.layer.plane.polygon, text)
         strokes(panel, part)
-        title(panel, text)
     return figure
 
 
@@ -135,16 +120,13 @@ def _process(plate: PlateStudy) -> Figure:
         (axes[0], plate.original, "(a) load and stress of the full plate"),
         (axes[1], plate.optimised, "(b) stress of the optimised part"),
     ):
-        section(panel, part.layer.plane.polygon)
+        section(panel, part.layer.plane.polygon, text)
         strokes(panel, part)
-        title(panel, text)
     show_load(axes[0], plate.plate)
-    section(axes[2], plate.optimised.layer.plane.polygon)
+    section(axes[2], plate.optimised.layer.plane.polygon, "(c) main load paths")
     _main_paths(axes[2], plate)
-    title(axes[2], "(c) main load paths")
-    section(axes[3], plate.optimised.layer.plane.polygon)
+    section(axes[3], plate.optimised.layer.plane.polygon, "(d) one path; links blue")
     path(axes[3], lpp)
-    title(axes[3], "(d) one path; links blue")
     return figure
 
 
@@ -202,7 +184,7 @@ def _curvature_shares(plate: PlateStudy) -> Figure:
         "every 0.5 mm of the path, links too",
         "at the vertices as planned, links too",
     )
-    figure, axes = curves(2, [("curvature, 1/mm", "share below it, %")] * 2)
+    figure, axes = curves([("curvature, 1/mm", "share below it, %")] * 2)
     for panel, reading, text in zip(axes, ("curvature", "native"), texts, strict=True):
         for name, (_, pattern) in _compared(plate).items():
             values = np.sort(getattr(pattern, reading))
@@ -222,7 +204,7 @@ def _curvature_shares(plate: PlateStudy) -> Figure:
 def _matching(plate: PlateStudy) -> Figure:
     """Draw matching rates over the angle, the slicer's on the full plate and on the part."""
     name = plate.plate.name
-    figure, axes = curves(2, [("angle, degrees", "strands within it of the stress, %")] * 2)
+    figure, axes = curves([("angle, degrees", "strands within it of the stress, %")] * 2)
     sides = (
         (axes[0], plate.original, f"{name}: the slicer's patterns on the full plate"),
         (axes[1], plate.optimised, f"{name}: all patterns on the optimised part"),
@@ -251,9 +233,8 @@ def _other_methods(plate: PlateStudy) -> Figure:
     have = [name for name in _OTHERS if name in part.patterns]
     figure, axes = panels([plate.plate.domain] * (1 + len(have)), 2)
     section(axes[0], plate.plate.domain, filled=False)
-    section(axes[0], part.layer.plane.polygon)
+    section(axes[0], part.layer.plane.polygon, "(a) load and supports; outline ours")
     show_load(axes[0], plate.plate)
-    title(axes[0], "(a) load and supports; outline ours")
     for letter, panel, name in zip("bcd", axes[1:], have, strict=False):
         section(panel, part.layer.plane.polygon)
         path(panel, part.patterns[name], COLOURS[name])

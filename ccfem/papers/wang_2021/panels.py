@@ -1,20 +1,14 @@
 """What the figures are made of: sections, stress vectors, loads, paths, in panels of one scale."""
 
-from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-import shapely
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
-from matplotlib.patches import PathPatch
-from matplotlib.path import Path
 
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.tensor import in_plane, strongest_in_plane
 from ccfem.cases.designed import DesignPlate
-from ccfem.comparison.plot.colours import INK, OUTLINE, SECTION, palette
+from ccfem.comparison.plot.colours import INK, palette
 from ccfem.papers.wang_2021.study import PartStudy, PatternStudy
 
 COLOURS = {
@@ -31,45 +25,6 @@ PULLED, PRESSED = "#1f4e9c", "#2c8a4b"
 """Tension and compression: blue and green, as in the paper."""
 STRAND, LINK = "#a51f2d", "#1f4e9c"
 """The path inside, and its links: red and blue, as in the paper."""
-
-_MARGIN = 0.12
-
-
-def panels(
-    shapes: Sequence[Any], columns: int, width: float = 4.6, box: Any = None
-) -> tuple[Figure, list[Any]]:
-    """Figure with a panel for each shape (shapely or points), in rows, without axes."""
-    boxes = np.array([shape.bounds for shape in shapes] if box is None else [box] * len(shapes))
-    size = boxes[:, 2:] - boxes[:, :2]
-    margin = _MARGIN * size.max()
-    share = float(((size[:, 1] + 2 * margin) / (size[:, 0] + 2 * margin)).max())
-    rows = -(-len(shapes) // columns)
-    height = width * share + 0.3
-    figure = Figure(figsize=(columns * width, rows * height), dpi=150.0, facecolor="white")
-    FigureCanvasAgg(figure)
-    axes = list(figure.subplots(rows, columns, squeeze=False).flat)
-    figure.subplots_adjust(0.005, 0.005, 0.995, 1.0 - 0.28 / (rows * height), 0.02, 0.3 / height)
-    for k, panel in enumerate(axes):
-        panel.set_axis_off()
-        panel.set_aspect("equal")
-        if k < len(shapes):
-            panel.set_xlim(boxes[k, 0] - margin, boxes[k, 2] + margin)
-            panel.set_ylim(boxes[k, 1] - margin, boxes[k, 3] + margin)
-    return figure, axes
-
-
-def title(axes: Any, text: str) -> None:
-    """Write a heading above a panel."""
-    axes.set_title(text, size=8, color=INK, loc="left", pad=2.0)
-
-
-def section(axes: Any, polygon: Any, filled: bool = True, colour: str = OUTLINE) -> None:
-    """Draw a section and its border."""
-    for part in shapely.get_parts(polygon):
-        rings = [np.asarray(r.coords)[:, :2] for r in (part.exterior, *part.interiors)]
-        outline = Path.make_compound_path(*[Path(ring, closed=True) for ring in rings])
-        face = SECTION if filled else "none"
-        axes.add_patch(PathPatch(outline, fc=face, ec=colour, lw=0.6))
 
 
 def show_load(axes: Any, plate: DesignPlate) -> None:
@@ -154,30 +109,3 @@ def _steps(pattern: PatternStudy) -> tuple[FloatArray, BoolArray]:
     paths, first = pattern.paths, _first(pattern)
     start = np.flatnonzero(first)
     return np.stack([paths.points[start], paths.points[start + 1]], axis=1), paths.link[start]
-
-
-def lines_of(axes: Any, lines: Iterable[FloatArray], colour: Any, width: float = 1.0) -> None:
-    """Draw polylines (n, 2)."""
-    axes.add_collection(LineCollection(list(lines), colors=colour, linewidths=width, zorder=2.5))
-
-
-def bar(figure: Figure, axes: Any, drawn: Any, label: str) -> None:
-    """Draw a colour bar beside a panel."""
-    shown = figure.colorbar(drawn, ax=axes, shrink=0.6, pad=0.01, aspect=16)
-    shown.set_label(label, size=7)
-    shown.ax.tick_params(labelsize=6)
-
-
-def curves(count: int, labels: Sequence[tuple[str, str]]) -> tuple[Figure, list[Any]]:
-    """Figure with plain axes side by side, and their labels."""
-    figure = Figure(figsize=(4.6 * count, 3.6), dpi=150.0, facecolor="white")
-    FigureCanvasAgg(figure)
-    axes = list(figure.subplots(1, count, squeeze=False)[0])
-    figure.subplots_adjust(0.12 / count, 0.14, 0.99, 0.9, 0.22)
-    for panel, (across, up) in zip(axes, labels, strict=True):
-        panel.spines[["top", "right"]].set_visible(False)
-        panel.tick_params(labelsize=7, colors=INK)
-        panel.set_xlabel(across, size=8, color=INK)
-        panel.set_ylabel(up, size=8, color=INK)
-        panel.grid(color=OUTLINE, alpha=0.2, lw=0.5)
-    return figure, axes
