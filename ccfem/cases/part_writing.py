@@ -161,7 +161,8 @@ def _value(value: Any) -> str:
     if isinstance(value, list | tuple):
         return f"[{', '.join(_value(entry) for entry in value)}]"
     if isinstance(value, str):
-        text = "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in _escaped(value))
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        text = "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in escaped)
         return f'"{text}"'
     if isinstance(value, int):
         return str(value)
@@ -169,7 +170,3 @@ def _value(value: Any) -> str:
     if math.isinf(number):
         return "inf" if number > 0.0 else "-inf"
     return repr(float(f"{number:.12g}"))
-
-
-def _escaped(text: str) -> str:
-    return text.replace("\\", "\\\\").replace('"', '\\"')

@@ -11,6 +11,7 @@ from ccfem.body.mesh.check import check_mesh
 from ccfem.cases import Case, create_case, named_cases
 from ccfem.cases.bodies import bar_outline, loop_outline
 from ccfem.cases.part_file import read_part
+from ccfem.cases.part_writing import part_text
 from ccfem.cases.stored import data_folder, manifest, stored_mesh
 from ccfem.cases.storing import store
 from ccfem.fem.elasticity.solve import solve
@@ -259,3 +260,10 @@ def test_stress_at_the_hole():
 def test_a_case_is_a_value(case):
     with pytest.raises(dataclasses.FrozenInstanceError):
         case.name = "other"
+
+
+def test_text_of_any_character_is_written_to_a_part_file():
+    """Read back by another parser: quotes, backslashes, and characters beyond the first 65,536."""
+    odd = 'a "b" \\ c\n\u00e4 \u200b \U000e0001 \U0001f600'
+    case = dataclasses.replace(create_case("bar"), source=odd)
+    assert tomllib.loads(part_text(case, "bar.npz"))["source"] == odd

@@ -1,7 +1,8 @@
 """The chain from stress to paths, stage by stage: seconds and what comes out (tables 1 and 2)."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +42,14 @@ class Chain:
     seconds: dict[str, float]
 
 
+@contextmanager
+def _clocked(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    """Note the seconds that a block takes."""
+    start = time.perf_counter()
+    yield
+    seconds[stage] = time.perf_counter() - start
+
+
 def chain(name: str) -> Chain:
     """Run the chain on a case, once for the compiler and once on the clock."""
     case = create_case(name)
@@ -48,36 +57,28 @@ def chain(name: str) -> Chain:
     slicer = case.slicing
     assert isinstance(slicer, LoadOriented)
     up = np.array([0.0, 0.0, 1.0])
-    seconds: dict[str, float] = {}
     for _ in range(2):
-        start = time.perf_counter()
-        regions = stress_regions(
-            stress.mesh, stress.stress, up, slicer.share, slicer.quantile, slicer.gap
-        )
-        seconds["critical regions"] = time.perf_counter() - start
-        start = time.perf_counter()
-        normals = normal_field(stress.mesh, regions, up)
-        seconds["vector field"] = time.perf_counter() - start
-        start = time.perf_counter()
-        lengths = (slicer.thickness / slicer.thickest, slicer.thickness / slicer.thinnest)
-        height_field(stress.mesh, normals.direction, slicer.blend, lengths)
-        seconds["scalar field"] = time.perf_counter() - start
-        start = time.perf_counter()
-        sliced = slicer.slice(stress)
-        whole = time.perf_counter() - start
-        seconds["layers"] = max(whole - sum(list(seconds.values())[:3]), 0.0)
-        start = time.perf_counter()
-        x, y, z = sliced.field.up.tolist()
-        support = support_layers(
-            stress.mesh, sliced.layers, (x, y, z), sliced.field.values, sliced.step
-        )
-        seconds["support layers"] = time.perf_counter() - start
-        start = time.perf_counter()
-        paths = plan(create("fiso", {"turns": "tight"}), sliced.layers, stress, case.machine)
-        seconds["paths"] = time.perf_counter() - start
-        stages = ("critical regions", "vector field", "scalar field", "layers")
-        parts = (*stages, "support layers", "paths")
-        seconds = {key: seconds[key] for key in parts}
+        seconds: dict[str, float] = {}
+        with _clocked(seconds, "critical regions"):
+            regions = stress_regions(
+                stress.mesh, stress.stress, up, slicer.share, slicer.quantile, slicer.gap
+            )
+        with _clocked(seconds, "vector field"):
+            normals = normal_field(stress.mesh, regions, up)
+        with _clocked(seconds, "scalar field"):
+            lengths = (slicer.thickness / slicer.thickest, slicer.thickness / slicer.thinnest)
+            height_field(stress.mesh, normals.direction, slicer.blend, lengths)
+        before = sum(seconds.values())  # the slicer does these again
+        with _clocked(seconds, "layers"):
+            sliced = slicer.slice(stress)
+        seconds["layers"] = max(seconds["layers"] - before, 0.0)
+        with _clocked(seconds, "support layers"):
+            x, y, z = sliced.field.up.tolist()
+            support = support_layers(
+                stress.mesh, sliced.layers, (x, y, z), sliced.field.values, sliced.step
+            )
+        with _clocked(seconds, "paths"):
+            paths = plan(create("fiso", {"turns": "tight"}), sliced.layers, stress, case.machine)
     seconds["all"] = sum(seconds.values())
     return Chain(case, stress, sliced, paths, support, distances_below(sliced.layers), seconds)
 

@@ -52,11 +52,10 @@ def _plate(length: float, width: float, holes: list[shapely.Polygon]) -> shapely
     return shapely.box(0.0, 0.0, length, width).difference(shapely.union_all(holes))
 
 
-def _star() -> shapely.Polygon:
-    angle = np.pi * np.arange(14) / 7.0
-    radius = np.where(np.arange(14) % 2, 14.0, 30.0)
-    return shapely.Polygon(np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
-
+_POINTS = np.pi * np.arange(14) / 7.0
+_STAR = np.where(np.arange(14) % 2, 14.0, 30.0)[:, None] * np.stack(
+    [np.cos(_POINTS), np.sin(_POINTS)], axis=1
+)
 
 SHAPES = {
     "disc": _disc(0.0, 0.0, 15.0),
@@ -72,7 +71,7 @@ SHAPES = {
         60.0,
         [_disc(10.0 + 20.0 * i, 10.0 + 20.0 * j, 4.0) for i in range(4) for j in range(3)],
     ),
-    "star": _star(),
+    "star": shapely.Polygon(_STAR),
 }
 
 
