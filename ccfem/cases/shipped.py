@@ -21,7 +21,7 @@ from ccfem.fem.elasticity.support_kinds import PressingSupport
 def shipped_cases() -> dict[str, Callable[..., Case]]:
     """Every case that comes with ccfem, by name."""
     files = {path.stem: path for path in data_folder().glob("*.toml")}
-    del files["manifest"]
+    files.pop("manifest", None)
     variants = {make.__name__: make for make in (bracket, t_bracket, two_load_plate)}
     return {
         **{name: part_maker(path) for name, path in files.items()},

@@ -15,7 +15,8 @@ _HEAD = """# Cases
 
 Parts that come with ccfem: `ccfem compare NAME`, or `ccfem.read("NAME")` in Python. A parameter is
 set by `--set-case NAME=VALUE`. The coloured facets are the patches that hold or load the part;
-arrows are the resultants of the loads, triangles mark what is held.
+arrows are the resultants of the loads, triangles mark what is held. Most are part files, in the
+folder `data` of the repository: examples for your own.
 
 """
 
