@@ -55,38 +55,38 @@ def figures(study: Study, number: int | None = None) -> dict[str, Figure]:
         "figure_08_agreement_of_vectors": lambda: _histograms(study),
         "figure_09_powers": lambda: _powers(study),
         "figure_10_field_processing": lambda: _processing(study),
-        "figure_14_large_displacement": lambda: _turns(study),
+        "figure_14_large_displacement": lambda: _turned_axes(study),
     }
     return drawn_of(drawn, number)
 
 
-def _middle(model: Model) -> LayerStages:
+def _middle_stages(model: Model) -> LayerStages:
     return model.stages[len(model.stages) // 2]
 
 
 def _pipeline(model: Model) -> Figure:
     """Vectors before and after each step, the fields, and the isocurves, on the middle layer."""
-    stages, vectors = _middle(model), model.vectors
+    stages, vectors = _middle_stages(model), model.vectors
     layer = stages.layer
     known = stages.directed
     figure, axes = panels([layer.plane.polygon] * 7, 4, 3.4)
     for panel in axes[:7]:
         section(panel, layer.plane.polygon)
     projected = known.tension.direction
-    _arrows(axes[0], layer, _in_plane(vectors.raw, layer))
+    _draw_arrows(axes[0], layer, _in_plane(vectors.raw, layer))
     title(axes[0], "(a) tension, signs as they come")
-    _arrows(axes[1], layer, _in_plane(vectors.oriented, layer))
+    _draw_arrows(axes[1], layer, _in_plane(vectors.oriented, layer))
     title(axes[1], "(b) oriented along the spanning tree")
-    _arrows(axes[2], layer, _in_plane(vectors.oriented, layer))
-    _arrows(axes[2], layer, _in_plane(vectors.oriented, layer), ~known.tension.defined, _WRONG)
+    _draw_arrows(axes[2], layer, _in_plane(vectors.oriented, layer))
+    _draw_arrows(axes[2], layer, _in_plane(vectors.oriented, layer), ~known.tension.defined, _WRONG)
     title(axes[2], "(c) red: taken away by the filter")
-    _arrows(axes[3], layer, projected, known.tension.defined)
+    _draw_arrows(axes[3], layer, projected, known.tension.defined)
     title(axes[3], "(d) what is left, in the layer")
     size = np.clip(known.size / known.cap, 0.0, 1.0)
-    bar(figure, axes[4], _faces(axes[4], layer, size), "share of the largest stress")
-    _arrows(axes[4], layer, known.direction)
+    bar(figure, axes[4], _draw_on_faces(axes[4], layer, size), "share of the largest stress")
+    _draw_arrows(axes[4], layer, known.direction)
     title(axes[4], "(e) filled and smoothed: u")
-    bar(figure, axes[5], _points(axes[5], layer, stages.values), "s")
+    bar(figure, axes[5], _draw_at_points(axes[5], layer, stages.values), "s")
     title(axes[5], "(f) scalar field s")
     lines_of(axes[6], stages.curves.lines(), _PATH, 0.7)
     title(axes[6], "(g) isocurves at least a width apart")
@@ -95,14 +95,14 @@ def _pipeline(model: Model) -> Figure:
 
 def _connection(model: Model) -> Figure:
     """From isocurves to paths."""
-    stages = _middle(model)
+    stages = _middle_stages(model)
     layer = stages.layer
     figure, axes = panels([layer.plane.polygon] * 4, 4, 3.4)
     steps: list[tuple[list[tuple[Any, str]], str]] = [
         ([(stages.curves.lines(), _PATH)], f"(a) {len(stages.curves.lines())} isocurves"),
         ([(stages.rings, _RING)], "(b), (c) curves round the chosen holes"),
         ([(stages.led, _PATH), (stages.rings, _RING)], "(d), (e) cut back and led round"),
-        ([(_lines(stages.paths, layer), _PATH)], f"(f) joined: {len(stages.paths)} paths"),
+        ([(_plane_lines(stages.paths, layer), _PATH)], f"(f) joined: {len(stages.paths)} paths"),
     ]
     for panel, (drawn, text) in zip(axes, steps, strict=False):
         section(panel, layer.plane.polygon, text)
@@ -120,24 +120,24 @@ def _layers(model: Model) -> Figure:
     for panel, k in zip(axes, chosen, strict=False):
         stages = model.stages[k]
         section(panel, stages.layer.plane.polygon, f"layer {k + 1} of {len(model.layers)}")
-        lines_of(panel, _lines(stages.paths, stages.layer), _PATH, 0.7)
+        lines_of(panel, _plane_lines(stages.paths, stages.layer), _PATH, 0.7)
     return figure
 
 
 def _pushed(study: Study) -> Figure:
     """Fields and paths under a push."""
-    stages = _middle(study.models["Loop, pushed"])
+    stages = _middle_stages(study.models["Loop, pushed"])
     layer = stages.layer
     figure, axes = panels([layer.plane.polygon] * 3, 3, 3.6)
     for panel in axes:
         section(panel, layer.plane.polygon)
     size = np.clip(stages.directed.size / stages.directed.cap, 0.0, 1.0)
-    bar(figure, axes[0], _faces(axes[0], layer, size), "share of the largest stress")
-    _arrows(axes[0], layer, stages.directed.direction)
+    bar(figure, axes[0], _draw_on_faces(axes[0], layer, size), "share of the largest stress")
+    _draw_arrows(axes[0], layer, stages.directed.direction)
     title(axes[0], "(b) u, pushed")
-    bar(figure, axes[1], _points(axes[1], layer, stages.values), "s")
+    bar(figure, axes[1], _draw_at_points(axes[1], layer, stages.values), "s")
     title(axes[1], "(c) scalar field s")
-    lines_of(axes[2], _lines(stages.paths, layer), _PATH, 0.7)
+    lines_of(axes[2], _plane_lines(stages.paths, layer), _PATH, 0.7)
     title(axes[2], "(d) paths")
     return figure
 
@@ -157,7 +157,7 @@ def _histograms(study: Study) -> Figure:
 
 def _powers(study: Study) -> Figure:
     """Paths for several p."""
-    layer = _middle(study.loop).layer
+    layer = _middle_stages(study.loop).layer
     index = layer.index
     figure, axes = panels([layer.plane.polygon] * len(study.powers), len(study.powers), 3.2)
     for panel, (power, paths) in zip(axes, study.powers.items(), strict=True):
@@ -166,23 +166,23 @@ def _powers(study: Study) -> Figure:
             layer.plane.polygon,
             f"p = {power:g}: {1e-3 * paths.lengths.sum():.1f} m in all layers",
         )
-        lines_of(panel, _lines(paths.select(paths.layer == index), layer), _PATH, 0.7)
+        lines_of(panel, _plane_lines(paths.select(paths.layer == index), layer), _PATH, 0.7)
     return figure
 
 
 def _processing(study: Study) -> Figure:
     """Paths with and without orientation and filter."""
-    layer = _middle(study.loop).layer
+    layer = _middle_stages(study.loop).layer
     index = layer.index
     figure, axes = panels([layer.plane.polygon] * 2, 2, 3.6)
     shown = (("(a) without", study.unprocessed), ("(b) with", study.loop.paths))
     for panel, (text, paths) in zip(axes, shown, strict=True):
         section(panel, layer.plane.polygon, f"{text} orientation and filter")
-        lines_of(panel, _lines(paths.select(paths.layer == index), layer), _PATH, 0.7)
+        lines_of(panel, _plane_lines(paths.select(paths.layer == index), layer), _PATH, 0.7)
     return figure
 
 
-def _turns(study: Study) -> Figure:
+def _turned_axes(study: Study) -> Figure:
     """How far principal directions turn."""
     labels = ("turned by, degrees", "share of the cells, %")
     figure, axes = curves([labels] * 2)
@@ -209,12 +209,12 @@ def _in_plane(vectors: FloatArray, layer: Layer) -> FloatArray:
     return plane / np.maximum(np.linalg.norm(plane, axis=1), 1e-300)[:, None]
 
 
-def _lines(paths: Toolpaths, layer: Layer) -> list[FloatArray]:
+def _plane_lines(paths: Toolpaths, layer: Layer) -> list[FloatArray]:
     """Paths in the plane of a layer."""
     return [path @ layer.plane.frame[:2].T for path in paths]
 
 
-def _arrows(
+def _draw_arrows(
     axes: Any,
     layer: Layer,
     vectors: FloatArray,
@@ -231,13 +231,13 @@ def _arrows(
     )
 
 
-def _faces(axes: Any, layer: Layer, values: FloatArray) -> Any:
+def _draw_on_faces(axes: Any, layer: Layer, values: FloatArray) -> Any:
     return axes.tripcolor(
         *layer.plane.points.T, layer.triangles, facecolors=values, cmap="YlOrBr", zorder=2.0
     )
 
 
-def _points(axes: Any, layer: Layer, values: FloatArray) -> Any:
+def _draw_at_points(axes: Any, layer: Layer, values: FloatArray) -> Any:
     drawn = axes.tripcolor(
         *layer.plane.points.T,
         layer.triangles,
@@ -425,17 +425,17 @@ def _paths(study: Study) -> dict[str, float]:
         lengths = [float(evaluation.paths.lengths.sum()) for evaluation in stages]
         changes = np.abs(np.diff(lengths)) / max(lengths)
         values["layers unlike the one below, %"] = 100.0 * float((changes > 1e-3).mean())
-    by_power = {power: _judged(loop, paths) for power, paths in study.powers.items()}
+    by_power = {power: _evaluated(loop, paths) for power, paths in study.powers.items()}
     low, high = min(by_power), max(by_power)
     for power, evaluation in by_power.items():
         values[f"fibre, m, p = {power:g}"] = 1e-3 * evaluation.total["fibre_length"]
     values["fibre at the largest p over that at p = 0"] = (
         values[f"fibre, m, p = {high:g}"] / values[f"fibre, m, p = {low:g}"]
     )
-    values["median over least spacing, largest p over p = 0"] = _spread(by_power[high]) / _spread(
-        by_power[low]
-    )
-    with_it, without = by_power[1.0], _judged(loop, study.unprocessed)
+    values["median over least spacing, largest p over p = 0"] = _spacing_spread(
+        by_power[high]
+    ) / _spacing_spread(by_power[low])
+    with_it, without = by_power[1.0], _evaluated(loop, study.unprocessed)
     values["nearer than W, %"] = 100.0 * with_it.total["spacing_below"]
     values["within 10 degrees with processing, %"] = 100.0 * with_it.total["aligned_10"]
     values["within 10 degrees without processing, %"] = 100.0 * without.total["aligned_10"]
@@ -451,11 +451,11 @@ def _paths(study: Study) -> dict[str, float]:
     return values
 
 
-def _judged(model: Model, paths: Toolpaths) -> Evaluation:
+def _evaluated(model: Model, paths: Toolpaths) -> Evaluation:
     return evaluate(paths, model.layers, model.stress, model.case.machine)
 
 
-def _spread(evaluation: Evaluation) -> float:
+def _spacing_spread(evaluation: Evaluation) -> float:
     """Median distance to the next strand over the fifth percentile."""
     return evaluation.total["spacing_50"] / evaluation.total["spacing_5"]
 

@@ -304,15 +304,17 @@ def targets_table(
 ) -> str:
     """Markdown table: figure, ours, ours with ``even``, the authors', what is wanted, verdict."""
     ours, even, theirs = (strands[name].table() for name in ("winding", "winding, even", "authors"))
-    rows = [_row(target, field[target.figure]) for target in _FIELD]
+    rows = [_target_row(target, field[target.figure]) for target in _FIELD]
     for target in _STRANDS:
         name = target.figure
-        rows.append(_row(target, ours[name], f"{even[name]:.3g}", f"{theirs[name]:.3g}"))
+        rows.append(_target_row(target, ours[name], f"{even[name]:.3g}", f"{theirs[name]:.3g}"))
     rows += [
-        _row(target, seconds[target.figure], name=f"seconds: {target.figure}")
+        _target_row(target, seconds[target.figure], name=f"seconds: {target.figure}")
         for target in _SECONDS
     ]
-    rows.append(_row(_FINER, finer[_FINER.figure], name="seconds, 170 thousand cells: all, clock"))
+    rows.append(
+        _target_row(_FINER, finer[_FINER.figure], name="seconds, 170 thousand cells: all, clock")
+    )
     head = (
         "figure",
         "winding",
@@ -325,7 +327,7 @@ def targets_table(
     return table(head, rows)
 
 
-def _row(
+def _target_row(
     target: _Target, ours: float, even: str = "", theirs: str = "", name: str = ""
 ) -> tuple[str, ...]:
     met = target.low <= ours <= target.high

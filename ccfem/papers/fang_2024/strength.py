@@ -78,7 +78,7 @@ def study() -> dict[tuple[str, str], tuple[float, ...]]:
     for model, field in fields.items():
         specimen = Specimen.of(field)
         for name, (layers, paths) in slicings.items():
-            figures[name, model] = _row(name, model, layers, paths, specimen)
+            figures[name, model] = _tested_row(name, model, layers, paths, specimen)
     return figures
 
 
@@ -96,7 +96,7 @@ def _slicings(stress: StressField) -> dict[str, tuple[Sequence[Layer], Toolpaths
     return {**slicings, "authors": (theirs, authors_strands(theirs))}
 
 
-def _row(
+def _tested_row(
     name: str, model: str, layers: Sequence[Layer], paths: Toolpaths, specimen: Specimen
 ) -> tuple[float, ...]:
     """Print one row; its figures."""
@@ -117,7 +117,7 @@ def _row(
     return figures
 
 
-def _check(table: dict[tuple[str, str], tuple[float, ...]]) -> None:
+def _check_specified(table: dict[tuple[str, str], tuple[float, ...]]) -> None:
     """Raise where the table is another one."""
     off = []
     for (name, model), figures in table.items():
@@ -134,4 +134,4 @@ def _check(table: dict[tuple[str, str], tuple[float, ...]]) -> None:
 
 
 if __name__ == "__main__":
-    _check(study())
+    _check_specified(study())

@@ -147,7 +147,7 @@ def figures(
             "figure_06_patterns_raster": lambda: _patterns(pixels()),
             "figure_06_benchmark": lambda: benchmark_fields(tension()),
             "figure_06_bars": lambda: _bars(tension(), ("C",)),
-            "figure_07_agreement": lambda: _maps(
+            "figure_07_agreement": lambda: _cell_maps(
                 tension(), _agreement_of, (0.0, 100.0), "agreement, %"
             ),
             "figure_07_moduli": layups,
@@ -174,7 +174,7 @@ def figures(
     return drawn_of(drawn, number)
 
 
-def _lines(paths: PlanePaths) -> list[FloatArray]:
+def _path_lines(paths: PlanePaths) -> list[FloatArray]:
     return np.split(paths.points, paths.offsets[1:-1]) if len(paths) else []
 
 
@@ -198,7 +198,9 @@ def _patterns(study: Mapping[str, CaseStudy]) -> Figure:
                 f"energy {pattern.values['ratio_C']:.2f} x benchmark (C-FRAM)",
             )
             for paths, colour in zip(pattern.paths, (COLOURS[name], INK), strict=False):
-                panel.add_collection(LineCollection(_lines(paths), colors=colour, linewidths=0.45))
+                panel.add_collection(
+                    LineCollection(_path_lines(paths), colors=colour, linewidths=0.45)
+                )
     return figure
 
 
@@ -221,7 +223,7 @@ def _medial_axis(case: CaseStudy) -> Figure:
         section(panel, case.plate, f"case {case.plate.name}: {heading}", filled=False)
     section(axes[2, 0], case.plate, f"case {case.plate.name}: paths of mat")
     axes[2, 0].add_collection(
-        LineCollection(_lines(case.patterns["mat"].paths[0]), colors=COLOURS["mat"], lw=0.6)
+        LineCollection(_path_lines(case.patterns["mat"].paths[0]), colors=COLOURS["mat"], lw=0.6)
     )
     return figure
 
@@ -254,7 +256,7 @@ def _agreement_of(case: CaseStudy, pattern: PatternStudy) -> FloatArray:
     return 100.0 * np.mean([agreement(m.angle - direction) for m in pattern.maps], axis=0)
 
 
-def _maps(study: Mapping[str, CaseStudy], values_of: Any, limits: Any, label: str) -> Figure:
+def _cell_maps(study: Mapping[str, CaseStudy], values_of: Any, limits: Any, label: str) -> Figure:
     cases = list(study.values())
     names = list(cases[0].patterns)
     figure, axes = plates_grid(len(names), len(cases), [c.plate for c in cases])
@@ -306,7 +308,7 @@ def _long_and_short(study: Mapping[str, CaseStudy]) -> Figure:
             for paths in pattern.paths:
                 colours = np.where(paths.lengths > LONG, INK, COLOURS["concentric"])
                 panel.add_collection(
-                    LineCollection(_lines(paths), colors=list(colours), linewidths=0.4)
+                    LineCollection(_path_lines(paths), colors=list(colours), linewidths=0.4)
                 )
             share = pattern.values["over_40"]
             title(panel, f"case {case.plate.name}, {name}: {share:.0f} % over 40 mm (dark)")

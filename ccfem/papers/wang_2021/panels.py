@@ -49,7 +49,7 @@ def strokes(axes: Any, part: PartStudy, count: int = 70) -> None:
     value, angle, _ = strongest_in_plane(plane)
     pulled, size = value >= 0.0, np.abs(value)
     middle = layer.plane.points[layer.triangles].mean(axis=1)
-    chosen = _spread(middle, float(np.ptp(layer.plane.points, axis=0).max()) / count)
+    chosen = _one_a_field(middle, float(np.ptp(layer.plane.points, axis=0).max()) / count)
     most = np.quantile(size, 0.97)
     chosen = chosen[size[chosen] > 0.01 * most]
     half = 0.5 * np.ptp(layer.plane.points, axis=0).max() / count
@@ -60,7 +60,7 @@ def strokes(axes: Any, part: PartStudy, count: int = 70) -> None:
         axes.add_collection(LineCollection(list(ends), colors=colour, linewidths=0.7, zorder=2.0))
 
 
-def _spread(points: FloatArray, size: float) -> Any:
+def _one_a_field(points: FloatArray, size: float) -> Any:
     """One point for each field of a grid: the one nearest to its middle."""
     field = np.floor(points / size)
     off = np.linalg.norm(points - (field + 0.5) * size, axis=1)
@@ -72,7 +72,7 @@ def _spread(points: FloatArray, size: float) -> Any:
 def path(axes: Any, pattern: PatternStudy, colour: str = STRAND, link: str = LINK) -> None:
     """Draw the paths of a pattern, its links in their own colour, start and end marked if one."""
     paths = pattern.paths
-    steps, mask = _steps(pattern)
+    steps, mask = _path_steps(pattern)
     for kind, stroke in ((~mask, colour), (mask, link)):
         axes.add_collection(LineCollection(list(steps[kind]), colors=stroke, lw=0.45, zorder=2.0))
     if len(paths) == 1:
@@ -82,8 +82,8 @@ def path(axes: Any, pattern: PatternStudy, colour: str = STRAND, link: str = LIN
 
 def by_level(axes: Any, pattern: PatternStudy, values: FloatArray, unit: str) -> None:
     """Draw the steps of the paths of a pattern, one colour a value (P,), with its share."""
-    steps, _ = _steps(pattern)
-    kept = values[_first(pattern)]
+    steps, _ = _path_steps(pattern)
+    kept = values[_step_starts(pattern)]
     length = np.linalg.norm(steps[:, 1] - steps[:, 0], axis=1)
     levels = np.unique(kept)
     colours = palette(map(str, levels)).values()
@@ -98,14 +98,14 @@ def by_level(axes: Any, pattern: PatternStudy, values: FloatArray, unit: str) ->
     axes.legend(fontsize=6, frameon=False, loc="upper right")
 
 
-def _first(pattern: PatternStudy) -> BoolArray:
+def _step_starts(pattern: PatternStudy) -> BoolArray:
     kept = np.ones(len(pattern.paths.points), dtype=bool)
     kept[pattern.paths.offsets[1:] - 1] = False
     return kept
 
 
-def _steps(pattern: PatternStudy) -> tuple[FloatArray, BoolArray]:
+def _path_steps(pattern: PatternStudy) -> tuple[FloatArray, BoolArray]:
     """Return the steps (s, 2, 2) of the paths of a pattern, and whether each is a link."""
-    paths, first = pattern.paths, _first(pattern)
+    paths, first = pattern.paths, _step_starts(pattern)
     start = np.flatnonzero(first)
     return np.stack([paths.points[start], paths.points[start + 1]], axis=1), paths.link[start]
