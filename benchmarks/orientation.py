@@ -4,22 +4,17 @@ Compliance of the optimised plates of Wang et al. 2021, of all densities and of 
 alone, with the axis along the principal stress and down the gradient, and the iterations taken.
 """
 
-import importlib
-
 import numpy as np
 
-from ccfem.cases.designed import LAMINATE
+from ccfem.cases.designed import LAMINATE, PLATES
 from ccfem.fem.topopt import Compliance, Somp
-
-PLATES = ("bridge", "suspension", "l_shape", "cantilever", "m_shape")
 
 
 def main() -> None:
     """Print the table."""
     print("| plate | way | compliance, N mm | of the densest cells | iterations |")
     print("|---|---|---|---|---|")
-    for name in PLATES:
-        plate = getattr(importlib.import_module(f"ccfem.cases.{name}"), f"{name}_plate")()
+    for name, plate in PLATES.items():
         for way in ("principal", "gradient"):
             radius = plate.radius * plate.pixel
             method = Somp(plate.volume_fraction, radius=radius, orientation=way)

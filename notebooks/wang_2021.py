@@ -22,7 +22,7 @@ import numpy as np
 
 from ccfem.slicing.layers.layer_stress import stress_on
 from ccfem.cases import create_case
-from ccfem.cases.bridge import bridge_plate
+from ccfem.cases.designed import PLATES
 from ccfem.fem.elasticity import solve
 from ccfem.fem.plates import solve_plane
 from ccfem.judging.evaluation import evaluate
@@ -37,7 +37,7 @@ from ccfem.strategies import create
 from ccfem.base.tensor import in_plane, largest_in_plane
 from ccfem.paths.toolpaths import Toolpaths
 
-plate = bridge_plate()
+plate = PLATES["bridge"]
 full = solve_plane(plate.problem)["down"]
 print("full plate of the laminate: compliance", round(2.0 * full.strain_energy, 3), "N mm")
 assert abs(2.0 * full.strain_energy - 9.13) < 0.05

@@ -21,7 +21,7 @@ import typer
 from ccfem.base.arrays import IntArray
 from ccfem.body.mesh.box import box_mesh
 from ccfem.body.mesh.patches import Box, patches_from_rules
-from ccfem.cases.bracket import bracket_design
+from ccfem.cases.bodies import bracket_design
 from ccfem.fem.elasticity import Force, PointForce, Problem, Support
 from ccfem.fem.materials import isotropic, plane_stress
 from ccfem.fem.plates import PlaneProblem, raster_mesh

@@ -21,7 +21,7 @@ from benchmarks.studies.table import print_table
 from ccfem.body.mesh.patches import Box, Cylinder, PatchRule, Plane, patches_from_rules
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.body.meshing import extrude
-from ccfem.cases.two_pull_loop import loop_mesh
+from ccfem.cases.bodies import loop_mesh
 from ccfem.fem.elasticity.problem import Force, Problem, Support
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.materials import printed_pla

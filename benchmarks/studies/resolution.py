@@ -23,14 +23,18 @@ from ccfem.base.arrays import FloatArray
 from ccfem.body.mesh.patches import Cylinder, PatchRule, Plane, patches_from_rules
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.body.meshing import extrude
-from ccfem.cases.bar import bar_outline
-from ccfem.cases.bracket import HOLE_RADIUS, HOLES, bracket_outline
-from ccfem.cases.case import Case, pulled
-from ccfem.cases.open_hole import open_hole_outline
-from ccfem.cases.two_pull_loop import HOLE, loop_outline
-from ccfem.cases.two_pull_loop import HOLE_RADIUS as EYE
+from ccfem.cases.bodies import (
+    BRACKET_HOLE_RADIUS,
+    BRACKET_HOLES,
+    LOOP_HOLE,
+    LOOP_HOLE_RADIUS,
+    bar_outline,
+    bracket_outline,
+    loop_outline,
+)
+from ccfem.cases.case import Case
 from ccfem.comparison import compare
-from ccfem.fem.elasticity import Bearing, Problem, Support, solve
+from ccfem.fem.elasticity import Bearing, Force, Problem, Support, solve
 from ccfem.fem.materials import printed_pla
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strands import cut_strands
@@ -72,11 +76,12 @@ class Part:
 
 
 def _pull_x(mesh: TetMesh) -> Problem:
-    return pulled(mesh, (1000.0, 0.0, 0.0), 1)
+    loads = {"pull": (Force("load", (1000.0, 0.0, 0.0)),)}
+    return Problem(mesh, printed_pla(), (Support("support"),), loads, order=1)
 
 
 def _pull_y(mesh: TetMesh) -> Problem:
-    return pulled(mesh, (0.0, 1000.0, 0.0), 1)
+    return replace(_pull_x(mesh), loads={"pull": (Force("load", (0.0, 1000.0, 0.0)),)})
 
 
 def _push_down(mesh: TetMesh) -> Problem:
@@ -85,18 +90,21 @@ def _push_down(mesh: TetMesh) -> Problem:
     return Problem(mesh, printed_pla(), held, {"down": loads})
 
 
+_PLATE = shapely.box(-100.0, -18.0, 100.0, 18.0).difference(
+    shapely.Point(0.0, 0.0).buffer(6.0, quad_segs=32)
+)
 _ENDS: dict[str, PatchRule] = {"support": Plane("x", "min"), "load": Plane("x", "max")}
 _EYES: dict[str, PatchRule] = {
-    "support": Cylinder((0.0, -HOLE, 0.0), "z", EYE, half="-y"),
-    "load": Cylinder((0.0, HOLE, 0.0), "z", EYE, half="y"),
+    "support": Cylinder((0.0, -LOOP_HOLE, 0.0), "z", LOOP_HOLE_RADIUS, half="-y"),
+    "load": Cylinder((0.0, LOOP_HOLE, 0.0), "z", LOOP_HOLE_RADIUS, half="y"),
 }
 _BOLTS: dict[str, PatchRule] = {
-    name: Cylinder((x, y, 0.0), "z", HOLE_RADIUS) for name, (x, y) in HOLES.items()
+    name: Cylinder((x, y, 0.0), "z", BRACKET_HOLE_RADIUS) for name, (x, y) in BRACKET_HOLES.items()
 }
 PARTS = {
     "bar": Part(bar_outline(), 5.0, (2.5, 2.0), _ENDS, _pull_x),
     "loop": Part(loop_outline(), 10.0, (3.2, 2.5), _EYES, _pull_y),
-    "open_hole": Part(open_hole_outline(), 4.0, (2.5, 2.0), _ENDS, _pull_x),
+    "open_hole": Part(_PLATE, 4.0, (2.5, 2.0), _ENDS, _pull_x),
     "bracket": Part(bracket_outline(), 6.0, (2.2, 1.75), _BOLTS, _push_down),
 }
 

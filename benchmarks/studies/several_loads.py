@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.studies.table import print_table
-from ccfem.cases.named import create_case
+from ccfem.cases import create_case
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.weighted_cases import WeightedCases
 from ccfem.judging.virtual_testing.several_cases import cases_failure, virtual_tests

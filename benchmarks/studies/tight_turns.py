@@ -14,7 +14,7 @@ from typing import get_args, get_type_hints
 from benchmarks.studies.confirmed_gain import LAYERS, PARTS, posed
 from benchmarks.studies.table import print_table
 from ccfem.base.errors import InputError
-from ccfem.cases.named import create_case
+from ccfem.cases import create_case
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.judging.evaluation import evaluate

@@ -10,22 +10,14 @@ from ccfem.base.checks import check_known, check_number
 from ccfem.base.display import Shown
 from ccfem.base.errors import Mistakes, shown
 from ccfem.body.mesh.face_places import BodyFaces
-from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.part_stress import PartStress
-from ccfem.fem.elasticity.problem import Force, Order, Problem, Support
+from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.support_kinds import AnySupport
-from ccfem.fem.materials import printed_pla
 from ccfem.machine.machine import Machine
 from ccfem.paths.placement.fibre_places import FibrePlaces
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.slicer import Slicer
 from ccfem.slicing.slicers.planar import Planar
-
-
-def pulled(mesh: TetMesh, force: tuple[float, float, float], order: Order) -> Problem:
-    """Make a part of printed PLA, held at patch ``support``; a force, N, pulls at ``load``."""
-    loads = {"pull": (Force("load", force),)}
-    return Problem(mesh, printed_pla(), (Support("support"),), loads, order=order)
 
 
 @dataclass(frozen=True)
@@ -97,14 +89,14 @@ class Case(Shown):
 
 def check_name(name: str, title: str) -> None:
     """Refuse a name that cannot be that of a folder, and a title that cannot be printed."""
-    found = Mistakes()
+    mistakes = Mistakes()
     if not re.fullmatch(r"\w[\w .+-]{0,79}", name):
-        found.lines.append(
+        mistakes.lines.append(
             "the name of a case must have letters, digits, spaces and ._+- alone, at most 80, "
             f"and begin with a letter or digit; got {name[:90]!r}: rename it"
         )
     if not title.isprintable():
-        found.lines.append(
+        mistakes.lines.append(
             f"the title of a case must be one printable line; got {shown(title)}: rewrite it"
         )
-    found.complain()
+    mistakes.complain()

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 import shapely
@@ -42,29 +42,35 @@ def check_places(what: str, places: Sequence[Place]) -> None:
             )
 
 
+def _corners(place: Place) -> tuple[Place, Place]:
+    """Lower and upper corner of a rectangle or a box."""
+    half = len(place) // 2
+    return place[:half], place[half:]
+
+
 def area_of(places: Sequence[Place]) -> Any:
     """Area of places seen from above: a shapely geometry, mm."""
-    found = []
+    areas = []
     for place in places:
         if len(place) == 3:
-            found.append(shapely.Point(place[:2]).buffer(place[2], quad_segs=32))
+            areas.append(shapely.Point(place[:2]).buffer(place[2], quad_segs=32))
         else:
-            half = len(place) // 2
-            found.append(shapely.box(*place[:2], *place[half : half + 2]))
-    return shapely.union_all(found) if found else shapely.Polygon()
+            low, high = _corners(place)
+            areas.append(shapely.box(*low[:2], *high[:2]))
+    return shapely.union_all(areas) if areas else shapely.Polygon()
 
 
 def cells_in(places: Sequence[Place], centres: FloatArray) -> BoolArray:
     """Which of some centres (m, 3), mm, lie in one of the places: an (m,) mask."""
-    found = np.zeros(len(centres), dtype=bool)
+    inside = np.zeros(len(centres), dtype=bool)
     for place in places:
         if len(place) == 3:
-            found |= np.linalg.norm(centres[:, :2] - np.array(place[:2]), axis=1) <= place[2]
+            inside |= np.linalg.norm(centres[:, :2] - np.array(place[:2]), axis=1) <= place[2]
         else:
-            half = len(place) // 2
-            low, high = np.array(place[:half]), np.array(place[half:])
-            found |= ((centres[:, :half] >= low) & (centres[:, :half] <= high)).all(axis=1)
-    return found
+            low, high = _corners(place)
+            near = centres[:, : len(low)]
+            inside |= ((near >= np.array(low)) & (near <= np.array(high))).all(axis=1)
+    return inside
 
 
 _CELLS = 4000.0
@@ -104,34 +110,15 @@ class Optimised:
     __repr__ = in_brief
 
 
-def optimise(
-    case: Case,
-    volume_fraction: float,
-    method: Literal["simp", "somp"] = "somp",
-    *,
-    element_size: float | None = None,
-    radius: float | None = None,
-    filter: Literal["sensitivity", "density"] = "sensitivity",
-    orientation: Literal["principal", "gradient", "fixed"] = "gradient",
-    laminate: Sequence[float] | None = None,
-    weights: Mapping[str, float] | None = None,
-    keep: Sequence[str] | None = None,
-    solid: Sequence[Place] = (),
-    void: Sequence[Place] = (),
-    max_iterations: int = 200,
-    in_space: bool = False,
-    progress: Progress = silent,
-) -> Optimised:
-    """Find the stiffest part with a share of the volume of a case.
+Method = Literal["simp", "somp"]
 
-    A prism along z whose loads lie in its plane is optimised as a sheet in plane stress, with one
-    layer of cells of its own, and the outline of the design is extruded again. Other parts are
-    optimised in space, on their own cells. Combinations of load cases do not count here.
 
-    Parameters
+@dataclass(frozen=True, kw_only=True)
+class Optimisation:
+    """What is asked of an optimisation: the parameters of `optimise` after the case.
+
+    Attributes
     ----------
-    case : Case
-        The initial part: its whole volume may be used.
     volume_fraction : float in (0, 1)
     method : str
         "somp": densities and the axis of a laminate, for a sheet. "simp": densities only.
@@ -155,7 +142,52 @@ def optimise(
         Places that stay full, and empty: (x, y, radius), or the corners of a rectangle or box, mm.
     in_space : bool
         Do not take a flat part for a sheet.
+    """
+
+    volume_fraction: float
+    method: Method = "somp"
+    element_size: float | None = None
+    radius: float | None = None
+    filter: Literal["sensitivity", "density"] = "sensitivity"
+    orientation: Literal["principal", "gradient", "fixed"] = "gradient"
+    laminate: Sequence[float] | None = None
+    weights: Mapping[str, float] | None = None
+    keep: Sequence[str] | None = None
+    solid: Sequence[Place] = ()
+    void: Sequence[Place] = ()
+    max_iterations: int = 200
+    in_space: bool = False
+
+    def __post_init__(self) -> None:
+        check_number("volume fraction", self.volume_fraction, above=0.0, below=1.0)
+        check_known("method", self.method, get_args(Method))
+        check_places("solid", self.solid)
+        check_places("void", self.void)
+
+
+def optimise(
+    case: Case,
+    volume_fraction: float,
+    method: Method = "somp",
+    *,
+    progress: Progress = silent,
+    **options: Any,
+) -> Optimised:
+    """Find the stiffest part with a share of the volume of a case.
+
+    A prism along z whose loads lie in its plane is optimised as a sheet in plane stress, with one
+    layer of cells of its own, and the outline of the design is extruded again. Other parts are
+    optimised in space, on their own cells. Combinations of load cases do not count here.
+
+    Parameters
+    ----------
+    case : Case
+        The initial part: its whole volume may be used.
+    volume_fraction, method
+        As in `Optimisation`.
     progress : callable, optional
+    **options
+        The other attributes of `Optimisation`, as ``element_size=1.5``.
 
     Raises
     ------
@@ -164,43 +196,20 @@ def optimise(
     SolveError
         When a solve misses its tolerance.
     """
-    check_number("volume fraction", volume_fraction, above=0.0, below=1.0)
-    check_known("method", method, ("simp", "somp"))
-    flat = None if in_space else flat_part(case.problem.mesh)
-    _check_case(case, method, flat, in_space)
-    wanted = _Wanted(
-        case,
-        volume_fraction,
-        weights,
-        _to_keep(case.problem) if keep is None else _known(keep, case.problem),
-        _places("solid", solid),
-        _places("void", void),
-        radius,
-        {"filter": filter, "max_iterations": max_iterations},
-        progress,
-    )
+    asked = Optimisation(volume_fraction=volume_fraction, method=method, **options)
+    problem = case.problem
+    flat = None if asked.in_space else flat_part(problem.mesh)
+    _check_case(case, asked, flat)
+    for name in asked.keep or ():
+        check_known("patch", name, sorted(problem.mesh.patches))
+    if asked.keep is None:
+        asked = replace(asked, keep=_to_keep(problem))
     if flat is None:
-        return _of_solid(wanted)
-    turned = None if method == "simp" else (orientation, laminate)
-    return _of_sheet(wanted, flat, element_size, turned)
+        return _of_solid(case, asked, progress)
+    return _of_sheet(case, asked, flat, progress)
 
 
-@dataclass(frozen=True)
-class _Wanted:
-    """The wanted part, whether it is a sheet or not."""
-
-    case: Case
-    volume_fraction: float
-    weights: Mapping[str, float] | None
-    keep: Sequence[str]
-    solid: Sequence[Place]
-    void: Sequence[Place]
-    radius: float | None
-    options: Mapping[str, Any]
-    progress: Progress
-
-
-def _check_case(case: Case, method: str, flat: FlatPart | None, in_space: bool) -> None:
+def _check_case(case: Case, asked: Optimisation, flat: FlatPart | None) -> None:
     """Raise on a case that cannot be optimised by a method."""
     if not any(case.problem.loads.values()):
         raise InputError(f"'{case.name}' has no load, and nothing to be stiff against: add one")
@@ -209,83 +218,72 @@ def _check_case(case: Case, method: str, flat: FlatPart | None, in_space: bool) 
             f"'{case.name}' has regions of other materials, which would not know where they end: "
             "leave them out, and keep their places with --solid"
         )
-    if method == "somp" and flat is None:
+    if asked.method == "somp" and flat is None:
         raise InputError(
-            f"'{case.name}' is {'to be designed in space' if in_space else 'no plate'}: SOMP turns "
-            "the fibre in the plane of a prism along z: take --method simp"
+            f"'{case.name}' is {'to be designed in space' if asked.in_space else 'no plate'}: SOMP "
+            "turns the fibre in the plane of a prism along z: take --method simp"
         )
 
 
-def _places(name: str, places: Sequence[Place]) -> Sequence[Place]:
-    """Check places that stay full, or empty."""
-    check_places(name, places)
-    return places
-
-
-def _known(keep: Sequence[str], problem: Problem) -> Sequence[str]:
-    """Check that a part has the patches that are to be kept."""
-    for name in keep:
-        check_known("patch", name, sorted(problem.mesh.patches))
-    return keep
-
-
-def _of_sheet(
-    wanted: _Wanted,
-    flat: FlatPart,
-    element_size: float | None,
-    turned: tuple[str, Sequence[float] | None] | None,
-) -> Optimised:
-    """Optimise a flat part as a sheet: by SOMP with an orientation and a laminate, or by SIMP."""
-    problem = wanted.case.problem
-    size = float(np.sqrt(flat.planform.area / _CELLS)) if element_size is None else element_size
+def _of_sheet(case: Case, asked: Optimisation, flat: FlatPart, progress: Progress) -> Optimised:
+    """Optimise a flat part as a sheet."""
+    problem, size = case.problem, asked.element_size
+    size = float(np.sqrt(flat.planform.area / _CELLS)) if size is None else size
     check_number("element size", size, above=0.0, unit="mm")
-    options = dict(wanted.options)
-    options["radius"] = _REACH * size if wanted.radius is None else wanted.radius
-    own = plane_stiffness(problem.material.stiffness)
-    if turned is not None:
-        own = _laminate(turned[1], own)
-        options["orientation"] = turned[0]
-    sheet, prism = sheet_problem(problem, flat, size, own)
-    full = _rims(problem, flat, wanted.keep, size).union(area_of(wanted.solid))
-    empty = area_of(wanted.void).difference(full)
+    radius = _REACH * size if asked.radius is None else asked.radius
+    stiffness = plane_stiffness(problem.material.stiffness)
+    if asked.method == "somp":
+        stiffness = _laminate(asked.laminate, stiffness)
+    sheet, prism = sheet_problem(problem, flat, size, stiffness)
+    full = _rims(problem, flat, asked.keep or (), size).union(area_of(asked.solid))
+    empty = area_of(asked.void).difference(full)
     x, y = _middles(sheet.mesh.points, sheet.mesh.cells, prism)
+    method: dict[str, Any] = {
+        "radius": radius,
+        "filter": asked.filter,
+        "max_iterations": asked.max_iterations,
+    }
     common: dict[str, Any] = {
-        "weights": wanted.weights,
+        "weights": asked.weights,
         "groups": prism,
-        "progress": wanted.progress,
+        "progress": progress,
         "solid": shapely.contains_xy(full, x, y),
         "void": shapely.contains_xy(empty, x, y),
     }
-    if turned is not None:
-        design = Somp(wanted.volume_fraction, **options)(sheet, own, **common)
+    if asked.method == "somp":
+        somp = Somp(asked.volume_fraction, orientation=asked.orientation, **method)
+        design = somp(sheet, stiffness, **common)
     else:
-        options["minimum_stiffness"] = 1e-6
-        design = Simp(wanted.volume_fraction, **options)(sheet, **common)
+        design = Simp(asked.volume_fraction, minimum_stiffness=1e-6, **method)(sheet, **common)
     planform = sheet_outline(design, flat, size, full, empty)
-    part = sheet_part(problem, flat, planform, min(size, _edge(problem)))
-    share = planform.area / flat.planform.area
-    return _result(wanted.case, part, design, size, planform, share)
+    part = sheet_part(problem, flat, planform, min(size, _median_edge(problem)))
+    return _result(case, part, design, size, planform, planform.area / flat.planform.area)
 
 
-def _of_solid(wanted: _Wanted) -> Optimised:
+def _of_solid(case: Case, asked: Optimisation, progress: Progress) -> Optimised:
     """Optimise a part in space, on its own cells."""
-    problem = wanted.case.problem
+    problem = case.problem
     mesh = problem.mesh if problem.mesh.order == 1 else problem.mesh.linear()
     whole = replace(problem, mesh=mesh, order=1, combinations={})
-    size = _edge(whole)
+    size = _median_edge(whole)
     centres = mesh.points[mesh.cells].mean(axis=1)
-    full = cells_in(wanted.solid, centres)
-    for name in wanted.keep:
+    full = cells_in(asked.solid, centres)
+    for name in asked.keep or ():
         nodes = mesh.points[np.unique(mesh.patch(name))]
         full |= cKDTree(nodes).query(centres)[0] <= _RIM * size
-    empty = cells_in(wanted.void, centres) & ~full
-    reach = max(3.0, 1.6 * size) if wanted.radius is None else wanted.radius
-    method = Simp(wanted.volume_fraction, minimum_stiffness=1e-6, radius=reach, **wanted.options)
-    design = method(whole, weights=wanted.weights, solid=full, void=empty, progress=wanted.progress)
+    empty = cells_in(asked.void, centres) & ~full
+    method = Simp(
+        asked.volume_fraction,
+        minimum_stiffness=1e-6,
+        radius=max(3.0, 1.6 * size) if asked.radius is None else asked.radius,
+        filter=asked.filter,
+        max_iterations=asked.max_iterations,
+    )
+    design = method(whole, weights=asked.weights, solid=full, void=empty, progress=progress)
     part = as_problem(design, problem.material)
     part = replace(part, axes=None, order=problem.order, combinations=problem.combinations)
     share = float(part.mesh.volumes.sum() / mesh.volumes.sum())
-    return _result(wanted.case, part, design, size, None, share)
+    return _result(case, part, design, size, None, share)
 
 
 def _result(
@@ -313,24 +311,21 @@ def _result(
     return Optimised(new, design, size, planform, tuple(remarks))
 
 
-def _laminate(given: Sequence[float] | None, own: FloatArray) -> FloatArray:
+def _laminate(given: Sequence[float] | None, stiffness: FloatArray) -> FloatArray:
     """Plane stress stiffness of the laminate: as given, of the part, or of the paper."""
     if given is not None:
-        if (
-            len(given) != 4
-            or not np.isfinite(given).all()
-            or min(given[0], given[1], given[3]) <= 0
-        ):
+        moduli = [*given[:2], *given[3:]]
+        if len(given) != 4 or not np.isfinite(given).all() or min(moduli) <= 0.0:
             raise InputError(
                 "a laminate is E1,E2,NU12,G12, moduli above 0 MPa; got "
                 f"{','.join(f'{value:g}' for value in given)}: give these four numbers, or none "
                 "for those of the part"
             )
         return plane_stress(*given)
-    isotropic = np.isclose(own[0, 0], own[1, 1], rtol=1e-6) and np.isclose(
-        own[2, 2], 0.5 * (own[0, 0] - own[0, 1]), rtol=1e-6
+    isotropic = np.isclose(stiffness[0, 0], stiffness[1, 1], rtol=1e-6) and np.isclose(
+        stiffness[2, 2], 0.5 * (stiffness[0, 0] - stiffness[0, 1]), rtol=1e-6
     )
-    return LAMINATE if isotropic else own
+    return LAMINATE if isotropic else stiffness
 
 
 def _to_keep(problem: Problem) -> tuple[str, ...]:
@@ -350,8 +345,8 @@ def _rims(problem: Problem, flat: FlatPart, keep: Sequence[str], size: float) ->
     walls = [trace.wall.buffer(_RIM * size) for trace in traces if not trace.wall.is_empty]
     areas = [face for trace in traces for face in trace.faces]
     whole = [area for area in areas if area.area > 0.99 * flat.planform.area]
-    found = shapely.union_all([*walls, *(area for area in areas if area not in whole)])
-    return shapely.intersection(found, flat.planform)
+    rims = shapely.union_all([*walls, *(area for area in areas if area not in whole)])
+    return shapely.intersection(rims, flat.planform)
 
 
 def _middles(points: FloatArray, cells: Any, prism: Any) -> tuple[FloatArray, FloatArray]:
@@ -361,7 +356,7 @@ def _middles(points: FloatArray, cells: Any, prism: Any) -> tuple[FloatArray, Fl
     return x[prism], y[prism]
 
 
-def _edge(problem: Problem) -> float:
+def _median_edge(problem: Problem) -> float:
     """Median edge length of a mesh, mm."""
     mesh = problem.mesh
     ends = mesh.points[mesh.corners[:, mesh.edges]]

@@ -41,33 +41,35 @@ def fibre_of(
     """
     if not isinstance(table, Mapping):
         raise InputError(f"fibre must be a table; got {shown(table)}: write [fibre] and its keys")
-    found = Mistakes()
+    mistakes = Mistakes()
     wrong = [key for key in table if key in _KEYS.values()]
     for key in wrong:
-        found.lines.append(f"fibre has no key '{key}': write {key.removesuffix('_height')}")
+        mistakes.lines.append(f"fibre has no key '{key}': write {key.removesuffix('_height')}")
     given = {_KEYS.get(str(k), str(k)): v for k, v in table.items() if k not in ("regions", *wrong)}
     regions = list(() if base is None else base.regions)
     if "regions" in table:
         if folder is None:
-            found.lines.append("fibre.regions belong in a part file: write [[fibre.regions]] there")
+            mistakes.lines.append(
+                "fibre.regions belong in a part file: write [[fibre.regions]] there"
+            )
         elif not isinstance(table["regions"], list):
-            found.lines.append("fibre.regions must be a list of tables: write [[fibre.regions]]")
+            mistakes.lines.append("fibre.regions must be a list of tables: write [[fibre.regions]]")
         else:
             regions = []
-            for k, each in enumerate(table["regions"]):
-                with found.noted():
-                    regions.append(_region(each, f"fibre.regions[{k}]", folder))
+            for k, region in enumerate(table["regions"]):
+                with mistakes.noted():
+                    regions.append(_region(region, f"fibre.regions[{k}]", folder))
     places = None
-    with found.noted():
+    with mistakes.noted():
         read = from_table(FibrePlaces, given, "fibre")
         names = {name: getattr(read, name) for name in given}
         places = replace(base or FibrePlaces(), **names)
     for key, name in _KEYS.items():
-        found.lines = [
+        mistakes.lines = [
             line.replace("fibre: fibre_places.", "fibre.").replace(name, key)
-            for line in found.lines
+            for line in mistakes.lines
         ]
-    found.complain()
+    mistakes.complain()
     assert places is not None
     return replace(places, regions=tuple(regions))
 
@@ -75,14 +77,14 @@ def fibre_of(
 def _region(table: object, where: str, folder: Path) -> FibreRegion:
     """Read a region."""
     rule, rest = named_table(table, "rule", FIBRE_REGIONS, where)
-    own = {key: rest.pop(key) for key in ("mode", "priority") if key in rest}
+    common = {key: rest.pop(key) for key in ("mode", "priority") if key in rest}
     if rule == "body":
         file = from_table(_file, rest, where)
         path = existing_file(folder / file, f"{where}.file")
         shape: Shape = InBody(read_surface(path), file)
     else:
         shape = from_table(FIBRE_REGIONS[rule], rest, where, infinite=rule == "box")
-    return replace(from_table(_region_of_rules, own, where), shape=shape)
+    return replace(from_table(_region_of_rules, common, where), shape=shape)
 
 
 def _file(file: str) -> str:
@@ -114,7 +116,7 @@ def fibre_table(places: FibrePlaces | None) -> dict[str, Any]:
     if places is None:
         return {}
     keys = {name: key for key, name in _KEYS.items()}
-    given = {one.name: getattr(places, one.name) for one in fields(places)}
+    given = {field.name: getattr(places, field.name) for field in fields(places)}
     table = {keys.get(k, k): v for k, v in given.items() if v is not None and k != "regions"}
     regions = []
     for region in places.regions:
@@ -124,6 +126,8 @@ def fibre_table(places: FibrePlaces | None) -> dict[str, Any]:
             raise InputError(
                 "fibre.regions of a surface cannot be written to a part file: leave them out"
             )
-        own = {one.name: getattr(shape, one.name) for one in fields(shape)}  # type: ignore[arg-type]
-        regions.append({"rule": rule, **own, "mode": region.mode, "priority": region.priority})
+        keys_of_shape = {field.name: getattr(shape, field.name) for field in fields(shape)}  # type: ignore[arg-type]
+        regions.append(
+            {"rule": rule, **keys_of_shape, "mode": region.mode, "priority": region.priority}
+        )
     return {**table, **({"regions": regions} if regions else {})}

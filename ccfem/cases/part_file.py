@@ -1,239 +1,15 @@
 """Part files: a part with its loads, described in TOML.
 
 Lengths are mm, forces N, stresses MPa. Paths are relative to the part file. Nothing in a part file
-is executed, and a key that is not listed here is an error. Directions are "x", "y", "z", one of
-them with a minus ("-z"), or three numbers.
-
-::
-
-    name = "hook"                     # default: the file's name
-    title = "Hook under 200 N"        # one line for tables and reports; default: the name
-    source = "..."                    # where the part comes from; default: nothing
-
-    # The body: exactly one of mesh, surface and planform.
-    mesh = "hook.msh"                 # tetrahedra: .tet .msh .vtu .inp .npz
-    surface = "hook.stl"              # closed surface (.stl .obj .ply) or CAD file (.step .iges
-                                      # .brep), filled with tetrahedra ...
-    edge_length = 2.0                 # ... of this edge length
-    mesher = "auto"                   # "gmsh", "ftetwild", or Gmsh where it is installed and works
-    scale = 1.0                       # factor on the coordinates of either file; 1000 for metres
-    merge_nodes = false               # join pieces of a mesh where their nodes coincide
-    order = "auto"                    # linear (1) or quadratic cells (2), or what the estimated
-                                      # error of linear ones calls for (default)
-
-    [planform]                        # a flat part that stands on z = 0
-    outline = [[0, 0], [80, 0], [80, 30], [0, 30]]
-    holes = [{ centre = [15, 15], radius = 5 }, { outline = [[40, 10], [50, 10], [45, 20]] }]
-    height = 6.0
-    edge_length = 2.0
-
-    build = "z"                       # build direction; default z
-    layers = 12                       # flat layers of fibre, spread evenly over the height ...
-    heights = [0.5, 1.0, 3.5]         # ... or their heights along the build direction; or [slicing]
-    material = "pla"                  # a name of the table (ccfem.fem.materials), or a table:
-
-    [material]                        # isotropic ...
-    modulus = 3500.0
-    poisson = 0.35
-    name = "PLA+"                     # optional; so are source, tensile_strength,
-                                      # compressive_strength, ...
-    mass_density = 1.24               # ... g/cm^3, for gravity, and the strain by heat, 1/K: ...
-    expansion = 7e-5                  # ... or expansion_fibre and expansion_transverse
-    [material]                        # ... or transversely isotropic, the fibre along x
-    modulus_fibre = 60000.0
-    modulus_transverse = 4100.0
-    poisson_fibre = 0.33
-    shear_fibre = 2200.0
-    poisson_transverse = 0.45         # optional
-
-    [slicing]                         # in place of layers and heights: a slicer (ccfem slicers)
-    method = "planar"                 # and its parameters; default: 12 flat layers
-    thickness = 0.4
-
-    [fibre]                           # which layers get fibre, for every strategy; default all
-    layers = "3:20:2"                 # first, end (not included), step, or a list; the lowest is 0
-    from = 0.4                        # mm over the lowest point of the part; or to
-    every = 2                         # every how many of these layers
-    between = 1                       # least number of matrix layers between two of fibre
-    covered = true                    # none where matrix would not hold it (process.cover)
-
-    [[fibre.regions]]                 # where on these layers
-    rule = "patch"                    # or "box", "cylinder" as below, "body" with file = "a.stl"
-    patch = "pin"
-    within = 6.0                      # mm
-    mode = "only"                     # fibre in such regions alone, or "exclude": none in it
-    priority = 1                      # where regions overlap the lowest number counts
-
-    # Patches: boundary facets chosen by a rule (ccfem.body.mesh.patches). Groups of a mesh file
-    # are patches already.
-    [patches.foot]
-    rule = "plane"                    # facets on a plane
-    normal = "z"
-    offset = "min"                    # distance along the normal, "min" or "max" ...
-    point = [0, 0, 0]                 # ... or, in place of offset, a point on the plane
-    tolerance = 0.1                   # optional
-
-    [patches.pin]
-    rule = "cylinder"                 # the walls of holes and pins up to this radius
-    point = [15, 15, 0]
-    axis = "z"
-    radius = 5.0
-    half = "-x"                       # optional: only the half on this side of the axis
-    tolerance = 0.1                   # optional
-
-    [patches.corner]
-    rule = "box"                      # facets inside a box; inf is allowed
-    lower = [0, 0, 0]
-    upper = [10, 10, inf]
-    normal = "x"                      # optional: only facets that face this way
-
-    [patches.tip]
-    rule = "nearest"                  # the facets nearest to a point
-    point = [80, 15, 3]
-    count = 4                         # how many (default 1), or radius = ...
-
-    [patches.grip]
-    rule = "group"                    # a group of the mesh file under another name
-    name = "Surface_12"
-
-    [patches.bore]                    # a surface's faces also are groups: face_1, face_2, ...
-    rule = "face"                     # the smooth face at a place (ccfem faces BODY) ...
-    at = [12.5, 15, 3]                # ... a point on it, or several: [[0, 0, 0], [9, 0, 0]]
-    axis = "z"                        # axis and radius of a round wall ...
-    radius = 2.5
-    normal = "x"                      # ... or the outward normal of any other face
-    tolerance = 0.5                   # optional: how far the face may be from the point
-    number = [3, 4]                   # or faces by their numbers, which change with the body
-    angle = 30.0                      # optional: feature angle of the listing, degrees
-
-    [patches.bolts]
-    rule = "holes"                    # the walls of all holes of a radius
-    radius = 2.75
-    axis = "z"                        # optional: only those along it
-
-    [regions.insert]                  # cells of another material, by a rule for their centres
-    rule = "cylinder"                 # point, axis, radius; or "box": lower, upper
-    point = [15, 15, 0]
-    axis = "z"
-    radius = 8.0
-    material = "pa6"                  # a name or a table, as above
-
-    [[supports]]                      # at least one
-    kind = "held"                     # default: components of the displacement of a patch
-    patch = "foot"
-    components = "xyz"                # which are held; default all
-    value = [0, 0, 0]                 # displacement they take, mm; default none
-    case = ["pull", "weight"]         # load cases in which it holds, or one name; default all.
-                                      # Of every kind of support
-
-    [[supports]]
-    kind = "pressing"                 # the patch lies on something rigid: it may slide and lift
-    patch = "foot"                    # off, and not sink in
-    normal = "-z"                     # optional: out of the part
-
-    [[supports]]
-    kind = "edge"                     # the nodes that two patches share
-    patches = ["foot", "pin"]         # components, value
-
-    [[supports]]
-    kind = "point"                    # the node nearest to a point: point, components, value
-    point = [0, 0, 0]
-
-    [[supports]]
-    kind = "sliding"                  # a patch of any slope that slides without friction:
-    patch = "corner"                  # only what goes across it is held
-    normal = [0, 1, 1]                # optional: the direction that is held
-    value = 0.0                       # optional: displacement along it, mm
-
-    [[supports]]
-    kind = "rigid"                    # a patch that a stiff plate is glued to
-    patch = "grip"
-    components = "z"                  # of its centre that are held, may be "" ...
-    rotations = ""                    # ... and the axes about which it cannot turn
-    angle = [0, 0, 0]                 # optional: rotation that it takes, degrees; value as above
-    centre = [80, 15, 3]              # optional
-
-    [[supports]]
-    kind = "pin"                      # a rigid pin in a hole; turns freely about its own axis
-    patch = "bore"
-    point = [15, 15, 0]               # on the axis
-    axis = "z"
-    slides = true                     # optional: moves along its axis too; value as above
-
-    [[supports]]
-    kind = "spring"                   # springs to the ground, spread evenly over a patch
-    patch = "tip"                     # ("point_spring": at the node nearest to a point)
-    stiffness = [10, 0, 0]            # N/mm along x, y, z, all together
-
-    [[supports]]
-    kind = "foundation"               # an elastic bed, MPa/mm across the patch and along it
-    patch = "foot"
-    normal = 5.0
-    tangential = 0.0                  # optional
-
-    [[alternative_supports]]          # another model of how the part is held, keys as of supports:
-    patch = "foot"                    # strategies are tested under both, and no ranking is stated
-    kind = "pressing"                 # on which the two disagree
-
-    [[loads.pull]]                    # at least one load of one load case, here "pull"
-    kind = "bearing"                  # total force, N, that a pin presses on a cylinder
-    patch = "pin"
-    vector = [200, 0, 0]
-
-    [[loads.pull]]                    # further loads of the same case
-    kind = "force"                    # total force, N, spread evenly: patch, vector
-    patch = "tip"                     # "traction", MPa: patch, vector
-    vector = [0, 0, -10]              # "pressure", MPa, inward: patch, magnitude
-                                      # "point", N at the nearest node: point, vector
-                                      # "body_force", N/mm^3: vector
-
-    [[loads.weight]]
-    kind = "gravity"                  # all keys optional
-    acceleration = [0, 0, -9.81]      # m/s^2, the way in which the weight pulls
-    mass_density = 1.24               # g/cm^3, of the whole part; default that of its materials
-
-    [[loads.heat]]
-    kind = "temperature"              # of the whole part
-    change = 40.0                     # K
-
-    [[loads.moved]]
-    kind = "displacement"             # what the supports on a patch take in this load case, mm
-    patch = "foot"
-    vector = [0, 0, 0.1]
-
-    [combinations.hot_pull]           # a load case more: the sum of others times factors
-    pull = 1.5
-    heat = 1.0
-
-    [weights]                         # weight of each case when all are planned for together
-    pull = 1.0                        # (--load-case all); cases that are left out do not count.
-    weight = 0.5                      # Without this table all but combinations count equally
-
-    [machine]                         # what differs from ccfem.machine.machine.Machine, or from a
-    profile = "klipper"               # machine of ccfem machines
-    minimum_length = 45.0
-
-    [machine.speeds]                  # fibre speed by curvature, length and angle of a path's
-    speed = [7, 15, 35]               # pieces (ccfem.machine.SpeedTable) in place of fibre_speed;
-    curvature = [0.2, 0.05]           # what is left out: Wang et al. 2021, table 2
-    length = [15, 25]
-    angle = [90, 135]
-
-    [machine.limits]                  # what differs from ccfem.machine.limits.Limits
-    on_fibre = 0.05
-    [machine.process]                 # what differs from ccfem.machine.print_process.Process
-    start_speed = 3.0                 # mm/s
-    [machine.gcode]                   # what differs from ccfem.machine.gcode_profile.GcodeProfile
-    cut = ["M42 P4 S255", "G4 P{wait}", "M42 P4 S0"]
-    bed = [250, 210, 200]             # mm
-
-    [strategies.isocurve]             # parameters of a strategy on this part
-    cap = 90.0
+is executed, and a key that is not listed is an error. Directions are "x", "y", "z", one of them
+with a minus ("-z"), or three numbers. All keys stand in ``all_keys.toml`` beside this module, whose
+text is `ALL_KEYS`.
 """
 
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -283,6 +59,9 @@ from ccfem.slicing.slicers.planar import Planar
 
 T = TypeVar("T")
 
+ALL_KEYS = Path(__file__).with_name("all_keys.toml").read_text(encoding="utf-8")
+"""All keys with what they mean, alternatives one below the other."""
+
 
 def read_part(path: str | os.PathLike[str]) -> Case:
     """Read a part file (its keys are in the documentation of this module).
@@ -302,7 +81,7 @@ def read_part(path: str | os.PathLike[str]) -> Case:
     InputError
         With the name of the file, what was expected, what came and the cure.
     """
-    return _of_file(path, _case)
+    return _of_file(path, part_case)
 
 
 def faces_of_part(path: str | os.PathLike[str], angle: float = FEATURE_ANGLE) -> BodyFaces:
@@ -329,87 +108,93 @@ def _of_file(path: str | os.PathLike[str], take: Callable[[Mapping[str, Any], Pa
         ) from None
 
 
-def _case(content: Mapping[str, Any], path: Path) -> Case:
-    """Case of a part file's content; all mistakes come at once, if possible before meshing."""
-    found = Mistakes()
-    part, unread = _readable(content, found)
+def part_case(content: Mapping[str, Any], path: Path, mesh: TetMesh | None = None) -> Case:
+    """Case of a part file's content; all mistakes come at once, if possible before meshing.
+
+    A mesh that is given takes the place of the one that the file names.
+    """
+    mistakes = Mistakes()
+    part, unread = _readable(content, mistakes)
     name, given = part.name or path.stem, _Values()
-    with found.noted():
+    with mistakes.noted():
         check_name(name, part.title or name)
-    with found.noted():
+    with mistakes.noted():
         given.build = unit_vector(part.build, "build")
-    with found.noted():
+    with mistakes.noted():
         given.slicing = slicing_of(part)
-    with found.noted():
+    with mistakes.noted():
         given.machine = machine_from(part.machine)
     if "material" not in unread:
-        with found.noted():
+        with mistakes.noted():
             given.material = material_of(part.material)
     if part.fibre is not None:
-        with found.noted():
+        with mistakes.noted():
             given.fibre = fibre_of(part.fibre, path.parent)
-    check_strategies(part.strategies, found)
-    rules = rules_of(part.patches, found)
+    check_strategies(part.strategies, mistakes)
+    rules = rules_of(part.patches, mistakes)
     readable = "supports" not in unread
-    supports, own = supports_of(part.supports, part.loads, found) if readable else ((), {})
-    others = alternative_supports_of(part.alternative_supports, found)
-    loads = loads_of(part.loads, found) if "loads" not in unread else {}
-    combinations = combinations_of(part.combinations, part.loads, found)
-    weights = weights_of(part.weights, {**part.loads, **part.combinations}, found)
-    regions = region_rules_of(part.regions, found)
-    with found.noted():
+    supports, case_supports = (
+        supports_of(part.supports, part.loads, mistakes) if readable else ((), {})
+    )
+    others = alternative_supports_of(part.alternative_supports, mistakes)
+    loads = loads_of(part.loads, mistakes) if "loads" not in unread else {}
+    combinations = combinations_of(part.combinations, part.loads, mistakes)
+    weights = weights_of(part.weights, {**part.loads, **part.combinations}, mistakes)
+    regions = region_rules_of(part.regions, mistakes)
+    with mistakes.noted():
         part.check(path.parent)
-    found.complain()
+    mistakes.complain()
 
-    rules, angle = _on_body(rules, part, path.parent, found)
-    found.complain()
+    rules, angle = _on_body(rules, part, path.parent, mistakes)
+    mistakes.complain()
 
     def before(surface: Surface) -> None:
         assert part.edge_length is not None
-        check_before_meshing(surface, part.edge_length, rules, supports, loads, own, angle)
+        check_before_meshing(
+            surface, part.edge_length, rules, supports, loads, case_supports, angle
+        )
 
-    mesh, findings = part.read(path.parent, before, angle)
-    for each, rule in rules.items():
-        with found.noted():
-            mesh = patches_from_rules(mesh, {each: rule})
-    found.complain()
+    findings: tuple[str, ...] = ()
+    if mesh is None:
+        mesh, findings = part.read(path.parent, before, angle)
+    for patch, rule in rules.items():
+        with mistakes.noted():
+            mesh = patches_from_rules(mesh, {patch: rule})
+    mistakes.complain()
     near = patches_of_fibre(given.fibre)
-    for each in near:
-        mesh.patch(each)
-    held = (*supports, *others, *(each for some in own.values() for each in some))
+    for patch in near:
+        mesh.patch(patch)
+    held = (*supports, *others, *chain.from_iterable(case_supports.values()))
     bare = without_faces(mesh, (*rules, *near, *patches_in_use(held, loads)))
-    body = numbered_faces(mesh) if len(bare.patches) < len(mesh.patches) else None
-    mesh = bare
-    build, slicing, machine, material = given.whole()
-    findings = (*findings, *about_patches(mesh, rules))
+    x, y, z = given.build.tolist()
     return Case(
         name=name,
         title=part.title or name,
         problem=Problem(
-            mesh,
-            material,
+            bare,
+            given.material,
             supports,
             loads,
-            regions=regions_of(mesh, regions),
+            regions=regions_of(bare, regions),
             combinations=combinations,
             order=part.order,
-            case_supports=own,
+            case_supports=case_supports,
         ),
-        build=(float(build[0]), float(build[1]), float(build[2])),
-        slicing=slicing,
-        machine=machine,
+        build=(x, y, z),
+        slicing=given.slicing,
+        machine=given.machine,
         parameters=part.strategies,
         source=part.source,
-        findings=findings,
+        findings=(*findings, *about_patches(bare, rules)),
         alternative_supports=others,
         fibre=given.fibre,
         weights=weights,
-        body=body,
+        body=numbered_faces(mesh) if len(bare.patches) < len(mesh.patches) else None,
     )
 
 
 def _on_body(
-    rules: Mapping[str, PatchRule], part: Part, folder: Path, found: Mistakes
+    rules: Mapping[str, PatchRule], part: Part, folder: Path, mistakes: Mistakes
 ) -> tuple[dict[str, PatchRule], float]:
     """Rules for faces looked up on the surface before it is meshed, and its feature angle.
 
@@ -434,7 +219,7 @@ def _on_body(
     assert part.edge_length is not None
     check_edge_length(Surface(body.points, body.triangles), part.edge_length)
     for name, rule in faces.items():
-        with found.noted():
+        with mistakes.noted():
             try:
                 rule.numbers_on(body)
             except InputError as error:
@@ -442,28 +227,21 @@ def _on_body(
     return {**rules, **{name: OnBody(rule, body) for name, rule in faces.items()}}, angle
 
 
-@dataclass
 class _Values:
-    """What the sections of a part file give."""
+    """What the sections of a part file give; none is missing where there was no mistake."""
 
-    build: FloatArray | None = None
-    slicing: Slicer | None = None
-    machine: Machine | None = None
-    material: Material | None = None
+    build: FloatArray
+    slicing: Slicer
+    machine: Machine
+    material: Material
     fibre: FibrePlaces | None = None
 
-    def whole(self) -> tuple[FloatArray, Slicer, Machine, Material]:
-        """All of them; none is missing where there was no mistake."""
-        found = (self.build, self.slicing, self.machine, self.material)
-        assert all(each is not None for each in found)
-        return found  # type: ignore[return-value]
 
-
-def _readable(content: Mapping[str, Any], found: Mistakes) -> tuple[Part, set[str]]:
+def _readable(content: Mapping[str, Any], mistakes: Mistakes) -> tuple[Part, set[str]]:
     """Take of a part file what reads; the rest is noted, and named."""
     good = {}
     for key, value in content.items():
-        with found.noted():
+        with mistakes.noted():
             from_table(Part, {key: value}, "the part file")
             good[key] = value
     return from_table(Part, good, "the part file"), set(content) - set(good)
@@ -493,12 +271,12 @@ REGIONS: dict[str, Callable[..., CellRule]] = {"box": CellBox, "cylinder": CellC
 
 
 def region_rules_of(
-    tables: Mapping[str, Any], found: Mistakes
+    tables: Mapping[str, Any], mistakes: Mistakes
 ) -> dict[str, tuple[Material, CellRule]]:
     """Materials and rules of the tables [regions.NAME]; what is wrong is noted."""
     rules = {}
     for name, table in tables.items():
-        with found.noted():
+        with mistakes.noted():
             rules[name] = _region(f"regions.{name}", table)
     return rules
 
@@ -526,7 +304,7 @@ def regions_of(mesh: TetMesh, rules: Mapping[str, tuple[Material, CellRule]]) ->
         For a region without a cell, and for two that share some.
     """
     owner = np.full(len(mesh.cells), -1)
-    names, found = list(rules), []
+    names, chosen = list(rules), []
     for k, (name, (material, rule)) in enumerate(rules.items()):
         try:
             cells = rule(mesh)
@@ -540,8 +318,8 @@ def regions_of(mesh: TetMesh, rules: Mapping[str, tuple[Material, CellRule]]) ->
                 "their border so that each cell is in one of them"
             )
         owner[cells] = k
-        found.append(Region(material, cells))
-    return tuple(found)
+        chosen.append(Region(material, cells))
+    return tuple(chosen)
 
 
 # What can be known of patches and supports before a surface is meshed, which may take minutes.
@@ -576,7 +354,7 @@ def check_before_meshing(
         For rules that choose nothing, unknown patches, loads that their patch cannot take, and
         motions that no support hinders.
     """
-    found = Mistakes()
+    mistakes = Mistakes()
     points, triangles, origin = refined(surface.points, surface.triangles, 0.5 * edge_length)
     groups = {
         face_name(k): triangles[np.isin(origin, face.facets)]
@@ -584,21 +362,20 @@ def check_before_meshing(
     }
     shell = Shell(points, triangles, groups)
     for name, rule in rules.items():
-        with found.noted():
+        with mistakes.noted():
             shell = patches_from_rules(shell, {name: rule})
-    own = [support for each in case_supports.values() for support in each]
-    for name in set(patches_in_use((*supports, *own), loads)) - set(rules):
-        with found.noted():
+    holding = (*supports, *chain.from_iterable(case_supports.values()))
+    for name in set(patches_in_use(holding, loads)) - set(rules):
+        with mistakes.noted():
             shell.patch(name)
-    found.complain()
+    mistakes.complain()
     sets = [(*supports, *case_supports.get(name, ())) for name in loads] or [supports]
-    for k, one in enumerate(sets):
-        if one not in sets[:k]:
-            with found.noted():
-                held(_Outline(shell, shell, one, loads))
-    for those in loads.values():
-        for load in those:
-            if isinstance(load, SurfaceLoad) and not isinstance(load, PointForce):
-                with found.noted():
-                    nodal_forces(shell, load)
-    found.complain()
+    for k, together in enumerate(sets):
+        if together not in sets[:k]:
+            with mistakes.noted():
+                held(_Outline(shell, shell, together, loads))
+    for load in chain.from_iterable(loads.values()):
+        if isinstance(load, SurfaceLoad) and not isinstance(load, PointForce):
+            with mistakes.noted():
+                nodal_forces(shell, load)
+    mistakes.complain()

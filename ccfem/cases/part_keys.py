@@ -66,30 +66,30 @@ class Body:
 
     def check(self, folder: Path) -> None:
         """Raise on keys that do not go together, and on files that do not exist."""
-        found = Mistakes()
+        mistakes = Mistakes()
         given = [key for key in ("mesh", "surface", "planform") if getattr(self, key) is not None]
         if len(given) != 1:
-            found.lines.append(
+            mistakes.lines.append(
                 "a part needs one of mesh, surface and planform; got "
                 f"{' and '.join(given) or 'none'}: name one"
             )
         elif (self.edge_length is not None) != (self.surface is not None):
-            found.lines.append(
+            mistakes.lines.append(
                 "edge_length goes with surface, and surface with edge_length: add the one that is "
                 "missing (a planform has its own edge_length)"
             )
         if self.planform is not None and self.scale != 1.0:
-            found.lines.append("scale goes with mesh or surface: leave it out of a planform")
+            mistakes.lines.append("scale goes with mesh or surface: leave it out of a planform")
         if self.planform is not None:
-            with found.noted():
+            with mistakes.noted():
                 from_table(_Planform, self.planform, "planform")
-        with found.noted():
+        with mistakes.noted():
             check_number("scale", self.scale, above=0.0)
         for key in ("mesh", "surface"):
             if getattr(self, key) is not None:
-                with found.noted():
+                with mistakes.noted():
                     existing_file(folder / getattr(self, key), f"{key} file")
-        found.complain()
+        mistakes.complain()
 
     def faces(self, folder: Path, angle: float = FEATURE_ANGLE) -> BodyFaces:
         """Faces of the part, numbered on its body: of a surface before any meshing.
@@ -131,8 +131,8 @@ class Body:
                 f"the part measures {size:.3g} mm across; expected {_SMALLEST:g} to {_LARGEST:g} "
                 "mm: correct scale, which makes the coordinates mm"
             )
-        found = (*made, *report.findings)
-        return mesh.quadratic() if self.order == 2 else mesh, found
+        findings = (*made, *report.findings)
+        return mesh.quadratic() if self.order == 2 else mesh, findings
 
 
 @dataclass(frozen=True)

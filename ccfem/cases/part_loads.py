@@ -63,7 +63,7 @@ SUPPORTS: dict[str, Callable[..., AnySupport]] = {
 
 
 def supports_of(
-    tables: tuple[dict[str, Any], ...], cases: Mapping[str, Any], found: Mistakes
+    tables: tuple[dict[str, Any], ...], cases: Mapping[str, Any], mistakes: Mistakes
 ) -> tuple[tuple[AnySupport, ...], dict[str, tuple[AnySupport, ...]]]:
     """Supports of the tables [[supports]]: those of all load cases, and those of each alone.
 
@@ -71,19 +71,19 @@ def supports_of(
     is wrong is noted.
     """
     if not tables:
-        found.lines.append("a part needs a support: add [[supports]] with its patch")
+        mistakes.lines.append("a part needs a support: add [[supports]] with its patch")
     always: list[AnySupport] = []
-    own: dict[str, tuple[AnySupport, ...]] = {}
+    in_case: dict[str, tuple[AnySupport, ...]] = {}
     for k, table in enumerate(tables):
-        with found.noted():
+        with mistakes.noted():
             names = _cases_of(table, cases, f"supports[{k}]")
             rest = {key: value for key, value in table.items() if key != _CASE}
             support = _support(rest, f"supports[{k}]")
             if not names:
                 always.append(support)
             for name in names:
-                own[name] = (*own.get(name, ()), support)
-    return tuple(always), own
+                in_case[name] = (*in_case.get(name, ()), support)
+    return tuple(always), in_case
 
 
 def _cases_of(table: Mapping[str, Any], cases: Mapping[str, Any], where: str) -> tuple[str, ...]:
@@ -106,12 +106,12 @@ def _cases_of(table: Mapping[str, Any], cases: Mapping[str, Any], where: str) ->
 
 
 def alternative_supports_of(
-    tables: tuple[dict[str, Any], ...], found: Mistakes
+    tables: tuple[dict[str, Any], ...], mistakes: Mistakes
 ) -> tuple[AnySupport, ...]:
     """Supports of the tables [[alternative_supports]], if any; what is wrong is noted."""
     supports: list[AnySupport] = []
     for k, table in enumerate(tables):
-        with found.noted():
+        with mistakes.noted():
             supports.append(_support(table, f"alternative_supports[{k}]"))
     return tuple(supports)
 
@@ -121,20 +121,20 @@ def _support(table: Mapping[str, Any], where: str) -> AnySupport:
     return from_table(SUPPORTS[kind], rest, where)
 
 
-def loads_of(cases: Mapping[str, Any], found: Mistakes) -> dict[str, tuple[Load, ...]]:
+def loads_of(cases: Mapping[str, Any], mistakes: Mistakes) -> dict[str, tuple[Load, ...]]:
     """Read the loads of every load case, of the tables [[loads.NAME]]; what is wrong is noted."""
     if not cases:
-        found.lines.append("a part needs a load: add [[loads.NAME]] with its kind")
+        mistakes.lines.append("a part needs a load: add [[loads.NAME]] with its kind")
     loads: dict[str, tuple[Load, ...]] = {}
     for name, tables in cases.items():
         if not isinstance(tables, list) or not tables:
-            found.lines.append(
+            mistakes.lines.append(
                 f"loads.{name} must be a list of tables; got {shown(tables)}: write "
                 f"[[loads.{name}]]"
             )
             continue
         for k, table in enumerate(tables):
-            with found.noted():
+            with mistakes.noted():
                 where = f"loads.{name}[{k}]"
                 kind, rest = named_table(table, "kind", LOADS, where)
                 load = from_table(LOADS[kind], rest, where)
@@ -143,12 +143,12 @@ def loads_of(cases: Mapping[str, Any], found: Mistakes) -> dict[str, tuple[Load,
 
 
 def combinations_of(
-    tables: Mapping[str, Any], cases: Mapping[str, Any], found: Mistakes
+    tables: Mapping[str, Any], cases: Mapping[str, Any], mistakes: Mistakes
 ) -> dict[str, dict[str, float]]:
     """Factors of load cases, of the tables [combinations.NAME]; what is wrong is noted."""
     combinations = {}
     for name, table in tables.items():
-        with found.noted():
+        with mistakes.noted():
             combinations[name] = _factors(name, table, cases)
     return combinations
 
@@ -178,12 +178,12 @@ def _factors(name: str, table: object, cases: Mapping[str, Any]) -> dict[str, fl
 
 
 def weights_of(
-    table: Mapping[str, Any], cases: Mapping[str, Any], found: Mistakes
+    table: Mapping[str, Any], cases: Mapping[str, Any], mistakes: Mistakes
 ) -> dict[str, float]:
     """Weights of load cases and combinations, of the table [weights]; what is wrong is noted."""
     weights = {}
     for name, weight in table.items():
-        with found.noted():
+        with mistakes.noted():
             if name not in cases:
                 raise InputError(
                     f"weights names no load case '{name}'; there are: {known_names(name, cases)}"

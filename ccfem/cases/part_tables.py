@@ -27,11 +27,11 @@ RULES: dict[str, Callable[..., PatchRule]] = {
 """Rules of patches by their name."""
 
 
-def rules_of(tables: Mapping[str, Any], found: Mistakes) -> dict[str, PatchRule]:
+def rules_of(tables: Mapping[str, Any], mistakes: Mistakes) -> dict[str, PatchRule]:
     """Rules of the tables [patches.NAME]; what is wrong is noted."""
     rules = {}
     for name, table in tables.items():
-        with found.noted():
+        with mistakes.noted():
             where = f"patches.{name}"
             kind, rest = named_table(table, "rule", RULES, where)
             make = RULES[kind]
@@ -67,14 +67,14 @@ def material_of(given: str | dict[str, Any] | None, where: str = "material") -> 
     return from_table(make, given, where)
 
 
-def check_strategies(tables: Mapping[str, Any], found: Mistakes) -> None:
+def check_strategies(tables: Mapping[str, Any], mistakes: Mistakes) -> None:
     """Note unknown strategies, and parameters that they do not take."""
     if not tables:
         return
     from ccfem.strategies import create
 
     for name, parameters in tables.items():
-        with found.noted():
+        with mistakes.noted():
             if not isinstance(parameters, Mapping):
                 raise InputError(
                     f"strategies.{name} must be a table; got {shown(parameters)}: write "

@@ -51,14 +51,14 @@ def part_text(case: Case, mesh: str, comment: str = "") -> str:
         "slicing": {"method": member_name(case.slicing), **_changed(case.slicing, Planar())},
         "fibre": fibre_table(case.fibre),
         "supports": _supports(problem),
-        "alternative_supports": [_kind(each, SUPPORTS) for each in case.alternative_supports],
+        "alternative_supports": [_kind(entry, SUPPORTS) for entry in case.alternative_supports],
         "loads": {
-            name: [_kind(each, LOADS) for each in loads] for name, loads in problem.loads.items()
+            name: [_kind(entry, LOADS) for entry in loads] for name, loads in problem.loads.items()
         },
-        "combinations": {name: dict(each) for name, each in problem.combinations.items()},
+        "combinations": {name: dict(entry) for name, entry in problem.combinations.items()},
         "weights": dict(case.weights),
         "machine": _changed(case.machine, Machine()),
-        "strategies": {name: dict(each) for name, each in case.parameters.items()},
+        "strategies": {name: dict(entry) for name, entry in case.parameters.items()},
     }
     lines = [f"# {line}".rstrip() for line in comment.splitlines()]
     return "\n".join([*lines, "", *_table(content, "")]).lstrip("\n") + "\n"
@@ -66,11 +66,11 @@ def part_text(case: Case, mesh: str, comment: str = "") -> str:
 
 def _supports(problem: Problem) -> list[dict[str, Any]]:
     """Tables of the supports, those that hold in some load cases alone with their names."""
-    found = [_kind(each, SUPPORTS) for each in problem.supports]
-    for each in problem.all_supports[len(problem.supports) :]:
-        cases = [name for name, own in problem.case_supports.items() if each in own]
-        found.append({**_kind(each, SUPPORTS), "case": cases})
-    return found
+    tables = [_kind(support, SUPPORTS) for support in problem.supports]
+    for support in problem.all_supports[len(problem.supports) :]:
+        cases = [name for name, held in problem.case_supports.items() if support in held]
+        tables.append({**_kind(support, SUPPORTS), "case": cases})
+    return tables
 
 
 def _kind(value: Any, kinds: Mapping[str, Any]) -> dict[str, Any]:
@@ -82,14 +82,14 @@ def _kind(value: Any, kinds: Mapping[str, Any]) -> dict[str, Any]:
 
 def _changed(value: Any, default: Any) -> dict[str, Any]:
     """Fields of a value that differ from a default, tables in tables; all, of another class."""
-    found = {}
+    changed = {}
     for field in dataclasses.fields(value):
-        own = getattr(value, field.name)
+        entry = getattr(value, field.name)
         other = getattr(default, field.name) if type(value) is type(default) else None
-        if own is None or own == other:
+        if entry is None or entry == other:
             continue
-        found[field.name] = _changed(own, other) if dataclasses.is_dataclass(own) else own
-    return found
+        changed[field.name] = _changed(entry, other) if dataclasses.is_dataclass(entry) else entry
+    return changed
 
 
 def _material(material: Material) -> dict[str, Any]:
@@ -137,8 +137,8 @@ def _table(content: Mapping[str, Any], path: str) -> list[str]:
             if value:
                 below += [*_headed(value, f"{path}{name}")]
         elif isinstance(value, list) and value and isinstance(value[0], Mapping):
-            for each in value:
-                below += ["", f"[[{path}{name}]]", *_table(each, f"{path}{name}.")]
+            for entry in value:
+                below += ["", f"[[{path}{name}]]", *_table(entry, f"{path}{name}.")]
         elif not (isinstance(value, list | tuple | str) and not len(value)) or path:
             lines.append(f"{name} = {_value(value)}")
     return lines + below
@@ -161,7 +161,8 @@ def _value(value: Any) -> str:
     if isinstance(value, list | tuple):
         return f"[{', '.join(_value(entry) for entry in value)}]"
     if isinstance(value, str):
-        text = "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in _escaped(value))
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        text = "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in escaped)
         return f'"{text}"'
     if isinstance(value, int):
         return str(value)
@@ -169,7 +170,3 @@ def _value(value: Any) -> str:
     if math.isinf(number):
         return "inf" if number > 0.0 else "-inf"
     return repr(float(f"{number:.12g}"))
-
-
-def _escaped(text: str) -> str:
-    return text.replace("\\", "\\\\").replace('"', '\\"')

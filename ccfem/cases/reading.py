@@ -1,13 +1,36 @@
 """A part by its name or its file."""
 
 import os
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from ccfem.base import plugins
 from ccfem.base.errors import InputError
 from ccfem.cases.case import Case
-from ccfem.cases.named import create_case
 from ccfem.cases.part_file import read_part
+from ccfem.cases.shipped import shipped_cases
+
+
+def named_cases() -> Mapping[str, Callable[..., Case]]:
+    """Every case by name: those that come with ccfem, and entry points ``ccfem.cases``.
+
+    Each is a function that returns a `Case`, whose parameters have defaults.
+    """
+    others = {entry.name: entry.load() for entry in plugins.entries("ccfem.cases")}
+    return {**shipped_cases(), **others}
+
+
+def create_case(name: str, **parameters: Any) -> Case:
+    """Make a case from its name and parameters.
+
+    Raises
+    ------
+    InputError
+        For an unknown case or parameter, the known ones listed; for a value of a wrong type.
+    """
+    cure = "or name a part file, .toml"
+    return plugins.create("case", named_cases(), name, parameters, cure)
 
 
 def read(part: str | os.PathLike[str] | Case, **parameters: Any) -> Case:

@@ -275,6 +275,7 @@ _TABLE: dict[str, Callable[[], Material]] = {
         interlayer_tensile=18.0,
         interlayer_shear=14.43,
     ),
+    "printed_pla": lambda: printed_pla(),  # as in the cases that come with ccfem
     "onyx": lambda: isotropic(
         1400.0,
         0.41,

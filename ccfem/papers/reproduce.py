@@ -29,12 +29,12 @@ _DATA = ("CCFEM_CHEN2021", "CCFEM_FANG2024")
 def named_papers() -> dict[str, Contents]:
     """Every paper that is built: the packages here that hold a module `contents`."""
     package = importlib.import_module("ccfem.papers")
-    found = {}
+    papers = {}
     for info in pkgutil.iter_modules(package.__path__):
         name = f"ccfem.papers.{info.name}.contents"
         if info.ispkg and importlib.util.find_spec(name) is not None:
-            found[info.name] = importlib.import_module(name).CONTENTS
-    return found
+            papers[info.name] = importlib.import_module(name).CONTENTS
+    return papers
 
 
 def reproduce(
@@ -115,26 +115,26 @@ def _written(
 
 def _inputs() -> str:
     """Digest of all that a part follows from: code, libraries, data of the authors."""
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     roots = [Path(str(resources.files("ccfem")))]
     roots += [Path(os.environ[name]) for name in _DATA if os.environ.get(name)]
     for root in roots:
         for file in sorted(root.rglob("*")):
             if file.is_file() and file.suffix not in (".pyc", ".nbi", ".nbc"):
-                found.update(f"{file.relative_to(root)}\0".encode())
-                found.update(hashlib.sha256(file.read_bytes()).digest())
+                digest.update(f"{file.relative_to(root)}\0".encode())
+                digest.update(hashlib.sha256(file.read_bytes()).digest())
     for library in ("numpy", "scipy", "shapely", "matplotlib"):
-        found.update(f"{library} {metadata.version(library)}\0".encode())
-    return found.hexdigest()
+        digest.update(f"{library} {metadata.version(library)}\0".encode())
+    return digest.hexdigest()
 
 
 def _record(folder: Path) -> dict[str, Any]:
     """Read what is kept in a folder: by part, its inputs and the digests of its files."""
     try:
-        found = json.loads((folder / KEPT).read_text(encoding="utf-8"))
+        record = json.loads((folder / KEPT).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return record if isinstance(record, dict) else {}
 
 
 def _kept(folder: Path, part: str, inputs: str) -> list[Path]:

@@ -8,7 +8,6 @@ from keys import keys
 
 from ccfem.cases import named_cases
 from ccfem.cases.case import Case
-from ccfem.cli.docstring import Attribute, attributes
 
 __all__ = ["cases_page"]
 
@@ -16,7 +15,8 @@ _HEAD = """# Cases
 
 Parts that come with ccfem: `ccfem compare NAME`, or `ccfem.read("NAME")` in Python. A parameter is
 set by `--set-case NAME=VALUE`. The coloured facets are the patches that hold or load the part;
-arrows are the resultants of the loads, triangles mark what is held.
+arrows are the resultants of the loads, triangles mark what is held. Most are part files, in the
+folder `data` of the repository: examples for your own.
 
 """
 
@@ -28,15 +28,8 @@ def cases_page() -> str:
 
 def _section(name: str, make: Callable[..., Case]) -> str:
     first, _, rest = (inspect.getdoc(make) or "").partition("\n")
-    said = re.split(r"^Parameters( as in|$)", rest, maxsplit=1, flags=re.M)[0].strip()
+    said = re.split(r"^Parameters$", rest, maxsplit=1, flags=re.M)[0].strip()
     return (
         f"## {name}\n\n{first}\n\n![The part, its patches and loads](pictures/cases/{name}.png)"
-        f"{{ loading=lazy }}\n\n{said}\n\n{keys(make, _meanings(make))}"
+        f"{{ loading=lazy }}\n\n{said}\n\n{keys(make)}"
     )
-
-
-def _meanings(make: Callable[..., Case]) -> dict[str, Attribute]:
-    """Say what the parameters of a case mean, in its words or those of the case that it names."""
-    other = re.search(r"Parameters as in `ccfem\.cases\.(\w+)`", inspect.getdoc(make) or "")
-    inherited = _meanings(named_cases()[other[1]]) if other else {}
-    return inherited | attributes(make)

@@ -1,14 +1,12 @@
 """Page of the part file: its keys, from the code that reads them."""
 
-import textwrap
-
 from keys import keys, kinds
 
 from ccfem.cases import part_file as reader
 from ccfem.cases.part_fibre import FIBRE_REGIONS
+from ccfem.cases.part_file import REGIONS
 from ccfem.cases.part_keys import Part
 from ccfem.cases.part_loads import LOADS, SUPPORTS
-from ccfem.cases.part_file import REGIONS
 from ccfem.cases.part_tables import RULES
 from ccfem.fem.materials import isotropic, material_names, transversely_isotropic
 from ccfem.machine import GcodeProfile, Kinematics, Limits, Machine, Process, SpeedTable
@@ -19,7 +17,7 @@ __all__ = ["part_file_page"]
 
 def part_file_page() -> str:
     """Write the page: the example of the reader's documentation, then every table."""
-    about, _, example = (reader.__doc__ or "").partition("::\n")
+    about = (reader.__doc__ or "").rpartition(" All keys stand in")[0]
     names = ", ".join(f"`{name}`" for name in material_names())
     parts = (
         f"# Part file\n\n{about}\n\n",
@@ -41,7 +39,7 @@ def part_file_page() -> str:
         "## Strategies `[strategies.NAME]`\n\nThe parameters of a [strategy](strategies.md) on "
         "this part.\n\n## Slicing `[slicing]`\n\n`method`, the name of a [slicer](slicers.md), and "
         "its parameters.\n\n",
-        f"## All of it in one example\n\n```toml\n{textwrap.dedent(example).strip()}\n```\n",
+        f"## All of it in one example\n\n```toml\n{reader.ALL_KEYS.strip()}\n```\n",
     )
     return "".join(parts)
 

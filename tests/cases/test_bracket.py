@@ -5,7 +5,13 @@ import pytest
 
 from ccfem.body.files.surface import Surface
 from ccfem.body.mesh.check import check_mesh
-from ccfem.cases.bracket import HOLES, bracket, bracket_design, bracket_domain, bracket_outline
+from ccfem.cases.bodies import (
+    BRACKET_HOLES,
+    bracket_design,
+    bracket_domain,
+    bracket_outline,
+)
+from ccfem.cases.shipped import bracket
 from ccfem.fem.elasticity import solve
 
 
@@ -20,7 +26,7 @@ def test_domain_is_that_of_the_drawing():
     # L of two legs of 21 mm, less four holes of radius 3 mm.
     assert bracket_outline().area == pytest.approx(2 * 52 * 21 - 21**2 - 4 * 9 * np.pi, rel=1e-3)
     assert mesh.volumes.sum() == pytest.approx(27.0 * bracket_outline().area, rel=5e-3)
-    for name in HOLES:
+    for name in BRACKET_HOLES:
         area, _ = mesh.facet_areas(mesh.patch(name))
         assert area.sum() == pytest.approx(2 * np.pi * 3.0 * 27.0, rel=0.02)
 
@@ -45,7 +51,7 @@ def test_the_stored_part_is_closed_and_holds_its_volume(case):
 
 def test_the_stored_part_is_loaded_and_held_at_its_holes(case):
     mesh = case.problem.mesh
-    for name in HOLES:
+    for name in BRACKET_HOLES:
         area, _ = mesh.facet_areas(mesh.patch(name))
         assert area.sum() == pytest.approx(2 * np.pi * 3.0 * 27.0, rel=0.02)
     fields = solve(case.problem)
@@ -71,6 +77,6 @@ def test_a_coarse_design_holds_its_rims_and_its_volume():
     assert design.volume_fraction == pytest.approx(0.3, abs=1e-6)
     assert design.compliance[-1] < 0.5 * design.compliance[0]
     centre = design.full.mesh.points[design.full.mesh.cells].mean(axis=1)[:, :2]
-    for x, y in HOLES.values():
+    for x, y in BRACKET_HOLES.values():
         near = np.hypot(centre[:, 0] - x, centre[:, 1] - y) < 4.5
         assert (design.density[near] == 1.0).all()

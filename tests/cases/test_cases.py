@@ -9,11 +9,11 @@ import shapely
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.check import check_mesh
 from ccfem.cases import Case, create_case, named_cases
-from ccfem.cases.bar import bar_outline
-from ccfem.cases.open_hole import open_hole_outline
-from ccfem.cases.stored.build import build
-from ccfem.cases.stored.stored_files import data_folder, manifest, stored_mesh
-from ccfem.cases.two_pull_loop import loop_outline
+from ccfem.cases.bodies import bar_outline, loop_outline
+from ccfem.cases.part_file import read_part
+from ccfem.cases.part_writing import part_text
+from ccfem.cases.stored import data_folder, manifest, stored_mesh
+from ccfem.cases.storing import store
 from ccfem.fem.elasticity.solve import solve
 
 NAMES = ("bar", "loop", "open_hole")
@@ -22,7 +22,11 @@ SIZES = {
     "bar": (125.0, 25.0, 5.0),
     "open_hole": (200.0, 36.0, 4.0),
 }
-PLANFORMS = {"loop": loop_outline, "bar": bar_outline, "open_hole": open_hole_outline}
+PLANFORMS = {
+    "loop": loop_outline,
+    "bar": bar_outline,
+    "open_hole": lambda: shapely.box(0, 0, 200, 36) - shapely.Point(100, 18).buffer(6),
+}
 
 
 @pytest.fixture(scope="module", params=NAMES)
@@ -60,6 +64,35 @@ def test_names():
         create_case("bar", element_size=-1.0)
 
 
+PART_FILES = sorted(path for path in data_folder().glob("*.toml") if path.stem != "manifest")
+
+
+@pytest.mark.parametrize("file", PART_FILES, ids=lambda file: file.stem)
+def test_a_shipped_part_file_reads_as_its_case(file):
+    """As a user's file, whose mesh lies beside it."""
+    part, case = read_part(file), create_case(file.stem)
+    assert part.name == file.stem
+    assert part.findings == ()
+    mine, theirs = part.problem, case.problem
+    for name in ("supports", "loads", "order", "combinations", "case_supports"):
+        assert getattr(mine, name) == getattr(theirs, name)
+    np.testing.assert_equal(mine.material.stiffness, theirs.material.stiffness)
+    np.testing.assert_equal(mine.mesh.points, theirs.mesh.points)
+    np.testing.assert_equal(mine.mesh.cells, theirs.mesh.cells)
+    np.testing.assert_equal(dict(mine.mesh.patches), dict(theirs.mesh.patches))
+    assert (part.slicing, part.machine, part.build) == (case.slicing, case.machine, case.build)
+
+
+def test_a_force_scales_all_loads_of_a_part_file():
+    """Vectors by the rule of three."""
+    loads = create_case("bracket", force=100.0).problem.loads
+    assert [load.vector for load in loads["down"]] == [(0.0, -50.0, 0.0)] * 2
+    assert [load.vector for load in loads["side"]] == [(0.0, 0.0, 20.0)] * 2
+    back = create_case("two_load_plate", element_size=6.0, force=36.0, both_ways=True)
+    vectors = [load.vector for load in back.problem.loads["shear_back"]]
+    np.testing.assert_allclose(vectors, [(0, -36, 0), (-120, 0, 0), (120, 0, 0)])
+
+
 def test_case_is_as_described(case):
     mesh = case.problem.mesh
     assert isinstance(case, Case)
@@ -76,21 +109,22 @@ def test_case_is_as_described(case):
     assert case.problem.material.source
 
 
-def test_the_stored_meshes_are_those_of_the_manifest(case):
-    entry = manifest()[case.name]
+@pytest.mark.parametrize("name", ["bar", "loop"])
+def test_the_stored_meshes_are_those_of_the_manifest(name):
+    entry, case = manifest()[name], create_case(name)
     content = (data_folder() / entry["file"]).read_bytes()
     assert hashlib.sha256(content).hexdigest() == entry["sha256"]
     assert len(content) < 1.5e6
-    mesh = stored_mesh(case.name, entry["element_size"])
+    mesh = stored_mesh(name, entry["element_size"])
     assert mesh is not None
     assert np.array_equal(mesh.cells, case.problem.mesh.cells)
-    assert stored_mesh(case.name, 1.01 * entry["element_size"]) is None
+    assert stored_mesh(name, 1.01 * entry["element_size"]) is None
     listed = {path.name for path in data_folder().glob("*.npz")}
     assert listed == {entry["file"] for entry in manifest().values()}
 
 
 def test_the_command_makes_the_stored_mesh_again(tmp_path):
-    text = build(tmp_path, ["bar"]).read_text()
+    text = store(tmp_path, ["bar"]).read_text()
     made = tomllib.loads(text)["bar"]
     stored = manifest()["bar"]
     assert {k: v for k, v in made.items() if k != "sha256"} == {
@@ -105,8 +139,8 @@ def test_the_command_makes_the_stored_mesh_again(tmp_path):
 
 
 def test_a_changed_file_is_refused(tmp_path, monkeypatch):
-    build(tmp_path, ["bar"])
-    monkeypatch.setattr("ccfem.cases.stored.stored_files.data_folder", lambda: tmp_path)
+    store(tmp_path, ["bar"])
+    monkeypatch.setattr("ccfem.cases.stored.data_folder", lambda: tmp_path)
     size = manifest()["bar"]["element_size"]
     assert stored_mesh("bar", size) is not None
     with (tmp_path / "bar.npz").open("ab") as file:
@@ -226,3 +260,10 @@ def test_stress_at_the_hole():
 def test_a_case_is_a_value(case):
     with pytest.raises(dataclasses.FrozenInstanceError):
         case.name = "other"
+
+
+def test_text_of_any_character_is_written_to_a_part_file():
+    """Read back by another parser: quotes, backslashes, and characters beyond the first 65,536."""
+    odd = 'a "b" \\ c\n\u00e4 \u200b \U000e0001 \U0001f600'
+    case = dataclasses.replace(create_case("bar"), source=odd)
+    assert tomllib.loads(part_text(case, "bar.npz"))["source"] == odd

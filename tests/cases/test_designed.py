@@ -1,6 +1,5 @@
 """Optimised plates of Wang et al. 2021: what they are, and the parts that are stored."""
 
-import importlib
 from dataclasses import replace
 
 import numpy as np
@@ -11,26 +10,21 @@ from ccfem.base.errors import InputError
 from ccfem.base.tensor import largest_in_plane
 from ccfem.body.mesh.check import check_mesh
 from ccfem.cases import create_case
-from ccfem.cases.designed import LAMINATE, DesignPlate, Stretch
-from ccfem.cases.stored.build import DESIGNED
-from ccfem.cases.stored.stored_files import manifest
+from ccfem.cases.designed import LAMINATE, PLATES, DesignPlate, Stretch
+from ccfem.cases.stored import manifest
 from ccfem.fem.elasticity import solve
 from ccfem.fem.materials import plane_stress
 from ccfem.fem.plates import rotate_plane, solve_plane
 
 
-def plate_of(name, **parameters):
-    return getattr(importlib.import_module(f"ccfem.cases.{name}"), f"{name}_plate")(**parameters)
-
-
-@pytest.fixture(scope="module", params=DESIGNED)
+@pytest.fixture(scope="module", params=PLATES)
 def plate(request):
-    return plate_of(request.param)
+    return PLATES[request.param]
 
 
 @pytest.fixture(scope="module")
 def bridge():
-    return plate_of("bridge")
+    return PLATES["bridge"]
 
 
 def cut(plate, angle):
@@ -74,7 +68,7 @@ def test_stored_part_fills_its_share_of_the_plate(plate):
 
 
 def test_the_windows_of_the_trusses():
-    windows = {name: len(plate_of(name).part.interiors) for name in DESIGNED}
+    windows = {name: len(PLATES[name].part.interiors) for name in PLATES}
     assert windows["bridge"] == 5  # between an arch, a tie and four diagonals
     assert windows["m_shape"] == 2  # between an arch and what hangs from it
     assert all(windows[name] >= 3 for name in ("suspension", "cantilever", "l_shape"))
@@ -82,7 +76,7 @@ def test_the_windows_of_the_trusses():
 
 @pytest.mark.parametrize(("name", "axis"), [("bridge", 0), ("m_shape", 0), ("cantilever", 1)])
 def test_parts_of_symmetric_plates_are_symmetric(name, axis):
-    plate = plate_of(name)
+    plate = PLATES[name]
     size = plate.border.bounds[2 + axis]
 
     def mirrored(points):
@@ -108,7 +102,7 @@ def test_m_shape_has_members_in_tension_and_in_compression():
 
 
 def test_the_hole_of_the_arm_is_round_and_rimmed():
-    part = plate_of("suspension").part
+    part = PLATES["suspension"].part
     rings = [np.asarray(ring.coords) for ring in part.interiors]
     centre = np.array([150.0, 108.0])
     ring = min(rings, key=lambda points: np.linalg.norm(points - centre, axis=1).max())
@@ -122,7 +116,7 @@ def test_the_hole_of_the_arm_is_round_and_rimmed():
 
 
 def test_the_command_makes_the_stored_outline_again():
-    plate = plate_of("m_shape")
+    plate = PLATES["m_shape"]
     part = plate.outline(plate.design())
     # Iterations magnify rounding, which differs between processors, to 1e-5 of the area; 0.0003
     # more of volume or a radius 0.4 % larger change 1e-3 of it.
@@ -131,7 +125,7 @@ def test_the_command_makes_the_stored_outline_again():
 
 
 def test_another_share_is_optimised_anew():
-    plate = plate_of("m_shape", volume_fraction=0.4)
+    plate = replace(PLATES["m_shape"], volume_fraction=0.4)
     assert plate.part.area == pytest.approx(0.4 * plate.domain.area, rel=0.005)
 
 

@@ -5,8 +5,7 @@ import pytest
 import shapely
 
 from ccfem.cases import create_case
-from ccfem.cases.arm_bracket import arm_bracket_outlines
-from ccfem.cases.corner_bracket import corner_bracket_outlines
+from ccfem.cases.bodies import arm_bracket_outlines, corner_bracket_outlines
 from ccfem.slicing.slicers import LoadOriented
 
 

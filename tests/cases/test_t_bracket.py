@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ccfem.cases.t_bracket import HOLES, t_bracket, t_bracket_front, t_bracket_top
+from ccfem.cases.bodies import T_BRACKET_HOLES, t_bracket_outlines
+from ccfem.cases.shipped import t_bracket
 from ccfem.fem.elasticity import solve
 from ccfem.slicing.slicers import Planar, Spatial
 
@@ -27,7 +28,7 @@ def test_volume_and_extent_are_those_of_the_authors_part(case):
 def test_walls_of_the_holes_have_the_area_of_cylinders(case):
     mesh = case.problem.mesh
     expected = {"base_left": 15.0, "base_right": 15.0, "head": 30.0, "pull": 15.0}
-    assert set(HOLES) == set(mesh.patches)
+    assert set(T_BRACKET_HOLES) == set(mesh.patches)
     for name, height in expected.items():
         area, normal = mesh.facet_areas(mesh.patch(name))
         assert area.sum() == pytest.approx(2.0 * np.pi * 5.5 * height, rel=0.015)
@@ -51,7 +52,8 @@ def test_bolts_press_on_the_walls_and_under_their_heads(case):
 
 
 def test_outlines_meet_in_the_part():
-    front, top = t_bracket_front(), t_bracket_top()
+    outlines = t_bracket_outlines()
+    front, top = outlines["z"], outlines["y"]
     assert front.is_valid
     assert top.is_valid
     assert len(front.interiors) == 1

@@ -4,7 +4,7 @@ import numpy as np
 import shapely
 from shapely import affinity
 
-from ccfem.cases.named import create_case
+from ccfem.cases import create_case
 from ccfem.geometry.sections import corners_only
 from ccfem.slicing.slicers.planar import Planar
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from ccfem.body.mesh import box_mesh
-from ccfem.papers.kipping_2023.contents import measured, verdicts
+from ccfem.papers.contents import claim_table, judged
+from ccfem.papers.kipping_2023.contents import EXPECTED, measured
 from ccfem.papers.kipping_2023.thickness import distances_below
-from ccfem.papers.verdicts import claim_table
 from ccfem.slicing.slicers import Planar
 
 
@@ -36,8 +36,8 @@ def test_a_strand_on_a_disc(bent):
 
 def test_claims_are_judged():
     found = {"A: inverted": 0.0, "B: inverted": 0.1}
-    checks = {check.quantity: check.verdict for check in verdicts(found)}
+    checks = {check.quantity: check.verdict for check in judged(found, EXPECTED)}
     assert checks["A: inverted"] == "reproduced"
     assert checks["B: inverted"] == "differs"
     assert checks["A: support, inverted"] == "not tried"
-    assert "not tried" in claim_table(verdicts(found))
+    assert "not tried" in claim_table(judged(found, EXPECTED))

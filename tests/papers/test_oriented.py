@@ -12,11 +12,9 @@ from ccfem.fem.materials import Material, isotropic, transversely_isotropic
 from ccfem.judging.virtual_testing.strands import cut_strands
 from ccfem.papers.chen_2021.virtual_test import (
     fibre_share,
-    mix,
     oriented_problem,
     oriented_ratio,
     oriented_stiffness,
-    to_plane_stress,
 )
 from ccfem.paths.toolpaths import Toolpaths
 
@@ -43,9 +41,6 @@ def test_one_direction_is_the_rotated_material():
         expected = rotate_stiffness(CARBON.stiffness, axes(direction))
         found = oriented_stiffness(fourth(direction), CARBON)
         np.testing.assert_allclose(found, expected, atol=1e-9 * expected.max())
-        np.testing.assert_allclose(
-            mix(-direction, 1.0, CARBON, PLA), expected, atol=1e-9 * expected.max()
-        )
 
 
 def test_a_distribution_is_the_average_of_rotated_materials():
@@ -55,28 +50,6 @@ def test_a_distribution_is_the_average_of_rotated_materials():
     np.testing.assert_allclose(
         oriented_stiffness(average, CARBON), expected, atol=1e-9 * expected.max()
     )
-
-
-def test_shares_mix_by_volume():
-    directions = np.array([[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [1.0, 1.0, 0.0]])
-    found = mix(directions, np.array([0.0, 0.25, 1.0]), CARBON, PLA)
-    np.testing.assert_allclose(found[0], PLA.stiffness)
-    turned = rotate_stiffness(CARBON.stiffness, axes(directions[1]))
-    np.testing.assert_allclose(found[1], 0.25 * turned + 0.75 * PLA.stiffness, atol=1e-8)
-    with pytest.raises(InputError, match=r"within \[0, 1\]; got 0.25 to 1.5"):
-        mix(directions, np.array([0.5, 0.25, 1.5]), CARBON, PLA)
-
-
-def test_to_plane_stress_is_the_textbook_stiffness():
-    e1, e2, nu12, g12 = 73200.0, 4100.0, 0.33, 2200.0
-    nu21 = nu12 * e2 / e1
-    d = 1.0 - nu12 * nu21
-    expected = np.array([[e1 / d, nu12 * e2 / d, 0], [nu12 * e2 / d, e2 / d, 0], [0, 0, g12]])
-    np.testing.assert_allclose(to_plane_stress(CARBON.stiffness), expected, rtol=1e-9, atol=1e-6)
-    pixels = mix(np.array([[[1.0, 0, 0], [0, 1.0, 0]]]), np.ones((1, 2)), CARBON, PLA)
-    found = to_plane_stress(pixels)
-    assert found.shape == (1, 2, 3, 3)
-    np.testing.assert_allclose(found[0, 1, 0, 0], e2 / d, rtol=1e-9)
 
 
 def test_other_symmetries_are_refused():

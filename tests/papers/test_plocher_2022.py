@@ -5,6 +5,7 @@ import tomllib
 import numpy as np
 import pytest
 
+from ccfem.papers.contents import claim_table, judged, write_figures
 from ccfem.papers.plocher_2022.contents import (
     EXPECTED,
     ROWS,
@@ -16,12 +17,10 @@ from ccfem.papers.plocher_2022.contents import (
     rank_table,
     raster_quantities,
     result_table,
-    verdicts,
 )
-from ccfem.papers.plocher_2022.figures import draw_all
+from ccfem.papers.plocher_2022.figures import figures
 from ccfem.papers.plocher_2022.plates import five_holes
 from ccfem.papers.plocher_2022.study import RASTER, run_case
-from ccfem.papers.verdicts import claim_table
 from ccfem.paths.raster.patterns import INFILL
 
 
@@ -97,7 +96,8 @@ def test_every_quantity_of_the_claims_is_computed(case, raster):
 
 
 def test_verdicts_follow_the_ranges():
-    checks = {c.quantity: c for c in verdicts({"agreement mps I": 90.0, "agreement mps II": 20.0})}
+    found = {"agreement mps I": 90.0, "agreement mps II": 20.0}
+    checks = {c.quantity: c for c in judged(found, EXPECTED)}
     assert checks["agreement mps I"].verdict == "reproduced"
     assert checks["agreement mps II"].verdict == "differs"
     assert checks["agreement mps III"].verdict == "not tried"
@@ -108,7 +108,7 @@ def test_verdicts_follow_the_ranges():
 
 
 def test_figures_and_tables(case, raster, tmp_path):
-    names = draw_all({"II": case}, {"II": raster}, tmp_path)
+    names = write_figures(figures({"II": case}, {"II": raster}), tmp_path)
     assert len(names) >= 8
     assert all((tmp_path / name).stat().st_size > 5000 for name in names)
     of_pixels = {"si_raw", "si_raw_mean", "isolated"}

@@ -5,7 +5,8 @@ import pytest
 
 from ccfem.base.errors import InputError
 from ccfem.comparison.plot.canvas import save
-from ccfem.papers.plocher_2022.radar import normalised, radar_picture
+from ccfem.papers.panels import canvas
+from ccfem.papers.plocher_2022.radar import draw_radar, normalised
 
 
 def test_the_best_of_every_index_has_one():
@@ -25,16 +26,19 @@ def test_values_that_cannot_be_scaled_are_refused():
     with pytest.raises(InputError, match="'low' or 'high'"):
         normalised(np.ones(2), "best")
     with pytest.raises(InputError, match="at least three"):
-        radar_picture({"a": [1.0, 2.0]}, {"x": "low", "y": "high"})
+        draw_radar(canvas(4.0, 4.0).add_subplot(), {"a": [1.0, 2.0]}, {"x": "low", "y": "high"})
     with pytest.raises(InputError, match="'a' has 2 values for 3"):
-        radar_picture({"a": [1.0, 2.0]}, {"x": "low", "y": "high", "z": "low"})
+        draw_radar(
+            canvas(4.0, 4.0).add_subplot(), {"a": [1.0, 2.0]}, {"x": "low", "y": "high", "z": "low"}
+        )
 
 
 def test_lines_join_the_scores_on_their_spokes(tmp_path):
     spokes = {"energy": "low", "stress": "low", "length": "high", "time": "low"}
     series = {"one": [1.0, 2.0, 3.0, 4.0], "two": [2.0, 2.0, 6.0, 2.0]}
-    figure = radar_picture(series, spokes, "Case")
-    (axes,) = figure.axes
+    figure = canvas(5.0, 4.2, dpi=150.0)
+    axes = figure.add_subplot()
+    draw_radar(axes, series, spokes)
     lines = {line.get_label(): line.get_xydata() for line in axes.lines}
     ends = np.array([[0.0, 1.0], [1.0, 0.0], [0.0, -1.0], [-1.0, 0.0]])
     expected = np.array([1.0, 1.0, 0.5, 0.5])[:, None] * ends

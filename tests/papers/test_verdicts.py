@@ -2,7 +2,7 @@
 
 import pytest
 
-from ccfem.papers.verdicts import claim_table, judged
+from ccfem.papers.contents import claim_table, judged
 
 CLAIMS = """
 [[claim]]

@@ -7,7 +7,7 @@ import pytest
 
 from ccfem.cases import create_case
 from ccfem.judging.evaluation.plane_paths import PlanePaths
-from ccfem.papers.verdicts import claim_table
+from ccfem.papers.contents import claim_table, judged, write_figures
 from ccfem.papers.wang_2021.contents import (
     EXPECTED,
     ROWS,
@@ -15,9 +15,8 @@ from ccfem.papers.wang_2021.contents import (
     quantities,
     result_table,
     speed_table,
-    verdicts,
 )
-from ccfem.papers.wang_2021.figures import draw_all
+from ccfem.papers.wang_2021.figures import figures
 from ccfem.papers.wang_2021.study import PATTERNS, PLATES, curvature_along, run_plate
 from ccfem.slicing.slicers.planar import Planar
 
@@ -85,7 +84,9 @@ def test_every_quantity_of_the_claims_is_computed(plate):
 
 
 def test_verdicts_follow_the_ranges():
-    checks = {c.quantity: c for c in verdicts({"width bridge": 185.0, "height bridge": 49.0})}
+    checks = {
+        c.quantity: c for c in judged({"width bridge": 185.0, "height bridge": 49.0}, EXPECTED)
+    }
     assert checks["width bridge"].verdict == "reproduced"
     assert checks["height bridge"].verdict == "differs"
     assert checks["width suspension"].verdict == "not tried"
@@ -95,7 +96,7 @@ def test_verdicts_follow_the_ranges():
 
 
 def test_figures_and_tables(plate, tmp_path):
-    names = draw_all({"l_shape": plate, "suspension": plate}, tmp_path)
+    names = write_figures(figures({"l_shape": plate, "suspension": plate}), tmp_path)
     assert len(names) >= 7
     assert all((tmp_path / name).stat().st_size > 5000 for name in names)
     assert result_table(plate).count("\n") == len(ROWS) + 2

@@ -13,7 +13,7 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh import TetMesh, box_mesh
 from ccfem.body.mesh.patches import Cylinder, patches_from_rules
 from ccfem.body.meshing import extrude
-from ccfem.cases.t_bracket import HOLES as WALLS
+from ccfem.cases.bodies import T_BRACKET_HOLES as WALLS
 from ccfem.fem.elasticity import Bearing, Force, GivenStress, Problem, Support, solve
 from ccfem.fem.materials import isotropic
 from ccfem.machine import Machine

@@ -3,9 +3,7 @@
 from ccfem.body.mesh.face_places import BodyFaces
 from ccfem.cases.inspection.beginning import examples, new_part, write_example
 from ccfem.cases.inspection.body_faces import faces
-from ccfem.cases.inspection.load_row import LoadRow
-from ccfem.cases.inspection.part_check import Check, check
-from ccfem.cases.inspection.patch_row import PatchRow
+from ccfem.cases.inspection.part_check import Check, LoadRow, PatchRow, check
 
 __all__ = [
     "BodyFaces",

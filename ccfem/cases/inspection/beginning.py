@@ -4,6 +4,7 @@ import os
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
+from string import Template
 
 import numpy as np
 
@@ -59,14 +60,15 @@ def new_part(
     existing_file(body, "the body")
     out = Path(f"{body.stem}.toml" if out is None else out)
     _refuse_present(out, force)
-    found = faces_of(body)
-    doubt = found.doubt
+    listing = faces_of(body)
+    doubt = listing.doubt
     if doubt:
-        found = faces_of(body, scale=1000.0)
-    faces, edge = found.faces, found.size / 25.0
+        listing = faces_of(body, scale=1000.0)
+    faces, edge = listing.faces, listing.size / 25.0
     held = max(range(len(faces)), key=lambda k: (_faces_down(faces[k]), faces[k].area))
-    feet = _beside(faces, held, 1e-3 * found.size)
-    centre = np.average([faces[k].centre for k in feet], axis=0, weights=_areas(faces, feet))
+    feet = _beside(faces, held, 1e-3 * listing.size)
+    areas = [max(faces[k].area, 1e-300) for k in feet]
+    centre = np.average([faces[k].centre for k in feet], axis=0, weights=areas)
     away = [float(np.linalg.norm(face.centre - centre)) for face in faces]
     others = [k for k in range(len(faces)) if k not in feet]
     meshable = [k for k in others if faces[k].area > edge**2]
@@ -76,7 +78,7 @@ def new_part(
     meshed = is_surface(body) or is_cad(body)
     with whole_file(out) as temporary:
         cells = edge if meshed else None
-        text = _text(body, cells, found, feet, pulled, pull.tolist(), doubt)
+        text = _text(body, cells, listing, feet, pulled, pull.tolist(), doubt)
         temporary.write_text(text, encoding="utf-8")
     return out
 
@@ -99,10 +101,6 @@ def _beside(faces: Sequence[Face], held: int, reach: float) -> list[int]:
     ]
 
 
-def _areas(faces: Sequence[Face], chosen: Sequence[int]) -> list[float]:
-    return [max(faces[k].area, 1e-300) for k in chosen]
-
-
 def _faces_down(face: Face) -> bool:
     return face.kind == "plane" and bool(face.direction[2] < -0.9)
 
@@ -115,7 +113,7 @@ def _refuse_present(out: Path, force: bool) -> None:
 def _text(
     body: Path,
     edge: float | None,
-    found: BodyFaces,
+    listing: BodyFaces,
     held: Sequence[int],
     pulled: int,
     pull: Sequence[float],
@@ -129,54 +127,29 @@ def _text(
     if doubt:
         given.append(f"scale = 1000                 # CHANGE: {doubt.partition(': scale')[0]}")
     listed = [
-        f"#   {number:>3}  at {place_text(found.point_on(face))}, {face.shape}"
-        + (f"  ({found.names[k]})" if any(found.names) else "")
-        for k, (number, face) in enumerate(zip(found.numbers, found.faces, strict=True))
+        f"#   {number:>3}  at {place_text(listing.point_on(face))}, {face.shape}"
+        + (f"  ({listing.names[k]})" if any(listing.names) else "")
+        for k, (number, face) in enumerate(zip(listing.numbers, listing.faces, strict=True))
     ][:_LISTED]
-    more = len(found.faces) - len(listed)
+    more = len(listing.faces) - len(listed)
     if more > 0:
         listed.append(f"#   and {more} smaller ones: ccfem faces {path}")
-    name = "".join(c if c.isalnum() or c in "-_" else "_" for c in body.stem)
-    return "\n".join(
-        [
-            f"# A part file for {path}: change what is marked, then",
-            "#",
-            "#     ccfem check FILE.toml      what is known before a solve",
-            "#     ccfem compare FILE.toml    plan by several strategies, say which is best",
-            "#",
-            "# All keys are described in ccfem/cases/part_file.py; `ccfem example` has more parts.",
-            "",
-            f'name = "{name}"',
-            *given,
-            'build = "z"                  # CHANGE: direction of printing',
-            "layers = 12                  # CHANGE: layers of fibre",
-            'material = "pla"             # CHANGE: or a table with modulus and poisson',
-            "",
-            "# Faces:",
-            *listed,
-            "",
-            "[patches.held]               # CHANGE: what is fixed",
-            *_rule(found, held),
-            "",
-            "[patches.pulled]             # CHANGE: where the load acts",
-            *_rule(found, [pulled]),
-            "",
-            "[[supports]]",
-            'patch = "held"',
-            "",
-            "[[loads.pull]]",
-            'kind = "force"',
-            'patch = "pulled"',
-            f"vector = [{', '.join(f'{x + 0.0:.1f}' for x in pull)}]   # CHANGE: N",
-            "",
-        ]
+    template = Template(files(__package__).joinpath("new_part.toml").read_text(encoding="utf-8"))
+    return template.substitute(
+        path=path,
+        name="".join(c if c.isalnum() or c in "-_" else "_" for c in body.stem),
+        body="\n".join(given),
+        faces="\n".join(listed),
+        held="\n".join(_rule(listing, held)),
+        pulled="\n".join(_rule(listing, [pulled])),
+        pull=", ".join(f"{x + 0.0:.1f}" for x in pull),
     )
 
 
-def _rule(found: BodyFaces, chosen: Sequence[int]) -> list[str]:
+def _rule(listing: BodyFaces, chosen: Sequence[int]) -> list[str]:
     """Lines of the rule for faces of one kind, by their places."""
-    numbers = [found.numbers[k] for k in chosen]
-    places = [found.place(number) for number in numbers]
+    numbers = [listing.numbers[k] for k in chosen]
+    places = [listing.place(number) for number in numbers]
     points = [place_text(np.array(place["at"])) for place in places]
     at = points[0] if len(points) == 1 else f"[{', '.join(points)}]"
     named = f"face{'s' if len(numbers) > 1 else ''} {', '.join(map(str, numbers))}"
@@ -193,8 +166,8 @@ def _rule(found: BodyFaces, chosen: Sequence[int]) -> list[str]:
 
 def examples() -> dict[str, str]:
     """Return the text of each example by its name."""
-    found = files("ccfem.cases").joinpath("examples").iterdir()
-    texts = {each.name: each.read_text(encoding="utf-8") for each in found}
+    folder = files("ccfem.cases").joinpath("examples")
+    texts = {file.name: file.read_text(encoding="utf-8") for file in folder.iterdir()}
     return {k.removesuffix(".toml"): texts[k] for k in sorted(texts) if k.endswith(".toml")}
 
 

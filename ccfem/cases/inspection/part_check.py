@@ -7,28 +7,173 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ccfem.base.arrays import FloatArray, IntArray, freeze
 from ccfem.base.display import Shown
 from ccfem.base.errors import Mistakes
 from ccfem.body.mesh.check import about_slivers
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases.case import Case
-from ccfem.cases.inspection.load_row import LoadRow, load_row
-from ccfem.cases.inspection.patch_row import PatchRow, patch_rows
 from ccfem.cases.reading import read
 from ccfem.fem.elasticity.held import Held
-from ccfem.fem.elasticity.load_kinds import kind_of, patches_of
-from ccfem.fem.elasticity.loads import load_case
+from ccfem.fem.elasticity.load_kinds import (
+    BodyForce,
+    Displacement,
+    Gravity,
+    Load,
+    SurfaceLoad,
+    Temperature,
+    in_words,
+    kind_of,
+    patches_of,
+)
+from ccfem.fem.elasticity.loads import load_case, nodal_forces
 from ccfem.fem.elasticity.order import MOST_CELLS
-from ccfem.fem.elasticity.plausibility import about_problem
+from ccfem.fem.elasticity.plausibility import about_problem, held_share
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.support_sets import support_sets
 from ccfem.fem.elasticity.supports import held
 from ccfem.fem.elasticity.system import prepare
+from ccfem.fem.elasticity.volume_loads import volume_forces
+from ccfem.geometry.facets import facet_keys
 from ccfem.geometry.measures import connected
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.planar import Planar
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+@dataclass(frozen=True)
+class PatchRow:
+    """A patch.
+
+    Attributes
+    ----------
+    area : float, mm^2
+    centre : (3,) array, mm
+        Of the area.
+    normal : (3,) array
+        Mean outward normal by area: of length 1 for a plane, 0 for a whole round wall.
+    pieces : int
+        That hang together through edges.
+    carries : str
+        Support and load cases on it, in words; empty for none.
+    """
+
+    name: str
+    area: float
+    centre: FloatArray
+    normal: FloatArray
+    facets: int
+    pieces: int
+    carries: str = ""
+
+    def __post_init__(self) -> None:
+        freeze(self, centre=float, normal=float)
+
+
+def patch_rows(mesh: TetMesh, carries: dict[str, list[str]]) -> tuple[PatchRow, ...]:
+    """Describe all patches of a mesh, those that carry something first."""
+    rows = []
+    for name in sorted(mesh.patches, key=lambda name: (name not in carries, name)):
+        facets = mesh.patches[name]
+        if not len(facets):
+            continue
+        area, normal = mesh.facet_areas(facets)
+        total = float(area.sum())
+        middle = mesh.points[facets[:, :3]].mean(axis=1)
+        rows.append(
+            PatchRow(
+                name,
+                total,
+                area @ middle / total,
+                area @ normal / total,
+                len(facets),
+                _count_pieces(facets[:, :3]),
+                "; ".join(dict.fromkeys(carries.get(name, []))),
+            )
+        )
+    return tuple(rows)
+
+
+def _count_pieces(facets: IntArray) -> int:
+    """Count the pieces of facets that share edges."""
+    (key,) = facet_keys(facets[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
+    order = np.argsort(key, kind="stable")
+    same = np.flatnonzero(np.diff(key[order]) == 0)
+    pairs = np.stack([order[same], order[same + 1]], axis=1) // 3
+    return len(np.unique(connected(pairs, len(facets))))
+
+
+_NONE = 1e-9
+"""Resultant over the sum of the sizes of the nodal forces that counts as none."""
+
+
+@dataclass(frozen=True)
+class LoadRow:
+    """A load.
+
+    Attributes
+    ----------
+    what : str
+        Kind and patch.
+    resultant : (3,) array, N
+        NaN for a temperature or a displacement.
+    moment : (3,) array, N mm
+        About the point of attack.
+    point : (3,) array, mm
+        Of attack: on the line of the resultant, nearest to the middle of the forces; their middle
+        where they have no resultant.
+    held : float
+        Share of the nodal forces of a load on a patch that supports take at once; 0 for a force of
+        the volume, whose share on held nodes is meant.
+    """
+
+    case: str
+    what: str
+    resultant: FloatArray
+    moment: FloatArray
+    point: FloatArray
+    held: float
+
+    def __post_init__(self) -> None:
+        freeze(self, resultant=float, moment=float, point=float)
+
+    @property
+    def size(self) -> float:
+        """Size of the resultant, N."""
+        return float(np.linalg.norm(self.resultant))
+
+
+def load_row(problem: Problem, case: str, load: Load, held: Held | None) -> LoadRow:
+    """Describe a load.
+
+    Raises
+    ------
+    InputError
+        For a load that its patch cannot take.
+    """
+    what = in_words(load)
+    if isinstance(load, Displacement | Temperature):
+        nothing = np.full(3, np.nan)
+        return LoadRow(case, what, nothing, nothing, nothing, 0.0)
+    if isinstance(load, SurfaceLoad):
+        forces = nodal_forces(problem.mesh, load)
+    else:
+        assert isinstance(load, BodyForce | Gravity)
+        forces = volume_forces(problem, load)
+    sizes = np.linalg.norm(forces, axis=1)
+    middle = sizes @ problem.mesh.points / sizes.sum()
+    total = forces.sum(axis=0)
+    turning = np.cross(problem.mesh.points - middle, forces).sum(axis=0)
+    point = middle
+    if np.linalg.norm(total) > _NONE * sizes.sum():
+        point = middle + np.cross(total, turning) / (total @ total)
+    else:
+        total = np.zeros(3)
+    moment = turning - np.cross(point - middle, total)
+    lost = 0.0 if held is None else held_share(problem, load, held)
+    return LoadRow(case, what, total, moment, point, lost)
 
 
 @dataclass(frozen=True)
@@ -136,23 +281,23 @@ def check(part: str | os.PathLike[str] | Case, **parameters: Any) -> Check:
         For a part that cannot be read; `InputError.mistakes` lists all that is wrong with it.
     """
     case = read(part, **parameters)
-    problem, found = case.problem, Mistakes()
+    problem, mistakes = case.problem, Mistakes()
     rows: list[LoadRow] = []
     doubts: list[str] = []
     sets = support_sets(problem)
-    for each in sets:
-        rows += _load_rows(each, found, doubts, len(sets) > 1)
+    for held_alike in sets:
+        rows += _load_rows(held_alike, mistakes, doubts, len(sets) > 1)
     order = list(problem.loads)
     rows.sort(key=lambda row: order.index(row.case))
     if not problem.loads:
-        found.lines.append("the part has no load case: give at least one load")
+        mistakes.lines.append("the part has no load case: give at least one load")
     layers = Mistakes()  # which keep the part from being planned on, not from being solved
     with layers.noted():
         if isinstance(case.slicing, Planar):
             case.slicing.check(problem.mesh, case.build, case.machine)
     doubts += layers.lines
     fibre: tuple[Layer, ...] = ()
-    with found.noted():
+    with mistakes.noted():
         fibre = _fibre_layers(case)
     return Check(
         case,
@@ -160,35 +305,37 @@ def check(part: str | os.PathLike[str] | Case, **parameters: Any) -> Check:
         patch_rows(problem.mesh, _carried(case)),
         tuple(rows),
         tuple(dict.fromkeys(_warnings(case, rows, doubts))),
-        tuple(dict.fromkeys(found.lines)),
+        tuple(dict.fromkeys(mistakes.lines)),
         fibre,
     )
 
 
-def _load_rows(problem: Problem, found: Mistakes, doubts: list[str], named: bool) -> list[LoadRow]:
+def _load_rows(
+    problem: Problem, mistakes: Mistakes, doubts: list[str], named: bool
+) -> list[LoadRow]:
     """Rows of the loads on one set of supports; mistakes are recorded, with the case if named.
 
     What is doubtful is added to `doubts`.
     """
     at_rest: Held | None = None
     rows, sound = [], []
-    with found.noted(f"load case '{next(iter(problem.loads))}': " if named else ""):
+    with mistakes.noted(f"load case '{next(iter(problem.loads))}': " if named else ""):
         at_rest = held(problem)
     for name, loads in problem.loads.items():
-        before = len(found.lines)
+        before = len(mistakes.lines)
         for load in loads:
-            with found.noted(f"load case '{name}': "):
+            with mistakes.noted(f"load case '{name}': "):
                 rows.append(load_row(problem, name, load, at_rest))
-        if len(found.lines) == before:
-            with found.noted():
+        if len(mistakes.lines) == before:
+            with mistakes.noted():
                 if at_rest is None:
                     load_case(problem, name)
                 else:
                     prepare(replace(problem, loads={name: loads}, combinations={}))
-        if len(found.lines) == before:
+        if len(mistakes.lines) == before:
             sound.append(name)
     if at_rest is not None and len(sound) == len(problem.loads) and problem.combinations:
-        with found.noted():
+        with mistakes.noted():
             prepare(problem)
     doubts += about_problem(problem, at_rest, sound)
     return rows
@@ -203,14 +350,14 @@ def _facts(case: Case) -> tuple[str, ...]:
     costs = " or, if their error is too large, ".join(
         cost.about for cost in solve_costs(case.problem)
     )
-    told = tuple(line for line in case.findings if _is_information(line))
+    information = tuple(line for line in case.findings if _is_information(line))
     return (
         f"{size} mm, {mesh.volumes.sum() / 1e3:.4g} cm^3, {case.problem.material.name}",
         f"{len(mesh.cells):,} {kind} cells, {len(mesh.points):,} nodes, {pieces} "
         f"piece{'s' if pieces > 1 else ''}",
         f"longest edge of a cell over its least height: {np.median(mesh.aspects):.3g} in the "
         f"middle, {mesh.aspects.max():.3g} at most",
-        *told,
+        *information,
         f"solve of a load case, {costs}",
     )
 
@@ -249,7 +396,7 @@ def _carried(case: Case) -> dict[str, list[str]]:
     problem = case.problem
     for support in problem.all_supports:
         held_along = getattr(support, "components", "")
-        within = [c for c, own in problem.case_supports.items() if support in own]
+        within = [c for c, supports in problem.case_supports.items() if support in supports]
         only = f" in {', '.join(within)}" if within and support not in problem.supports else ""
         for name in patches_of(support):
             word = kind_of(support)

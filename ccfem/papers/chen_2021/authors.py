@@ -5,7 +5,9 @@ Run with the environment variable ``CCFEM_CHEN2021`` set::
     python -m ccfem.papers.chen_2021.authors
 """
 
+import tomllib
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
@@ -24,66 +26,10 @@ from ccfem.slicing.slicers.planar import Planar
 PATHS = {"ours": "GcodeGenerater_Ours_raw.txt", "zigzag": "GcodeGenerater_Zigzag_Contour_raw.txt"}
 """File of each set of published paths: the authors' own and their zigzag with contours."""
 
-STATED = {
-    "ours": {
-        "length_min": 45.0,
-        "length_median": 168.0,
-        "length_max": 1211.0,
-        "curvature_50": 0.028,
-        "curvature_80": 0.066,
-        "curvature_95": 0.21,
-        "curvature_max": 3.7,
-        "curvature_ok": 0.960,
-        "spacing_1": 0.89,
-        "spacing_5": 1.11,
-        "spacing_50": 1.68,
-        "spacing_below": 0.020,
-        "coverage": 0.472,
-        "coverage_stress": 0.558,
-        "coverage_quartile_1": 0.27,
-        "coverage_quartile_2": 0.43,
-        "coverage_quartile_3": 0.55,
-        "coverage_quartile_4": 0.63,
-        "coverage_top_10": 0.64,
-        "aligned_10": 0.723,
-        "aligned_20": 0.850,
-        "aligned_30": 0.888,
-        "aligned_stress_10": 0.850,
-        "aligned_stress_20": 0.953,
-        "aligned_stress_30": 0.966,
-        "angle_mean": 11.7,
-        "efficiency": 0.918,
-    },
-    "zigzag": {
-        "length_min": 42.0,
-        "length_median": 368.0,
-        "length_max": 1678.0,
-        "curvature_50": 0.008,
-        "curvature_80": 0.10,
-        "curvature_95": 0.72,
-        "curvature_max": 1.5,
-        "curvature_ok": 0.919,
-        "spacing_1": 0.58,
-        "spacing_5": 0.90,
-        "spacing_50": 1.70,
-        "spacing_below": 0.093,
-        "coverage": 0.471,
-        "aligned_10": 0.184,
-        "aligned_20": 0.301,
-        "aligned_30": 0.399,
-        "aligned_stress_10": 0.284,
-        "aligned_stress_20": 0.455,
-        "aligned_stress_30": 0.564,
-        "angle_mean": 41.3,
-        "efficiency": 0.419,
-    },
-}
-"""Figures of the published Loop paths, all 20 layers, as an independent evaluation gave them.
-
-Where it measured another way: curvature at the published waypoints (`waypoint_curvature` does the
-same), not by arc length; spacing from sampled point to sampled point, not to the strand; the
-stress-weighted coverage and its quartiles on a grid whose plain coverage is .467, not .472.
-"""
+STATED: dict[str, dict[str, float]] = tomllib.loads(
+    Path(__file__).with_name("stated.toml").read_text(encoding="utf-8")
+)
+"""Figures of the published Loop paths, as an independent evaluation gave them."""
 
 TABLE_2 = {"ours": 34.658, "zigzag": 35.895}
 """Length of fibre, m, in the paper's Table 2: the first 12 layers."""

@@ -51,7 +51,7 @@ def turns_at(
     turn = np.tile(np.eye(3), (len(mesh.cells), 1, 1))
     stress = np.zeros_like(turn)
     first = stress
-    moved, found = 0.0, {}
+    moved, angles = 0.0, {}
     for stop in stops:
         while moved < stop - 1e-9:
             by = min(step, stop - moved)
@@ -63,8 +63,8 @@ def turns_at(
             first = stress if moved == 0.0 else first
             moved += by
         still = np.broadcast_to(np.eye(3), turn.shape)
-        found[stop] = Turned(turned_by(first, stress, still), turned_by(first, stress, turn))
-    return found
+        angles[stop] = Turned(turned_by(first, stress, still), turned_by(first, stress, turn))
+    return angles
 
 
 def turned_by(first: FloatArray, last: FloatArray, turn: FloatArray) -> FloatArray:

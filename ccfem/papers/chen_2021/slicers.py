@@ -105,7 +105,8 @@ def slicer_paths(
     """
     section = layers[len(layers) // 2]
     filled = {
-        one: _fill(section, pattern, one, density) for one in dict.fromkeys((angle, angle + turn))
+        direction: _fill(section, pattern, direction, density)
+        for direction in dict.fromkeys((angle, angle + turn))
     }
     return Toolpaths.concatenate(
         Toolpaths.from_plane(filled[angle + (turn if k % 2 else 0.0)], layer)
@@ -180,10 +181,10 @@ def _fill(layer: Layer, pattern: str, angle: float, density: float) -> list[Floa
                 f"{PROGRAM} gave nothing in {_SECONDS:g} s: run it by hand on the section"
             ) from None
         if done.returncode != 0 or not printed.is_file():
-            said = (done.stderr.strip() or done.stdout.strip() or "nothing").splitlines()[-1]
+            message = (done.stderr.strip() or done.stdout.strip() or "nothing").splitlines()[-1]
             raise InputError(
                 f"{PROGRAM} refused {pattern} at {angle:g} degrees, {density:.4g}: it said "
-                f"'{said}': correct the pattern, the angle or the density"
+                f"'{message}': correct the pattern, the angle or the density"
             )
         lines = extrusion_lines(printed.read_text(encoding="utf-8"), f"G-code of {PROGRAM}")
     middle = 0.5 * (layer.plane.points.min(axis=0) + layer.plane.points.max(axis=0))
@@ -275,16 +276,16 @@ def _parse(raw: str, where: str) -> tuple[str, dict[int, float]]:
     command, *rest = bare.split() or [""]
     if command == "" or (command[0] == "M" and command[1:].isdigit()) or command == "G21":
         return command, {}
-    found = [_WORD.fullmatch(word) for word in rest]
+    matches = [_WORD.fullmatch(word) for word in rest]
     known = command in ("G0", "G1", "G28", "G90", "G91", "G92")
-    letters = [match[1] for match in found if match]
-    if not known or None in found or len(set(letters)) < len(rest) or set(letters) - set("XYZEF"):
+    letters = [match[1] for match in matches if match]
+    if not known or None in matches or len(set(letters)) < len(rest) or set(letters) - set("XYZEF"):
         raise InputError(
             f"{where}: expected G0 or G1 with X, Y, Z, E, F, or G21, G28, G90, G91, G92, M..; got "
             f"'{bare[:40]}': slice without arcs, in mm"
         )
     values = {
-        "XYZE".index(match[1]): float(match[2]) for match in found if match and match[1] != "F"
+        "XYZE".index(match[1]): float(match[2]) for match in matches if match and match[1] != "F"
     }
     return command, values
 

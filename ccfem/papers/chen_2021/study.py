@@ -119,7 +119,7 @@ class Study:
 
 def joined(stages: list[LayerStages]) -> Toolpaths:
     """Paths of several layers as one."""
-    return Toolpaths.concatenate([each.paths for each in stages])
+    return Toolpaths.concatenate([layer.paths for layer in stages])
 
 
 def model(name: str, case: Case, layers: int = 12) -> Model:
@@ -177,7 +177,7 @@ def _compared(loop: Model) -> dict[str, tuple[Toolpaths, float]]:
     """Paths of equal length and what they make of the part, with fibres that carry tension only."""
     paths, machine = loop.paths, loop.case.machine
     wanted = float(paths.lengths.sum()) / len(loop.layers)
-    found = {
+    designs = {
         "the paper's algorithm": paths,
         "contour_zigzag": plan_to_length(
             create("contour_zigzag", {"turns": "tight"}), loop.layers, loop.stress, machine, wanted
@@ -186,7 +186,8 @@ def _compared(loop: Model) -> dict[str, tuple[Toolpaths, float]]:
     }
     specimen = Specimen.of(loop.stress)
     return {
-        name: (each, virtual_test(each, specimen, span=()).ratio) for name, each in found.items()
+        name: (design, virtual_test(design, specimen, span=()).ratio)
+        for name, design in designs.items()
     }
 
 

@@ -26,6 +26,7 @@ from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.judging.virtual_testing.strands import Strands, cut_strands
 from ccfem.judging.virtual_testing.strength import first_failure, matrix_peak
 from ccfem.judging.virtual_testing.virtual_test import virtual_bracket, virtual_test
+from ccfem.papers.chen_2021.authors import PATHS
 from ccfem.papers.chen_2021.loop import LAYERS_TABLE_2, authors_folder, authors_loop
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.export.waypoints import read_waypoints
@@ -43,12 +44,10 @@ _HEIGHT = 10.0
 _FRAME = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """Axes of the tool, X, Y and Z, in the frame of the mesh."""
 
-_FILES = {"zigzag": "GcodeGenerater_Zigzag_Contour_raw.txt", "ours": "GcodeGenerater_Ours_raw.txt"}
-
 
 def authors_paths(name: str, layers: int = LAYERS_TABLE_2) -> Toolpaths:
     """Paths of the authors' first `layers` layers, "ours" or "zigzag", evenly over the height."""
-    paths = read_waypoints(authors_folder() / "Loop" / _FILES[name], _FRAME)
+    paths = read_waypoints(authors_folder() / "Loop" / PATHS[name], _FRAME)
     paths = paths.select(paths.layer < layers)
     points = np.array(paths.points)
     points[:, 1] = (np.repeat(paths.layer, np.diff(paths.offsets)) + 0.5) * _HEIGHT / layers
@@ -64,50 +63,6 @@ def ratios(
         for name in ("zigzag", "ours")
     )
     return zigzag, ours, ours / zigzag
-
-
-def main() -> None:
-    """Print the ratios and first-failure loads beside the physical ones."""
-    case = authors_loop()
-    field = solve(case.problem)["pull"]
-    specimen = Specimen.of(field)
-    strands = {name: cut_strands(authors_paths(name), field.mesh) for name in _FILES}
-    print("Loop, stiffness:             zigzag/none  ours/none  ours/zigzag")
-    print("physical, one specimen each       {:6.2f}     {:6.2f}       {:6.2f}".format(*PHYSICAL))
-    for mode in ("bonded", "tension"):
-        for rho in (2.15, 2.25, 4.0, 4.25):
-            found = ratios(specimen, strands, rho, mode)
-            text = "{:6.3f}     {:6.3f}       {:6.3f}".format(*found)
-            print(f"{mode:8} rho {rho:4.2f} mm^2          {text}")
-
-    carbon, area = named_material("c_fram"), case.machine.filament_area
-    smeared = [oriented_ratio(strands[name], field, carbon, area)[0] for name in strands]
-    text = "{:6.3f}     {:6.3f}       {:6.3f}".format(*smeared, smeared[1] / smeared[0])
-    rho = area / np.linalg.inv(carbon.stiffness)[0, 0] / specimen.modulus
-    print(f"smeared  rho {rho:4.2f} mm^2          {text}")
-
-    print(
-        "\nfirst failure, kN (tension only, rho 4, one matrix strength): predicted, measured peak"
-    )
-    index, _ = matrix_peak(field)
-    print(f"none    {MATRIX_STRENGTH / index:5.2f} {_PEAKS['none']:5.2f}  in the matrix")
-    brackets = {}
-    for name in ("zigzag", "ours"):
-        brackets[name] = virtual_bracket(strands[name], specimen, span=())
-        failure = first_failure(brackets[name].tension, matrix_strength=MATRIX_STRENGTH)
-        print(f"{name:7} {1e-3 * failure.load:5.2f} {_PEAKS[name]:5.2f}  in the {failure.what}")
-    said = {FIRST: "ours", SECOND: "zigzag"}
-    verdict = stiffer(brackets["ours"], brackets["zigzag"])
-    print(f"stiffer: {said.get(verdict, verdict)}")
-
-    bearing = replace(case.problem, loads={"bearing": (Bearing("load", (0.0, 0.0, 1000.0)),)})
-    pressed = virtual_test(strands["ours"], solve(bearing)["bearing"], span=())
-    print(f"ours/none under a bearing load on the same hole, rho 4, tension: {pressed.ratio:.3f}")
-    print(f"\n{HONEST_PROMISE}")
-
-
-if __name__ == "__main__":
-    main()
 
 
 # Oriented stiffness: fibres smeared over the cells, instead of bars in them.
@@ -178,41 +133,6 @@ def oriented_stiffness(fourth: FloatArray, fibre: Material) -> FloatArray:
     return isotropic + alpha * crossed + 2.0 * (along - transverse) * both + beta * fourth
 
 
-def mix(directions: FloatArray, share: FloatArray, fibre: Material, matrix: Material) -> FloatArray:
-    """Stiffness of pixels, or cells, with one fibre direction each.
-
-    Parameters
-    ----------
-    directions : (..., 3) array
-        Along the fibre; normalised here, sign free.
-    share : (...,) array in [0, 1]
-        Volume share of the fibre.
-
-    Returns
-    -------
-    (..., 6, 6) array, MPa
-    """
-    share = np.asarray(share, dtype=np.float64)
-    if not ((share >= 0.0) & (share <= 1.0)).all():
-        raise InputError(
-            f"the share of fibre must be within [0, 1]; got {share.min():.4g} to {share.max():.4g}"
-        )
-    a = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
-    m = to_voigt(a[..., :, None] * a[..., None, :])
-    smeared = oriented_stiffness(m[..., :, None] * m[..., None, :], fibre)
-    return matrix.stiffness + share[..., None, None] * (smeared - matrix.stiffness)
-
-
-def to_plane_stress(stiffness: FloatArray) -> FloatArray:
-    """Condense stiffness (..., 6, 6) to plane stress (..., 3, 3) in 11, 22, 12, MPa."""
-    kept, free = np.array([0, 1, 5]), np.array([2, 3, 4])
-    inner = stiffness[..., free[:, None], free]
-    across = stiffness[..., free[:, None], kept]
-    return stiffness[..., kept[:, None], kept] - np.swapaxes(across, -1, -2) @ np.linalg.solve(
-        inner, across
-    )
-
-
 def oriented_problem(problem: Problem, strands: Strands, fibre: Material, area: float) -> Problem:
     """Return the problem with the stiffness of fibre and matrix mixed in each cell.
 
@@ -263,3 +183,47 @@ def oriented_ratio(
     specimen = Specimen.of(part, backend)
     before = specimen.stiffness(part.displacement, part.strain_energy)
     return specimen.stiffness(after.displacement, after.strain_energy) / before, after
+
+
+def main() -> None:
+    """Print the ratios and first-failure loads beside the physical ones."""
+    case = authors_loop()
+    field = solve(case.problem)["pull"]
+    specimen = Specimen.of(field)
+    strands = {name: cut_strands(authors_paths(name), field.mesh) for name in ("zigzag", "ours")}
+    print("Loop, stiffness:             zigzag/none  ours/none  ours/zigzag")
+    print("physical, one specimen each       {:6.2f}     {:6.2f}       {:6.2f}".format(*PHYSICAL))
+    for mode in ("bonded", "tension"):
+        for rho in (2.15, 2.25, 4.0, 4.25):
+            triple = ratios(specimen, strands, rho, mode)
+            text = "{:6.3f}     {:6.3f}       {:6.3f}".format(*triple)
+            print(f"{mode:8} rho {rho:4.2f} mm^2          {text}")
+
+    carbon, area = named_material("c_fram"), case.machine.filament_area
+    smeared = [oriented_ratio(strands[name], field, carbon, area)[0] for name in strands]
+    text = "{:6.3f}     {:6.3f}       {:6.3f}".format(*smeared, smeared[1] / smeared[0])
+    rho = area / np.linalg.inv(carbon.stiffness)[0, 0] / specimen.modulus
+    print(f"smeared  rho {rho:4.2f} mm^2          {text}")
+
+    print(
+        "\nfirst failure, kN (tension only, rho 4, one matrix strength): predicted, measured peak"
+    )
+    index, _ = matrix_peak(field)
+    print(f"none    {MATRIX_STRENGTH / index:5.2f} {_PEAKS['none']:5.2f}  in the matrix")
+    brackets = {}
+    for name in ("zigzag", "ours"):
+        brackets[name] = virtual_bracket(strands[name], specimen, span=())
+        failure = first_failure(brackets[name].tension, matrix_strength=MATRIX_STRENGTH)
+        print(f"{name:7} {1e-3 * failure.load:5.2f} {_PEAKS[name]:5.2f}  in the {failure.what}")
+    names = {FIRST: "ours", SECOND: "zigzag"}
+    verdict = stiffer(brackets["ours"], brackets["zigzag"])
+    print(f"stiffer: {names.get(verdict, verdict)}")
+
+    bearing = replace(case.problem, loads={"bearing": (Bearing("load", (0.0, 0.0, 1000.0)),)})
+    pressed = virtual_test(strands["ours"], solve(bearing)["bearing"], span=())
+    print(f"ours/none under a bearing load on the same hole, rho 4, tension: {pressed.ratio:.3f}")
+    print(f"\n{HONEST_PROMISE}")
+
+
+if __name__ == "__main__":
+    main()

@@ -9,7 +9,7 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.bisection import bisected
 from ccfem.body.mesh.patches import patches_from_rules
 from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.cases.t_bracket import HOLES
+from ccfem.cases.bodies import T_BRACKET_HOLES
 from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.fem.elasticity.problem import Bearing, Problem, Support
 from ccfem.fem.elasticity.solve import solve
@@ -34,7 +34,7 @@ def authors_mesh() -> TetMesh:
     """84,056 tetrahedra with the walls of the holes as patches."""
     with np.load(authors_folder() / "TBracket-solid.npz") as archive:
         mesh = TetMesh(archive["V"], archive["T"])
-    return patches_from_rules(mesh, HOLES)
+    return patches_from_rules(mesh, T_BRACKET_HOLES)
 
 
 def finer_mesh() -> TetMesh:

@@ -1,6 +1,5 @@
 """What of Fang et al. 2024 can be made again."""
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,25 +9,23 @@ import numpy as np
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
 from ccfem.base.progress import Progress, silent
-from ccfem.cases.t_bracket import t_bracket
+from ccfem.cases.shipped import t_bracket
 from ccfem.comparison.files import write_results
 from ccfem.comparison.plot.canvas import png
 from ccfem.comparison.plot.stack_page import space_picture, turning_page
 from ccfem.comparison.result import Comparison
-from ccfem.fem.elasticity.ball import BALL, ball_averages
 from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.fem.elasticity.zone import ZONE, distance_from_patches
 from ccfem.geometry.locate import locate
-from ccfem.judging.virtual_testing.interlayer import layer_normals
 from ccfem.machine import Machine
-from ccfem.papers.contents import Contents
+from ccfem.papers.contents import Contents, table, write_claims
 from ccfem.papers.fang_2024.authors import authors_mesh, authors_stress, finer_mesh
 from ccfem.papers.fang_2024.measures import Strands
 from ccfem.papers.fang_2024.planar_against_curved import ROWS, against, failure_loads
 from ccfem.papers.fang_2024.t_bracket import PAPER_SECONDS, study, timed_chain
-from ccfem.papers.verdicts import Check, claim_table, judged
+from ccfem.papers.layer_traction import layer_traction
 from ccfem.paths.planning import plan
 from ccfem.paths.toolpaths import MATRIX
 from ccfem.printing.export.robot_waypoints import write_robot_waypoints
@@ -36,6 +33,9 @@ from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.spatial import Spatial, SpatialSlicing
 from ccfem.strategies import create
 from ccfem.strategies.winding_curves.piece import pieces_with_joints
+
+EXPECTED = Path(__file__).with_name("expected.toml")
+"""Claims of the paper, with the ranges that count as reproduced."""
 
 # The whole of the paper: its study, figures, tables and claims beside ours.
 
@@ -51,8 +51,8 @@ def write_all(
     sliced, paths = chain.sliced, chain.strands
     finer = timed_chain(authors_stress(finer_mesh(), order=1)).seconds
     strands = study(stress, sliced)
-    laid = set(paths.layer.tolist())
-    reached = field_figures(sliced, stress, laid)
+    with_fibre = set(paths.layer.tolist())
+    reached = field_figures(sliced, stress, with_fibre)
     targets = targets_table(reached, strands, chain.seconds, finer)
     (folder / "targets.md").write_text(targets, encoding="utf-8")
     print(f"\n{targets}", flush=True)
@@ -73,14 +73,11 @@ def write_all(
         tests[load] = against(load)
         (folder / load).mkdir(exist_ok=True)
         write_results(tests[load], folder / load)
-    found = quantities(field, strands, chain.seconds, tests)
-    found["170 k cells: seconds"] = finer["all, clock"]
+    values = quantities(field, strands, chain.seconds, tests)
+    values["170 k cells: seconds"] = finer["all, clock"]
     if "pull" in tests:
-        found |= _failures_explained(tests["pull"], folder)
-    (folder / "quantities.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
-    claims = claim_table(verdicts(found))
-    (folder / "claims.md").write_text(claims, encoding="utf-8")
-    print(f"\n{claims}")
+        values |= _failures_explained(tests["pull"], folder)
+    print(f"\n{write_claims(folder, values, EXPECTED)}")
 
 
 def _failures_explained(pulled: Comparison, folder: Path) -> dict[str, float]:
@@ -88,18 +85,15 @@ def _failures_explained(pulled: Comparison, folder: Path) -> dict[str, float]:
     where = {"walls fixed": openings(pulled), "bolts press": openings(pulled, pressing=True)}
     tensile = pulled.case.problem.material.interlayer_tensile
     assert tensile is not None
-    table = openings_table(where, tensile)
-    (folder / "where_layers_open.md").write_text(table, encoding="utf-8")
+    text = openings_table(where, tensile)
+    (folder / "where_layers_open.md").write_text(text, encoding="utf-8")
     title = f"Pull on the head: load that opens the layers, bond of {tensile:g} MPa"
     openings_picture(where, title, folder / "where_layers_open.png")
-    print(f"\n{table}", flush=True)
+    print(f"\n{text}", flush=True)
     return bonds_needed(where, tensile)
 
 
 # The claims of the paper beside ours: every quantity is computed from a run.
-
-
-EXPECTED = Path(__file__).with_name("expected.toml")
 
 
 def quantities(
@@ -109,45 +103,40 @@ def quantities(
     tests: Mapping[str, Comparison],
 ) -> dict[str, float]:
     """Every quantity that `expected.toml` may name; orders that hold are 1, others 0."""
-    found = {**field, **{f"seconds, {name}": value for name, value in seconds.items()}}
+    values = {**field, **{f"seconds, {name}": value for name, value in seconds.items()}}
     for name, figures in strands.items():
-        found |= {f"{name}: {key}": value for key, value in figures.table().items()}
+        values |= {f"{name}: {key}": value for key, value in figures.table().items()}
     for figure, name in (("thickness ratio", "thickness ratio"), ("pieces a layer", "pieces")):
-        ratio = found[f"all lines {figure}"] / found[f"default {figure}"]
-        found[f"all lines {name} over default"] = ratio
-    found["time over the paper's"] = seconds["all, clock"] / PAPER_SECONDS["all"]
+        ratio = values[f"all lines {figure}"] / values[f"default {figure}"]
+        values[f"all lines {name} over default"] = ratio
+    values["time over the paper's"] = seconds["all, clock"] / PAPER_SECONDS["all"]
     for load, compared in tests.items():
-        found |= _loads(load, compared)
-    return found
+        values |= _loads(load, compared)
+    return values
 
 
 def _loads(load: str, compared: Comparison) -> dict[str, float]:
     """Orders of slicings under one load, with fixed and with pressing supports."""
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     for held, end in (("fixed", ""), ("pressing", "_alternative")):
         about = f"{load}, {held}"
         fails = failure_loads(compared, f"first_failure_load{end}")
         stiff = failure_loads(compared, f"stiffness_ratio_tension{end}")
         z, x, y = (fails[f"planar {axis}"] for axis in "zxy")
         curved = fails["spatial"]
-        found[f"{about}: z below x"] = float(z < x)
-        found[f"{about}: x below spatial"] = float(x < curved)
-        found[f"{about}: spatial above all flat"] = float(curved > max(x, y, z))
-        found[f"{about}: z over x"] = z / x
-        found[f"{about}: y over x"] = y / x
-        found[f"{about}: spatial over the weakest"] = curved / min(x, y, z)
-        found[f"{about}: spatial stiffest"] = float(stiff["spatial"] >= max(stiff.values()))
+        values[f"{about}: z below x"] = float(z < x)
+        values[f"{about}: x below spatial"] = float(x < curved)
+        values[f"{about}: spatial above all flat"] = float(curved > max(x, y, z))
+        values[f"{about}: z over x"] = z / x
+        values[f"{about}: y over x"] = y / x
+        values[f"{about}: spatial over the weakest"] = curved / min(x, y, z)
+        values[f"{about}: spatial stiffest"] = float(stiff["spatial"] >= max(stiff.values()))
     for name in ("planar z", "planar x", "planar y", "spatial"):
-        found[f"{load}, {name}: angle to stress"] = failure_loads(compared, "space_angle_stress")[
+        values[f"{load}, {name}: angle to stress"] = failure_loads(compared, "space_angle_stress")[
             name
         ]
-        found[f"{load}, {name}: joints linked"] = failure_loads(compared, "joints_linked")[name]
-    return found
-
-
-def verdicts(found: Mapping[str, float]) -> list[Check]:
-    """Judge the claims of the paper by the quantities found."""
-    return judged(found, EXPECTED)
+        values[f"{load}, {name}: joints linked"] = failure_loads(compared, "joints_linked")[name]
+    return values
 
 
 # The field and its layers under other weights, thicknesses, terms of the joints, and meshes.
@@ -182,7 +171,7 @@ def field_study(fine: SpatialSlicing) -> dict[str, float]:
         Of the authors' part, with the default parameters.
     """
     stress = solve(t_bracket(order=1).problem)["pull"]
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     slicings: dict[str, SpatialSlicing] = {}
     for name, given in VARIANTS.items():
         try:
@@ -190,57 +179,57 @@ def field_study(fine: SpatialSlicing) -> dict[str, float]:
         except InputError as error:
             print(f"{name}: {error}")
             continue
-        found |= _figures(name, slicings[name])
-    found |= _figures("84 k cells", fine)
-    found["degrees between normals on 30 k and 84 k cells"] = _between(slicings["default"], fine)
+        values |= _figures(name, slicings[name])
+    values |= _figures("84 k cells", fine)
+    values["degrees between normals on 30 k and 84 k cells"] = _between(slicings["default"], fine)
     for name, cut in (("cut", True), ("no cut", False)):
         layers = slicings["default"].layers
         paths = plan(create("winding", {"cut": cut}), layers, stress, Machine())
-        found[f"{name} strands a layer"] = len(paths) / len(np.unique(paths.layer))
-    return found
+        values[f"{name} strands a layer"] = len(paths) / len(np.unique(paths.layer))
+    return values
 
 
 def _figures(name: str, slicing: SpatialSlicing) -> dict[str, float]:
     quality = vars(slicing.quality)
     pieces = [int(layer.component.max()) + 1 for layer in slicing.layers]
-    found = {f"{name} {column}": float(quality[column]) for column in COLUMNS}
+    values = {f"{name} {column}": float(quality[column]) for column in COLUMNS}
     ratio = quality["thickness_95"] / quality["thickness_5"]
     return {
-        **found,
+        **values,
         f"{name} thickness ratio": float(ratio),
         f"{name} pieces a layer": float(np.mean(pieces)),
         f"{name} layers": float(len(slicing.layers)),
     }
 
 
-def _between(one: SpatialSlicing, other: SpatialSlicing) -> float:
+def _between(coarse: SpatialSlicing, fine: SpatialSlicing) -> float:
     """Mean angle, degrees, by volume, between the normals of two fields on meshes of one part.
 
     The part is its own mirror image in z, and so are fields of other signs of as low an energy:
     the nearer of the two counts.
     """
-    mesh, own = other.field.mesh, one.field.mesh
-    centre = own.points[own.corners].mean(axis=1)
-    found = []
+    mesh, coarse_mesh = fine.field.mesh, coarse.field.mesh
+    centre = coarse_mesh.points[coarse_mesh.corners].mean(axis=1)
+    angles = []
     for mirror in ([1.0, 1.0, 1.0], [1.0, 1.0, -1.0]):
         holder, _ = locate(mesh.points, mesh.corners, centre * mirror, 2.0)
         inside = holder >= 0
-        a, b = one.field.gradient[inside], other.field.gradient[holder[inside]] * mirror
+        a, b = coarse.field.gradient[inside], fine.field.gradient[holder[inside]] * mirror
         size = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
         cosine = np.abs(np.einsum("ed,ed->e", a, b)) / np.maximum(size, 1e-300)
         angle = np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0)))
-        found.append(float(np.average(angle, weights=own.volumes[inside])))
-    return min(found)
+        angles.append(float(np.average(angle, weights=coarse_mesh.volumes[inside])))
+    return min(angles)
 
 
-def field_table(found: dict[str, float]) -> str:
+def field_table(figures: Mapping[str, float]) -> str:
     """Markdown table of the variants."""
     heads = (*COLUMNS, "thickness ratio", "pieces a layer", "layers")
-    lines = [f"| field | {' | '.join(heads)} |", "|---" * (len(heads) + 1) + "|"]
-    for name in (*VARIANTS, "84 k cells"):
-        values = [found.get(f"{name} {head}", np.nan) for head in heads]
-        lines.append(f"| {name} | {' | '.join(f'{value:.3g}' for value in values)} |")
-    return "\n".join(lines)
+    rows = [
+        (name, *(f"{figures.get(f'{name} {head}', np.nan):.3g}" for head in heads))
+        for name in (*VARIANTS, "84 k cells")
+    ]
+    return table(("field", *heads), rows)
 
 
 # What layers and strands on the T-bracket have to reach, in one table beside the authors' own.
@@ -281,26 +270,28 @@ _SECONDS = (
 _FINER = _Target("all, clock", 0.0, 40.0)
 
 
-def field_figures(sliced: SpatialSlicing, stress: PartStress, laid: set[int]) -> dict[str, float]:
+def field_figures(
+    sliced: SpatialSlicing, stress: PartStress, with_fibre: set[int]
+) -> dict[str, float]:
     """Figures of the layers by the names of their targets.
 
     Parameters
     ----------
-    laid : set of int
-        Layers with fibre.
+    with_fibre : set of int
+        Numbers of layers.
     """
     names, quality = stress.held_or_loaded, sliced.quality
     whole = {
         layer.index
         for layer in sliced.layers
-        if max((len(one.loops) for one in pieces_with_joints(layer, names)), default=0) == 3
+        if max((len(piece.loops) for piece in pieces_with_joints(layer, names)), default=0) == 3
     }
     figures = (
         quality.angle_mean,
         quality.thickness_5,
         quality.thickness_50,
         quality.thickness_95,
-        float(len(whole - laid)),
+        float(len(whole - with_fibre)),
     )
     return {target.figure: value for target, value in zip(_FIELD, figures, strict=True)}
 
@@ -313,21 +304,32 @@ def targets_table(
 ) -> str:
     """Markdown table: figure, ours, ours with ``even``, the authors', what is wanted, verdict."""
     ours, even, theirs = (strands[name].table() for name in ("winding", "winding, even", "authors"))
-    head = "| figure | winding | winding, even | authors, same stress | wanted | aim | verdict |"
-    lines = [head, "|---" * 7 + "|"]
-    lines += [_row(target, field[target.figure]) for target in _FIELD]
+    rows = [_target_row(target, field[target.figure]) for target in _FIELD]
     for target in _STRANDS:
         name = target.figure
-        lines.append(_row(target, ours[name], f"{even[name]:.3g}", f"{theirs[name]:.3g}"))
-    lines += [
-        _row(target, seconds[target.figure], name=f"seconds: {target.figure}")
+        rows.append(_target_row(target, ours[name], f"{even[name]:.3g}", f"{theirs[name]:.3g}"))
+    rows += [
+        _target_row(target, seconds[target.figure], name=f"seconds: {target.figure}")
         for target in _SECONDS
     ]
-    lines.append(_row(_FINER, finer[_FINER.figure], name="seconds, 170 thousand cells: all, clock"))
-    return "\n".join(lines)
+    rows.append(
+        _target_row(_FINER, finer[_FINER.figure], name="seconds, 170 thousand cells: all, clock")
+    )
+    head = (
+        "figure",
+        "winding",
+        "winding, even",
+        "authors, same stress",
+        "wanted",
+        "aim",
+        "verdict",
+    )
+    return table(head, rows)
 
 
-def _row(target: _Target, ours: float, even: str = "", theirs: str = "", name: str = "") -> str:
+def _target_row(
+    target: _Target, ours: float, even: str = "", theirs: str = "", name: str = ""
+) -> tuple[str, ...]:
     met = target.low <= ours <= target.high
     if target.high == _INF:
         wanted = f"at least {target.low:g}"
@@ -340,8 +342,7 @@ def _row(target: _Target, ours: float, even: str = "", theirs: str = "", name: s
         aim = f"{target.aim:g}"
         reached = ours >= target.aim if target.high == _INF else ours <= target.aim
         verdict += ", aim reached" if reached else ", aim missed"
-    shown = name or target.figure
-    return f"| {shown} | {ours:.4g} | {even} | {theirs} | {wanted} | {aim} | {verdict} |"
+    return name or target.figure, f"{ours:.4g}", even, theirs, wanted, aim, verdict
 
 
 # Why the paper's order of failure loads comes out or not: the load that opens layers, by place.
@@ -377,24 +378,24 @@ class Opening(NamedTuple):
         return float(self.load[(height > low) & (height <= high)].min())
 
 
-def openings(found: Comparison, pressing: bool = False) -> dict[str, Opening]:
+def openings(compared: Comparison, pressing: bool = False) -> dict[str, Opening]:
     """Find the loads for the paper's slicings with its strategies on them.
 
     Parameters
     ----------
-    found : Comparison
+    compared : Comparison
         With virtual tests.
     pressing : bool
         Under bolts that only press, not fixed walls.
     """
     result = {}
     for slicing, strategy in ROWS.items():
-        one = found.slicings[slicing]
-        tested = next(run.tested for run in one.runs if run.name == strategy)
+        sliced = compared.slicings[slicing]
+        tested = next(run.tested for run in sliced.runs if run.name == strategy)
         tested = tested.alternative if pressing and tested is not None else tested
         if tested is not None:
             test = tested.bracket.tension
-            result[slicing] = _opening(test.solution, one.layers, test.force)
+            result[slicing] = _opening(test.solution, sliced.layers, test.force)
     return result
 
 
@@ -403,47 +404,41 @@ def _opening(stress: StressField, layers: tuple[Layer, ...], force: float) -> Op
     mesh, material = stress.mesh, stress.problem.material
     middle = mesh.points[mesh.corners].mean(axis=1)
     judged = np.flatnonzero(distance_from_patches(stress.problem, stress.case, middle, ZONE) > ZONE)
-    values = stress.stress.reshape(-1, 9)
-    tensor = ball_averages(middle, values, mesh.volumes, judged, BALL).reshape(-1, 3, 3)
-    normal = layer_normals(layers, middle[judged])
-    traction = np.einsum("mij,mj->mi", tensor, normal)
-    across = np.einsum("mi,mi->m", traction, normal)
-    along = np.linalg.norm(traction - across[:, None] * normal, axis=1)
+    opening, sliding = layer_traction(stress, layers, judged)
     tensile = material.interlayer_tensile
     assert tensile is not None
     shear = tensile if material.interlayer_shear is None else material.interlayer_shear
-    index = np.hypot(np.maximum(across, 0.0) / tensile, along / shear)
+    index = np.hypot(np.maximum(opening, 0.0) / tensile, sliding / shear)
     return Opening(middle[judged], 1e-3 * force / np.maximum(index, 1e-9))
 
 
-def openings_table(found: dict[str, dict[str, Opening]], tensile: float) -> str:
+def openings_table(by_supports: dict[str, dict[str, Opening]], tensile: float) -> str:
     """Markdown table over supports and slicings.
 
     Parameters
     ----------
-    found : dict of supports to dict of slicing to Opening
+    by_supports : dict of supports to dict of slicing to Opening
     tensile : float, MPa
         Strength of the bond that the loads are for; that of shear goes with it.
     """
-    heads = [f"{place} opens at, kN" for place in PLACES]
-    lines = [f"| supports | slicing | {' | '.join(heads)} | paper | bond that explains it, MPa |"]
-    lines.append("|---" * (len(heads) + 4) + "|")
-    for supports, slicings in found.items():
+    rows = []
+    for supports, slicings in by_supports.items():
         for slicing, opening in slicings.items():
             loads = [f"{opening.at(place):.2f}" for place in PLACES]
-            said, bond = "", ""
+            published, bond = "", ""
             if slicing in PAPER_LOADS:
                 place, load = PAPER_LOADS[slicing]
-                said, bond = f"{place} {load}", f"{_bond(slicing, opening, tensile):.1f}"
-            lines.append(f"| {supports} | {slicing} | {' | '.join(loads)} | {said} | {bond} |")
-    return "\n".join(lines)
+                published, bond = f"{place} {load}", f"{_bond(slicing, opening, tensile):.1f}"
+            rows.append((supports, slicing, *loads, published, bond))
+    heads = [f"{place} opens at, kN" for place in PLACES]
+    return table(("supports", "slicing", *heads, "paper", "bond that explains it, MPa"), rows)
 
 
-def bonds_needed(found: dict[str, dict[str, Opening]], tensile: float) -> dict[str, float]:
+def bonds_needed(by_supports: dict[str, dict[str, Opening]], tensile: float) -> dict[str, float]:
     """Strength of the bond, MPa, at which the paper's loads come out where it saw the failure."""
     return {
         f"{supports}, {slicing}: bond that explains the paper": _bond(slicing, opening, tensile)
-        for supports, slicings in found.items()
+        for supports, slicings in by_supports.items()
         for slicing, opening in slicings.items()
         if slicing in PAPER_LOADS
     }
@@ -454,29 +449,28 @@ def _bond(slicing: str, opening: Opening, tensile: float) -> float:
     return tensile * load / opening.at(place)
 
 
-def openings_picture(found: dict[str, dict[str, Opening]], title: str, file: Path) -> None:
+def openings_picture(by_supports: dict[str, dict[str, Opening]], title: str, file: Path) -> None:
     """Draw, seen along z, the least load that opens layers along each line of sight."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.colors import LogNorm
-    from matplotlib.figure import Figure
 
-    columns = max(len(slicings) for slicings in found.values())
-    figure = Figure(figsize=(4.0 * columns, 2.6 * len(found) + 0.4), layout="constrained")
-    FigureCanvasAgg(figure)
-    grid = figure.subplots(len(found), columns, squeeze=False)
+    from ccfem.papers.panels import canvas
+
+    columns = max(len(slicings) for slicings in by_supports.values())
+    figure = canvas(4.0 * columns, 2.6 * len(by_supports) + 0.4, layout="constrained")
+    grid = figure.subplots(len(by_supports), columns, squeeze=False)
     shades = None
-    for row, (supports, slicings) in zip(grid, found.items(), strict=True):
+    for row, (supports, slicings) in zip(grid, by_supports.items(), strict=True):
         for axes, (slicing, opening) in zip(row, slicings.items(), strict=True):
             order = np.argsort(-opening.load, kind="stable")
             x, y, _ = opening.middle[order].T
             load = opening.load[order]
             shades = axes.scatter(x, y, c=load, s=6, cmap="viridis_r", norm=LogNorm(1.0, 50.0))
             axes.plot(x[-1], y[-1], "rx", ms=11, mew=2.5)
-            said = f"{slicing}, {supports}: opens at {load[-1]:.2f} kN"
+            heading = f"{slicing}, {supports}: opens at {load[-1]:.2f} kN"
             if slicing in PAPER_LOADS:
-                place, told = PAPER_LOADS[slicing]
-                said += f"\npaper: {place} at {told} kN, here {opening.at(place):.2f}"
-            axes.set_title(said, fontsize=9)
+                place, published = PAPER_LOADS[slicing]
+                heading += f"\npaper: {place} at {published} kN, here {opening.at(place):.2f}"
+            axes.set_title(heading, fontsize=9)
             axes.set_aspect("equal")
             axes.set_axis_off()
     if shades is not None:

@@ -85,12 +85,12 @@ def measured(
     weight : (m,) array
         Of the cells: above 0 where stress lines join the joints.
     """
-    laid = np.unique(paths.layer)
+    with_fibre = np.unique(paths.layer)
     angle, length, cell = _angles(paths, stress)
     critical = weight[cell] > 0.0
     spacing, curvature, round_all, area = [], [], [], np.zeros(2)
     known = {layer.index: layer for layer in layers}
-    for index in laid.tolist():
+    for index in with_fibre.tolist():
         mine = paths.on_layer(index)
         spacing.append(_spacing(mine))
         curvature.append(_curvature(mine))
@@ -101,11 +101,11 @@ def measured(
     low, middle, high = np.quantile(apart, [0.1, 0.5, 0.9])
     half, most, nearly_all = (float(value) for value in np.quantile(bend, [0.5, 0.8, 0.95]))
     return Strands(
-        float(len(laid)),
-        len(paths) / len(laid),
+        float(len(with_fibre)),
+        len(paths) / len(with_fibre),
         float(paths.closed.mean()),
         float(np.concatenate(round_all).mean()),
-        float(paths.lengths.sum()) / 1e3 / len(laid),
+        float(paths.lengths.sum()) / 1e3 / len(with_fibre),
         float(np.average(angle[critical], weights=length[critical])),
         float(np.average(angle, weights=length * weight[cell])),
         float(low),
@@ -140,7 +140,7 @@ def _spacing(paths: Toolpaths) -> FloatArray:
     along = np.cumsum(step)
     along = along - along[offsets[:-1]][owner]
     period = np.where(paths.closed, paths.lengths, np.inf)
-    found = []
+    spacing = []
     tree = cKDTree(points)
     for row, near in zip(
         range(0, len(points), 3), tree.query_ball_point(points[::3], 6.0), strict=True
@@ -150,8 +150,8 @@ def _spacing(paths: Toolpaths) -> FloatArray:
         apart = np.minimum(apart, period[owner[row]] - apart)
         others = others[(owner[others] != owner[row]) | (apart > _AWAY)]
         away = np.linalg.norm(points[others] - points[row], axis=1)
-        found.append(float(away.min()) if len(others) else np.nan)
-    return np.array(found)
+        spacing.append(float(away.min()) if len(others) else np.nan)
+    return np.array(spacing)
 
 
 def _covered(paths: Toolpaths, layer: Layer, reach: float) -> FloatArray:

@@ -10,7 +10,7 @@ table of each load; into a folder it writes the whole reports.
 import sys
 from pathlib import Path
 
-from ccfem.cases.t_bracket import t_bracket
+from ccfem.cases.shipped import t_bracket
 from ccfem.comparison.engine import compare
 from ccfem.comparison.files import write_results
 from ccfem.comparison.result import Comparison
@@ -50,10 +50,10 @@ COLUMNS = (
 def against(load_case: str) -> Comparison:
     """Compare under one load, and print the table."""
     case = t_bracket(order=1, bolts=True)
-    found = compare(case, ["winding", "concentric"], slicings=SLICINGS, load_case=load_case)
-    table = found.frame
+    compared = compare(case, ["winding", "concentric"], slicings=SLICINGS, load_case=load_case)
+    table = compared.frame
     heads = ["slicing", "strategy", "printable", "fails in", *COLUMNS]
-    print(f"\n## {load_case}, {found.fibre:.0f} mm of fibre in all\n")
+    print(f"\n## {load_case}, {compared.fibre:.0f} mm of fibre in all\n")
     print(f"| {' | '.join(heads)} |\n{'|---' * len(heads)}|")
     for row in table.to_dict("records"):
         name = [row["slicing"], row["strategy"]]
@@ -61,16 +61,16 @@ def against(load_case: str) -> Comparison:
             print(f"| {name[0]} | {name[1]} | {row['failure']} |")
             continue
         cells = [f"{row[column]:.4g}" for column in COLUMNS if column in table]
-        said = ["yes" if row["printable"] else f"no: {row['why_not']}", row["fails_in"]]
-        print(f"| {' | '.join([*name, *said, *cells])} |", flush=True)
-    print(f"\n{found.verdict}")
-    return found
+        outcome = ["yes" if row["printable"] else f"no: {row['why_not']}", row["fails_in"]]
+        print(f"| {' | '.join([*name, *outcome, *cells])} |", flush=True)
+    print(f"\n{compared.verdict}")
+    return compared
 
 
-def failure_loads(found: Comparison, column: str) -> dict[str, float]:
+def failure_loads(compared: Comparison, column: str) -> dict[str, float]:
     """Failure load, N, of the paper's rows, by slicing."""
-    rows = {(row["slicing"], row["strategy"]): row for row in found.frame.to_dict("records")}
-    return {slicing: float(rows[slicing, each][column]) for slicing, each in ROWS.items()}
+    rows = {(row["slicing"], row["strategy"]): row for row in compared.frame.to_dict("records")}
+    return {slicing: float(rows[slicing, strategy][column]) for slicing, strategy in ROWS.items()}
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ in that order.
 
 from collections.abc import Sequence
 
-from ccfem.cases.t_bracket import bolt_heads
+from ccfem.cases.bodies import bolt_heads
 from ccfem.fem.elasticity.problem import Bearing, Problem, Support
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.stress_field import StressField
@@ -73,30 +73,30 @@ def study() -> dict[tuple[str, str], tuple[float, ...]]:
     }
     print(f"| layers | supports | fibre m | {' | '.join(COLUMNS)} | first | at | zones |")
     print("|---" * (len(COLUMNS) + 6) + "|")
-    found = {}
+    figures = {}
     slicings = _slicings(fields["fixed"])
     for model, field in fields.items():
         specimen = Specimen.of(field)
         for name, (layers, paths) in slicings.items():
-            found[name, model] = _row(name, model, layers, paths, specimen)
-    return found
+            figures[name, model] = _tested_row(name, model, layers, paths, specimen)
+    return figures
 
 
 def _slicings(stress: StressField) -> dict[str, tuple[Sequence[Layer], Toolpaths]]:
     """Layers and fibre of each row."""
     machine = Machine(minimum_length=42.0)
     rings = create("concentric", {"spacing": 2.2, "turns": "tight"})
-    found: dict[str, tuple[Sequence[Layer], Toolpaths]] = {}
+    slicings: dict[str, tuple[Sequence[Layer], Toolpaths]] = {}
     for name, count in COUNTS.items():
         build = (float(name == "x"), float(name == "y"), float(name == "z"))
         layers = Planar(count=count).cut(stress.mesh, build)
         wanted = FIBRE / len(layers)
-        found[name] = layers, plan_to_length(rings, layers, stress, machine, wanted).toolpaths
+        slicings[name] = layers, plan_to_length(rings, layers, stress, machine, wanted).toolpaths
     theirs = authors_layers(stress)
-    return {**found, "authors": (theirs, authors_strands(theirs))}
+    return {**slicings, "authors": (theirs, authors_strands(theirs))}
 
 
-def _row(
+def _tested_row(
     name: str, model: str, layers: Sequence[Layer], paths: Toolpaths, specimen: Specimen
 ) -> tuple[float, ...]:
     """Print one row; its figures."""
@@ -105,33 +105,33 @@ def _row(
     bare = test.force / interlayer(specimen.unreinforced, layers).index
     loads = (bare, failure.interlayer_load, failure.matrix_load, failure.fibre_load)
     figures = (test.ratio, *(1e-3 * load for load in loads))
-    told = [f"{a:.2f} ({b:g})" for a, b in zip(figures, SPECIFIED[name, model], strict=True)]
+    beside = [f"{a:.2f} ({b:g})" for a, b in zip(figures, SPECIFIED[name, model], strict=True)]
     place = ", ".join(f"{x:.0f}" for x in failure.interlayer_where)
     zones = " / ".join(f"{1e-3 * load:.2f}" for load in failure.interlayer_zones)
     length = float(paths.lengths.sum()) / 1e3
     print(
-        f"| {name} | {model} | {length:.1f} | {' | '.join(told)} | {1e-3 * failure.load:.2f} "
+        f"| {name} | {model} | {length:.1f} | {' | '.join(beside)} | {1e-3 * failure.load:.2f} "
         f"{failure.what} | {place} | {zones} |",
         flush=True,
     )
     return figures
 
 
-def _check(found: dict[tuple[str, str], tuple[float, ...]]) -> None:
+def _check_specified(table: dict[tuple[str, str], tuple[float, ...]]) -> None:
     """Raise where the table is another one."""
     off = []
-    for (name, model), figures in found.items():
-        for column, own, told in zip(COLUMNS, figures, SPECIFIED[name, model], strict=True):
+    for (name, model), figures in table.items():
+        for column, value, specified in zip(COLUMNS, figures, SPECIFIED[name, model], strict=True):
             ours = name != "authors" and column != "without fibre"
-            if model == "fixed" and abs(own / told - 1.0) > (_RINGS if ours else _CLOSE):
-                off.append(f"{name} {column}: {own:.2f} for {told:g}")
+            if model == "fixed" and abs(value / specified - 1.0) > (_RINGS if ours else _CLOSE):
+                off.append(f"{name} {column}: {value:.2f} for {specified:g}")
     if off:
         raise SystemExit(f"fixed supports: off the specification: {', '.join(off)}")
     for model in ("fixed", "contact"):
-        loads = [found[name, model][2] for name in ("x", "y", "authors")]
+        loads = [table[name, model][2] for name in ("x", "y", "authors")]
         if sorted(loads) != loads:
             raise SystemExit(f"{model}: interlayer loads of x, y and the authors' are {loads}")
 
 
 if __name__ == "__main__":
-    _check(study())
+    _check_specified(study())

@@ -15,6 +15,7 @@ import numpy as np
 
 from ccfem.fem.elasticity.part_stress import GivenStress, PartStress
 from ccfem.machine import Machine
+from ccfem.papers.contents import table
 from ccfem.papers.fang_2024.authors import (
     authors_layers,
     authors_mesh,
@@ -61,8 +62,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
 def _timed(work: Callable[[], Any]) -> tuple[Any, float, float]:
     """Return a result, seconds on the clock and those of all processors."""
     start, busy = time.perf_counter(), time.process_time()
-    found = work()
-    return found, time.perf_counter() - start, time.process_time() - busy
+    result = work()
+    return result, time.perf_counter() - start, time.process_time() - busy
 
 
 class Chain(NamedTuple):
@@ -117,21 +118,21 @@ def _fresh(stress: PartStress) -> GivenStress:
 
 
 def _single_layers(
-    stress: PartStress, laid: set[int], strategy: Strategy, machine: Machine
+    stress: PartStress, with_fibre: set[int], strategy: Strategy, machine: Machine
 ) -> list[float]:
     """Seconds of processor of each layer with fibre, strands and matrix, planned alone."""
     layers = Spatial().slice(stress, BUILD).layers
     assert isinstance(strategy, PartStrategy)
     planner = strategy.for_part(stress, layers, machine)
-    found: list[float] = []
-    for layer in (one for one in layers if one.index in laid):
+    seconds: list[float] = []
+    for layer in (one for one in layers if one.index in with_fibre):
 
         def work(one: Layer = layer) -> None:
             planner(one, stress_on(one, stress), machine)
             layer_matrix([one], machine)
 
-        found.append(_timed(work)[2])
-    return found
+        seconds.append(_timed(work)[2])
+    return seconds
 
 
 def _times(seconds: dict[str, float], cells: int) -> str:
@@ -144,39 +145,36 @@ def _times(seconds: dict[str, float], cells: int) -> str:
     }
     head = f"{cells} cells, {seconds['layers']:.0f} layers"
     lines = [f"\n{head}; seconds of the paper on 85,119 cells, 45 layers\n"]
-    lines += ["| seconds | ours, clock | processors | paper |", "|---|---|---|---|"]
+    rows = []
     for name in ("stress lines", "field and layers", "strands", "matrix paths", "all"):
-        told = f"{theirs[name]:.2f}" if name in theirs else ""
+        published = f"{theirs[name]:.2f}" if name in theirs else ""
         clock, busy = seconds[f"{name}, clock"], seconds[f"{name}, processors"]
-        lines.append(f"| {name} | {clock:.2f} | {busy:.2f} | {told} |")
-    one = f"{seconds['slowest layer, processors']:.2f}"
-    median = seconds["median layer, processors"]
-    lines.append(f"| slowest layer (median {median:.2f}) | | {one} | {paper['a layer']:.2f} |")
-    lines.append(f"\nload of the machine before: {seconds['load of the machine before']:.1f}")
+        rows.append((name, f"{clock:.2f}", f"{busy:.2f}", published))
+    slowest = f"slowest layer (median {seconds['median layer, processors']:.2f})"
+    busiest = f"{seconds['slowest layer, processors']:.2f}"
+    rows.append((slowest, "", busiest, f"{paper['a layer']:.2f}"))
+    lines.append(table(("seconds", "ours, clock", "processors", "paper"), rows))
+    lines.append(f"load of the machine before: {seconds['load of the machine before']:.1f}")
     return "\n".join(lines)
 
 
 def study(stress: PartStress, sliced: SpatialSlicing) -> dict[str, Strands]:
     """Print the tables of field and strands; the strands' figures by name."""
     machine = Machine()
-    print("\n| field | ours |\n|---|---|")
-    for name, value in vars(sliced.quality).items():
-        print(f"| {name} | {value:.3f} |")
+    quality = [(name, f"{value:.3f}") for name, value in vars(sliced.quality).items()]
+    print(f"\n{table(('field', 'ours'), quality)}", end="")
     weight = sliced.region.weight
-    found: dict[str, Strands] = {}
+    strands: dict[str, Strands] = {}
     for name, given in VARIANTS.items():
         paths = plan(create("winding", given), sliced.layers, stress, machine)
-        found[name] = measured(paths, sliced.layers, stress, weight)
+        strands[name] = measured(paths, sliced.layers, stress, weight)
     theirs = authors_layers(stress)
-    found["authors"] = measured(authors_strands(theirs), theirs, stress, weight)
+    strands["authors"] = measured(authors_strands(theirs), theirs, stress, weight)
     paths = plan(create("winding"), theirs, stress, machine)
-    found["winding on the authors' layers"] = measured(paths, theirs, stress, weight)
-    names = list(next(iter(found.values())).table())
-    print("\n| strands | " + " | ".join(names) + " |\n" + "|---" * (len(names) + 1) + "|")
-    for name, figures in found.items():
-        values = " | ".join(f"{value:.3g}" for value in figures.table().values())
-        print(f"| {name} | {values} |")
-    return found
+    strands["winding on the authors' layers"] = measured(paths, theirs, stress, weight)
+    rows = [(k, *(f"{v:.3g}" for v in row.table().values())) for k, row in strands.items()]
+    print(f"\n{table(('strands', *strands['authors'].table()), rows)}", end="")
+    return strands
 
 
 if __name__ == "__main__":

@@ -1,6 +1,8 @@
 """The chain from stress to paths, stage by stage: seconds and what comes out (tables 1 and 2)."""
 
 import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +11,7 @@ from ccfem.cases import create_case
 from ccfem.cases.case import Case
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.papers.contents import table
 from ccfem.papers.kipping_2023.thickness import Distances, distances_below
 from ccfem.paths.planning import plan
 from ccfem.paths.toolpaths import Toolpaths
@@ -39,6 +42,14 @@ class Chain:
     seconds: dict[str, float]
 
 
+@contextmanager
+def _clocked(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    """Note the seconds that a block takes."""
+    start = time.perf_counter()
+    yield
+    seconds[stage] = time.perf_counter() - start
+
+
 def chain(name: str) -> Chain:
     """Run the chain on a case, once for the compiler and once on the clock."""
     case = create_case(name)
@@ -46,64 +57,55 @@ def chain(name: str) -> Chain:
     slicer = case.slicing
     assert isinstance(slicer, LoadOriented)
     up = np.array([0.0, 0.0, 1.0])
-    seconds: dict[str, float] = {}
     for _ in range(2):
-        start = time.perf_counter()
-        regions = stress_regions(
-            stress.mesh, stress.stress, up, slicer.share, slicer.quantile, slicer.gap
-        )
-        seconds["critical regions"] = time.perf_counter() - start
-        start = time.perf_counter()
-        normals = normal_field(stress.mesh, regions, up)
-        seconds["vector field"] = time.perf_counter() - start
-        start = time.perf_counter()
-        lengths = (slicer.thickness / slicer.thickest, slicer.thickness / slicer.thinnest)
-        height_field(stress.mesh, normals.direction, slicer.blend, lengths)
-        seconds["scalar field"] = time.perf_counter() - start
-        start = time.perf_counter()
-        sliced = slicer.slice(stress)
-        whole = time.perf_counter() - start
-        seconds["layers"] = max(whole - sum(list(seconds.values())[:3]), 0.0)
-        start = time.perf_counter()
-        x, y, z = sliced.field.up.tolist()
-        support = support_layers(
-            stress.mesh, sliced.layers, (x, y, z), sliced.field.values, sliced.step
-        )
-        seconds["support layers"] = time.perf_counter() - start
-        start = time.perf_counter()
-        paths = plan(create("fiso", {"turns": "tight"}), sliced.layers, stress, case.machine)
-        seconds["paths"] = time.perf_counter() - start
-        stages = ("critical regions", "vector field", "scalar field", "layers")
-        parts = (*stages, "support layers", "paths")
-        seconds = {key: seconds[key] for key in parts}
+        seconds: dict[str, float] = {}
+        with _clocked(seconds, "critical regions"):
+            regions = stress_regions(
+                stress.mesh, stress.stress, up, slicer.share, slicer.quantile, slicer.gap
+            )
+        with _clocked(seconds, "vector field"):
+            normals = normal_field(stress.mesh, regions, up)
+        with _clocked(seconds, "scalar field"):
+            lengths = (slicer.thickness / slicer.thickest, slicer.thickness / slicer.thinnest)
+            height_field(stress.mesh, normals.direction, slicer.blend, lengths)
+        before = sum(seconds.values())  # the slicer does these again
+        with _clocked(seconds, "layers"):
+            sliced = slicer.slice(stress)
+        seconds["layers"] = max(seconds["layers"] - before, 0.0)
+        with _clocked(seconds, "support layers"):
+            x, y, z = sliced.field.up.tolist()
+            support = support_layers(
+                stress.mesh, sliced.layers, (x, y, z), sliced.field.values, sliced.step
+            )
+        with _clocked(seconds, "paths"):
+            paths = plan(create("fiso", {"turns": "tight"}), sliced.layers, stress, case.machine)
     seconds["all"] = sum(seconds.values())
     return Chain(case, stress, sliced, paths, support, distances_below(sliced.layers), seconds)
 
 
-def table_1(chains: dict[str, Chain]) -> str:
+def table_1(chains: Mapping[str, Chain]) -> str:
     """Parameters and properties of both parts, the paper's in brackets."""
-    head = (
-        "| part | cells | share of the peak | of cells critical | in regions | regions | layers |"
-    )
-    lines = [head, "|---" * 7 + "|"]
+    rows = []
     for part, run in chains.items():
-        cells, slicer = len(run.stress.mesh.cells), run.case.slicing
+        slicer, regions = run.case.slicing, run.sliced.regions
         assert isinstance(slicer, LoadOriented)
-        regions = run.sliced.regions
-        lines.append(
-            f"| {part} | {cells} ({PAPER_CELLS[part]}) | {slicer.share:g} "
-            f"({PAPER_SHARE[part]:g}) | "
-            f"{regions.critical.mean():.1%} | {(regions.region >= 0).mean():.1%} | "
-            f"{regions.count} | {len(run.sliced.layers)} |"
+        rows.append(
+            (
+                *(part, f"{len(run.stress.mesh.cells)} ({PAPER_CELLS[part]})"),
+                f"{slicer.share:g} ({PAPER_SHARE[part]:g})",
+                *(f"{regions.critical.mean():.1%}", f"{(regions.region >= 0).mean():.1%}"),
+                *(str(regions.count), str(len(run.sliced.layers))),
+            )
         )
-    return "\n".join(lines) + "\n"
+    shares = ("share of the peak", "of cells critical", "in regions")
+    return table(("part", "cells", *shares, "regions", "layers"), rows)
 
 
-def table_2(chains: dict[str, Chain]) -> str:
+def table_2(chains: Mapping[str, Chain]) -> str:
     """Seconds of each stage; the paper gives sums alone."""
     stages = list(next(iter(chains.values())).seconds)
-    lines = [f"| part | {' | '.join(stages)} | paper, all |", "|---" * (len(stages) + 2) + "|"]
-    for part, run in chains.items():
-        values = " | ".join(f"{run.seconds[stage]:.2f}" for stage in stages)
-        lines.append(f"| {part} | {values} | {PAPER_SECONDS[part]:g} |")
-    return "\n".join(lines) + "\n"
+    rows = [
+        (part, *(f"{run.seconds[stage]:.2f}" for stage in stages), f"{PAPER_SECONDS[part]:g}")
+        for part, run in chains.items()
+    ]
+    return table(("part", *stages, "paper, all"), rows)

@@ -1,7 +1,5 @@
 """What of Kipping and Schueppstuhl 2023 can be made again."""
 
-import json
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,23 +8,23 @@ from typing import Any, cast
 import numpy as np
 import shapely
 
-from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.arrays import FloatArray
 from ccfem.base.progress import Progress, silent
 from ccfem.body.meshing import extrude
-from ccfem.cases.arm_bracket import HOLES
+from ccfem.cases.bodies import ARM_BRACKET_HOLES
 from ccfem.comparison.plot.canvas import png
-from ccfem.fem.elasticity.ball import BALL, ball_averages
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.fem.elasticity.support_kinds import PressingSupport
 from ccfem.fem.materials import isotropic
-from ccfem.judging.virtual_testing.interlayer import interlayer, layer_normals
+from ccfem.judging.virtual_testing.interlayer import interlayer
 from ccfem.machine import Machine
-from ccfem.papers.contents import Contents, WhenAsked
+from ccfem.papers.contents import Contents, WhenAsked, table, write_claims
 from ccfem.papers.kipping_2023.chain import PAPER_SECONDS, PARTS, Chain, chain, table_1, table_2
-from ccfem.papers.kipping_2023.figures import blank, part_figures, senses_figure
+from ccfem.papers.kipping_2023.figures import part_figures, senses_figure
 from ccfem.papers.kipping_2023.thickness import distances_below
-from ccfem.papers.verdicts import Check, claim_table, judged
+from ccfem.papers.layer_traction import layer_traction
+from ccfem.papers.panels import canvas
 from ccfem.paths.fields.chart import chart_of
 from ccfem.printing.support import support_columns
 from ccfem.slicing.layers.layer import Layer
@@ -35,11 +33,10 @@ from ccfem.slicing.slicers.load_oriented import LoadOriented
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies.fiso import Fiso
 
+EXPECTED = Path(__file__).with_name("expected.toml")
+"""Claims of the paper, with the ranges that count as reproduced."""
+
 # First in, spiral out on eight shapes, flat and bent to a radius of 25 mm.
-#
-# python -m ccfem.papers.kipping_2023.contents [FOLDER]
-#
-# prints the table; into a folder it draws the strands.
 
 
 WIDTH, BEND = 0.9, 25.0
@@ -55,11 +52,10 @@ def _plate(length: float, width: float, holes: list[shapely.Polygon]) -> shapely
     return shapely.box(0.0, 0.0, length, width).difference(shapely.union_all(holes))
 
 
-def _star() -> shapely.Polygon:
-    angle = np.pi * np.arange(14) / 7.0
-    radius = np.where(np.arange(14) % 2, 14.0, 30.0)
-    return shapely.Polygon(np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
-
+_POINTS = np.pi * np.arange(14) / 7.0
+_STAR = np.where(np.arange(14) % 2, 14.0, 30.0)[:, None] * np.stack(
+    [np.cos(_POINTS), np.sin(_POINTS)], axis=1
+)
 
 SHAPES = {
     "disc": _disc(0.0, 0.0, 15.0),
@@ -75,7 +71,7 @@ SHAPES = {
         60.0,
         [_disc(10.0 + 20.0 * i, 10.0 + 20.0 * j, 4.0) for i in range(4) for j in range(3)],
     ),
-    "star": _star(),
+    "star": shapely.Polygon(_STAR),
 }
 
 
@@ -152,37 +148,40 @@ def _longest_step(line: shapely.LineString, section: shapely.Polygon) -> float:
 
 def shapes_table() -> tuple[str, dict[tuple[str, bool], Strand]]:
     """Table in Markdown, and the strands by shape, flat and bent."""
-    head = ["shape", "", "paths", "coverage", "of the opened area", "crossings", "longest step"]
-    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
-    found = {}
-    for name in SHAPES:
-        for bent in (False, True):
-            one = found[name, bent] = measured(name, bent)
-            lines.append(
-                f"| {name} | {'bent' if bent else 'flat'} | {one.paths} | {one.coverage:.3f} | "
-                f"{one.coverage_opened:.3f} | {one.crossings} | {one.longest_step:.2f} |"
-            )
-    return "\n".join(lines) + "\n", found
+    strands = {(name, bent): measured(name, bent) for name in SHAPES for bent in (False, True)}
+    rows = [
+        (
+            *(name, "bent" if bent else "flat", str(strand.paths), f"{strand.coverage:.3f}"),
+            *(f"{strand.coverage_opened:.3f}", str(strand.crossings)),
+            f"{strand.longest_step:.2f}",
+        )
+        for (name, bent), strand in strands.items()
+    ]
+    head = ("shape", "", "paths", "coverage", "of the opened area", "crossings", "longest step")
+    return table(head, rows), strands
 
 
 def options_table() -> str:
     """Table of what the options cost in coverage, on the flat shapes."""
-    lines = ["| options | paths | mean coverage | least | crossings | longest step |"]
-    lines.append("|---" * 6 + "|")
+    rows = []
     for title, options in OPTIONS.items():
-        each = [measured(name, False, **options) for name in SHAPES]
-        coverage = [one.coverage for one in each]
-        lines.append(
-            f"| {title} | {sum(one.paths for one in each)} | {np.mean(coverage):.3f} | "
-            f"{min(coverage):.3f} | {sum(one.crossings for one in each)} | "
-            f"{max(one.longest_step for one in each):.2f} |"
+        strands = [measured(name, False, **options) for name in SHAPES]
+        coverage = [strand.coverage for strand in strands]
+        rows.append(
+            (
+                *(title, str(sum(strand.paths for strand in strands))),
+                *(f"{np.mean(coverage):.3f}", f"{min(coverage):.3f}"),
+                str(sum(strand.crossings for strand in strands)),
+                f"{max(strand.longest_step for strand in strands):.2f}",
+            )
         )
-    return "\n".join(lines) + "\n"
+    head = ("options", "paths", "mean coverage", "least", "crossings", "longest step")
+    return table(head, rows)
 
 
 def shapes_picture(strands: dict[tuple[str, bool], Strand]) -> bytes:
     """Draw the flat ones."""
-    figure = blank(20.0, 10.0)
+    figure = canvas(20.0, 10.0, layout="tight")
     for axes, name in zip(figure.subplots(2, 4).flat, SHAPES, strict=True):
         for line in strands[name, False].lines:
             axes.plot(*line.T, lw=0.8)
@@ -194,49 +193,34 @@ def shapes_picture(strands: dict[tuple[str, bool], Strand]) -> bytes:
     return png(figure)
 
 
-if __name__ == "__main__":
-    table, laid = shapes_table()
-    print(table)
-    print(options_table())
-    if len(sys.argv) > 1:
-        folder = Path(sys.argv[1])
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "figure_7.png").write_bytes(shapes_picture(laid))
-
-
 # The whole of the paper: its study, figures, tables and claims beside ours.
 
 
 def write_all(folder: Path, progress: Progress = silent) -> None:
     """Run the study, and write figures, tables and claims into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    chains: dict[str, Chain] = {}
-    for part, name in PARTS.items():
-        progress(f"planning part {part}", len(chains) / len(PARTS))
-        chains[part] = chain(name)
+    chains = dict(_run(progress))
     tables = [table_1(chains), table_2(chains), support_table(chains)]
     print("\n".join(tables), flush=True)
     trades = {part: trade(run) for part, run in chains.items()}
-    loads = {part: failure_loads(run) for part, run in chains.items()}
     pressed = on_pressing_supports(chains["B"])
-    loads["B, pressed"] = failure_loads(chains["B"], pressed)
+    loads = _loads(chains, pressed)
     shapes, strands = shapes_table()
     tables += [trade_table(trades), strength_table(loads), shapes, options_table()]
     print("\n".join(tables[3:]), flush=True)
-    pictures = {"figure_7.png": shapes_picture(strands), "trade.png": trade_picture(trades)}
     models = {"holes held": chains["B"].stress, "supports press": pressed}
-    pictures["sliding_B.png"] = sliding_picture(chains["B"], models)
-    pictures["figure_1_3.png"] = senses_figure()[0]
+    pictures = {
+        "figure_7.png": shapes_picture(strands),
+        "trade.png": trade_picture(trades),
+        "sliding_B.png": sliding_picture(chains["B"], models),
+        "figure_1_3.png": senses_figure()[0],
+    }
     for part, run in chains.items():
         pictures |= part_figures(part, run)
     for name, picture in pictures.items():
         (folder / name).write_bytes(picture)
     (folder / "tables.md").write_text("\n".join(tables), encoding="utf-8")
-    found = quantities(chains, trades, loads, strands)
-    (folder / "quantities.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
-    claims = claim_table(verdicts(found))
-    (folder / "claims.md").write_text(claims, encoding="utf-8")
-    print(claims)
+    print(write_claims(folder, quantities(chains, trades, loads, strands), EXPECTED))
 
 
 # What flatter layers cost: tension across layers over the blend, and the paper's own choices.
@@ -254,6 +238,9 @@ VARIANTS: dict[str, dict[str, Any]] = {
 }
 """Parameters of `LoadOriented`."""
 
+Trades = Mapping[str, Mapping[str, Mapping[str, float]]]
+"""By part, variant and column."""
+
 COLUMNS = ("tension", "below z", "below the best plane", "angle", "tilt", "inverted", "in range")
 
 
@@ -261,14 +248,14 @@ def trade(run: Chain) -> dict[str, dict[str, float]]:
     """Figures of the variants by name: `COLUMNS`."""
     slicer = run.case.slicing
     assert isinstance(slicer, LoadOriented)
-    found = {}
+    figures = {}
     for name, given in VARIANTS.items():
         sliced = run.sliced if name == "default" else replace(slicer, **given).slice(run.stress)
         across = sliced.across.tension
         gradient = sliced.field.gradient
         cosine = gradient @ sliced.field.up / np.linalg.norm(gradient, axis=1)
         tilt = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
-        found[name] = {
+        figures[name] = {
             "tension": across,
             "below z": 1.0 - across / sliced.across_build.tension,
             "below the best plane": 1.0 - across / sliced.across_best.tension,
@@ -278,24 +265,24 @@ def trade(run: Chain) -> dict[str, dict[str, float]]:
             "in range": distances_below(sliced.layers).within(slicer.thinnest, slicer.thickest),
             "blend": sliced.field.blend,
         }
-    return found
+    return figures
 
 
-def trade_table(found: dict[str, dict[str, dict[str, float]]]) -> str:
+def trade_table(trades: Trades) -> str:
     """Table in Markdown, by part and variant."""
-    lines = [f"| part | variant | {' | '.join(COLUMNS)} |", "|---" * (len(COLUMNS) + 2) + "|"]
-    for part, variants in found.items():
-        for name, figures in variants.items():
-            values = " | ".join(f"{figures[column]:.4g}" for column in COLUMNS)
-            lines.append(f"| {part} | {name} | {values} |")
-    return "\n".join(lines) + "\n"
+    rows = [
+        (part, name, *(f"{figures[column]:.4g}" for column in COLUMNS))
+        for part, variants in trades.items()
+        for name, figures in variants.items()
+    ]
+    return table(("part", "variant", *COLUMNS), rows)
 
 
-def trade_picture(found: dict[str, dict[str, dict[str, float]]]) -> bytes:
+def trade_picture(trades: Trades) -> bytes:
     """Draw the tension across layers over the blend."""
-    figure = blank(6.0, 4.0)
+    figure = canvas(6.0, 4.0, layout="tight")
     axes = figure.subplots()
-    for part, variants in found.items():
+    for part, variants in trades.items():
         rows = [v for name, v in variants.items() if set(VARIANTS[name]) <= {"blend"}]
         rows = sorted((v for v in rows if v["inverted"] == 0.0), key=lambda v: v["blend"])
         axes.plot([v["blend"] for v in rows], [v["tension"] for v in rows], "o-", label=part)
@@ -311,10 +298,16 @@ def _run(progress: Progress) -> Mapping[str, Chain]:
     return WhenAsked(tuple(PARTS), lambda part: chain(PARTS[part]), progress, "planning part")
 
 
-def _strength(chains: Mapping[str, Chain]) -> str:
+def _loads(
+    chains: Mapping[str, Chain], pressed: StressField
+) -> dict[str, dict[str, tuple[float, ...]]]:
+    """Failure loads by part, the arm bracket's a second time by the stress of pressing supports."""
     loads = {part: failure_loads(run) for part, run in chains.items()}
-    loads["B, pressed"] = failure_loads(chains["B"], on_pressing_supports(chains["B"]))
-    return strength_table(loads)
+    return {**loads, "B, pressed": failure_loads(chains["B"], pressed)}
+
+
+def _strength(chains: Mapping[str, Chain]) -> str:
+    return strength_table(_loads(chains, on_pressing_supports(chains["B"])))
 
 
 CONTENTS = Contents(
@@ -335,40 +328,37 @@ CONTENTS = Contents(
 # The claims of the paper beside ours: every quantity is computed from a run.
 
 
-EXPECTED = Path(__file__).with_name("expected.toml")
-
-
 def quantities(
     chains: Mapping[str, Chain],
-    trades: Mapping[str, Mapping[str, Mapping[str, float]]],
+    trades: Trades,
     loads: Mapping[str, Mapping[str, tuple[float, ...]]],
     strands: Mapping[tuple[str, bool], Strand],
 ) -> dict[str, float]:
     """Every quantity that `expected.toml` may name."""
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     for part, run in chains.items():
-        found |= {f"{part}: seconds, {name}": value for name, value in run.seconds.items()}
-        found[f"{part}: time over the paper's"] = run.seconds["all"] / PAPER_SECONDS[part]
-        found[f"{part}: inverted"] = run.sliced.inverted
-        found[f"{part}: thickness"] = run.distances.mean
-        found[f"{part}: with a layer below"] = run.distances.covered
-        found[f"{part}: paths"] = float(len(run.paths))
+        values |= {f"{part}: seconds, {name}": value for name, value in run.seconds.items()}
+        values[f"{part}: time over the paper's"] = run.seconds["all"] / PAPER_SECONDS[part]
+        values[f"{part}: inverted"] = run.sliced.inverted
+        values[f"{part}: thickness"] = run.distances.mean
+        values[f"{part}: with a layer below"] = run.distances.covered
+        values[f"{part}: paths"] = float(len(run.paths))
         layers = len(np.unique(run.paths.layer))
-        found[f"{part}: layers with paths"] = float(layers)
-        found |= {f"{part}: support, {name}": v for name, v in _support(run).items()}
+        values[f"{part}: layers with paths"] = float(layers)
+        values |= {f"{part}: support, {name}": v for name, v in _support(run).items()}
         for name, figures in trades[part].items():
-            found |= {f"{part}, {name}: {key}": value for key, value in figures.items()}
-    for part, each in loads.items():
-        flat, ours = each["flat, z"], each["load-oriented"]
-        found[f"{part}: failure load over flat"] = ours[0] / flat[0]
-        found[f"{part}: failure load over flat, bond strong in shear"] = ours[3] / flat[3]
-        found[f"{part}: failure load over flat, by opening"] = ours[6] / flat[6]
-    found["strands: most paths"] = float(max(s.paths for s in strands.values()))
-    found["strands: least coverage"] = min(s.coverage for s in strands.values())
-    found["strands: least coverage, opened"] = min(s.coverage_opened for s in strands.values())
-    found["strands: crossings"] = float(sum(s.crossings for s in strands.values()))
-    found["strands: longest step"] = max(s.longest_step for s in strands.values())
-    return found
+            values |= {f"{part}, {name}: {key}": value for key, value in figures.items()}
+    for part, slicings in loads.items():
+        flat, ours = slicings["flat, z"], slicings["load-oriented"]
+        values[f"{part}: failure load over flat"] = ours[0] / flat[0]
+        values[f"{part}: failure load over flat, bond strong in shear"] = ours[3] / flat[3]
+        values[f"{part}: failure load over flat, by opening"] = ours[6] / flat[6]
+    values["strands: most paths"] = float(max(s.paths for s in strands.values()))
+    values["strands: least coverage"] = min(s.coverage for s in strands.values())
+    values["strands: least coverage, opened"] = min(s.coverage_opened for s in strands.values())
+    values["strands: crossings"] = float(sum(s.crossings for s in strands.values()))
+    values["strands: longest step"] = max(s.longest_step for s in strands.values())
+    return values
 
 
 def _support(run: Chain) -> dict[str, float]:
@@ -402,24 +392,23 @@ def _support(run: Chain) -> dict[str, float]:
 
 def support_table(chains: Mapping[str, Chain]) -> str:
     """Table of the support of each part: layers along the stress, and flat ones that carry 45."""
-    head = "| part | layers | mm^3 | contact mm^2 | part mm^3 | number | 0.2 to 0.5 mm | inverted |"
-    lines = [head, "|---" * 8 + "|"]
+    rows = []
     for part, run in chains.items():
-        mesh, own = run.stress.mesh, _support(run)
-        flat = support_columns(mesh, angle=45.0)
-        lines += [
-            f"| {part} | load-oriented | {own['mm^3']:.0f} | {own['contact mm^2']:.0f} | "
-            f"{mesh.volumes.sum():.0f} | {own['layers']:.0f} | {own['in range']:.1%} | "
-            f"{own['inverted']:.2%} |",
-            f"| {part} | flat, over 45 degrees | {flat.volume:.0f} | {flat.contact:.0f} | "
-            f"{mesh.volumes.sum():.0f} | | | |",
+        mesh, support = run.stress.mesh, _support(run)
+        flat, volume = support_columns(mesh, angle=45.0), f"{mesh.volumes.sum():.0f}"
+        rows += [
+            (
+                *(part, "load-oriented", f"{support['mm^3']:.0f}"),
+                *(f"{support['contact mm^2']:.0f}", volume, f"{support['layers']:.0f}"),
+                *(f"{support['in range']:.1%}", f"{support['inverted']:.2%}"),
+            ),
+            (
+                *(part, "flat, over 45 degrees", f"{flat.volume:.0f}", f"{flat.contact:.0f}"),
+                *(volume, "", "", ""),
+            ),
         ]
-    return "\n".join(lines) + "\n"
-
-
-def verdicts(found: Mapping[str, float]) -> list[Check]:
-    """Judge the claims by the quantities found."""
-    return judged(found, EXPECTED)
+    head = ("part", "layers", "mm^3", "contact mm^2", "part mm^3", "number", "0.2 to 0.5 mm")
+    return table((*head, "inverted"), rows)
 
 
 # What the layers are worth: load at which they come apart, flat beside load-oriented.
@@ -450,15 +439,15 @@ def failure_loads(run: Chain, stress: StressField | None = None) -> dict[str, tu
     Three loads for each of `SHEAR`. The part is without fibre: what the layers alone are worth.
     All are judged by one stress, by default that which the layers were made for.
     """
-    found: dict[str, tuple[float, ...]] = {}
+    loads: dict[str, tuple[float, ...]] = {}
     for name, layers in _slicings(run).items():
-        told: list[float] = []
+        of_slicing: list[float] = []
         for shear in SHEAR:
             bond = isotropic(3500.0, 0.35, interlayer_tensile=TENSILE, interlayer_shear=shear)
             judged = interlayer(run.stress if stress is None else stress, layers, bond)
-            told += [_LOAD / max(index, 1e-12) for index in judged.zone_indices]
-        found[name] = tuple(told)
-    return found
+            of_slicing += [_LOAD / max(index, 1e-12) for index in judged.zone_indices]
+        loads[name] = tuple(of_slicing)
+    return loads
 
 
 def on_pressing_supports(run: Chain) -> StressField:
@@ -467,7 +456,7 @@ def on_pressing_supports(run: Chain) -> StressField:
     mesh = problem.mesh
     middle = mesh.points[mesh.boundary].mean(axis=1)
     up = mesh.facet_areas(mesh.boundary)[1][:, 2]
-    feet = [HOLES[name].point for name in ("foot_near", "foot_far")]
+    feet = [ARM_BRACKET_HOLES[name].point for name in ("foot_near", "foot_far")]
     near = [np.hypot(middle[:, 0] - x, middle[:, 1] - y) < _HEAD for x, y, _ in feet]
     thick = float(middle[(up > 0.99) & near[1], 2].max())
     heads = (up > 0.99) & (near[0] | near[1]) & (np.abs(middle[:, 2] - thick) < 1e-3)
@@ -485,11 +474,11 @@ def sliding_picture(run: Chain, models: dict[str, StressField]) -> bytes:
     centre = mesh.points[mesh.corners].mean(axis=1)
     middle = 0.5 * (mesh.points[:, 1].min() + mesh.points[:, 1].max())
     shown = np.flatnonzero(np.abs(centre[:, 1] - middle) < 3.0)
-    slicings = {name: each for name, each in _slicings(run).items() if "best" not in name}
-    figure, row = blank(14.0, 3.2 * len(slicings) * len(models)), 0
+    slicings = {name: layers for name, layers in _slicings(run).items() if "best" not in name}
+    figure, row = canvas(14.0, 3.2 * len(slicings) * len(models), layout="tight"), 0
     for model, stress in models.items():
         for name, layers in slicings.items():
-            opening, sliding = _tractions(stress, layers, centre, shown)
+            opening, sliding = layer_traction(stress, layers, shown)
             for column, (what, values) in enumerate(
                 {"across the layers": opening, "along the layers": sliding}.items()
             ):
@@ -503,26 +492,14 @@ def sliding_picture(run: Chain, models: dict[str, StressField]) -> bytes:
     return png(figure)
 
 
-def _tractions(
-    stress: StressField, layers: Sequence[Layer], centre: FloatArray, shown: IntArray
-) -> tuple[FloatArray, FloatArray]:
-    """Traction across layers, positive where it opens them, and along them, at some cells."""
-    every = stress.stress.reshape(-1, 9)
-    tensor = ball_averages(centre, every, stress.mesh.volumes, shown, BALL).reshape(-1, 3, 3)
-    normal = layer_normals(layers, centre[shown])
-    traction = np.einsum("mij,mj->mi", tensor, normal)
-    opening = np.einsum("mi,mi->m", traction, normal)
-    return opening, np.linalg.norm(traction - opening[:, None] * normal, axis=1)
-
-
-def strength_table(loads: dict[str, dict[str, tuple[float, ...]]]) -> str:
+def strength_table(loads: Mapping[str, Mapping[str, tuple[float, ...]]]) -> str:
     """Table in Markdown, by part and slicing; a load for each zone, 3, 1.5 and 0 mm."""
-    heads = ("S 18 MPa", "S 35 MPa", "opening alone")
-    lines = [f"| part | layers | {' | '.join(heads)} | over flat |", "|---" * 6 + "|"]
-    for part, found in loads.items():
-        flat = np.array(found["flat, z"])
-        for name, values in found.items():
-            told = [f"{a:.0f}, {b:.0f}, {c:.0f} N" for a, b, c in np.reshape(values, (-1, 3))]
+    rows = []
+    for part, slicings in loads.items():
+        flat = slicings["flat, z"]
+        for name, values in slicings.items():
+            zones = [f"{a:.0f}, {b:.0f}, {c:.0f} N" for a, b, c in np.reshape(values, (-1, 3))]
             gain = ", ".join(f"{values[k] / flat[k]:.2f}" for k in (0, 3, 6))
-            lines.append(f"| {part} | {name} | {' | '.join(told)} | {gain} |")
-    return "\n".join(lines) + "\n"
+            rows.append((part, name, *zones, gain))
+    head = ("part", "layers", "S 18 MPa", "S 35 MPa", "opening alone", "over flat")
+    return table(head, rows)

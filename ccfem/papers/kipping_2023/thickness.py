@@ -41,7 +41,7 @@ class Distances:
 
 def distances_below(layers: Sequence[Layer], judged: Sequence[bool] | None = None) -> Distances:
     """Measure the distance of all layers, or of those that are judged, from those below."""
-    found, areas = [], []
+    distances, areas = [], []
     for k, layer in enumerate(layers[1:], 1):
         if judged is not None and not judged[k]:
             continue
@@ -58,8 +58,8 @@ def distances_below(layers: Sequence[Layer], judged: Sequence[bool] | None = Non
             plane = np.abs(np.einsum("kd,kd->k", off, below.normals[foot.triangle]))
             inside = foot.distance - plane < _AT_BORDER * foot.distance + 1e-3
             nearest[near] = np.minimum(nearest[near], np.where(inside, plane, np.inf))
-        found.append(nearest)
+        distances.append(nearest)
         areas.append(layer.areas)
-    distance, area = np.concatenate(found), np.concatenate(areas)
+    distance, area = np.concatenate(distances), np.concatenate(areas)
     known = distance < _FARTHEST
     return Distances(distance[known], area[known], float(area[known].sum() / area.sum()))

@@ -24,17 +24,26 @@ from ccfem.judging.evaluation.indices.sinuosity import (
 )
 from ccfem.judging.evaluation.indices.stiffness_alignment import agreement
 from ccfem.judging.evaluation.plane_paths import plane_paths
-from ccfem.papers.contents import Contents
+from ccfem.papers.contents import (
+    Contents,
+    claim_table,
+    judged,
+    table,
+    write_figures,
+    write_report,
+)
 from ccfem.papers.plocher_2022.fibre_map import fibre_map
-from ccfem.papers.plocher_2022.figures import draw_all, figures
+from ccfem.papers.plocher_2022.figures import figures
 from ccfem.papers.plocher_2022.plane_study import laid_plate, print_seconds, reduced_stiffness
 from ccfem.papers.plocher_2022.plates import Plate, five_holes, single_hole
 from ccfem.papers.plocher_2022.study import MATERIALS, RASTER, CaseStudy, machine_of, run_study
-from ccfem.papers.verdicts import Check, claim_table, judged
 from ccfem.paths.planning import plan
 from ccfem.paths.raster.patterns import concentric_regions, medial_regions
 from ccfem.paths.raster.raster_plan import raster_plan
 from ccfem.strategies import create
+
+EXPECTED = Path(__file__).with_name("expected.toml")
+"""Claims of the paper, with the ranges that count as reproduced."""
 
 # The whole of the paper: its study, figures, tables and claims beside ours.
 
@@ -59,42 +68,38 @@ def write_all(folder: Path, progress: Progress = silent) -> None:
     study = run_study(progress=progress)
     raster = run_study(patterns=RASTER, known=study, progress=progress)
     tried = try_variants()
-    found = quantities(study) | raster_quantities(raster) | variant_quantities(tried)
-    checks = verdicts(found)
+    values = quantities(study) | raster_quantities(raster) | variant_quantities(tried)
+    claims = claim_table(judged(values, EXPECTED))
     computed = perf_counter() - begun
-    drawn = draw_all(study, raster, folder)
+    drawn = write_figures(figures(study, raster), folder)
     rows = [
-        [name, mode, pattern, k, f"{v:.8g}"]
+        [name, mode, pattern, index, f"{value:.8g}"]
         for mode, cases in (("polyline", study), ("raster", raster))
         for name, case in cases.items()
-        for pattern, one in case.patterns.items()
-        for k, v in one.values.items()
+        for pattern, paths in case.patterns.items()
+        for index, value in paths.values.items()
     ]
     write_csv(folder / "results.csv", ("case", "mode", "pattern", "index", "value"), rows)
-    parts = [
-        "# Infill patterns of Plocher, Wioland and Panesar (2022): ours beside theirs\n",
-        "Written by `ccfem reproduce plocher_2022`.\n",
-        f"Study {computed:.1f} s, figures {perf_counter() - begun - computed:.1f} s.\n",
-        "## Claims\n",
-        claim_table(checks),
-        *(
-            f"## Case {name}, polylines\n\n{result_table(study[name])}\n"
-            f"## Case {name}, pixels\n\n{result_table(raster[name])}"
-            for name in study
-        ),
-        f"## Pixels beside a prototype (in brackets)\n\n{prototype_table(raster)}",
-        PROTOTYPE_NOTE,
-        f"## Rings of pixels by metric: SI of raw pixels\n\n{metric_table(raster)}",
-        f"## Ranks of PI\n\n{rank_table(found)}",
-        f"## Variants tried\n\n{variant_table(tried)}",
-        f"## Table 2: indices\n\n{index_table()}",
-        f"## Table 3: cases\n\n{case_table(study)}",
-        f"## Table 5: materials\n\n{material_table()}",
-        "## Figures\n",
-        *(f"![{name}]({name})\n" for name in drawn),
-    ]
-    (folder / "report.md").write_text("\n".join(parts))
-    print(claim_table(checks))
+    introduction = (
+        "# Infill patterns of Plocher, Wioland and Panesar (2022): ours beside theirs\n\n"
+        "Written by `ccfem reproduce plocher_2022`.\n\n"
+        f"Study {computed:.1f} s, figures {perf_counter() - begun - computed:.1f} s.\n"
+    )
+    sections = {"Claims": claims}
+    for name in study:
+        sections[f"Case {name}, polylines"] = result_table(study[name])
+        sections[f"Case {name}, pixels"] = result_table(raster[name])
+    sections |= {
+        "Pixels beside a prototype (in brackets)": f"{prototype_table(raster)}\n{PROTOTYPE_NOTE}",
+        "Rings of pixels by metric: SI of raw pixels": metric_table(raster),
+        "Ranks of PI": rank_table(values),
+        "Variants tried": variant_table(tried),
+        "Table 2: indices": index_table(),
+        "Table 3: cases": case_table(study),
+        "Table 5: materials": material_table(),
+    }
+    write_report(folder, introduction, sections, drawn)
+    print(claims)
     print(f"report.md: {perf_counter() - begun:.1f} s")
 
 
@@ -152,13 +157,13 @@ def try_variant(plate: Plate, strategy: str, parameters: dict[str, Any]) -> Trie
     toolpaths = plan(create(strategy, parameters), layers, stress, machine_of(plate))
     paths = [plane_paths(toolpaths, layer) for layer in layers]
     maps = [fibre_map(p, plate.mesh.centres, plate.bead) for p in paths]
-    laid = laid_plate(plate.problem(stiffness), np.stack([m.angle for m in maps]), stiffness)
+    solved = laid_plate(plate.problem(stiffness), np.stack([m.angle for m in maps]), stiffness)
     direction, defined = strongest_direction(plate.isotropic_field)
     winding = sinuosity_indices(sample_sinuosity(paths[0], plate.bead))
     return Tried(
         100.0 * float(np.mean([agreement(m.angle - direction)[defined] for m in maps])),
-        1e6 * laid.strain_energy,
-        laid.stress,
+        1e6 * solved.strain_energy,
+        solved.stress,
         float(np.mean([print_seconds(p) for p in paths])),
         100.0 * winding["over_40_count"],
     )
@@ -184,34 +189,30 @@ def variant_quantities(tried: Mapping[str, Tried]) -> dict[str, float]:
 
 def metric_table(cases: Mapping[str, CaseStudy]) -> str:
     """Markdown table: rings of pixels by three metrics, SI of their raw pixels, mean of paths."""
-    lines = ["| case | rings by | concentric | mat | paths, concentric | mat |", "|" + "---|" * 6]
+    rows = []
     for name, case in cases.items():
         (made,) = case.patterns["concentric"].raster
         for metric in ("euclid", "cross", "square"):
-            winding, count = [], []
+            winding = []
             for regions_of in (concentric_regions, medial_regions):
-                regions = regions_of(made.raster.mask, metric=metric)
-                traced = raster_plan(made.raster, regions)
-                found = path_sinuosity(*pack(traced.chains), made.raster.pixel)
-                winding.append(f"{found.mean():.3f}")
-                count.append(str(len(found)))
-            lines.append(f"| {' | '.join([name, metric, *winding, *count])} |")
-    return "\n".join(lines) + "\n"
+                traced = raster_plan(made.raster, regions_of(made.raster.mask, metric=metric))
+                winding.append(path_sinuosity(*pack(traced.chains), made.raster.pixel))
+            means = [f"{sinuosity.mean():.3f}" for sinuosity in winding]
+            rows.append([name, metric, *means, *(str(len(sinuosity)) for sinuosity in winding)])
+    return table(("case", "rings by", "concentric", "mat", "paths, concentric", "mat"), rows)
 
 
 def variant_table(tried: Mapping[str, Tried]) -> str:
     """Markdown table of all variants."""
-    lines = [
-        "| variant | agreement, % | energy C, 1e-6 N mm | stress p99.9 C, MPa | print, s | "
-        "> 40 mm, % |",
-        "|---|---|---|---|---|---|",
+    head = ("variant", "agreement, %", "energy C, 1e-6 N mm", "stress p99.9 C, MPa", "print, s")
+    rows = [
+        (
+            *(name, f"{variant.agreement:.1f}", f"{variant.energy:.1f}", f"{variant.stress:.3f}"),
+            *(f"{variant.print_seconds:.0f}", f"{variant.over_40:.0f}"),
+        )
+        for name, variant in tried.items()
     ]
-    lines += [
-        f"| {name} | {found.agreement:.1f} | {found.energy:.1f} | {found.stress:.3f} | "
-        f"{found.print_seconds:.0f} | {found.over_40:.0f} |"
-        for name, found in tried.items()
-    ]
-    return "\n".join(lines) + "\n"
+    return table((*head, "> 40 mm, %"), rows)
 
 
 _Both = tuple[Mapping[str, CaseStudy], Mapping[str, CaseStudy]]
@@ -225,7 +226,7 @@ def _run(progress: Progress) -> _Both:
 
 def _claims(study: _Both) -> str:
     """Claims, but for those that need the variants, which take as long again."""
-    return claim_table(verdicts(quantities(study[0]) | raster_quantities(study[1])))
+    return claim_table(judged(quantities(study[0]) | raster_quantities(study[1]), EXPECTED))
 
 
 CONTENTS = Contents(
@@ -246,9 +247,6 @@ CONTENTS = Contents(
 
 # The claims of the paper beside ours: every quantity is computed from a run.
 
-
-EXPECTED = Path(__file__).with_name("expected.toml")
-
 _STRAIGHT = 0.002
 """Sinuosities no further apart are equal."""
 
@@ -258,54 +256,54 @@ def quantities(study: Mapping[str, CaseStudy]) -> dict[str, float]:
 
     Orders that hold are 1, others 0.
     """
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     for name, case in study.items():
         have = set(case.patterns)
         for rule in (_agreement, _energy, _stress, _printing, _sensitivity, _mixed, _ranks):
-            found |= rule(case, name, have)
-    return found
+            values |= rule(case, name, have)
+    return values
 
 
 def raster_quantities(raster: Mapping[str, CaseStudy]) -> dict[str, float]:
     """Quantities of paths of pixels: their names start with "raster"."""
-    found = {f"raster {name}": value for name, value in quantities(raster).items()}
+    values = {f"raster {name}": value for name, value in quantities(raster).items()}
     for name, case in raster.items():
         winding = [case.value(p, "si_raw_mean") for p in case.patterns]
         spread = 100.0 * (max(winding) / min(winding) - 1.0)
-        found[f"raster range of sinuosity of raw pixels {name}, %"] = spread
-    return found
+        values[f"raster range of sinuosity of raw pixels {name}, %"] = spread
+    return values
 
 
 def _agreement(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
-    found = {f"agreement {p} {name}": case.value(p, "agreement") for p in have}
+    values = {f"agreement {p} {name}": case.value(p, "agreement") for p in have}
     if have >= {"mat", "concentric"}:
         less = case.value("mat", "agreement") - case.value("concentric", "agreement")
-        found[f"agreement mat less concentric {name}"] = less
-    return found
+        values[f"agreement mat less concentric {name}"] = less
+    return values
 
 
 def _energy(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
     ratio = {p: case.value(p, "ratio_C") for p in have}
     soft = {p: case.value(p, "energy_S") for p in have}
-    found = {
+    values = {
         f"least energy ratio C {name}": min(ratio.values()),
         f"range of energy {name} S, %": 100.0 * (max(soft.values()) / min(soft.values()) - 1.0),
     }
     if have >= {"mps", "grid 45"}:
-        found[f"energy grid 45 over mps {name}"] = ratio["grid 45"] / ratio["mps"]
+        values[f"energy grid 45 over mps {name}"] = ratio["grid 45"] / ratio["mps"]
         drop = 1.0 - case.value("mps", "stress_C") / case.value("grid 45", "stress_C")
-        found[f"stress drop mps {name}"] = 100.0 * drop
+        values[f"stress drop mps {name}"] = 100.0 * drop
     if have >= {"mps", "grid 45", "grid 0", "concentric", "mat"}:
         middle = [ratio[p] for p in ("grid 0", "concentric", "mat")]
         holds = ratio["mps"] < min(middle) and max(middle) < ratio["grid 45"]
-        found[f"order of energies {name}"] = float(holds)
+        values[f"order of energies {name}"] = float(holds)
     if have >= {"mps", "concentric", "mat"}:
         for key, suffix in (("ratio_C", ""), ("ratio_off_peaks_C", " off peaks")):
             order = [case.value(p, key) for p in ("mps", "concentric", "mat")]
             best = min(case.value(p, key) for p in have)
             holds = order == sorted(order) and order[0] == best
-            found[f"order on {name} C{suffix}"] = float(holds)
-    return found
+            values[f"order on {name} C{suffix}"] = float(holds)
+    return values
 
 
 def _stress(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
@@ -319,31 +317,31 @@ def _stress(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
 
 
 def _printing(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
-    found = {}
+    values = {}
     if have >= {"mps", "concentric"}:
         seconds = case.value("mps", "cpu_with_fe") / case.value("concentric", "cpu_with_fe")
-        found[f"cpu mps over concentric {name}, %"] = 100.0 * (seconds - 1.0)
+        values[f"cpu mps over concentric {name}, %"] = 100.0 * (seconds - 1.0)
     if have >= {"grid 45", "concentric"}:
         longer = case.value("grid 45", "print") / case.value("concentric", "print") - 1.0
-        found[f"print time grid 45 over concentric {name}, %"] = 100.0 * longer
+        values[f"print time grid 45 over concentric {name}, %"] = 100.0 * longer
     if "concentric" in have and len(have) > 1:
         for key, label in (("cpu_with_fe", "cpu"), ("print", "print time")):
             others = min(case.value(p, key) for p in have - {"concentric"})
-            found[f"{label} concentric over least other {name}"] = (
+            values[f"{label} concentric over least other {name}"] = (
                 case.value("concentric", key) / others
             )
         long = {p: case.value(p, "over_40") for p in have}
         holds = long["concentric"] == max(long.values())
-        found[f"concentric longest {name}"] = float(holds)
+        values[f"concentric longest {name}"] = float(holds)
     winding = {p: case.value(p, "si") for p in have}
-    found[f"range of sinuosity {name}, %"] = 100.0 * (
+    values[f"range of sinuosity {name}, %"] = 100.0 * (
         max(winding.values()) / min(winding.values()) - 1.0
     )
     grids = [winding[p] for p in have if p.startswith("grid")]
     if grids:
         holds = min(grids) <= min(winding.values()) + _STRAIGHT
-        found[f"grid straightest {name}"] = float(holds)
-    return found
+        values[f"grid straightest {name}"] = float(holds)
+    return values
 
 
 def _sensitivity(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
@@ -354,19 +352,19 @@ def _sensitivity(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]
 
 
 def _mixed(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     if "grid 45" not in have:
-        return found
+        return values
     energy = {p: case.value(p, "energy_mixed") for p in have}
-    found[f"grid 45 softest mixed {name}"] = float(energy["grid 45"] == max(energy.values()))
+    values[f"grid 45 softest mixed {name}"] = float(energy["grid 45"] == max(energy.values()))
     for p in have - {"grid 45"}:
         drop = 1.0 - case.value(p, "stress_mixed") / case.value("grid 45", "stress_mixed")
-        found[f"mixed stress drop {p} {name}"] = 100.0 * drop
-    return found
+        values[f"mixed stress drop {p} {name}"] = 100.0 * drop
+    return values
 
 
 def _ranks(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
-    found = {}
+    values = {}
     for key in case.benchmarks:
         for reading in ("weighted", "literal", "harmonic"):
             label = "PI" if reading == "weighted" else f"PI {reading}"
@@ -376,16 +374,11 @@ def _ranks(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
                 index = [case.value(p, f"pi_{reading}_{key}") for p in sorted(patterns)]
                 stiff = [1.0 / case.value(p, f"energy_{key}") for p in sorted(patterns)]
                 rank = float(spearmanr(index, stiff).statistic)
-                found[f"rank of {label} {key} {name}{suffix}"] = rank
+                values[f"rank of {label} {key} {name}{suffix}"] = rank
                 far = [1.0 / case.value(p, f"ratio_off_peaks_{key}") for p in sorted(patterns)]
                 rank = float(spearmanr(index, far).statistic)
-                found[f"rank of {label} {key} {name}{suffix}, off peaks"] = rank
-    return found
-
-
-def verdicts(found: Mapping[str, float]) -> list[Check]:
-    """Judge every check of `expected.toml` by the quantities found."""
-    return judged(found, EXPECTED)
+                values[f"rank of {label} {key} {name}{suffix}, off peaks"] = rank
+    return values
 
 
 # Tables of a run, in Markdown.
@@ -427,20 +420,15 @@ ROWS = {
 }
 
 
-def _table(head: list[str], rows: list[list[str]]) -> str:
-    lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
-    return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)]) + "\n"
-
-
 def result_table(case: CaseStudy) -> str:
     """Every index of every pattern on one plate."""
-    known = set.intersection(*(set(one.values) for one in case.patterns.values()))
+    known = set.intersection(*(set(pattern.values) for pattern in case.patterns.values()))
     rows = [
         [title, *(form.format(case.value(pattern, index)) for pattern in case.patterns)]
         for index, (title, form) in ROWS.items()
         if index in known
     ]
-    return _table(["index", *case.patterns], rows)
+    return table(["index", *case.patterns], rows)
 
 
 def prototype_table(raster: Mapping[str, CaseStudy], path: Path = PROTOTYPE) -> str:
@@ -456,22 +444,22 @@ def prototype_table(raster: Mapping[str, CaseStudy], path: Path = PROTOTYPE) -> 
                 f"{form.format(case.value(pattern, index))} ({value:g})" for pattern, value in pairs
             ]
             rows.append([name, title, *cells])
-    return _table(["case", "index", *next(iter(raster.values())).patterns], rows)
+    return table(["case", "index", *next(iter(raster.values())).patterns], rows)
 
 
-def rank_table(found: Mapping[str, float]) -> str:
+def rank_table(values: Mapping[str, float]) -> str:
     """Rank correlation (Spearman) of PI with the stiffness of the patterns, by reading."""
     head = ["reading of PI", "material", "patterns"]
-    cases = [name for name in ("I", "II", "III") if f"rank of PI C {name}" in found]
+    cases = [name for name in ("I", "II", "III") if f"rank of PI C {name}" in values]
     rows = []
     for reading in ("PI", "PI literal", "PI harmonic"):
         for key in MATERIALS:
             for suffix in ("", " without 0/90"):
-                ranks = [found[f"rank of {reading} {key} {name}{suffix}"] for name in cases]
+                ranks = [values[f"rank of {reading} {key} {name}{suffix}"] for name in cases]
                 about = [reading if reading != "PI" else "PI weighted", f"{key}-FRAM"]
                 patterns = "all five" if not suffix else suffix.strip()
                 rows.append([*about, patterns, *(f"{rank:.2f}" for rank in ranks)])
-    return _table([*head, *(f"case {name}" for name in cases)], rows)
+    return table([*head, *(f"case {name}" for name in cases)], rows)
 
 
 def index_table() -> str:
@@ -488,7 +476,7 @@ def index_table() -> str:
     )
     columns = {column.name: column for column in COLUMNS}
     rows = [[n, columns[n].unit, columns[n].formula, columns[n].range] for n in names]
-    return _table(["index", "unit", "what", "range"], rows)
+    return table(["index", "unit", "what", "range"], rows)
 
 
 def case_table(study: Mapping[str, CaseStudy]) -> str:
@@ -509,7 +497,7 @@ def case_table(study: Mapping[str, CaseStudy]) -> str:
             ]
         )
     head = ["case", "plate", "box, mm", "area, mm^2", "elements", "bead, mm", "all patterns, s"]
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def material_table() -> str:
@@ -529,4 +517,4 @@ def material_table() -> str:
                 material.source,
             ]
         )
-    return _table(["material", "E1, GPa", "E2", "G12", "nu12", "E1/E2", "source"], rows)
+    return table(["material", "E1, GPa", "E2", "G12", "nu12", "E1/E2", "source"], rows)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ccfem.base.arrays import FloatArray, IntArray, read_only
+from ccfem.base.arrays import FloatArray, IntArray, freeze
 from ccfem.geometry.polylines import arc_lengths, sample_at
 from ccfem.judging.evaluation.plane_paths import PlanePaths
 
@@ -33,8 +33,7 @@ class FibreMap:
     path: IntArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "angle", read_only(self.angle))
-        object.__setattr__(self, "path", read_only(self.path, np.int64))
+        freeze(self, angle=float, path=int)
 
 
 def fibre_map(paths: PlanePaths, centres: FloatArray, bead: float) -> FibreMap:
@@ -60,25 +59,25 @@ def fibre_map(paths: PlanePaths, centres: FloatArray, bead: float) -> FibreMap:
         raise ValueError("a fibre map needs at least one path")
     points, angle, line = _tangents(paths, bead)
     distance, nearest = cKDTree(points).query(centres)
-    found = distance <= _NEAR * bead
-    if not found.any():
-        found = distance <= distance.min()
+    known = distance <= _NEAR * bead
+    if not known.any():
+        known = distance <= distance.min()
     double = np.exp(2.0j * angle[nearest])
-    double[~found] = 0.0
+    double[~known] = 0.0
     near = cKDTree(centres).query_pairs(1.5 * bead, output_type="ndarray")
-    while not found.all():
+    while not known.all():
         total = np.zeros(len(centres), dtype=complex)
         count = np.zeros(len(centres))
         for a, b in (near.T, near.T[::-1]):
             np.add.at(total, a, double[b])
-            np.add.at(count, a, found[b].astype(float))
+            np.add.at(count, a, known[b].astype(float))
         # A part of the plate that no path reaches takes the angle of the nearest path.
-        fresh = ~found & (count > 0.0)
+        fresh = ~known & (count > 0.0)
         if not fresh.any():
-            fresh, total = ~found, np.exp(2.0j * angle[nearest])
+            fresh, total = ~known, np.exp(2.0j * angle[nearest])
         size = np.abs(total[fresh])
         double[fresh] = np.where(size > 1e-12, total[fresh] / np.maximum(size, 1e-12), 1.0)
-        found |= fresh
+        known |= fresh
     path = np.where(distance <= _NEAR * bead, line[nearest], -1)
     return FibreMap(0.5 * np.angle(double), path)
 
@@ -91,8 +90,8 @@ def _tangents(paths: PlanePaths, bead: float) -> tuple[FloatArray, FloatArray, I
     first = np.cumsum(parts + 1) - (parts + 1)
     position = (np.arange(len(line)) - first[line]) * (total / parts)[line]
     # The given points too: paths on a raster pass through the centres of its cells.
-    own = np.repeat(np.arange(len(total)), np.diff(offsets))
-    line = np.concatenate([line, own])
+    line_of_point = np.repeat(np.arange(len(total)), np.diff(offsets))
+    line = np.concatenate([line, line_of_point])
     position = np.concatenate([position, arc_lengths(points, offsets)])
     ends = []
     for shift in (-_REACH * bead, _REACH * bead):

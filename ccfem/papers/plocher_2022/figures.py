@@ -1,25 +1,24 @@
 """Figures of the paper that are computations, redrawn from a run."""
 
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.tensor import strongest_in_plane
-from ccfem.comparison.plot.canvas import save
-from ccfem.comparison.plot.colours import INK, OUTLINE, SECTION, scale
+from ccfem.comparison.plot.colours import INK, OUTLINE, scale
 from ccfem.fem.materials import named_material
 from ccfem.fem.plates import rotate_plane, stack_plane
 from ccfem.judging.evaluation.indices.sinuosity import LONG
 from ccfem.judging.evaluation.indices.stiffness_alignment import agreement
 from ccfem.judging.evaluation.plane_paths import PlanePaths
 from ccfem.judging.evaluation.sensitivity import OffAxis
+from ccfem.papers import panels
 from ccfem.papers.contents import drawn_of
+from ccfem.papers.panels import bar, canvas, title
 from ccfem.papers.plocher_2022.plane_study import laid_plate, reduced_stiffness, turned_energies
 from ccfem.papers.plocher_2022.plates import Plate
 from ccfem.papers.plocher_2022.radar import draw_radar
@@ -47,31 +46,20 @@ def plates_grid(
     """Figure with one picture of a plate a place; the plates of a column have one shape."""
     shares = [plate.mask.shape[0] / plate.mask.shape[1] for plate in plates]
     height = width * max(shares) + 0.28
-    figure = Figure(figsize=(columns * width, rows * height), dpi=130.0, facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = canvas(columns * width, rows * height, dpi=130.0)
     axes = figure.subplots(rows, columns, squeeze=False)
     figure.subplots_adjust(0.01, 0.01, 0.99, 1.0 - 0.25 / (rows * height), 0.03, 0.18)
-    for one in axes.flat:
-        one.set_axis_off()
-        one.set_aspect("equal")
+    for panel in axes.flat:
+        panel.set_axis_off()
+        panel.set_aspect("equal")
     return figure, axes
 
 
-def section(axes: Any, plate: Plate, filled: bool = True) -> None:
-    """Outline of a plate, filled or not, and the limits of its picture."""
-    from matplotlib.patches import PathPatch
-    from matplotlib.path import Path as Outline
-
-    rings = [np.asarray(r.coords) for r in (plate.polygon.exterior, *plate.polygon.interiors)]
-    outline = Outline.make_compound_path(*[Outline(ring[:, :2], closed=True) for ring in rings])
-    axes.add_patch(PathPatch(outline, fc=SECTION if filled else "none", ec=OUTLINE, lw=0.4))
+def section(axes: Any, plate: Plate, text: str = "", filled: bool = True) -> None:
+    """Outline of a plate, filled or not, with the limits of its picture and a heading if any."""
+    panels.section(axes, plate.polygon, text, filled, width=0.4)
     axes.set_xlim(-1.0, plate.mask.shape[1] * plate.bead + 1.0)
     axes.set_ylim(-1.0, plate.mask.shape[0] * plate.bead + 1.0)
-
-
-def title(axes: Any, text: str) -> None:
-    """Line of text above a picture."""
-    axes.set_title(text, size=7.5, color=INK, loc="left", pad=2.0)
 
 
 def strokes(axes: Any, case: CaseStudy, every: int = 3) -> None:
@@ -102,23 +90,21 @@ def image(axes: Any, plate: Plate, values: FloatArray, colours: Any, limits: Any
 
 def plain(columns: int, width: float = 4.4, height: float = 3.2) -> tuple[Figure, Any]:
     """Figure with diagrams side by side."""
-    figure = Figure(figsize=(columns * width, height), dpi=130.0, facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = canvas(columns * width, height, dpi=130.0)
     axes = figure.subplots(1, columns, squeeze=False)[0]
     figure.subplots_adjust(0.14 / columns, 0.2, 0.98, 0.88, 0.28)
-    for one in axes:
-        one.spines[["top", "right"]].set_visible(False)
-        one.tick_params(labelsize=7, colors=INK)
+    for panel in axes:
+        panel.spines[["top", "right"]].set_visible(False)
+        panel.tick_params(labelsize=7, colors=INK)
     return figure, axes
 
 
 def polar(columns: int) -> tuple[Figure, Any]:
     """Figure with polar diagrams side by side."""
-    figure = Figure(figsize=(3.6 * columns, 4.0), dpi=130.0, facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = canvas(3.6 * columns, 4.0, dpi=130.0)
     axes = [figure.add_subplot(1, columns, k + 1, projection="polar") for k in range(columns)]
-    for one in axes:
-        one.tick_params(labelsize=6)
+    for panel in axes:
+        panel.tick_params(labelsize=6)
     figure.subplots_adjust(0.08, 0.1, 0.92, 0.82, 0.35)
     return figure, axes
 
@@ -132,16 +118,6 @@ SPOKES = {
     "CPU time": ("cpu_with_fe", "low"),
     "print time": ("print", "low"),
 }
-
-
-def draw_all(
-    study: Mapping[str, CaseStudy], raster: Mapping[str, CaseStudy], folder: Path
-) -> list[str]:
-    """Draw every figure that the cases run allow; the names of the files."""
-    made = figures(study, raster)
-    for name, figure in made.items():
-        save(figure, folder / f"{name}.png")
-    return [f"{name}.png" for name in made]
 
 
 def figures(
@@ -171,7 +147,7 @@ def figures(
             "figure_06_patterns_raster": lambda: _patterns(pixels()),
             "figure_06_benchmark": lambda: benchmark_fields(tension()),
             "figure_06_bars": lambda: _bars(tension(), ("C",)),
-            "figure_07_agreement": lambda: _maps(
+            "figure_07_agreement": lambda: _cell_maps(
                 tension(), _agreement_of, (0.0, 100.0), "agreement, %"
             ),
             "figure_07_moduli": layups,
@@ -198,7 +174,7 @@ def figures(
     return drawn_of(drawn, number)
 
 
-def _lines(paths: PlanePaths) -> list[FloatArray]:
+def _path_lines(paths: PlanePaths) -> list[FloatArray]:
     return np.split(paths.points, paths.offsets[1:-1]) if len(paths) else []
 
 
@@ -209,19 +185,22 @@ def _patterns(study: Mapping[str, CaseStudy]) -> Figure:
     figure, axes = plates_grid(len(names) + 1, len(cases), [c.plate for c in cases])
     for column, case in enumerate(cases):
         top = axes[0, column]
-        section(top, case.plate)
+        section(
+            top, case.plate, f"case {case.plate.name}: direction of the largest stress (benchmark)"
+        )
         strokes(top, case)
-        title(top, f"case {case.plate.name}: direction of the largest stress (benchmark)")
         for row, name in enumerate(names, start=1):
-            one, found = axes[row, column], case.patterns[name]
-            section(one, case.plate)
-            for paths, colour in zip(found.paths, (COLOURS[name], INK), strict=False):
-                one.add_collection(LineCollection(_lines(paths), colors=colour, linewidths=0.45))
-            title(
-                one,
-                f"{name}: agreement {found.values['agreement']:.1f} %, "
-                f"energy {found.values['ratio_C']:.2f} x benchmark (C-FRAM)",
+            panel, pattern = axes[row, column], case.patterns[name]
+            section(
+                panel,
+                case.plate,
+                f"{name}: agreement {pattern.values['agreement']:.1f} %, "
+                f"energy {pattern.values['ratio_C']:.2f} x benchmark (C-FRAM)",
             )
+            for paths, colour in zip(pattern.paths, (COLOURS[name], INK), strict=False):
+                panel.add_collection(
+                    LineCollection(_path_lines(paths), colors=colour, linewidths=0.45)
+                )
     return figure
 
 
@@ -233,21 +212,19 @@ def _medial_axis(case: CaseStudy) -> Figure:
     axis = skeleton(inside)
     first = np.where(made.raster.mask, np.where(inside, 1.0, 0.0), np.nan)
     domain = np.where(made.raster.mask, made.regions.domain, np.nan)
-    panels = (
+    shown = (
         ("three shells, and the medial axis of the rest", np.where(axis, 2.0, first)),
         ("shells, rings round the medial axis, concentric rest", domain),
     )
-    for one, (heading, pixels) in zip(axes[:, 0], panels, strict=False):
+    for panel, (heading, pixels) in zip(axes[:, 0], shown, strict=False):
         height, width = (made.raster.pixel * n for n in pixels.shape)
         x, y = made.raster.origin
-        one.imshow(pixels, cmap=scale("field"), extent=(x, x + width, y, y + height))
-        section(one, case.plate, filled=False)
-        title(one, f"case {case.plate.name}: {heading}")
-    section(axes[2, 0], case.plate)
+        panel.imshow(pixels, cmap=scale("field"), extent=(x, x + width, y, y + height))
+        section(panel, case.plate, f"case {case.plate.name}: {heading}", filled=False)
+    section(axes[2, 0], case.plate, f"case {case.plate.name}: paths of mat")
     axes[2, 0].add_collection(
-        LineCollection(_lines(case.patterns["mat"].paths[0]), colors=COLOURS["mat"], lw=0.6)
+        LineCollection(_path_lines(case.patterns["mat"].paths[0]), colors=COLOURS["mat"], lw=0.6)
     )
-    title(axes[2, 0], f"case {case.plate.name}: paths of mat")
     return figure
 
 
@@ -256,16 +233,16 @@ def _simplification(case: CaseStudy) -> Figure:
     figure, axes = plain(1, 5.0, 4.2)
     (made,) = case.patterns["concentric"].raster
     bead = made.raster.pixel
-    one = axes[0]
+    panel = axes[0]
     lines = made.lines()
-    one.add_collection(LineCollection(made.chains, colors=OUTLINE, linewidths=1.0, alpha=0.7))
-    one.add_collection(LineCollection(lines, colors=COLOURS["concentric"], linewidths=1.2))
-    one.plot(*np.array([line[0] for line in lines]).T, "o", color=INK, ms=3.5)
-    one.plot(*made.raster.centres(np.argwhere(made.paths.isolated)).T, "x", color=INK, ms=3.5)
-    one.set_xlim(0.0, 40.0 * bead)
-    one.set_ylim(0.0, 0.5 * bead * case.plate.mask.shape[0] + 4.0 * bead)
-    one.set_aspect("equal")
-    one.set_title(
+    panel.add_collection(LineCollection(made.chains, colors=OUTLINE, linewidths=1.0, alpha=0.7))
+    panel.add_collection(LineCollection(lines, colors=COLOURS["concentric"], linewidths=1.2))
+    panel.plot(*np.array([line[0] for line in lines]).T, "o", color=INK, ms=3.5)
+    panel.plot(*made.raster.centres(np.argwhere(made.paths.isolated)).T, "x", color=INK, ms=3.5)
+    panel.set_xlim(0.0, 40.0 * bead)
+    panel.set_ylim(0.0, 0.5 * bead * case.plate.mask.shape[0] + 4.0 * bead)
+    panel.set_aspect("equal")
+    panel.set_title(
         "concentric: pixels (grey), made straight, starts (dots), isolated (x)",
         size=8,
         loc="left",
@@ -274,24 +251,22 @@ def _simplification(case: CaseStudy) -> Figure:
     return figure
 
 
-def _agreement_of(case: CaseStudy, found: PatternStudy) -> FloatArray:
+def _agreement_of(case: CaseStudy, pattern: PatternStudy) -> FloatArray:
     direction = case.benchmarks["C"].direction
-    return 100.0 * np.mean([agreement(m.angle - direction) for m in found.maps], axis=0)
+    return 100.0 * np.mean([agreement(m.angle - direction) for m in pattern.maps], axis=0)
 
 
-def _maps(study: Mapping[str, CaseStudy], values_of: Any, limits: Any, label: str) -> Figure:
+def _cell_maps(study: Mapping[str, CaseStudy], values_of: Any, limits: Any, label: str) -> Figure:
     cases = list(study.values())
     names = list(cases[0].patterns)
     figure, axes = plates_grid(len(names), len(cases), [c.plate for c in cases])
     for column, case in enumerate(cases):
         for row, name in enumerate(names):
-            found = case.patterns[name]
-            values = values_of(case, found)
+            pattern = case.patterns[name]
+            values = values_of(case, pattern)
             drawn = image(axes[row, column], case.plate, values, scale("field"), limits)
             title(axes[row, column], f"case {case.plate.name}, {name}: mean {values.mean():.1f} %")
-    bar = figure.colorbar(drawn, ax=axes[:, -1], shrink=0.4, pad=0.01)
-    bar.set_label(label, size=7)
-    bar.ax.tick_params(labelsize=6)
+    bar(figure, axes[:, -1], drawn, label, shrink=0.4, aspect=20)
     return figure
 
 
@@ -303,8 +278,8 @@ def _energies(study: Mapping[str, CaseStudy], key: str = "C") -> Figure:
     for column, case in enumerate(cases):
         best = case.benchmarks[key].laid
         for row, name in enumerate(names):
-            laid = best if name == "benchmark" else case.patterns[name].laid[key]
-            density = laid.field.energy_density / best.field.energy_density.mean()
+            solved = best if name == "benchmark" else case.patterns[name].laid[key]
+            density = solved.field.energy_density / best.field.energy_density.mean()
             drawn = image(
                 axes[row, column],
                 case.plate,
@@ -312,14 +287,13 @@ def _energies(study: Mapping[str, CaseStudy], key: str = "C") -> Figure:
                 scale("stress"),
                 (-1.0, 1.3),
             )
-            ratio = laid.strain_energy / best.strain_energy
+            ratio = solved.strain_energy / best.strain_energy
             title(
                 axes[row, column],
                 f"case {case.plate.name}, {key}-FRAM, {name}: sum {ratio:.2f} x benchmark",
             )
-    bar = figure.colorbar(drawn, ax=axes[:, -1], shrink=0.4, pad=0.01)
-    bar.set_label("log10 of density over mean of benchmark", size=7)
-    bar.ax.tick_params(labelsize=6)
+    label = "log10 of density over mean of benchmark"
+    bar(figure, axes[:, -1], drawn, label, shrink=0.4, aspect=20)
     return figure
 
 
@@ -329,15 +303,15 @@ def _long_and_short(study: Mapping[str, CaseStudy]) -> Figure:
     figure, axes = plates_grid(len(names), len(cases), [c.plate for c in cases], 3.6)
     for column, case in enumerate(cases):
         for row, name in enumerate(names):
-            one, found = axes[row, column], case.patterns[name]
-            section(one, case.plate)
-            for paths in found.paths:
+            panel, pattern = axes[row, column], case.patterns[name]
+            section(panel, case.plate)
+            for paths in pattern.paths:
                 colours = np.where(paths.lengths > LONG, INK, COLOURS["concentric"])
-                one.add_collection(
-                    LineCollection(_lines(paths), colors=list(colours), linewidths=0.4)
+                panel.add_collection(
+                    LineCollection(_path_lines(paths), colors=list(colours), linewidths=0.4)
                 )
-            share = found.values["over_40"]
-            title(one, f"case {case.plate.name}, {name}: {share:.0f} % over 40 mm (dark)")
+            share = pattern.values["over_40"]
+            title(panel, f"case {case.plate.name}, {name}: {share:.0f} % over 40 mm (dark)")
     return figure
 
 
@@ -381,8 +355,8 @@ def _mixed_bars(study: Mapping[str, CaseStudy]) -> Figure:
 def _sensitivity(study: Mapping[str, CaseStudy]) -> Figure:
     figure, axes = plain(2)
     angle = np.radians(np.linspace(0.0, 90.0, 181))
-    for one, (key, name) in zip(axes, MATERIALS.items(), strict=True):
-        one.plot(
+    for panel, (key, name) in zip(axes, MATERIALS.items(), strict=True):
+        panel.plot(
             np.degrees(angle),
             OffAxis(named_material(name))(angle),
             color=OUTLINE,
@@ -392,12 +366,12 @@ def _sensitivity(study: Mapping[str, CaseStudy]) -> Figure:
         for case, colour in zip(study.values(), (COLOURS["mps"], COLOURS["grid 45"]), strict=False):
             curve = case.benchmarks[key].curve
             label = f"case {case.plate.name}"
-            one.plot(np.degrees(angle), curve(angle), color=colour, lw=1.1, label=label)
-            one.plot(curve.angles, curve.values, "o", color=colour, ms=3.0)
-        one.set_title(f"{key}-FRAM: f; grey: uniform tension", size=8, loc="left", color=INK)
-        one.set_xlabel("fibre turned from the principal direction, degrees", size=7.5)
-        one.set_ylim(0.0, 1.05)
-        one.legend(fontsize=7, frameon=False)
+            panel.plot(np.degrees(angle), curve(angle), color=colour, lw=1.1, label=label)
+            panel.plot(curve.angles, curve.values, "o", color=colour, ms=3.0)
+        panel.set_title(f"{key}-FRAM: f; grey: uniform tension", size=8, loc="left", color=INK)
+        panel.set_xlabel("fibre turned from the principal direction, degrees", size=7.5)
+        panel.set_ylim(0.0, 1.05)
+        panel.legend(fontsize=7, frameon=False)
     return figure
 
 
@@ -406,8 +380,7 @@ def _radars(
 ) -> Figure:
     """Radar of all indices; `instead` names other values for some."""
     chosen = SPOKES | dict(instead or {})
-    figure = Figure(figsize=(5.0 * len(study), 4.4), dpi=130.0, facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = canvas(5.0 * len(study), 4.4, dpi=130.0)
     spokes = {title: better for title, (_, better) in chosen.items()}
     for k, (name, case) in enumerate(study.items()):
         axes = figure.add_axes(((k + 0.16) / len(study), 0.13, 0.68 / len(study), 0.74))
@@ -446,13 +419,12 @@ def benchmark_fields(study: Mapping[str, CaseStudy]) -> Figure:
         image(axes[0, column], plate, largest, scale("stress"), (0.0, limit))
         title(axes[0, column], f"case {name}: largest stress, 0 to {limit:.3g} MPa")
         near = axes[1, column]
-        section(near, plate)
+        section(near, plate, f"case {name}: its direction at a hole (blue: compression)")
         strokes(near, case, every=1)
         hole = min(plate.polygon.interiors, key=lambda ring: ring.centroid.x)
         x, y, reach = hole.centroid.x, hole.centroid.y, 1.3 * np.ptp(np.asarray(hole.coords)[:, 0])
         near.set_xlim(x - 2.0 * reach, x + 2.0 * reach)
         near.set_ylim(y - reach, y + reach)
-        title(near, f"case {name}: its direction at a hole (blue: compression)")
         density = case.benchmarks["C"].laid.field.energy_density
         limit = float(np.percentile(density, 99.5))
         image(axes[2, column], plate, density, scale("stress"), (0.0, limit))
@@ -472,12 +444,12 @@ def layups() -> Figure:
     """Figure 7 f and g: modulus over the direction of the load, of layers and of materials."""
     figure, axes = polar(len(MATERIALS))
     angle = np.linspace(0.0, 2.0 * np.pi, 361)
-    for one, (key, material) in zip(axes, MATERIALS.items(), strict=True):
+    for panel, (key, material) in zip(axes, MATERIALS.items(), strict=True):
         for name, (layup, colour) in LAYUPS.items():
             modulus = 1e-3 * layup_moduli(angle, layup, material)
-            one.plot(angle, modulus, color=colour, lw=1.2, label=name)
-        one.set_title(f"{key}-FRAM: modulus, GPa", size=8, pad=12.0)
-        one.legend(loc="lower center", bbox_to_anchor=(0.5, -0.22), ncols=3, fontsize=6.5,
+            panel.plot(angle, modulus, color=colour, lw=1.2, label=name)
+        panel.set_title(f"{key}-FRAM: modulus, GPa", size=8, pad=12.0)
+        panel.legend(loc="lower center", bbox_to_anchor=(0.5, -0.22), ncols=3, fontsize=6.5,
                    frameon=False)  # fmt: skip
     return figure
 
@@ -496,7 +468,7 @@ def turned_fibre(case: CaseStudy) -> Figure:
     quarter = np.where(away[:, 0] * away[:, 1] > 0.0, 1.0, -1.0)
     image(axes[0], plate, quarter, "coolwarm", (-2.0, 2.0))
     axes[0].set_aspect("equal")
-    _heading(axes[0], "a: senses of the turn")
+    title(axes[0], "a: senses of the turn")
     problem = plate.isotropic_field.problem
     for side, label, colour in ((quarter, "mirrored", INK), (1.0, "one sense", COLOURS["mps"])):
         curve = turned_energies(problem, best.direction, stiffness, side)
@@ -512,7 +484,7 @@ def turned_fibre(case: CaseStudy) -> Figure:
         )  # fmt: skip
     axes[1].set_xlabel("fibre turned, degrees", size=7.5)
     axes[1].legend(fontsize=6.5, frameon=False)
-    _heading(axes[1], "b: energy and stress (p99.9) over the benchmark's")
+    title(axes[1], "b: energy and stress (p99.9) over the benchmark's")
     share = np.sort(best.laid.field.cell_energy)[::-1]
     share = np.minimum(share / np.quantile(share, 0.995), 1.0)
     cells = np.linspace(0.0, 100.0, len(share))
@@ -520,11 +492,11 @@ def turned_fibre(case: CaseStudy) -> Figure:
         axes[2].plot(cells, share**power, color=colour, lw=1.2, label=f"p = {power}")
     axes[2].set_xlabel("cells by their energy, %", size=7.5)
     axes[2].legend(fontsize=7, frameon=False)
-    _heading(axes[2], "d: weight of a cell, its energy to the power p")
+    title(axes[2], "d: weight of a cell, its energy to the power p")
     index = {name: case.value(name, "pi_weighted_C") for name in case.patterns}
     axes[3].bar(list(index), list(index.values()), color=[COLOURS[n] for n in index], width=0.65)
     axes[3].tick_params(axis="x", labelrotation=30)
-    _heading(axes[3], "e: index PI of the patterns")
+    title(axes[3], "e: index PI of the patterns")
     return figure
 
 
@@ -541,7 +513,3 @@ def shear(case: CaseStudy) -> Figure:
         "direction of the largest stress (red: tension, blue: compression)",
     )
     return figure
-
-
-def _heading(axes: Any, text: str) -> None:
-    axes.set_title(text, size=8, loc="left", color=INK)

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 import shapely
 
-from ccfem.base.arrays import BoolArray, FloatArray, read_only
+from ccfem.base.arrays import BoolArray, FloatArray, freeze, read_only
 from ccfem.base.tensor import strongest_in_plane
 from ccfem.fem.materials import Material
 from ccfem.fem.plates import PlaneField, PlaneProblem, rotate_plane, solve_plane, stack_plane
@@ -52,7 +52,7 @@ class LaidPlate:
     components: FloatArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "components", read_only(self.components))
+        freeze(self, components=float)
 
     @property
     def strain_energy(self) -> float:
@@ -106,7 +106,7 @@ def laid_plate(problem: PlaneProblem, angles: FloatArray, stiffness: FloatArray)
     solved = solve_plane(replace(problem, stiffness=stack_plane(turned)))
     (field,) = solved.values()
     per_layer = np.broadcast_to(stiffness, (*angles.shape, 3, 3))
-    parts = [field.stress_in(a, own) for a, own in zip(angles, per_layer, strict=True)]
+    parts = [field.stress_in(a, along) for a, along in zip(angles, per_layer, strict=True)]
     return LaidPlate(field, np.stack(parts))
 
 
@@ -190,9 +190,9 @@ def benchmark(
         See `turned_energies`.
     """
     _, direction, defined = strongest_in_plane(isotropic.stress)
-    laid = laid_plate(isotropic.problem, direction, stiffness)
+    solved = laid_plate(isotropic.problem, direction, stiffness)
     curve = turned_energies(isotropic.problem, direction, stiffness, side, angles)
-    return Benchmark(direction, defined, laid, curve)
+    return Benchmark(direction, defined, solved, curve)
 
 
 def mixed_stiffness(
@@ -208,8 +208,8 @@ def mixed_stiffness(
     cells without a path of `short` (Plocher et al. 2022, figures 4 and 14).
     """
     layers = []
-    for laid, found in zip(paths, maps, strict=True):
-        is_long = np.append(laid.lengths > limit, False)[found.path]
+    for layer_paths, fibre in zip(paths, maps, strict=True):
+        is_long = np.append(layer_paths.lengths > limit, False)[fibre.path]
         layers.append(np.where(is_long[:, None, None], long, short))
     return np.stack(layers)
 

@@ -7,14 +7,13 @@ load. The loading axis is x.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import shapely
 from scipy import ndimage
 
-from ccfem.base.arrays import BoolArray, FloatArray, read_only
+from ccfem.base.arrays import BoolArray, FloatArray, freeze
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import TetMesh
 from ccfem.body.meshing import extrude
@@ -67,8 +66,7 @@ class Plate:
     peaks: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mask", read_only(self.mask, np.bool_))
-        object.__setattr__(self, "points", MappingProxyType(dict(self.points)))
+        freeze(self, mask=bool, points=dict)
 
     @cached_property
     def mesh(self) -> PlaneMesh:
@@ -108,7 +106,7 @@ class Plate:
         """
         mesh = self._with_patches(extrude(self.polygon, _THICKNESS, _EDGE * self.bead, 1))
         plane = self.isotropic_field
-        nodal = _spatial(self._carried(plane.stress, mesh.points[:, :2]))
+        nodal = _spatial_stress(self._interpolated(plane.stress, mesh.points[:, :2]))
         cell = nodal[mesh.corners].mean(axis=1)
         nothing = np.zeros_like(mesh.points)
         loads = {"load": (Force("load", (1.0, 0.0, 0.0)),)}
@@ -136,7 +134,7 @@ class Plate:
         names = ("load", "support", "support_right")
         return mesh.with_patches({n: facets[k] for n, k in zip(names, near, strict=True)})
 
-    def _carried(self, values: FloatArray, points: FloatArray) -> FloatArray:
+    def _interpolated(self, values: FloatArray, points: FloatArray) -> FloatArray:
         """Bilinear interpolation (k, c), between pixel centres, of values (m, c) per cell."""
         image = np.zeros((*self.mask.shape, values.shape[1]))
         image[self.mask] = values
@@ -155,7 +153,7 @@ class Plate:
         )
 
 
-def _spatial(plane: FloatArray) -> FloatArray:
+def _spatial_stress(plane: FloatArray) -> FloatArray:
     """Stress tensors (k, 3, 3) of plane stress (k, 3)."""
     tensor = np.zeros((len(plane), 3, 3))
     tensor[:, 0, 0], tensor[:, 1, 1] = plane[:, 0], plane[:, 1]
@@ -177,7 +175,9 @@ def single_hole(bead: float = BEAD, radius: float = 6.0) -> Plate:
     radius : float, mm
         Stated as 6 mm; the stated cut-out area of 131 mm^2 would be 6.46 mm.
     """
-    return _pulled("I", "Single hole in tension", (201.6, 36.0), [(100.8, 18.0)], radius, bead)
+    return _pulled_plate(
+        "I", "Single hole in tension", (201.6, 36.0), [(100.8, 18.0)], radius, bead
+    )
 
 
 def five_holes(bead: float = BEAD, radius: float = 4.0) -> Plate:
@@ -187,12 +187,12 @@ def five_holes(bead: float = BEAD, radius: float = 4.0) -> Plate:
     one in the middle, four at (+-30, +-9) mm from it.
     """
     centres = [(54.0 + 30.0 * i, 18.0 + 9.0 * j) for i in (-1, 1) for j in (-1, 1)]
-    return _pulled(
+    return _pulled_plate(
         "II", "Five holes in tension", (108.0, 36.0), [(54.0, 18.0), *centres], radius, bead
     )
 
 
-def _pulled(
+def _pulled_plate(
     name: str,
     title: str,
     size: tuple[float, float],
@@ -296,13 +296,7 @@ class BendingBeam:
     design: Design
 
     def __post_init__(self) -> None:
-        for name, dtype in (
-            ("mask", np.bool_),
-            ("density", np.float64),
-            ("supports", np.float64),
-            ("loads", np.float64),
-        ):
-            object.__setattr__(self, name, read_only(getattr(self, name), dtype))
+        freeze(self, mask=bool, density=float, supports=float, loads=float)
 
 
 def three_point_bending_problem(size: float = 1.0) -> PlaneProblem:
@@ -350,7 +344,7 @@ def three_point_bending(size: float = 0.8, volume_fraction: float = 0.6) -> Bend
     fine = ndimage.zoom(coarse, _TIMES, order=1, mode="nearest", grid_mode=True)
     half = fine.shape[1] // 2
     fine = np.concatenate([fine[:, :half], fine[:, :half][:, ::-1]], axis=1)
-    mask = _part(fine, volume_fraction)
+    mask = _symmetric_part(fine, volume_fraction)
     width, height = size * mask.shape[1], size * mask.shape[0]
     inward = _SUPPORT_IN * _TIMES * size
     supports = np.array([[inward, 0.0], [width - inward, 0.0]])
@@ -373,7 +367,7 @@ def three_point_bending(size: float = 0.8, volume_fraction: float = 0.6) -> Bend
     )
 
 
-def _part(density: FloatArray, share: float) -> BoolArray:
+def _symmetric_part(density: FloatArray, share: float) -> BoolArray:
     """Densest pixels of a share of the image: the largest piece, with its small voids filled."""
     order = np.sort(density.reshape(-1))[::-1]
     dense = density >= order[round(share * order.size) - 1]

@@ -1,16 +1,13 @@
 """Radar ("spider") plots: several indices of several strategies on one scale."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
 from ccfem.comparison.plot.colours import INK, OUTLINE, palette
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _RINGS = (0.25, 0.5, 0.75, 1.0)
 
@@ -47,13 +44,13 @@ def normalised(values: FloatArray, better: str) -> FloatArray:
     return np.asarray(values / known.max()) if known.max() > 0.0 else np.ones_like(values)
 
 
-def radar_picture(
+def draw_radar(
+    axes: Any,
     series: Mapping[str, Sequence[float]],
     indices: Mapping[str, str],
-    heading: str = "",
     colours: Mapping[str, str] | None = None,
-) -> "Figure":
-    """Radar plot of several series.
+) -> None:
+    """Draw a radar plot of several series on axes of matplotlib.
 
     Parameters
     ----------
@@ -64,27 +61,6 @@ def radar_picture(
     colours : mapping of name to colour, optional
         Default `palette`.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(5.0, 4.2), dpi=150.0, facecolor="white")
-    FigureCanvasAgg(figure)
-    axes = figure.add_axes((0.16, 0.13, 0.68, 0.70))
-    draw_radar(axes, series, indices, colours)
-    figure.text(0.03, 0.95, heading, size=10, weight="bold", color=INK)
-    axes.legend(
-        loc="upper center", bbox_to_anchor=(0.5, -0.02), ncols=3, frameon=False, fontsize=7.5
-    )
-    return figure
-
-
-def draw_radar(
-    axes: Any,
-    series: Mapping[str, Sequence[float]],
-    indices: Mapping[str, str],
-    colours: Mapping[str, str] | None = None,
-) -> None:
-    """Draw a radar plot on axes of matplotlib: see `radar_picture`."""
     if len(indices) < 3:
         raise InputError(f"a radar plot needs at least three indices; got {len(indices)}")
     for name, values in series.items():

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from ccfem.base.arrays import FloatArray, read_only
+from ccfem.base.arrays import FloatArray, freeze, read_only
 from ccfem.base.errors import InputError
 from ccfem.judging.evaluation.sensitivity import acute
 
@@ -33,8 +33,7 @@ class Sensitivity:
     energies: FloatArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "angles", read_only(self.angles))
-        object.__setattr__(self, "energies", read_only(self.energies))
+        freeze(self, angles=float, energies=float)
         if self.angles.shape != self.energies.shape or not (np.diff(self.angles) > 0.0).all():
             raise InputError(
                 "a sensitivity curve needs rising angles with an energy each; got "

@@ -173,7 +173,7 @@ def run_case(
         field = plate.isotropic_field
         benchmarks = {key: benchmark(field, matrix) for key, matrix in stiffness.items()}
     machine = machine_of(plate)
-    found = {}
+    studies = {}
     for name, (strategy, parameters) in patterns.items():
         planner = create(strategy, parameters)
         chosen = layers[: 2 if strategy == "grid" else 1]
@@ -187,22 +187,22 @@ def run_case(
         paths = tuple(plane_paths(toolpaths, layer) for layer in chosen)
         maps = tuple(fibre_map(p, plate.mesh.centres, plate.bead) for p in paths)
         angles = np.stack([m.angle for m in maps])
-        laid = {
+        solved_plates = {
             key: laid_plate(plate.problem(matrix), angles, matrix)
             for key, matrix in stiffness.items()
         }
         mixed = mixed_stiffness(paths, maps, stiffness["C"], stiffness["S"])
-        laid["mixed"] = laid_plate(plate.problem(stiffness["S"]), angles, mixed)
+        solved_plates["mixed"] = laid_plate(plate.problem(stiffness["S"]), angles, mixed)
         values = {
             "cpu": planned,
             "cpu_to_gcode": printed,
             "cpu_with_fe": printed + (solved if strategy == "mps" else 0.0),
             **_of_paths(toolpaths, chosen, stress, machine, plate),
             **_of_pixels(raster),
-            **_of_plate(plate, benchmarks, maps, laid),
+            **_of_plate(plate, benchmarks, maps, solved_plates),
         }
-        found[name] = PatternStudy(toolpaths, paths, maps, laid, values, raster)
-    return CaseStudy(plate, benchmarks, found, perf_counter() - begun)
+        studies[name] = PatternStudy(toolpaths, paths, maps, solved_plates, values, raster)
+    return CaseStudy(plate, benchmarks, studies, perf_counter() - begun)
 
 
 def _printed(toolpaths: Toolpaths, machine: Machine) -> str:
@@ -237,16 +237,16 @@ def _of_pixels(raster: Sequence[RasterPlan]) -> dict[str, float]:
     if not raster:
         return {}
     winding, length = [], []
-    for one in raster:
-        points, offsets = pack(one.chains)
-        winding.append(path_sinuosity(points, offsets, one.raster.pixel))
+    for layer_plan in raster:
+        points, offsets = pack(layer_plan.chains)
+        winding.append(path_sinuosity(points, offsets, layer_plan.raster.pixel))
         length.append(lengths(points, offsets))
-    means = [found.mean() for found in winding]
+    means = [sinuosity.mean() for sinuosity in winding]
     weighted = [np.average(w, weights=n) for w, n in zip(winding, length, strict=True)]
     return {
         "si_raw": float(np.mean(weighted)),
         "si_raw_mean": float(np.mean(means)),
-        "isolated": float(np.mean([one.paths.isolated.sum() for one in raster])),
+        "isolated": float(np.mean([layer_plan.paths.isolated.sum() for layer_plan in raster])),
     }
 
 
@@ -257,7 +257,7 @@ def _of_paths(
     total = evaluate(toolpaths, layers, stress, machine).total
     paths = [plane_paths(toolpaths, layer) for layer in layers]
     winding = [sinuosity_indices(sample_sinuosity(p, plate.bead)) for p in paths]
-    mean = {key: float(np.mean([found[key] for found in winding])) for key in winding[0]}
+    mean = {key: float(np.mean([indices[key] for indices in winding])) for key in winding[0]}
     cover = np.mean([bead_area(p, plate.bead) for p in paths], axis=0)
     return {
         "paths": total["paths"] / len(layers),
@@ -276,27 +276,27 @@ def _of_plate(
     plate: Plate,
     benchmarks: Mapping[str, Benchmark],
     maps: Sequence[FibreMap],
-    laid: Mapping[str, LaidPlate],
+    solved: Mapping[str, LaidPlate],
 ) -> dict[str, float]:
     """Compute the indices of the solved plate."""
     off = plate.off_peaks
     values = {"agreement": 100.0 * benchmarks["C"].agreement(maps)}
     for key, best in benchmarks.items():
-        own = laid[key]
+        plate_of_material = solved[key]
         values |= {
-            f"energy_{key}": own.strain_energy,
-            f"density_sum_{key}": own.density_sum,
-            f"ratio_{key}": own.strain_energy / best.laid.strain_energy,
-            f"ratio_off_peaks_{key}": own.energy_in(off) / best.laid.energy_in(off),
-            f"stress_{key}": own.stress,
-            f"raw_stress_{key}": own.raw_stress,
-            f"mean_stress_{key}": own.mean_stress,
+            f"energy_{key}": plate_of_material.strain_energy,
+            f"density_sum_{key}": plate_of_material.density_sum,
+            f"ratio_{key}": plate_of_material.strain_energy / best.laid.strain_energy,
+            f"ratio_off_peaks_{key}": plate_of_material.energy_in(off) / best.laid.energy_in(off),
+            f"stress_{key}": plate_of_material.stress,
+            f"raw_stress_{key}": plate_of_material.raw_stress,
+            f"mean_stress_{key}": plate_of_material.mean_stress,
             **{f"pi_{reading}_{key}": best.index(maps, reading) for reading in READINGS},
         }
     values |= {
-        "energy_mixed": laid["mixed"].strain_energy,
-        "mixed_over_S": laid["mixed"].strain_energy / laid["S"].strain_energy,
-        "stress_mixed": laid["mixed"].stress,
-        "raw_stress_mixed": laid["mixed"].raw_stress,
+        "energy_mixed": solved["mixed"].strain_energy,
+        "mixed_over_S": solved["mixed"].strain_energy / solved["S"].strain_energy,
+        "stress_mixed": solved["mixed"].stress,
+        "raw_stress_mixed": solved["mixed"].raw_stress,
     }
     return values

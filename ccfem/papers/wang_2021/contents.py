@@ -11,17 +11,22 @@ import shapely
 from ccfem.base.csv_table import write_csv
 from ccfem.base.progress import Progress, silent
 from ccfem.base.tensor import in_plane, largest_in_plane
-from ccfem.cases.bridge import bridge_plate
-from ccfem.cases.designed import Hole, designed_case
+from ccfem.cases.designed import PLATES, Hole, designed_case
 from ccfem.geometry.medial_axis import medial_axis
 from ccfem.judging.evaluation.indices.curvature import sample_curvature
 from ccfem.judging.evaluation.indices.manufacture import sample_manufacture
 from ccfem.judging.evaluation.indices.matching import READINGS, THRESHOLDS, matching_rate
 from ccfem.judging.evaluation.plane_paths import PlanePaths, plane_paths
 from ccfem.machine import SpeedTable
-from ccfem.papers.contents import Contents
-from ccfem.papers.verdicts import Check, claim_table, judged
-from ccfem.papers.wang_2021.figures import draw_all, figures
+from ccfem.papers.contents import (
+    Contents,
+    claim_table,
+    judged,
+    table,
+    write_figures,
+    write_report,
+)
+from ccfem.papers.wang_2021.figures import figures
 from ccfem.papers.wang_2021.study import (
     BASELINES,
     LIMIT,
@@ -39,6 +44,9 @@ from ccfem.slicing.layers import LayerStress
 from ccfem.strategies import create
 from ccfem.strategies.stress_tracing.frame import frame
 
+EXPECTED = Path(__file__).with_name("expected.toml")
+"""Claims of the paper, with the ranges that count as reproduced."""
+
 # The whole of the paper: its study, figures, tables and claims beside ours.
 
 
@@ -48,41 +56,40 @@ def write_all(folder: Path, progress: Progress = silent) -> None:
     begun = perf_counter()
     study = run_study(progress=progress)
     tried = try_radii(study)
-    found = quantities(study) | variant_quantities(tried, try_hole())
-    checks = verdicts(found)
+    values = quantities(study) | variant_quantities(tried, try_hole())
+    claims = claim_table(judged(values, EXPECTED))
     computed = perf_counter() - begun
-    drawn = draw_all(study, folder)
+    drawn = write_figures(figures(study), folder)
     rates = [
-        [name, which, pattern, reading, *(f"{v:.6g}" for v in one.rates[reading])]
+        [name, which, pattern, reading, *(f"{v:.6g}" for v in paths.rates[reading])]
         for name, plate in study.items()
         for which, part in (("optimised", plate.optimised), ("full", plate.original))
-        for pattern, one in part.patterns.items()
+        for pattern, paths in part.patterns.items()
         for reading in READINGS
     ]
     columns = ["plate", "part", "pattern", "reading", *(f"{t:g}" for t in THRESHOLDS)]
     write_csv(folder / "rates.csv", columns, rates)
-    write_csv(folder / "quantities.csv", ("quantity", "value"), found.items())
-    parts = [
-        "# Load-dependent paths of Wang et al. (2021): ours beside theirs\n",
+    write_csv(folder / "quantities.csv", ("quantity", "value"), values.items())
+    introduction = (
+        "# Load-dependent paths of Wang et al. (2021): ours beside theirs\n\n"
         "Written by `ccfem reproduce wang_2021`. lpp is strategy `svt`; lpp uncrossed "
         "ends its strands in the middle of a joint. The slicer's patterns and lpp uncrossed are "
-        "laid by this project too.\n",
+        "laid by this project too.\n\n"
         "The cantilever, the M-shape and the L-shape are optimised here under loads as in the "
         "paper, which gives no measures: their outlines are ours. The M-shape hangs its load "
         "between its feet, so that members are in tension and in compression, as the paper's are. "
-        "`eqs` is our reading of a method that the paper shows in pictures alone.\n",
-        f"Study {computed:.1f} s, figures {perf_counter() - begun - computed:.1f} s.\n",
-        "## Claims\n",
-        claim_table(checks),
-        f"## Plates\n\n{plate_table(study)}",
-        *(f"## {name}\n\n{result_table(plate)}" for name, plate in study.items()),
-        f"## Radius of the turns\n\n{variant_table(tried)}",
-        f"## Table 2: speeds\n\n{speed_table()}",
-        "## Figures\n",
-        *(f"![{name}]({name})\n" for name in drawn),
-    ]
-    (folder / "report.md").write_text("\n".join(parts))
-    print(claim_table(checks))
+        "`eqs` is our reading of a method that the paper shows in pictures alone.\n\n"
+        f"Study {computed:.1f} s, figures {perf_counter() - begun - computed:.1f} s.\n"
+    )
+    sections = {
+        "Claims": claims,
+        "Plates": plate_table(study),
+        **{name: result_table(plate) for name, plate in study.items()},
+        "Radius of the turns": variant_table(tried),
+        "Table 2: speeds": speed_table(),
+    }
+    write_report(folder, introduction, sections, drawn)
+    print(claims)
     print(f"report.md: {perf_counter() - begun:.1f} s")
 
 
@@ -109,7 +116,7 @@ class Tried:
 
 def try_radii(study: Mapping[str, PlateStudy]) -> dict[tuple[str, float], Tried]:
     """Plan lpp with every radius, by plate and radius."""
-    found = {}
+    tried = {}
     for name in _PLATES:
         if name not in study or "lpp" not in study[name].optimised.patterns:
             continue
@@ -120,18 +127,18 @@ def try_radii(study: Mapping[str, PlateStudy]) -> dict[tuple[str, float], Tried]
             made = plan(create(strategy, parameters), (part.layer,), part.field, machine)
             paths = plane_paths(made, part.layer)
             whole = PlanePaths(part.layer, paths.points, paths.offsets, paths.closed)
-            found[name, radius] = Tried(
+            tried[name, radius] = Tried(
                 100.0 * float((sample_curvature(whole, machine.fibre_width).native < LIMIT).mean()),
                 100.0 * float((curvature_along(whole)[1] < LIMIT).mean()),
                 float(paths.lengths.sum()),
                 float(sample_manufacture(paths, made, machine).seconds[0]),
             )
-    return found
+    return tried
 
 
 def try_hole() -> PartStudy:
     """Lay the slicer's patterns on the full bridge with a hole in its middle."""
-    plate = replace(bridge_plate(), holes=(_HOLE,))
+    plate = replace(PLATES["bridge"], holes=(_HOLE,))
     return run_part(designed_case(plate, optimised=False), BASELINES, tested=False)
 
 
@@ -139,30 +146,29 @@ def variant_quantities(
     tried: Mapping[tuple[str, float], Tried], pierced: PartStudy
 ) -> dict[str, float]:
     """Shares of the vertices below 0.26 / mm, %, by radius and plate; the bridge with a hole."""
-    rate = {name: one.rate(30.0) for name, one in pierced.patterns.items()}
+    rate = {name: variant.rate(30.0) for name, variant in pierced.patterns.items()}
     lead = rate["zigzag 45"] - max(rate["concentric"], rate["zigzag 90"])
+    shares = {
+        f"variant share of vertices below 0.26 with turns of {radius:g} mm {name}": lpp.vertices
+        for (name, radius), lpp in tried.items()
+    }
     return {
         "variant zigzag 45 over the other two at 30 degrees bridge with a hole": lead,
-        **{
-            f"variant share of vertices below 0.26 with turns of {radius:g} mm {name}": one.vertices
-            for (name, radius), one in tried.items()
-        },
+        **shares,
     }
 
 
 def variant_table(tried: Mapping[tuple[str, float], Tried]) -> str:
     """Markdown table of all radii."""
-    lines = [
-        "| plate | tightest turn, mm | vertices below 0.26 / mm, % | length below, % | "
-        "length, mm | time, s |",
-        "|---|---|---|---|---|---|",
+    head = ("plate", "tightest turn, mm", "vertices below 0.26 / mm, %")
+    rows = [
+        (
+            *(name, f"{radius:g}", f"{lpp.vertices:.1f}", f"{lpp.length_share:.1f}"),
+            *(f"{lpp.length:.0f}", f"{lpp.seconds:.0f}"),
+        )
+        for (name, radius), lpp in tried.items()
     ]
-    lines += [
-        f"| {name} | {radius:g} | {one.vertices:.1f} | {one.length_share:.1f} | {one.length:.0f} | "
-        f"{one.seconds:.0f} |"
-        for (name, radius), one in tried.items()
-    ]
-    return "\n".join(lines) + "\n"
+    return table((*head, "length below, %", "length, mm", "time, s"), rows)
 
 
 CONTENTS = Contents(
@@ -171,7 +177,7 @@ CONTENTS = Contents(
     run=lambda progress: run_study(progress=progress),
     whole=write_all,
     tables={
-        "claims": lambda study: claim_table(verdicts(quantities(study()))),
+        "claims": lambda study: claim_table(judged(quantities(study()), EXPECTED)),
         "table2": lambda study: speed_table(),
         "plates": lambda study: plate_table(study()),
     },
@@ -235,46 +241,43 @@ def _value(pattern: PatternStudy, row: str) -> float | None:
     }[row]
 
 
-def _table(head: list[str], rows: list[list[str]]) -> str:
-    lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
-    return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)]) + "\n"
-
-
 def result_table(plate: PlateStudy) -> str:
     """Every index of every pattern, on the optimised part and on the full plate."""
     columns = dict(plate.optimised.patterns)
-    columns |= {f"{name}, full plate": one for name, one in plate.original.patterns.items()}
+    columns |= {f"{name}, full plate": pattern for name, pattern in plate.original.patterns.items()}
     rows = []
     for row, text in ROWS.items():
         values = [_value(pattern, row) for pattern in columns.values()]
         rows.append([text, *("" if v is None else f"{v:.4g}" for v in values)])
-    return _table(["index", *columns], rows)
+    return table(["index", *columns], rows)
 
 
 def plate_table(study: Mapping[str, PlateStudy]) -> str:
     """List the plates and their optimisation."""
     rows = []
-    for name, one in study.items():
-        plate, design = one.plate, one.design
+    for name, plate_study in study.items():
+        plate, design = plate_study.plate, plate_study.design
         width, height = plate.border.bounds[2:]
-        found = ["", "", "", ""]
+        of_design = ["", "", "", ""]
         if design is not None:
-            found = [
+            of_design = [
                 f"{design.compliance[-1]:.4g}",
                 str(design.iterations),
                 f"{design.grey:.3f}",
-                f"{100.0 * one.off_stored:.2f}",
+                f"{100.0 * plate_study.off_stored:.2f}",
             ]
-        work = [2.0 * part.field.strain_energy for part in (one.original, one.optimised)]
+        work = [
+            2.0 * part.field.strain_energy for part in (plate_study.original, plate_study.optimised)
+        ]
         rows.append(
             [
                 name,
                 f"{width:g} x {height:g}",
                 f"{plate.volume_fraction:g}",
-                f"{one.optimised.layer.plane.polygon.area / plate.domain.area:.3f}",
-                *found,
+                f"{plate_study.optimised.layer.plane.polygon.area / plate.domain.area:.3f}",
+                *of_design,
                 *(f"{w:.1f}" for w in work),
-                f"{one.seconds:.1f}",
+                f"{plate_study.seconds:.1f}",
             ]
         )
     head = [
@@ -290,26 +293,23 @@ def plate_table(study: Mapping[str, PlateStudy]) -> str:
         "part, N mm",
         "all patterns, s",
     ]
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def speed_table() -> str:
     """Table 2: which speed a piece of the path gets."""
-    table = SpeedTable()
-    slow, middle, fast = (f"{speed:g} mm/s" for speed in table.speed)
-    (high, low), (short, long), (sharp, flat) = table.curvature, table.length, table.angle
+    speeds = SpeedTable()
+    slow, middle, fast = (f"{speed:g} mm/s" for speed in speeds.speed)
+    (high, low), (short, long), (sharp, flat) = speeds.curvature, speeds.length, speeds.angle
     rows = [
         ["curvature, 1/mm", f"> {high:g}", f"{low:g} to {high:g}", f"< {low:g}"],
         ["length, mm", f"< {short:g}", f"{short:g} to {long:g}", f"> {long:g}"],
         ["angle, degrees", f"< {sharp:g}", f"{sharp:g} to {flat:g}", f">= {flat:g}"],
     ]
-    return _table(["piece", slow, middle, fast], rows)
+    return table(["piece", slow, middle, fast], rows)
 
 
 # The claims of the paper beside ours: every quantity is computed from a run.
-
-
-EXPECTED = Path(__file__).with_name("expected.toml")
 
 _RANGES = {"5 to 45": (5.0, 45.0), "10 to 30": (10.0, 30.0)}
 _NEAR_HOLE = 2.0
@@ -323,16 +323,11 @@ def quantities(study: Mapping[str, PlateStudy]) -> dict[str, float]:
 
     Shares and rates are in percent, leads in points, orders that hold are 1, others 0.
     """
-    found: dict[str, float] = dict(_speeds())
+    values: dict[str, float] = dict(_speeds())
     for name, plate in study.items():
         for rule in (_design, _stresses, _curvatures, _rates, _leads, _fill, _tested):
-            found |= {f"{key} {name}": value for key, value in rule(plate).items()}
-    return found
-
-
-def verdicts(found: Mapping[str, float]) -> list[Check]:
-    """Judge every check of `expected.toml` by the quantities found."""
-    return judged(found, EXPECTED)
+            values |= {f"{key} {name}": value for key, value in rule(plate).items()}
+    return values
 
 
 def _speeds() -> dict[str, float]:
@@ -356,19 +351,19 @@ def _speeds() -> dict[str, float]:
 
 def _design(plate: PlateStudy) -> dict[str, float]:
     box = plate.plate.border.bounds
-    found = {"width": box[2], "height": box[3]}
+    values = {"width": box[2], "height": box[3]}
     if plate.design is not None:
-        found["volume fraction of the design"] = plate.design.volume_fraction
-        found["part off the stored one, %"] = 100.0 * plate.off_stored
-    return found
+        values["volume fraction of the design"] = plate.design.volume_fraction
+        values["part off the stored one, %"] = 100.0 * plate.off_stored
+    return values
 
 
 def uniaxial(stress: LayerStress) -> float:
     """Share of the area, %, where one principal stress is at least five times the other in size."""
     plane = in_plane(stress.nodal, stress.layer.plane.frame)[stress.layer.triangles].mean(axis=1)
     sizes = np.sort(np.abs(np.stack(largest_in_plane(plane)[:2])), axis=0)
-    one = sizes[1] >= 5.0 * sizes[0]
-    return 100.0 * float(stress.layer.areas[one].sum() / stress.layer.areas.sum())
+    single = sizes[1] >= 5.0 * sizes[0]
+    return 100.0 * float(stress.layer.areas[single].sum() / stress.layer.areas.sum())
 
 
 def _stresses(plate: PlateStudy) -> dict[str, float]:
@@ -396,80 +391,84 @@ def _sharp_turns(pattern: PatternStudy) -> float:
 
 
 def _curvatures(plate: PlateStudy) -> dict[str, float]:
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     for where, part in (("", plate.optimised), (" on the full plate", plate.original)):
-        for name, one in part.patterns.items():
-            found[f"largest curvature of {name}{where}"] = float(one.curvature.max(initial=0.0))
-            found[f"sharp turns a metre of {name}{where}"] = _sharp_turns(one)
+        for name, pattern in part.patterns.items():
+            values[f"largest curvature of {name}{where}"] = float(
+                pattern.curvature.max(initial=0.0)
+            )
+            values[f"sharp turns a metre of {name}{where}"] = _sharp_turns(pattern)
     if "lpp" not in plate.optimised.patterns:
-        return found
+        return values
     lpp = plate.optimised.patterns["lpp"]
     readings = ("native", "native_in_part", "curvature", "curvature_in_part")
     labels = ("vertices", "vertices in the part", "0.5 mm", "0.5 mm in the part")
     for reading, label in zip(readings, labels, strict=True):
-        found[f"lpp below 0.26, {label}"] = _below(getattr(lpp, reading))
+        values[f"lpp below 0.26, {label}"] = _below(getattr(lpp, reading))
     for where, part in (("optimised part", plate.optimised), ("full plate", plate.original)):
         others = [part.patterns[p] for p in BASELINES if p in part.patterns]
         if others:
             for reading, label in zip(readings[1::2], labels[1::2], strict=True):
-                best = max(_below(getattr(one, reading)) for one in others)
-                own = _below(getattr(lpp, reading))
-                found[f"lead below 0.26 on the {where}, {label}"] = own - best
-            least = min(_sharp_turns(one) for one in others)
+                best = max(_below(getattr(pattern, reading)) for pattern in others)
+                share = _below(getattr(lpp, reading))
+                values[f"lead below 0.26 on the {where}, {label}"] = share - best
+            least = min(_sharp_turns(pattern) for pattern in others)
             fewer = float(_sharp_turns(lpp) < least)
-            found[f"lpp has the fewest sharp turns, others on the {where}"] = fewer
+            values[f"lpp has the fewest sharp turns, others on the {where}"] = fewer
     inside = shapely.contains_xy(plate.optimised.layer.plane.polygon.buffer(1e-3), *lpp.places.T)
     sharp = lpp.curvature > LIMIT
-    found["tight places of lpp that lie outside"] = 100.0 * float((~inside[sharp]).mean())
+    values["tight places of lpp that lie outside"] = 100.0 * float((~inside[sharp]).mean())
     if plate.plate.holes and "concentric" in plate.original.patterns:
-        one = plate.original.patterns["concentric"]
+        pattern = plate.original.patterns["concentric"]
         near = [
-            np.linalg.norm(one.places - (hole.x, hole.y), axis=1) < _NEAR_HOLE * hole.radius
+            np.linalg.norm(pattern.places - (hole.x, hole.y), axis=1) < _NEAR_HOLE * hole.radius
             for hole in plate.plate.holes
         ]
-        tight = one.curvature > LIMIT
-        found["tight places of concentric near the holes"] = 100.0 * float(
+        tight = pattern.curvature > LIMIT
+        values["tight places of concentric near the holes"] = 100.0 * float(
             np.any(near, axis=0)[tight].mean()
         )
-    return found
+    return values
 
 
 def _rates(plate: PlateStudy) -> dict[str, float]:
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     for where, part in (("", plate.optimised), (" on the full plate", plate.original)):
-        for name, one in part.patterns.items():
+        for name, pattern in part.patterns.items():
             for reading in ("path", "strands", "stress_best", "stress_nearest"):
-                found[f"{reading} within 30 degrees of {name}{where}"] = one.rate(30.0, reading)
+                values[f"{reading} within 30 degrees of {name}{where}"] = pattern.rate(
+                    30.0, reading
+                )
     full = plate.original.patterns
     if set(BASELINES) <= set(full):
         rate = {name: full[name].rate(30.0) for name in BASELINES}
         others = (rate["concentric"], rate["zigzag 90"])
-        found["zigzag 45 over the other two at 30 degrees"] = rate["zigzag 45"] - max(others)
-        found["zigzag 90 is the lowest at 30 degrees"] = float(
+        values["zigzag 45 over the other two at 30 degrees"] = rate["zigzag 45"] - max(others)
+        values["zigzag 90 is the lowest at 30 degrees"] = float(
             rate["zigzag 90"] < min(rate["concentric"], rate["zigzag 45"])
         )
-    return found
+    return values
 
 
 def _leads(plate: PlateStudy) -> dict[str, float]:
     """Smallest lead of lpp over the best pattern of the slicer, over ranges of angles."""
-    found: dict[str, float] = {}
-    for own in ("lpp", "lpp uncrossed"):
-        if own not in plate.optimised.patterns:
+    values: dict[str, float] = {}
+    for name in ("lpp", "lpp uncrossed"):
+        if name not in plate.optimised.patterns:
             continue
         for where, part in (("optimised part", plate.optimised), ("full plate", plate.original)):
             others = [part.patterns[p] for p in BASELINES if p in part.patterns]
             if not others:
                 continue
-            best = np.max([one.rates["path"] for one in others], axis=0)
-            lead = 100.0 * (plate.optimised.patterns[own].rates["strands"] - best)
+            best = np.max([pattern.rates["path"] for pattern in others], axis=0)
+            lead = 100.0 * (plate.optimised.patterns[name].rates["strands"] - best)
             for label, (low, high) in _RANGES.items():
                 chosen = (low - 1e-9 <= THRESHOLDS) & (high + 1e-9 >= THRESHOLDS)
-                key = f"least lead of {own} from {label} degrees, others on the {where}"
-                found[key] = float(lead[chosen].min())
+                key = f"least lead of {name} from {label} degrees, others on the {where}"
+                values[key] = float(lead[chosen].min())
             mean = float(lead[THRESHOLDS <= 60.0 + 1e-9].mean())
-            found[f"mean lead of {own} to 60 degrees, others on the {where}"] = mean
-    return found
+            values[f"mean lead of {name} to 60 degrees, others on the {where}"] = mean
+    return values
 
 
 def joint_discs(part: PartStudy) -> object:
@@ -482,31 +481,31 @@ def joint_discs(part: PartStudy) -> object:
 def _fill(plate: PlateStudy) -> dict[str, float]:
     part = plate.optimised
     discs = joint_discs(part)
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     half = 0.5 * part.machine.fibre_width
-    for name, one in part.patterns.items():
-        found[f"coverage of {name}"] = 100.0 * one.total["coverage"]
-        found[f"pieces of {name}"] = one.total["paths"]
+    for name, pattern in part.patterns.items():
+        values[f"coverage of {name}"] = 100.0 * pattern.total["coverage"]
+        values[f"pieces of {name}"] = pattern.total["paths"]
         if not shapely.is_empty(discs):
-            lines = one.paths.in_part
+            lines = pattern.paths.in_part
             index = np.repeat(np.arange(len(lines)), np.diff(lines.offsets))
             fibre = shapely.union_all(
                 shapely.buffer(shapely.linestrings(lines.points, indices=index), half)
             )
             share = shapely.area(shapely.intersection(fibre, discs)) / shapely.area(discs)
-            found[f"coverage of the joints by {name}"] = 100.0 * float(share)
+            values[f"coverage of the joints by {name}"] = 100.0 * float(share)
     if "lpp" in part.patterns:
         total = part.patterns["lpp"].total
-        found["crossings of lpp"] = total["crossings"] + total["self_crossings"]
+        values["crossings of lpp"] = total["crossings"] + total["self_crossings"]
         for other in ("offset", "streamline", "eqs"):
             if other in part.patterns:
-                less = found["coverage of lpp"] - found[f"coverage of {other}"]
-                found[f"coverage of lpp less {other}"] = less
+                less = values["coverage of lpp"] - values[f"coverage of {other}"]
+                values[f"coverage of lpp less {other}"] = less
                 key = "coverage of the joints by {}"
-                if key.format(other) in found:
-                    less = found[key.format("lpp")] - found[key.format(other)]
-                    found[f"coverage of the joints by lpp less {other}"] = less
-    return found
+                if key.format(other) in values:
+                    less = values[key.format("lpp")] - values[key.format(other)]
+                    values[f"coverage of the joints by lpp less {other}"] = less
+    return values
 
 
 def _tested(plate: PlateStudy) -> dict[str, float]:
@@ -514,10 +513,10 @@ def _tested(plate: PlateStudy) -> dict[str, float]:
     patterns = plate.optimised.patterns
     if "lpp" not in patterns:
         return {}
-    own = patterns["lpp"].stiffness
-    found = {}
+    gained = patterns["lpp"].stiffness
+    values = {}
     for other in ("concentric", "zigzag 45", "zigzag 90", "offset", "streamline", "eqs"):
         if other in patterns:
             for mode, value in patterns[other].stiffness.items():
-                found[f"stiffness of lpp over {other}, {mode}"] = own[mode] / value
-    return found
+                values[f"stiffness of lpp over {other}, {mode}"] = gained[mode] / value
+    return values

@@ -1,7 +1,6 @@
 """Figures of the paper that are computations, redrawn from a run."""
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,24 +8,12 @@ import shapely
 from matplotlib.figure import Figure
 from scipy.spatial import Voronoi
 
-from ccfem.comparison.plot.canvas import save
 from ccfem.comparison.plot.colours import INK, OUTLINE, palette
 from ccfem.geometry.medial_axis import medial_axis
 from ccfem.judging.evaluation.indices.matching import THRESHOLDS
 from ccfem.papers.contents import drawn_of
-from ccfem.papers.wang_2021.panels import (
-    COLOURS,
-    bar,
-    by_level,
-    curves,
-    lines_of,
-    panels,
-    path,
-    section,
-    show_load,
-    strokes,
-    title,
-)
+from ccfem.papers.panels import bar, curves, lines_of, panels, section, title
+from ccfem.papers.wang_2021.panels import COLOURS, by_level, path, show_load, strokes
 from ccfem.papers.wang_2021.study import BASELINES, LIMIT, PatternStudy, PlateStudy
 from ccfem.paths.linking.print_speed import step_speeds
 from ccfem.strategies.stress_tracing.criterion import Criterion
@@ -38,14 +25,6 @@ _MOST = 4.0
 """End of the colour scale of curvature, 1/mm."""
 _FAINT = "#b5bac1"
 _OTHERS = ("streamline", "offset", "eqs")
-
-
-def draw_all(study: Mapping[str, PlateStudy], folder: Path) -> list[str]:
-    """Draw every figure that the plates and patterns run allow; the names of the files."""
-    made = figures(study)
-    for name, figure in made.items():
-        save(figure, folder / f"{name}.png")
-    return [f"{name}.png" for name in made]
 
 
 def figures(study: Mapping[str, PlateStudy], number: int | None = None) -> dict[str, Figure]:
@@ -69,13 +48,13 @@ def figures(study: Mapping[str, PlateStudy], number: int | None = None) -> dict[
         add(f"figure_{maps}_{name}_curvature", _curvature_maps, name)
         add(f"figure_{maps}_{name}_curvature_shares", _curvature_shares, name)
         add(f"figure_{rates}_{name}_matching", _matching, name)
-    for name, others, own in (
+    for name, others, lpp_number in (
         ("cantilever", 12, 13),
         ("m_shape", 14, 15),
         ("l_shape", 16, 17),
     ):
         add(f"figure_{others}_{name}_other_methods", _other_methods, name)
-        add(f"figure_{own}_{name}_lpp", _lpp, name, lpp=True)
+        add(f"figure_{lpp_number}_{name}_lpp", _lpp, name, lpp=True)
     return drawn_of(made, number)
 
 
@@ -91,14 +70,12 @@ def _voronoi(plate: PlateStudy) -> Figure:
     points = np.unique(shapely.get_coordinates(np.concatenate(sites)), axis=0)
     diagram = Voronoi(points)
     ridges = [diagram.vertices[ridge] for ridge in diagram.ridge_vertices if min(ridge) >= 0]
-    section(axes[0], polygon)
+    section(axes[0], polygon, "(a) points of the border every 2 mm, and their Voronoi diagram")
     lines_of(axes[0], ridges, OUTLINE, 0.4)
     axes[0].plot(*points.T, "o", color="#e69f00", ms=2.0, zorder=3.0)
-    title(axes[0], "(a) points of the border every 2 mm, and their Voronoi diagram")
     axis = medial_axis(polygon, 0.5 * part.machine.fibre_width, object_angle=None, arc_chord=1.6)
-    section(axes[1], polygon)
+    section(axes[1], polygon, "(b) medial axis")
     lines_of(axes[1], [segment.points for segment in axis.segments], INK, 1.2)
-    title(axes[1], "(b) medial axis")
     return figure
 
 
@@ -106,16 +83,14 @@ def _stresses(plate: PlateStudy) -> Figure:
     """Load, stress of the full plate, and stress of the optimised part."""
     domain = plate.plate.domain
     figure, axes = panels([domain] * 3, 1, 7.0)
-    section(axes[0], domain)
+    section(axes[0], domain, "(a) load and supports")
     show_load(axes[0], plate.plate)
-    title(axes[0], "(a) load and supports")
-    for one, part, text in (
+    for panel, part, text in (
         (axes[1], plate.original, "(b) stress of the full plate: blue pulled, green pressed"),
         (axes[2], plate.optimised, "(c) stress of the optimised part"),
     ):
-        section(one, part.layer.plane.polygon)
-        strokes(one, part)
-        title(one, text)
+        section(panel, part.layer.plane.polygon, text)
+        strokes(panel, part)
     return figure
 
 
@@ -141,20 +116,17 @@ def _process(plate: PlateStudy) -> Figure:
     lpp = plate.optimised.patterns["lpp"]
     box = shapely.union(plate.plate.domain, shapely.MultiPoint(lpp.paths.points)).bounds
     figure, axes = panels([plate.plate.domain] * 4, 2, box=box)
-    for one, part, text in (
+    for panel, part, text in (
         (axes[0], plate.original, "(a) load and stress of the full plate"),
         (axes[1], plate.optimised, "(b) stress of the optimised part"),
     ):
-        section(one, part.layer.plane.polygon)
-        strokes(one, part)
-        title(one, text)
+        section(panel, part.layer.plane.polygon, text)
+        strokes(panel, part)
     show_load(axes[0], plate.plate)
-    section(axes[2], plate.optimised.layer.plane.polygon)
+    section(axes[2], plate.optimised.layer.plane.polygon, "(c) main load paths")
     _main_paths(axes[2], plate)
-    title(axes[2], "(c) main load paths")
-    section(axes[3], plate.optimised.layer.plane.polygon)
+    section(axes[3], plate.optimised.layer.plane.polygon, "(d) one path; links blue")
     path(axes[3], lpp)
-    title(axes[3], "(d) one path; links blue")
     return figure
 
 
@@ -162,10 +134,10 @@ def _main_paths(axes: Any, plate: PlateStudy) -> None:
     """Draw main load paths as `svt` joins them, one colour each."""
     part, svt = plate.optimised, Svt()
     members = frame(part.layer.plane.polygon, 0.5 * part.machine.fibre_width)
-    found = main_paths(members, part.stress, Criterion(turn=svt.turn), svt.width_ratio)
-    names = [str(k) for k in range(len(found))]
-    for one, colour in zip(found, palette(names).values(), strict=True):
-        lines_of(axes, [np.concatenate([m.points for m in one.members])], colour, 2.0)
+    joined = main_paths(members, part.stress, Criterion(turn=svt.turn), svt.width_ratio)
+    names = [str(k) for k in range(len(joined))]
+    for main_path, colour in zip(joined, palette(names).values(), strict=True):
+        lines_of(axes, [np.concatenate([m.points for m in main_path.members])], colour, 2.0)
 
 
 def _compared(plate: PlateStudy) -> dict[str, tuple[Any, PatternStudy]]:
@@ -182,14 +154,14 @@ def _compared(plate: PlateStudy) -> dict[str, tuple[Any, PatternStudy]]:
 def _curvature_maps(plate: PlateStudy) -> Figure:
     """Places of four patterns that curve by more than 0.26 / mm, every half millimetre."""
     shown = _compared(plate)
-    box = shapely.union_all([shapely.MultiPoint(one.paths.points) for _, one in shown.values()])
+    box = shapely.union_all([shapely.MultiPoint(panel.paths.points) for _, panel in shown.values()])
     figure, axes = panels([box] * len(shown), 2, 5.0)
-    for letter, one, (name, (polygon, pattern)) in zip("abcd", axes, shown.items(), strict=False):
-        section(one, polygon)
-        path(one, pattern, _FAINT, _FAINT)
+    for letter, panel, (name, (polygon, pattern)) in zip("abcd", axes, shown.items(), strict=False):
+        section(panel, polygon)
+        path(panel, pattern, _FAINT, _FAINT)
         order = np.argsort(pattern.curvature, kind="stable")
         order = order[pattern.curvature[order] > LIMIT]
-        drawn = one.scatter(
+        drawn = panel.scatter(
             *pattern.places[order].T,
             c=pattern.curvature[order],
             s=3.0,
@@ -201,7 +173,7 @@ def _curvature_maps(plate: PlateStudy) -> Figure:
         )
         share, vertices = (100.0 * (c < LIMIT).mean() for c in (pattern.curvature, pattern.native))
         text = f"below {LIMIT} / mm: {share:.0f} % of the length, {vertices:.0f} % of the vertices"
-        title(one, f"({letter}) {name}, {text}")
+        title(panel, f"({letter}) {name}, {text}")
     bar(figure, axes, drawn, "curvature, 1/mm")
     return figure
 
@@ -212,19 +184,19 @@ def _curvature_shares(plate: PlateStudy) -> Figure:
         "every 0.5 mm of the path, links too",
         "at the vertices as planned, links too",
     )
-    figure, axes = curves(2, [("curvature, 1/mm", "share below it, %")] * 2)
-    for one, reading, text in zip(axes, ("curvature", "native"), texts, strict=True):
+    figure, axes = curves([("curvature, 1/mm", "share below it, %")] * 2)
+    for panel, reading, text in zip(axes, ("curvature", "native"), texts, strict=True):
         for name, (_, pattern) in _compared(plate).items():
             values = np.sort(getattr(pattern, reading))
             share = 100.0 * np.arange(1, len(values) + 1) / max(len(values), 1)
-            one.step(
+            panel.step(
                 np.maximum(values, 0.005), share, where="post", color=COLOURS[name], label=name
             )
-        one.axvline(LIMIT, color=OUTLINE, lw=0.8, ls="--")
-        one.set_xscale("log")
-        one.set_xlim(0.005, 6.0)
-        one.set_ylim(0.0, 101.0)
-        one.set_title(text, size=8, loc="left", color=INK)
+        panel.axvline(LIMIT, color=OUTLINE, lw=0.8, ls="--")
+        panel.set_xscale("log")
+        panel.set_xlim(0.005, 6.0)
+        panel.set_ylim(0.0, 101.0)
+        panel.set_title(text, size=8, loc="left", color=INK)
     axes[0].legend(fontsize=7, frameon=False, loc="lower right")
     return figure
 
@@ -232,23 +204,25 @@ def _curvature_shares(plate: PlateStudy) -> Figure:
 def _matching(plate: PlateStudy) -> Figure:
     """Draw matching rates over the angle, the slicer's on the full plate and on the part."""
     name = plate.plate.name
-    figure, axes = curves(2, [("angle, degrees", "strands within it of the stress, %")] * 2)
+    figure, axes = curves([("angle, degrees", "strands within it of the stress, %")] * 2)
     sides = (
         (axes[0], plate.original, f"{name}: the slicer's patterns on the full plate"),
         (axes[1], plate.optimised, f"{name}: all patterns on the optimised part"),
     )
-    for one, part, text in sides:
-        own = [p for p in ("lpp", "lpp uncrossed") if p in plate.optimised.patterns]
-        shown = {p: plate.optimised.patterns[p] for p in own}
+    for panel, part, text in sides:
+        lpp_names = [p for p in ("lpp", "lpp uncrossed") if p in plate.optimised.patterns]
+        shown = {p: plate.optimised.patterns[p] for p in lpp_names}
         shown |= {p: part.patterns[p] for p in BASELINES if p in part.patterns}
         for label, pattern in shown.items():
             style = "--" if label == "lpp uncrossed" else "-"
             rate = 100.0 * pattern.rates["strands"]
-            one.plot(THRESHOLDS, rate, style, color=COLOURS[label], marker="o", ms=2.5, label=label)
-        one.plot([0.0, 90.0], [0.0, 100.0], color=OUTLINE, lw=0.8, ls=":")
-        one.set_xlim(0.0, 90.0)
-        one.set_ylim(0.0, 101.0)
-        one.set_title(text, size=8, loc="left", color=INK)
+            panel.plot(
+                THRESHOLDS, rate, style, color=COLOURS[label], marker="o", ms=2.5, label=label
+            )
+        panel.plot([0.0, 90.0], [0.0, 100.0], color=OUTLINE, lw=0.8, ls=":")
+        panel.set_xlim(0.0, 90.0)
+        panel.set_ylim(0.0, 101.0)
+        panel.set_title(text, size=8, loc="left", color=INK)
     axes[1].legend(fontsize=7, frameon=False, loc="lower right")
     return figure
 
@@ -259,16 +233,15 @@ def _other_methods(plate: PlateStudy) -> Figure:
     have = [name for name in _OTHERS if name in part.patterns]
     figure, axes = panels([plate.plate.domain] * (1 + len(have)), 2)
     section(axes[0], plate.plate.domain, filled=False)
-    section(axes[0], part.layer.plane.polygon)
+    section(axes[0], part.layer.plane.polygon, "(a) load and supports; outline ours")
     show_load(axes[0], plate.plate)
-    title(axes[0], "(a) load and supports; outline ours")
-    for letter, one, name in zip("bcd", axes[1:], have, strict=False):
-        section(one, part.layer.plane.polygon)
-        path(one, part.patterns[name], COLOURS[name])
+    for letter, panel, name in zip("bcd", axes[1:], have, strict=False):
+        section(panel, part.layer.plane.polygon)
+        path(panel, part.patterns[name], COLOURS[name])
         total = part.patterns[name].total
         text = f"{total['paths']:.0f} pieces, {100.0 * total['coverage']:.0f} % covered"
         reading = ", our reading" if name == "eqs" else ""
-        title(one, f"({letter}) {name}{reading}: {text}")
+        title(panel, f"({letter}) {name}{reading}: {text}")
     return figure
 
 
@@ -278,8 +251,8 @@ def _lpp(plate: PlateStudy) -> Figure:
     lpp = part.patterns["lpp"]
     box = shapely.union(part.layer.plane.polygon, shapely.MultiPoint(lpp.paths.points)).bounds
     figure, axes = panels([part.layer.plane.polygon] * 2, 2, box=box)
-    for one in axes[:2]:
-        section(one, part.layer.plane.polygon)
+    for panel in axes[:2]:
+        section(panel, part.layer.plane.polygon)
     strokes(axes[0], part, 45)
     axis = frame(part.layer.plane.polygon, 0.5 * part.machine.fibre_width)
     lines_of(axes[0], [member.points for member in axis.members], INK, 1.2)

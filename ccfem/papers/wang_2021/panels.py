@@ -1,20 +1,14 @@
 """What the figures are made of: sections, stress vectors, loads, paths, in panels of one scale."""
 
-from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-import shapely
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
-from matplotlib.patches import PathPatch
-from matplotlib.path import Path
 
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.tensor import in_plane, strongest_in_plane
 from ccfem.cases.designed import DesignPlate
-from ccfem.comparison.plot.colours import INK, OUTLINE, SECTION, palette
+from ccfem.comparison.plot.colours import INK, palette
 from ccfem.papers.wang_2021.study import PartStudy, PatternStudy
 
 COLOURS = {
@@ -31,45 +25,6 @@ PULLED, PRESSED = "#1f4e9c", "#2c8a4b"
 """Tension and compression: blue and green, as in the paper."""
 STRAND, LINK = "#a51f2d", "#1f4e9c"
 """The path inside, and its links: red and blue, as in the paper."""
-
-_MARGIN = 0.12
-
-
-def panels(
-    shapes: Sequence[Any], columns: int, width: float = 4.6, box: Any = None
-) -> tuple[Figure, list[Any]]:
-    """Figure with a panel for each shape (shapely or points), in rows, without axes."""
-    boxes = np.array([shape.bounds for shape in shapes] if box is None else [box] * len(shapes))
-    size = boxes[:, 2:] - boxes[:, :2]
-    margin = _MARGIN * size.max()
-    share = float(((size[:, 1] + 2 * margin) / (size[:, 0] + 2 * margin)).max())
-    rows = -(-len(shapes) // columns)
-    height = width * share + 0.3
-    figure = Figure(figsize=(columns * width, rows * height), dpi=150.0, facecolor="white")
-    FigureCanvasAgg(figure)
-    axes = list(figure.subplots(rows, columns, squeeze=False).flat)
-    figure.subplots_adjust(0.005, 0.005, 0.995, 1.0 - 0.28 / (rows * height), 0.02, 0.3 / height)
-    for k, one in enumerate(axes):
-        one.set_axis_off()
-        one.set_aspect("equal")
-        if k < len(shapes):
-            one.set_xlim(boxes[k, 0] - margin, boxes[k, 2] + margin)
-            one.set_ylim(boxes[k, 1] - margin, boxes[k, 3] + margin)
-    return figure, axes
-
-
-def title(axes: Any, text: str) -> None:
-    """Write a heading above a panel."""
-    axes.set_title(text, size=8, color=INK, loc="left", pad=2.0)
-
-
-def section(axes: Any, polygon: Any, filled: bool = True, colour: str = OUTLINE) -> None:
-    """Draw a section and its border."""
-    for part in shapely.get_parts(polygon):
-        rings = [np.asarray(r.coords)[:, :2] for r in (part.exterior, *part.interiors)]
-        outline = Path.make_compound_path(*[Path(ring, closed=True) for ring in rings])
-        face = SECTION if filled else "none"
-        axes.add_patch(PathPatch(outline, fc=face, ec=colour, lw=0.6))
 
 
 def show_load(axes: Any, plate: DesignPlate) -> None:
@@ -94,7 +49,7 @@ def strokes(axes: Any, part: PartStudy, count: int = 70) -> None:
     value, angle, _ = strongest_in_plane(plane)
     pulled, size = value >= 0.0, np.abs(value)
     middle = layer.plane.points[layer.triangles].mean(axis=1)
-    chosen = _spread(middle, float(np.ptp(layer.plane.points, axis=0).max()) / count)
+    chosen = _one_a_field(middle, float(np.ptp(layer.plane.points, axis=0).max()) / count)
     most = np.quantile(size, 0.97)
     chosen = chosen[size[chosen] > 0.01 * most]
     half = 0.5 * np.ptp(layer.plane.points, axis=0).max() / count
@@ -105,7 +60,7 @@ def strokes(axes: Any, part: PartStudy, count: int = 70) -> None:
         axes.add_collection(LineCollection(list(ends), colors=colour, linewidths=0.7, zorder=2.0))
 
 
-def _spread(points: FloatArray, size: float) -> Any:
+def _one_a_field(points: FloatArray, size: float) -> Any:
     """One point for each field of a grid: the one nearest to its middle."""
     field = np.floor(points / size)
     off = np.linalg.norm(points - (field + 0.5) * size, axis=1)
@@ -117,9 +72,9 @@ def _spread(points: FloatArray, size: float) -> Any:
 def path(axes: Any, pattern: PatternStudy, colour: str = STRAND, link: str = LINK) -> None:
     """Draw the paths of a pattern, its links in their own colour, start and end marked if one."""
     paths = pattern.paths
-    steps, mask = _steps(pattern)
-    for kind, own in ((~mask, colour), (mask, link)):
-        axes.add_collection(LineCollection(list(steps[kind]), colors=own, lw=0.45, zorder=2.0))
+    steps, mask = _path_steps(pattern)
+    for kind, stroke in ((~mask, colour), (mask, link)):
+        axes.add_collection(LineCollection(list(steps[kind]), colors=stroke, lw=0.45, zorder=2.0))
     if len(paths) == 1:
         axes.plot(*paths.points[0], "o", color=INK, ms=4.0, zorder=3.0)
         axes.plot(*paths.points[-1], "s", color=INK, ms=4.0, zorder=3.0)
@@ -127,57 +82,30 @@ def path(axes: Any, pattern: PatternStudy, colour: str = STRAND, link: str = LIN
 
 def by_level(axes: Any, pattern: PatternStudy, values: FloatArray, unit: str) -> None:
     """Draw the steps of the paths of a pattern, one colour a value (P,), with its share."""
-    steps, _ = _steps(pattern)
-    kept = values[_first(pattern)]
+    steps, _ = _path_steps(pattern)
+    kept = values[_step_starts(pattern)]
     length = np.linalg.norm(steps[:, 1] - steps[:, 0], axis=1)
     levels = np.unique(kept)
     colours = palette(map(str, levels)).values()
     for level, colour in zip(levels, colours, strict=True):
-        one = kept == level
-        share = 100.0 * length[one].sum() / length.sum()
+        at_level = kept == level
+        share = 100.0 * length[at_level].sum() / length.sum()
         label = f"{level:g} {unit}: {share:.0f} % of the length"
         lines = LineCollection(
-            list(steps[one]), colors=colour, lw=0.8, zorder=2.0, label=label, capstyle="round"
+            list(steps[at_level]), colors=colour, lw=0.8, zorder=2.0, label=label, capstyle="round"
         )
         axes.add_collection(lines)
     axes.legend(fontsize=6, frameon=False, loc="upper right")
 
 
-def _first(pattern: PatternStudy) -> BoolArray:
+def _step_starts(pattern: PatternStudy) -> BoolArray:
     kept = np.ones(len(pattern.paths.points), dtype=bool)
     kept[pattern.paths.offsets[1:] - 1] = False
     return kept
 
 
-def _steps(pattern: PatternStudy) -> tuple[FloatArray, BoolArray]:
+def _path_steps(pattern: PatternStudy) -> tuple[FloatArray, BoolArray]:
     """Return the steps (s, 2, 2) of the paths of a pattern, and whether each is a link."""
-    paths, first = pattern.paths, _first(pattern)
+    paths, first = pattern.paths, _step_starts(pattern)
     start = np.flatnonzero(first)
     return np.stack([paths.points[start], paths.points[start + 1]], axis=1), paths.link[start]
-
-
-def lines_of(axes: Any, lines: Iterable[FloatArray], colour: Any, width: float = 1.0) -> None:
-    """Draw polylines (n, 2)."""
-    axes.add_collection(LineCollection(list(lines), colors=colour, linewidths=width, zorder=2.5))
-
-
-def bar(figure: Figure, axes: Any, drawn: Any, label: str) -> None:
-    """Draw a colour bar beside a panel."""
-    shown = figure.colorbar(drawn, ax=axes, shrink=0.6, pad=0.01, aspect=16)
-    shown.set_label(label, size=7)
-    shown.ax.tick_params(labelsize=6)
-
-
-def curves(count: int, labels: Sequence[tuple[str, str]]) -> tuple[Figure, list[Any]]:
-    """Figure with plain axes side by side, and their labels."""
-    figure = Figure(figsize=(4.6 * count, 3.6), dpi=150.0, facecolor="white")
-    FigureCanvasAgg(figure)
-    axes = list(figure.subplots(1, count, squeeze=False)[0])
-    figure.subplots_adjust(0.12 / count, 0.14, 0.99, 0.9, 0.22)
-    for one, (across, up) in zip(axes, labels, strict=True):
-        one.spines[["top", "right"]].set_visible(False)
-        one.tick_params(labelsize=7, colors=INK)
-        one.set_xlabel(across, size=8, color=INK)
-        one.set_ylabel(up, size=8, color=INK)
-        one.grid(color=OUTLINE, alpha=0.2, lw=0.5)
-    return figure, axes

@@ -1,14 +1,13 @@
 """Five plates, optimised and full, under the load-dependent paths and those of other methods.
 
 T. Wang et al., Load-dependent path planning method for 3D printing of continuous fiber reinforced
-plastics, Composites Part A 140 (2021) 106181. The plates are `ccfem.cases.bridge` and its
-neighbours; lpp is strategy `svt`.
+plastics, Composites Part A 140 (2021) 106181. The plates are those of `ccfem.cases.designed`;
+lpp is strategy `svt`.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib import import_module
 from time import perf_counter
 from types import MappingProxyType
 from typing import Any
@@ -18,8 +17,7 @@ import numpy as np
 from ccfem.base.arrays import FloatArray
 from ccfem.base.progress import Progress, silent
 from ccfem.cases import Case, create_case
-from ccfem.cases.designed import ELEMENT_SIZE, DesignPlate
-from ccfem.cases.stored.build import DESIGNED
+from ccfem.cases.designed import ELEMENT_SIZE, PLATES, DesignPlate
 from ccfem.fem.elasticity import StressField, solve
 from ccfem.fem.topopt import Design
 from ccfem.geometry.polylines import resample, turning_angles
@@ -39,8 +37,6 @@ from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import stress_on
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create, named
-
-PLATES = DESIGNED
 
 PATTERNS: Mapping[str, tuple[str, dict[str, Any]]] = MappingProxyType(
     {
@@ -146,14 +142,8 @@ class PlateStudy:
     seconds: float
 
 
-def plate_of(name: str) -> DesignPlate:
-    """Plate of a name."""
-    plate: DesignPlate = getattr(import_module(f"ccfem.cases.{name}"), f"{name}_plate")()
-    return plate
-
-
 def run_study(
-    plates: Sequence[str] = PLATES,
+    plates: Sequence[str] = tuple(PLATES),
     patterns: Sequence[str] = tuple(PATTERNS),
     design: bool = True,
     progress: Progress = silent,
@@ -187,11 +177,11 @@ def run_plate(
 ) -> PlateStudy:
     """Optimise a plate if asked to, then solve, plan and judge both parts."""
     begun = perf_counter()
-    plate = plate_of(name)
-    found = plate.design() if design else None
+    plate = PLATES[name]
+    new_design = plate.design() if design else None
     off = np.nan
-    if found is not None:
-        outline = plate.outline(found)
+    if new_design is not None:
+        outline = plate.outline(new_design)
         off = outline.symmetric_difference(plate.part).area / outline.area
     optimised, original = (
         run_part(
@@ -201,7 +191,7 @@ def run_plate(
         )
         for whole in (True, False)
     )
-    return PlateStudy(plate, optimised, original, found, off, perf_counter() - begun)
+    return PlateStudy(plate, optimised, original, new_design, off, perf_counter() - begun)
 
 
 def run_part(case: Case, patterns: Sequence[str], tested: bool) -> PartStudy:
@@ -211,8 +201,8 @@ def run_part(case: Case, patterns: Sequence[str], tested: bool) -> PartStudy:
     (layer,) = Planar(count=1).cut(case.problem.mesh)
     stress = stress_on(layer, field)
     specimen = Specimen.of(field) if tested else None
-    found = {p: _run_pattern(p, layer, field, machine, specimen) for p in patterns}
-    return PartStudy(case, machine, field, layer, stress, MappingProxyType(found))
+    studies = {p: _run_pattern(p, layer, field, machine, specimen) for p in patterns}
+    return PartStudy(case, machine, field, layer, stress, MappingProxyType(studies))
 
 
 def _run_pattern(

@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from ccfem.base.errors import InputError
-from ccfem.cases.named import create_case
+from ccfem.cases import create_case
 from ccfem.fem.elasticity.solve import solve
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning import plan
