@@ -119,21 +119,28 @@ class Reach:
                 self.named_by[name].add(f"{file}:{owner}")
             self._names(child, file, owner_of(node, child, owner))
 
-    def of(self, function: str, seen: set[str]) -> set[str]:
+    def of(self, function: str) -> set[str]:
         """Find the tests of ``file:name``; names with _ are looked for in their file alone."""
-        if function in self.tests:
-            return self.tests[function]
-        seen.add(function)
-        file, _, owner = function.partition(":")
-        name = owner.removesuffix(".__init__").removesuffix(".__post_init__").rpartition(".")[2]
-        callers = {f for f in self.named_by[name] if name[:1] != "_" or f.startswith(f"{file}:")}
-        return set().union(*(self.of(f, seen) for f in sorted(callers) if f not in seen))
+        near, seen = {function}, {function}
+        while near:
+            tests = set().union(*(self.tests[f] for f in near if f in self.tests))
+            if tests:
+                return tests
+            callers = set()
+            for file, _, owner in (f.partition(":") for f in near):
+                owner = owner.removesuffix(".__init__").removesuffix(".__post_init__")
+                name = owner.rpartition(".")[2]
+                by = self.named_by[name]
+                callers |= {f for f in by if name[:1] != "_" or f.startswith(f"{file}:")}
+            near = callers - seen
+            seen |= near
+        return set()
 
     def chosen(self, function: str) -> list[str]:
         """Choose tests: those that reach least else first, a test's further parameters last."""
         often = collections.Counter[str]()
         ranked = []
-        for test in sorted(self.of(function, set()), key=lambda test: (self.width[test], test)):
+        for test in sorted(self.of(function), key=lambda test: (self.width[test], test)):
             often[test.partition("[")[0]] += 1
             ranked.append((often[test.partition("[")[0]], len(ranked), test))
         chosen, left = [], SECONDS
@@ -144,7 +151,7 @@ class Reach:
         return chosen
 
 
-def stale(module: Path) -> set[str]:
+def stale_modules(module: Path) -> set[str]:
     """Compiled modules that stand on a module: their cached code still holds what it was."""
     compiled = [file for file in (ROOT / "ccfem").rglob("*.py") if "njit" in text_of(file)]
     files, size = {module}, 0
@@ -159,20 +166,23 @@ def stale(module: Path) -> set[str]:
 
 def fate(module: Path, text: str, tests: list[str], seconds: float) -> str:
     """Break a module in a copy of the project, and run tests there."""
-    old = stale(module)
-    ignored = shutil.ignore_patterns(".git", "results", *(f"{name}.*.nb[ic]" for name in old))
+    stale = stale_modules(module)
+    ignored = shutil.ignore_patterns(".git", "results", *(f"{name}.*.nb[ic]" for name in stale))
     with tempfile.TemporaryDirectory() as copy:
         shutil.copytree(ROOT, copy, ignore=ignored, dirs_exist_ok=True)
         Path(copy, module.relative_to(ROOT)).write_text(text, encoding="utf-8")
-        words = [sys.executable, "-m", "pytest", "-xn0", "-p", "no:cacheprovider", *tests]
+        words = [sys.executable, "-m", "pytest", "-x", "-n", "0", "-p", "no:cacheprovider", *tests]
         environment = os.environ | {"PYTHONPATH": copy}
-        limit = START + 3.0 * seconds + COMPILATION * bool(old)
+        limit = START + 3.0 * seconds + COMPILATION * bool(stale)
         try:
             run = subprocess.run(
                 words, cwd=copy, env=environment, capture_output=True, timeout=limit
             )
         except subprocess.TimeoutExpired:
             return "time out"
+    old = text_of(module)
+    if run.returncode > 1 and text != old and fate(module, old, tests, seconds) != "SURVIVED":
+        raise RuntimeError(f"the tests of {module} do not run: {run.stdout.decode()[-2000:]}")
     return "caught" if run.returncode else "SURVIVED"
 
 
