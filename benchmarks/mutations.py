@@ -1,150 +1,158 @@
 """Break the code in one place at a time, and see whether its tests notice.
 
-Run ``python benchmarks/mutations.py COUNT [SEED]``: one line a mutation, at last the share that was
-caught. Mutations are spread over all wings; each runs the tests that name its module, in a copy of
-the project, for at most two minutes a mutation.
+    REACHED=FOLDER python -m pytest -p benchmarks.reached
+    python -m benchmarks.mutations COUNT FOLDER [SEED]
+
+The first writes which tests reach which functions; run the tests before, so that compiling does not
+count as theirs, and again for files that change. The second breaks COUNT places, spread over all
+wings, each in a copy of the project, and runs the tests that reach it: one line a mutation, at last
+the share that was caught. Lines also go to FOLDER/log.txt: a run that was cut off goes on, and a
+later one tries again all that was not caught. What survives is judged by eye: some mutations change
+nothing.
 """
 
 import ast
+import collections
+import itertools
+import os
 import random
-import re
 import shutil
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
-SECONDS = 120.0
-TESTS = 4
-"""Most test files that are run for a mutation."""
+from benchmarks.reached import ROOT, Reach, owner_of, text_of
 
-SWAPS: dict[type, type] = {
-    ast.Lt: ast.LtE,
-    ast.LtE: ast.Lt,
-    ast.Gt: ast.GtE,
-    ast.GtE: ast.Gt,
-    ast.Eq: ast.NotEq,
-    ast.NotEq: ast.Eq,
-    ast.Add: ast.Sub,
-    ast.Sub: ast.Add,
-    ast.Mult: ast.Div,
-    ast.Div: ast.Mult,
-    ast.And: ast.Or,
-    ast.Or: ast.And,
-}
+PROCESSES = 2
+APART = (".git", ".venv", "venv", "results")
+"""What is not copied with the project."""
+START, COMPILATION = 60.0, 240.0
+"""Seconds that a run may take to start, and to compile what a broken compiled function is in."""
+
+TWINS = (
+    (ast.Lt, ast.LtE),
+    (ast.Gt, ast.GtE),
+    (ast.Eq, ast.NotEq),
+    (ast.Add, ast.Sub),
+    (ast.Mult, ast.Div),
+    (ast.And, ast.Or),
+)
+SWAPS: dict[type, type] = {old: new for a, b in TWINS for old, new in ((a, b), (b, a))}
 
 
-def places(tree: ast.Module) -> Iterator[tuple[ast.AST, str]]:
-    """Nodes that can be broken, and the field to break; docstrings and annotations are none."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.BinOp | ast.BoolOp) and type(node.op) in SWAPS:
-            yield node, "op"
-        elif isinstance(node, ast.Compare) and type(node.ops[0]) in SWAPS:
-            yield node, "ops"
-        elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not | ast.USub):
-            yield node, "operand"
-        elif isinstance(node, ast.Constant) and isinstance(node.value, float) and node.value != 0.0:
-            yield node, "value"
-        elif isinstance(node, ast.Raise):
-            yield node, "exc"
+def places(node: ast.AST, owner: str = "") -> Iterator[tuple[str, ast.AST, str]]:
+    """Owner, node and field of what can be broken; what is only printed (f-strings) is left out."""
+    if isinstance(node, ast.BinOp | ast.BoolOp) and type(node.op) in SWAPS:
+        yield owner, node, "op"
+    elif isinstance(node, ast.Compare) and type(node.ops[0]) in SWAPS:
+        yield owner, node, "ops"
+    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not | ast.USub):
+        yield owner, node, "operand"
+    elif isinstance(node, ast.Constant) and isinstance(node.value, float) and node.value != 0.0:
+        yield owner, node, "value"
+    elif isinstance(node, ast.Raise):
+        yield owner, node, "exc"
+    for child in () if isinstance(node, ast.JoinedStr) else ast.iter_child_nodes(node):
+        yield from places(child, owner_of(node, child, owner))
 
 
-def broken(source: str, number: int) -> tuple[str, int, str]:
-    """Source with one place broken, its line, and what was done there."""
+def broken(source: str, number: int) -> tuple[str, str, str]:
+    """Source with one place broken, its owner, and its line with what was done there."""
     tree = ast.parse(source)
-    node, field = list(places(tree))[number]
-    before = ast.unparse(node)
+    owner, node, field = list(places(tree))[number]
+    before, new = ast.unparse(node), node
     if field == "op":
-        node.op = SWAPS[type(node.op)]()  # type: ignore[attr-defined]
+        node.op = SWAPS[type(node.op)]()
     elif field == "ops":
-        node.ops[0] = SWAPS[type(node.ops[0])]()  # type: ignore[attr-defined]
+        node.ops[0] = SWAPS[type(node.ops[0])]()
     elif field == "value":
-        node.value *= 1.5  # type: ignore[attr-defined]
-    elif field == "exc":
-        node = _replaced(tree, node, ast.Pass())
+        node.value *= 1.5
     else:
-        node = _replaced(tree, node, node.operand)  # type: ignore[attr-defined]
-    line = getattr(node, "lineno", 0)
-    return ast.unparse(ast.fix_missing_locations(tree)), line, f"{before[:60]} -> {field}"
+        new = ast.Pass() if field == "exc" else node.operand
+        for parent in ast.walk(tree):
+            for name, value in ast.iter_fields(parent):
+                if value is node:
+                    setattr(parent, name, new)
+                elif isinstance(value, list):
+                    value[:] = [new if item is node else item for item in value]
+    what = f"{node.lineno}: {before[:80]} -> {ast.unparse(new)[:80]}"
+    return ast.unparse(ast.fix_missing_locations(tree)), owner, " ".join(what.split())
 
 
-def _replaced(tree: ast.Module, old: ast.AST, new: ast.AST) -> ast.AST:
-    """Put another node in the place of one."""
-    for parent in ast.walk(tree):
-        for name, value in ast.iter_fields(parent):
-            if value is old:
-                setattr(parent, name, new)
-            elif isinstance(value, list) and any(item is old for item in value):
-                setattr(parent, name, [new if item is old else item for item in value])
-    return ast.copy_location(new, old)
+def stale_modules(module: Path) -> set[str]:
+    """Compiled modules that stand on a module: their cached code still holds what it was."""
+    compiled = [file for file in (ROOT / "ccfem").rglob("*.py") if "njit" in text_of(file)]
+    files, size = {module}, 0
+    while size < len(files):
+        size = len(files)
+        dotted = [".".join(f.relative_to(ROOT).with_suffix("").parts) for f in files]
+        files |= {
+            f for f in compiled if any(f"from {name} import" in text_of(f) for name in dotted)
+        }
+    return {file.stem for file in files if "njit" in text_of(file)}
 
 
-def tests_of(module: Path) -> list[Path]:
-    """Test files that name a module, those that mirror it first."""
-    dotted = ".".join(module.relative_to(ROOT).with_suffix("").parts)
-    package, _, name = dotted.rpartition(".")
-    direct = re.compile(
-        rf"\b{re.escape(dotted)}\b|from {re.escape(package)} import [^\n]*\b{name}\b"
-    )
-    files = sorted((ROOT / "tests").rglob("test_*.py"))
-    named = [file for file in files if direct.search(file.read_text(encoding="utf-8"))]
-    mirror = ROOT / "tests" / module.relative_to(ROOT / "ccfem").parent
-    named.sort(key=lambda file: (file.stem != f"test_{name}", file.parent != mirror))
-    return named[:TESTS]
+def fate(module: Path, text: str, tests: list[str], seconds: float) -> str:
+    """Break a module in a copy of the project, and run tests there."""
+    stale = stale_modules(module)
+    ignored = shutil.ignore_patterns(*APART, *(f"{name}.*.nb[ic]" for name in stale))
+    with tempfile.TemporaryDirectory() as copy:
+        shutil.copytree(ROOT, copy, ignore=ignored, dirs_exist_ok=True)
+        Path(copy, module.relative_to(ROOT)).write_text(text, encoding="utf-8")
+        words = [sys.executable, "-m", "pytest", "-x", "-n", "0", "-p", "no:cacheprovider", *tests]
+        environment = os.environ | {"PYTHONPATH": copy}
+        limit = START + 3.0 * seconds + COMPILATION * bool(stale)
+        try:
+            run = subprocess.run(
+                words, cwd=copy, env=environment, capture_output=True, timeout=limit
+            )
+        except subprocess.TimeoutExpired:
+            return "time out"
+    old = text_of(module)
+    if run.returncode > 1 and text != old and fate(module, old, tests, seconds) != "SURVIVED":
+        raise RuntimeError(f"the tests of {module} do not run: {run.stdout.decode()[-2000:]}")
+    return "caught" if run.returncode else "SURVIVED"
+
+
+def drawn(count: int, seed: int) -> list[tuple[Path, int]]:
+    """Modules and numbers of places, in turn from every wing, none twice."""
+    dice = random.Random(seed)
+    wings: dict[str, list[tuple[Path, int]]] = collections.defaultdict(list)
+    for module in sorted((ROOT / "ccfem").glob("*/**/*.py")):
+        wing = wings[module.relative_to(ROOT / "ccfem").parts[0]]
+        wing += [(module, number) for number, _ in enumerate(places(ast.parse(text_of(module))))]
+    turns = [dice.sample(wing, min(count, len(wing))) for wing in wings.values()]
+    rounds = itertools.chain(*itertools.zip_longest(*turns))
+    return [place for place in rounds if place is not None][:count]
 
 
 def main() -> None:
     """Break and test."""
-    count, seed = int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0
-    dice = random.Random(seed)
-    wings: dict[str, list[Path]] = {}
-    for module in sorted((ROOT / "ccfem").rglob("*.py")):
-        wing = module.relative_to(ROOT / "ccfem").parts[0]
-        if module.name != "__init__.py" and list(places(ast.parse(module.read_text("utf-8")))):
-            wings.setdefault(wing, []).append(module)
-    caught = tried = 0
-    with tempfile.TemporaryDirectory() as folder:
-        copy = Path(folder) / "project"
-        ignored = shutil.ignore_patterns(".git", "results")
-        shutil.copytree(ROOT, copy, ignore=ignored)
-        while tried < count:
-            module = dice.choice(wings[sorted(wings)[tried % len(wings)]])
-            tests = tests_of(module)
-            source = module.read_text("utf-8")
-            number = dice.randrange(len(list(places(ast.parse(source)))))
-            text, line, what = broken(source, number)
-            tried += 1
-            where = f"{module.relative_to(ROOT)}:{line}: {what}"
-            if not tests:
-                print(f"no test  {where}", flush=True)
-                continue
-            changed = copy / module.relative_to(ROOT)
-            changed.write_text(text, encoding="utf-8")
-            command = [
-                sys.executable,
-                "-m",
-                "pytest",
-                "-q",
-                "-x",
-                "-n",
-                "0",
-                "-p",
-                "no:cacheprovider",
-            ]
-            command += [str(test.relative_to(ROOT)) for test in tests]
-            try:
-                done = subprocess.run(
-                    command, cwd=copy, capture_output=True, timeout=SECONDS, check=False
-                )
-                noticed = done.returncode != 0
-            except subprocess.TimeoutExpired:
-                noticed = True
-            changed.write_text(source, encoding="utf-8")
-            caught += noticed
-            print(f"{'caught' if noticed else 'SURVIVED':8} {where}", flush=True)
-    print(f"{caught} of {tried} mutations were caught, {caught / tried:.0%}")
+    folder = Path(sys.argv[2])
+    chosen = drawn(int(sys.argv[1]), int(sys.argv[3]) if len(sys.argv) > 3 else 0)
+    reach, log = Reach(folder), folder / "log.txt"
+    lines = log.read_text(encoding="utf-8").splitlines() if log.exists() else []
+    became = {line[9:]: line[:9].strip() for line in lines}
+
+    def judged(module: Path, number: int) -> bool:
+        text, owner, what = broken(text_of(module), number)
+        name = module.relative_to(ROOT)
+        where = f"{name}:{what}"
+        if became.get(where) != "caught":
+            tests = reach.chosen(f"{name}:{owner}")
+            seconds = sum(reach.seconds[test] for test in tests)
+            became[where] = fate(module, text, tests, seconds) if tests else "no test"
+            with log.open("a", encoding="utf-8") as file:
+                file.write(f"{became[where]:8} {where}\n")
+        print(f"{became[where]:8} {where}", flush=True)
+        return became[where] in ("caught", "time out")
+
+    with ThreadPoolExecutor(PROCESSES) as pool:
+        caught = sum(pool.map(judged, *zip(*chosen, strict=True)))
+    print(f"{caught} of {len(chosen)} mutations were caught, {caught / len(chosen):.0%}")
 
 
 if __name__ == "__main__":

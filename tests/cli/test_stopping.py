@@ -7,6 +7,9 @@ import sys
 import time
 
 import pytest
+import typer
+
+from ccfem.cli.main import main
 
 IMPORTING = """
 import os, signal, sys
@@ -125,6 +128,17 @@ def test_a_stop_while_the_module_of_folders_is_imported(tmp_path):
 def test_a_stop_while_running(moment, tmp_path):
     name = "SIGINT" if moment in ("writing", "kept") else "SIGTERM"
     check(RUNNING.format(name=name, moment=MOMENTS[moment].strip()), name, tmp_path)
+
+
+def test_a_fault_of_the_program_is_no_stop(monkeypatch):
+    """Nobody asked for an end: the fault shows as it is, and no line takes its place."""
+
+    def faulty(standalone_mode):
+        raise ZeroDivisionError("a fault")
+
+    monkeypatch.setattr(typer.main, "get_command", lambda app: faulty)
+    with pytest.raises(ZeroDivisionError, match="a fault"):
+        main()
 
 
 def test_a_study_is_stopped(tmp_path):

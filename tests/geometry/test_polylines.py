@@ -140,6 +140,13 @@ def test_a_hairpin_turns_by_half_a_turn() -> None:
     assert turning_angles(points, offsets, np.array([False]))[1] == pytest.approx(np.pi)
 
 
+def test_a_line_without_points_turns_nowhere() -> None:
+    corner = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
+    points, offsets = pack([corner, np.zeros((0, 2)), corner, np.zeros((0, 2))])
+    found = turning_angles(points, offsets, np.zeros(4, dtype=bool))
+    assert found == pytest.approx([0.0, np.pi / 2, 0.0, 0.0, np.pi / 2, 0.0])
+
+
 def test_repeated_points_are_merged() -> None:
     a = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0], [1.0, 1e-9], [2.0, 0.0]])
     points, offsets, kept = merge_repeated(*pack([a, a[:2]]), tolerance=1e-6)

@@ -185,6 +185,14 @@ def test_layers_are_put_in_and_left_out_by_their_distance(block):
                 heights.append(here.mean())
         gaps = np.diff(np.sort(heights))
         assert 0.24 < gaps.min() <= gaps.max() < 0.61
+    # Layers in part of the block keep the names of its sides: all edges there, each once.
+    assert any(len(layer.patches["x_min"]) == 0 for layer in found.layers)
+    for layer in found.layers:
+        sides = layer.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+        sides, used = np.unique(np.sort(sides), axis=0, return_counts=True)
+        for name, axis, at in (("x_min", 0, 0.0), ("x_max", 0, 24.0), ("y_min", 1, 0.0)):
+            on = (used == 1) & (np.abs(layer.points[sides, axis] - at) < 1e-9).all(axis=1)
+            assert set(map(tuple, np.sort(layer.patches[name]))) == set(map(tuple, sides[on]))
 
 
 def test_tension_across_flat_layers_is_that_of_the_tensor(block):
