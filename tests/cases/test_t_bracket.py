@@ -27,7 +27,7 @@ def test_volume_and_extent_are_those_of_the_authors_part(case):
 
 def test_arcs_of_the_outline_run_into_each_other():
     """Drawn in steps of 6 degrees; the only corners are those of the base's two ends."""
-    line = np.array(t_bracket_front().exterior.coords)
+    line = np.array(t_bracket_outlines()["z"].exterior.coords)
     steps = np.diff(line, axis=0)
     steps = steps[np.linalg.norm(steps, axis=1) > 1e-6]
     after = np.roll(steps, -1, axis=0)
