@@ -11,7 +11,6 @@ ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "ccfem"
 
 TWICE = {
-    "assembly": "of tetrahedra and of plates",
     "problem": "in space and in the plane",
     "solve": "in space and in the plane",
 }
