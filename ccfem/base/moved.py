@@ -16,9 +16,20 @@ _INDICES = (
 )
 
 _FOLDED = {
+    "cases.bodies": (
+        "cases.arm_bracket cases.bar cases.corner_bracket cases.crossed cases.lifting_eye "
+        "cases.twist_bar cases.two_angle_bracket cases.two_pull_loop"
+    ),
+    "cases.inspection.part_check": (
+        "cases.inspection.cost cases.inspection.load_row cases.inspection.patch_row"
+    ),
+    "cases.reading": "cases.named",
+    "cases.shipped": "cases.bracket cases.t_bracket cases.two_load_plate",
+    "cases.stored": "cases.stored.stored_files",
+    "cases.storing": "cases.stored.build",
+    "papers.contents": "papers.verdicts",
     "body.mesh.check": "body.mesh.hanging",
     "body.meshing.meshed_body": "body.meshing.cache",
-    "cases.inspection.part_check": "cases.inspection.cost",
     "cases.optimised": "cases.passive",
     "cases.part_file": "cases.before_meshing cases.part_regions cases.part_slicing",
     "cases.part_keys": "cases.part_body",
