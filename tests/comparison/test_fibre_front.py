@@ -81,6 +81,13 @@ def test_marked_are_those_that_none_with_as_little_fibre_exceeds():
     assert front.strongest.tolist() == [True, False, True, False, False]
 
 
+def test_plans_to_one_length_are_compared_as_if_they_laid_it():
+    """Both ask for 250 mm on 2 layers, 500 mm; the weaker lays 1 mm less, and is not marked."""
+    pair = (point(2, 250.0, 500.0, 2.5, 8000.0), point(2, 250.0, 499.0, 2.4, 7900.0))
+    assert [each.asked_in_all for each in pair] == [500.0, 500.0]
+    assert FibreFront("bar", "pruned", pair, {}).stiffest.tolist() == [True, False]
+
+
 def test_plans_that_fail_before_the_part_without_fibre_are_not_marked():
     points = (point(1, 500.0, 500.0, 1.4, 80.0), point(1, 900.0, 900.0, 2.0, 120.0))
     front = FibreFront("bar", "zigzag", points, {}, bare=100.0)

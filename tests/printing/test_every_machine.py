@@ -34,6 +34,18 @@ def test_the_checks_see_what_there_is_to_see(printed):
     assert {step.kind for step in run.steps if step.lays} >= {*PART, "Wipe tower", "Skirt/Brim"}
 
 
+def test_the_bar_for_the_first_strand_is_three_lines_side_by_side(printed):
+    """As long as the tail and 20 mm, a line's width apart; the first strand lies on the middle."""
+    machine = printed.machine
+    steps = [s for s in printed.done.steps if s.lays and s.kind == "Wipe tower"]
+    long = [s for s in steps if s.tool == 0 and abs(s.length - machine.tail - 20.0) < 1e-2]
+    across = np.unique(np.round([s.end[1] for s in long], 3))
+    np.testing.assert_allclose(np.diff(across), [machine.matrix_width] * 2, atol=2e-3)
+    assert across[-1] < printed.corner[1]
+    on_bar = [s.end[1] for s in printed.done.steps if s.lays and s.strand.startswith("beside")]
+    np.testing.assert_allclose(on_bar, across[1], atol=2e-3)
+
+
 def test_the_head_says_what_is_used(printed):
     head, machine = printed.done.head, printed.machine
     steps = printed.done.steps

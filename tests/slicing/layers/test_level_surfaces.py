@@ -131,6 +131,24 @@ def test_cleaning_a_plane_grid_keeps_its_border_and_area():
     assert corners <= {tuple(p) for p in points[border[:, 0], :2]}
 
 
+@pytest.mark.parametrize("size", [0.01, 1.0, 100.0])
+@pytest.mark.parametrize(("lift", "flips"), [(0.0, True), (0.7, True), (0.8, False)])
+def test_thin_pairs_are_flipped_unless_that_folds_the_surface(lift, flips, size):
+    """The side from (-1, 0, 0) to (1, 0, 0) has two opposite angles above a right angle.
+
+    Flipped, the cosine of a triangle's normal and z is 1 / sqrt(1 + lift^2): .82 or .78; the least
+    is .8. Nothing changes with the size or with the directions.
+    """
+    points = np.array([[-1, 0, 0], [1, 0, 0], [0, 0.3, lift], [0, -0.3, lift]], dtype=float)
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    fixed = np.ones(4, dtype=bool)
+    triangles = np.array([[0, 1, 2], [1, 0, 3]])
+    new, cell = clean(size * points @ turn.T, triangles, np.array([7, 8]), fixed, 1e-9, 1e-9)
+    expected = [{0, 2, 3}, {1, 2, 3}] if flips else [{0, 1, 2}, {0, 1, 3}]
+    assert sorted(map(sorted, new)) == sorted(map(sorted, expected))
+    assert set(cell) == {7, 8}
+
+
 def test_pieces_bubbles_and_specks():
     mesh = box_mesh((20.0, 20.0, 20.0), (12, 12, 12))
     x, y, z = (mesh.points - 10.0).T
