@@ -26,6 +26,16 @@ def test_every_name_is_there():
         _ = ccfem.compair
 
 
+def test_a_module_that_is_not_there_and_one_that_lacks_a_library(monkeypatch):
+    with pytest.raises(AttributeError, match=r"'ccfem\.geometry' has no attribute 'ofsets'"):
+        _ = ccfem.geometry.ofsets
+    monkeypatch.delattr(ccfem.geometry, "offsets", raising=False)
+    monkeypatch.delitem(sys.modules, "ccfem.geometry.offsets", raising=False)
+    monkeypatch.setitem(sys.modules, "shapely", None)
+    with pytest.raises(ModuleNotFoundError, match="shapely"):
+        _ = ccfem.geometry.offsets
+
+
 def test_importing_loads_nothing_heavy():
     """Whoever asks for help or one function does not wait for the rest."""
     said = "import sys, ccfem; print(sorted({'numpy', 'pyvista', 'numba'} & set(sys.modules)))"

@@ -6,11 +6,13 @@ import re
 
 import numpy as np
 import pytest
+import pyvista
 from matplotlib.figure import Figure
 from PIL import Image
 
 import ccfem
 from ccfem.base.errors import InputError
+from ccfem.comparison.plot.scenes import add
 from ccfem.slicing.layers.layer_stress import stress_on
 
 
@@ -90,6 +92,24 @@ def test_a_view_in_space_without_a_screen_is_a_picture(values, compared, tmp_pat
         values["case"].show(picture=tmp_path / "case.gif")
     with pytest.raises(InputError, match="Evaluation is nothing in space"):
         values["evaluation"].show()
+
+
+def test_a_stress_field_is_drawn_as_it_moves(values):
+    """By the scale that is given; else the largest displacement is a twentieth of the diagonal."""
+    stress = values["stress"]
+    border = np.unique(stress.mesh.boundary)
+    still, moved = stress.mesh.points[border], stress.displacement[border]
+    largest = np.linalg.norm(moved, axis=1).max()
+    diagonal = np.linalg.norm(np.ptp(stress.mesh.points, axis=0))
+    for scale in (None, 7.0):
+        plotter = pyvista.Plotter(off_screen=True)
+        add(stress, plotter, scale=scale)
+        factor = 0.05 * diagonal / largest if scale is None else scale
+        ends = np.stack(
+            [(still + factor * moved).min(axis=0), (still + factor * moved).max(axis=0)]
+        )
+        np.testing.assert_allclose(np.reshape(plotter.bounds, (3, 2)).T, ends, rtol=1e-6, atol=1e-9)
+        plotter.close()
 
 
 def test_a_comparison_draws_layers_and_fronts(compared):

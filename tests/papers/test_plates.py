@@ -52,6 +52,14 @@ def test_hole_concentrates_the_stress_as_howland_found():
     assert field.stress[:, 0].max() * 24.0 == pytest.approx(2.31, rel=0.1)
 
 
+def test_the_material_of_the_first_solution_has_no_direction(plate):
+    """Plane stress, Poisson's ratio 0.3: C12 = 0.3 C11 and C66 = 0.35 C11, for any modulus."""
+    stiffness = plate.isotropic_field.problem.stiffness
+    expected = np.array([[1.0, 0.3, 0.0], [0.3, 1.0, 0.0], [0.0, 0.0, 0.35]])
+    expected = np.broadcast_to(expected, stiffness.shape)
+    np.testing.assert_allclose(stiffness / stiffness[..., :1, :1], expected, rtol=1e-12)
+
+
 def test_layers_carry_the_stress_of_the_pixels(plate):
     layers, stress = plate.planned_on(2)
     assert [layer.index for layer in layers] == [0, 1]
