@@ -203,6 +203,26 @@ def test_a_linear_stress_leaves_quadratic_cells_no_error():
     assert found.energy > 0.0
 
 
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_recovered_stress_of_zero_leaves_the_whole_energy_as_error(order, monkeypatch):
+    """What is integrated in a cell is then its own stress, here beside a quadrature."""
+    names = estimate_error.__globals__
+    patches_of = names["stress_patches"]
+
+    def zero(*given):
+        patches = patches_of(*given)
+        return replace(patches, coefficients=0.0 * patches.coefficients)
+
+    monkeypatch.setitem(names, "stress_patches", zero)
+    mesh = box_mesh((3.0, 2.0, 1.0), (2, 1, 1))
+    mesh = mesh if order == 1 else mesh.quadratic()
+    u = np.random.default_rng(4).normal(size=mesh.points.shape)
+    found = estimate_error(mesh, u, MATERIAL.stiffness)
+    energy = true_error(mesh, u, np.zeros_like)
+    np.testing.assert_allclose(found.cells, energy, rtol=1e-9)
+    assert found.energy == pytest.approx(energy.sum(), rel=1e-9)
+
+
 def test_the_estimate_keeps_a_jump_of_stress_between_materials():
     # Two bars in a row under tension, one ten times as stiff: the exact stress is piecewise
     # constant across the sides that are free, and so is the solution's where Poisson's ratio is 0.
