@@ -24,6 +24,18 @@ def test_volume_and_extent_are_those_of_the_authors_part(case):
     assert mesh.aspects.max() < 20.0
 
 
+def test_arcs_of_the_outline_run_into_each_other():
+    """Drawn in steps of 6 degrees; the only corners are those of the base's two ends."""
+    line = np.array(t_bracket_front().exterior.coords)
+    steps = np.diff(line, axis=0)
+    steps = steps[np.linalg.norm(steps, axis=1) > 1e-6]
+    after = np.roll(steps, -1, axis=0)
+    across = steps[:, 0] * after[:, 1] - steps[:, 1] * after[:, 0]
+    turns = np.degrees(np.abs(np.arctan2(across, np.einsum("ij,ij->i", steps, after))))
+    corners = turns > 6.5
+    assert turns[corners] == pytest.approx([90.0] * 4)
+
+
 def test_walls_of_the_holes_have_the_area_of_cylinders(case):
     mesh = case.problem.mesh
     expected = {"base_left": 15.0, "base_right": 15.0, "head": 30.0, "pull": 15.0}

@@ -45,6 +45,14 @@ def test_the_space_below_a_bridge(bridge, lift, volume):
     )
 
 
+def test_cells_of_a_column_grow_downwards():
+    """Each half as high again as the one above; asked for 1 mm, of 12 mm in 5: 12 / 13.1875 mm."""
+    found = column_mesh(box_mesh((4.0, 4.0, 4.0), (2, 2, 2)), lift=12.0, size=1.0)
+    levels = np.unique(found.mesh.points[:, 2].round(9))[::-1]
+    expected = 12.0 / 13.1875 * 1.5 ** np.arange(5)
+    np.testing.assert_allclose(-np.diff(levels), expected, rtol=1e-6)
+
+
 @pytest.mark.parametrize("degrees", [30.0, 60.0])
 def test_the_space_below_a_wedge(degrees):
     """A roof that leans over by an angle from upright, 12 mm high."""
