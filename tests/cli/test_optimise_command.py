@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
+from ccfem.base.errors import InputError
 from ccfem.body.files import write_mesh
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.part_file import read_part
@@ -112,6 +113,16 @@ def test_patches_stay_where_they_are_and_what_is_symmetric_stays_so(plate, tmp_p
     disc = shapely.Point(20.0, 8.0).buffer(2.4)
     assert shapely.intersection(found.planform, disc).area < 1e-6
     assert found.planform.buffer(1e-6).covers(shapely.box(9.0, 6.0, 12.0, 10.0))
+
+
+def test_a_patch_of_half_a_wall_has_no_trace_in_a_plate():
+    """A wall of 4 mm along y and 6 mm along z: a patch up to z = 4 mm is no line of a planform."""
+    mesh = box_mesh((8.0, 4.0, 6.0), (4, 2, 3))
+    assert flat_part(mesh).traces["x_max"].wall.length == pytest.approx(4.0)
+    wall = mesh.patch("x_max")
+    low = wall[mesh.points[wall][..., 2].max(axis=1) < 4.1]
+    with pytest.raises(InputError, match="patch 'low' takes only a part of the height"):
+        flat_part(mesh.with_patches({"low": low}))
 
 
 def test_in_space_on_the_cells_of_the_part(plate, tmp_path):

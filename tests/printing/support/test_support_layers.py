@@ -45,12 +45,13 @@ def test_the_space_below_a_bridge(bridge, lift, volume):
     )
 
 
-def test_cells_of_a_column_grow_downwards():
-    """Each half as high again as the one above; asked for 1 mm, of 12 mm in 5: 12 / 13.1875 mm."""
-    found = column_mesh(box_mesh((4.0, 4.0, 4.0), (2, 2, 2)), lift=12.0, size=1.0)
+@pytest.mark.parametrize(("drop", "count"), [(12.0, 5), (0.5, 2)])
+def test_cells_of_a_column_grow_downwards(drop, count):
+    """Each is half as high again as the one above; none of the first is higher than 1 mm."""
+    found = column_mesh(box_mesh((4.0, 4.0, 4.0), (2, 2, 2)), lift=drop, size=1.0)
     levels = np.unique(found.mesh.points[:, 2].round(9))[::-1]
-    expected = 12.0 / 13.1875 * 1.5 ** np.arange(5)
-    np.testing.assert_allclose(-np.diff(levels), expected, rtol=1e-6)
+    shares = 1.5 ** np.arange(count)
+    np.testing.assert_allclose(-np.diff(levels), drop * shares / shares.sum(), rtol=1e-6)
 
 
 @pytest.mark.parametrize("degrees", [30.0, 60.0])
