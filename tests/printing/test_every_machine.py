@@ -34,6 +34,19 @@ def test_the_checks_see_what_there_is_to_see(printed):
     assert {step.kind for step in run.steps if step.lays} >= {*PART, "Wipe tower", "Skirt/Brim"}
 
 
+def test_block_and_bar_are_as_high_as_their_layers(printed):
+    """What is fed fills a line's width from the layer below up to the nozzle."""
+    steps = [s for s in printed.done.steps if s.lays and s.kind == "Wipe tower" and s.tool == 0]
+    top = np.array([s.end[2] for s in steps])
+    levels = np.append(0.0, np.unique(top))
+    assert len(levels) > 3
+    height = top - levels[np.searchsorted(levels, top) - 1]
+    section = printed.machine.matrix_width * height
+    long = np.array([s.length for s in steps]) > 1.0
+    fed = np.array([s.fed * FILAMENT / s.length for s in steps])
+    np.testing.assert_allclose(fed[long], section[long], rtol=0.02)
+
+
 def test_the_bar_for_the_first_strand_is_three_lines_side_by_side(printed):
     """As long as the tail and 20 mm, a line's width apart; the first strand lies on the middle."""
     machine = printed.machine
