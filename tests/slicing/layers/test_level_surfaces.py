@@ -5,7 +5,7 @@ import pytest
 import shapely
 from scipy.integrate import dblquad
 
-from ccfem.body.mesh import box_mesh
+from ccfem.body.mesh import TetMesh, box_mesh
 from ccfem.body.mesh.patches import Cylinder, patches_from_rules
 from ccfem.body.meshing import extrude
 from ccfem.slicing.layers.cleaning import clean
@@ -129,6 +129,17 @@ def test_cleaning_a_plane_grid_keeps_its_border_and_area():
     border = border_edges(new, len(points))
     corners = {(0.0, 0.0), (0.0, 10.0), (10.0, 0.0), (10.0, 10.0)}
     assert corners <= {tuple(p) for p in points[border[:, 0], :2]}
+
+
+def test_cleaning_moves_the_border_by_a_twentieth_of_the_shortest_edge():
+    """Of a square of 2 mm cut in steps of an eighth, whose corners carry no patches."""
+    box = box_mesh((2.0, 2.0, 1.0), (16, 16, 2))
+    mesh = TetMesh(box.points, box.cells)
+    (layer,) = level_surfaces(mesh, mesh.points[:, 2], np.array([0.3]), 1.0, 0.5, 1.0).layers
+    assert len(layer.points) < 100
+    section = shapely.union_all(shapely.polygons(layer.points[layer.triangles][..., :2]))
+    corners = shapely.points([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0], [2.0, 2.0]])
+    assert shapely.distance(section, corners).max() <= 0.05 * 0.5
 
 
 @pytest.mark.parametrize("size", [0.01, 1.0, 100.0])
