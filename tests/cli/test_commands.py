@@ -17,6 +17,7 @@ from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cli.arguments import parameters_by_strategy
 from ccfem.cli.main import main
+from ccfem.comparison.plot.part_views import draw_part
 from ccfem.printing.export.waypoints import read_waypoints
 from ccfem.strategies import named
 
@@ -265,6 +266,16 @@ def test_what_was_found_in_the_mesh_is_printed(ccfem, folder):
     (folder / "inside.toml").write_text(PART.replace("body.npz", "in.npz"))
     _, out, _ = ccfem("plan", "inside.toml", "--strategy", "zigzag", "--no-virtual-test")
     assert f"mesh: {len(mesh.cells)} cells were inside out: turned" in out
+
+
+def test_a_face_has_its_number_on_the_side_from_which_it_is_seen(ccfem, monkeypatch):
+    """A box is drawn from two opposite corners: three of its faces on each side."""
+    figures = []
+    monkeypatch.setitem(draw_part.__globals__, "save", lambda figure, path: figures.append(figure))
+    assert ccfem("faces", "body.npz", "--out", "faces.png")[0] == 0
+    shown = [{text.get_text() for text in axes.texts} for axes in figures[0].axes]
+    assert [len(numbers) for numbers in shown] == [3, 3]
+    assert set.union(*shown) == {"1", "2", "3", "4", "5", "6"}
 
 
 def test_faces_are_listed_and_drawn(ccfem, folder):
