@@ -119,6 +119,25 @@ def test_a_pack_of_strands_gives_way_at_once_and_keeps_off_the_border(bent_beam)
             assert shapely.hausdorff_distance(strand, strand.simplify(0.05)) < 0.05
 
 
+def test_strands_across_the_beam_keep_off_between_their_points_too(bent_beam):
+    """Points of neighbours stand at half steps, so that the nearest places are no points."""
+    _, layers = bent_beam
+    up = np.linspace(2.0, 10.0, 9)
+    across = [
+        np.column_stack([np.full(9, 20.0 + 0.8 * k), up + 0.25 * (-1) ** k]) for k in range(5)
+    ]
+    paths = laid([in_plane_of(layers[0], line) for line in across], layers)
+    lines = strand_lines(paths, layers, MACHINE)
+    slide = spacing(lines, layers, 1.0, 0.5).spread(np.zeros(len(lines.path)))
+    for layer in layers:
+        strands = [
+            shapely.linestrings(path @ layer.plane.frame[:2].T)
+            for path in lines.slid(slide).on_layer(layer.index)
+        ]
+        for k, strand in enumerate(strands):
+            assert all(strand.distance(other) > 0.998 for other in strands[k + 1 :])
+
+
 def test_what_is_far_enough_apart_stays(bent_beam):
     _, layers = bent_beam
     lines = strand_lines(straight(layers, 2.0, 3.1, 6.0), layers, MACHINE)
