@@ -96,6 +96,7 @@ def test_unknown_material_lists_the_known():
         lambda: plane_stress(1000.0, 9000.0, 0.4, 500.0),
         lambda: Material("bad", np.diag([1.0, 1, 1, 1, 1, -1])),
         lambda: Material("bad", np.eye(3)),
+        lambda: Material("bad", np.eye(6) + 0.1 * np.eye(6, k=3)),
     ],
 )
 def test_impossible_constants_are_refused(make):

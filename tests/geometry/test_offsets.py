@@ -114,6 +114,20 @@ def test_gap_between_end_and_start_of_joined_rings():
         assert np.linalg.norm(strand[-1] - strand[0]) >= 1.0
 
 
+@pytest.mark.parametrize("scale", [0.25, 3.0])
+def test_joined_rings_grow_with_their_spacing(scale):
+    """The innermost ring is too short for a gap and a ramp, at any size, and stays closed."""
+    start, square = np.array([7.0, 3.0]), shapely.box(0.0, 0.0, 6.4, 6.4)
+    strands = join_rings(offset_rings(square, 0.5, 1.0, 1.0), start, 1.0, 1.0)
+    assert len(strands) == 2
+    assert np.array_equal(strands[-1][0], strands[-1][-1])
+    levels = offset_rings(shapely.box(0.0, 0.0, *[6.4 * scale] * 2), *scale * np.array([0.5, 1, 1]))
+    grown = join_rings(levels, scale * start, scale, scale)
+    assert len(grown) == len(strands)
+    for one, other in zip(grown, strands, strict=True):
+        np.testing.assert_allclose(one, scale * other, atol=1e-9)
+
+
 @settings(deadline=None, max_examples=30)
 @given(star_with_hole())
 def test_joined_rings_lay_the_rings_without_crossing(section):
