@@ -1,19 +1,19 @@
 """Break the code in one place at a time, and see whether its tests notice.
 
     REACHED=FOLDER python -m pytest -p benchmarks.reached
-    python benchmarks/mutations.py COUNT FOLDER [SEED]
+    python -m benchmarks.mutations COUNT FOLDER [SEED]
 
-The first asks once which tests reach which functions (later for test files that changed). The
-second breaks COUNT places, spread over all wings, each in a copy of the project, and runs the tests
-that reach it: one line a mutation, at last the share that was caught. Lines also go to
-FOLDER/log.txt: a run that was cut off goes on, and a later one tries again all that was not caught.
+The first writes which tests reach which functions; run the tests before, so that compiling does not
+count as theirs, and again for files that change. The second breaks COUNT places, spread over all
+wings, each in a copy of the project, and runs the tests that reach it: one line a mutation, at last
+the share that was caught. Lines also go to FOLDER/log.txt: a run that was cut off goes on, and a
+later one tries again all that was not caught. What survives is judged by eye: some mutations change
+nothing.
 """
 
 import ast
 import collections
-import functools
 import itertools
-import json
 import os
 import random
 import shutil
@@ -24,10 +24,11 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+from benchmarks.reached import ROOT, Reach, owner_of, text_of
+
 PROCESSES = 2
-TESTS, SECONDS = 100, 40.0
-"""Most tests of a mutation, and most seconds that they took while they were traced."""
+APART = (".git", ".venv", "venv", "results")
+"""What is not copied with the project."""
 START, COMPILATION = 60.0, 240.0
 """Seconds that a run may take to start, and to compile what a broken compiled function is in."""
 
@@ -40,20 +41,6 @@ TWINS = (
     (ast.And, ast.Or),
 )
 SWAPS: dict[type, type] = {old: new for a, b in TWINS for old, new in ((a, b), (b, a))}
-SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
-
-
-@functools.cache
-def text_of(file: Path) -> str:
-    return file.read_text(encoding="utf-8")
-
-
-def owner_of(parent: ast.AST, child: ast.AST, owner: str) -> str:
-    """Dotted name of the outermost function, or class, or constant, that a node belongs to."""
-    if isinstance(parent, ast.Module) and isinstance(child, ast.Assign | ast.AnnAssign):
-        return ast.unparse(child.targets[0] if isinstance(child, ast.Assign) else child.target)
-    inside = isinstance(parent, ast.Module | ast.ClassDef) and isinstance(child, SCOPES)
-    return f"{owner}.{child.name}".lstrip(".") if inside else owner
 
 
 def places(node: ast.AST, owner: str = "") -> Iterator[tuple[str, ast.AST, str]]:
@@ -95,62 +82,6 @@ def broken(source: str, number: int) -> tuple[str, str, str]:
     return ast.unparse(ast.fix_missing_locations(tree)), owner, " ".join(what.split())
 
 
-class Reach:
-    """Which tests reach a function; a compiled function or a constant: by those that name it."""
-
-    def __init__(self, folder: Path) -> None:
-        rows: dict[str, tuple[float, list[str]]] = {}
-        for file in sorted(folder.glob("reached-*.json")):
-            rows |= json.loads(text_of(file))
-        self.seconds = {test: seconds for test, (seconds, _) in rows.items()}
-        self.width = {test: len(functions) for test, (_, functions) in rows.items()}
-        self.tests: dict[str, set[str]] = collections.defaultdict(set)
-        for test, (_, functions) in rows.items():
-            for function in functions:
-                self.tests[function].add(test)
-        self.named_by: dict[str, set[str]] = collections.defaultdict(set)
-        for file in [*(ROOT / "ccfem").rglob("*.py"), *(ROOT / "tests").rglob("*.py")]:
-            self._names(ast.parse(text_of(file)), str(file.relative_to(ROOT)), "")
-
-    def _names(self, node: ast.AST, file: str, owner: str) -> None:
-        for child in ast.iter_child_nodes(node):
-            name = getattr(child, "id", getattr(child, "attr", None))
-            if owner and isinstance(name, str):
-                self.named_by[name].add(f"{file}:{owner}")
-            self._names(child, file, owner_of(node, child, owner))
-
-    def of(self, function: str) -> set[str]:
-        """Find the tests of ``file:name``; names with _ are looked for in their file alone."""
-        near, seen = {function}, {function}
-        while near:
-            tests = set().union(*(self.tests[f] for f in near if f in self.tests))
-            if tests:
-                return tests
-            callers = set()
-            for file, _, owner in (f.partition(":") for f in near):
-                owner = owner.removesuffix(".__init__").removesuffix(".__post_init__")
-                name = owner.rpartition(".")[2]
-                by = self.named_by[name]
-                callers |= {f for f in by if name[:1] != "_" or f.startswith(f"{file}:")}
-            near = callers - seen
-            seen |= near
-        return set()
-
-    def chosen(self, function: str) -> list[str]:
-        """Choose tests: those that reach least else first, a test's further parameters last."""
-        often = collections.Counter[str]()
-        ranked = []
-        for test in sorted(self.of(function), key=lambda test: (self.width[test], test)):
-            often[test.partition("[")[0]] += 1
-            ranked.append((often[test.partition("[")[0]], len(ranked), test))
-        chosen, left = [], SECONDS
-        for _, _, test in sorted(ranked)[:TESTS]:
-            if not chosen or self.seconds[test] < left:
-                chosen.append(test)
-                left -= self.seconds[test]
-        return chosen
-
-
 def stale_modules(module: Path) -> set[str]:
     """Compiled modules that stand on a module: their cached code still holds what it was."""
     compiled = [file for file in (ROOT / "ccfem").rglob("*.py") if "njit" in text_of(file)]
@@ -167,7 +98,7 @@ def stale_modules(module: Path) -> set[str]:
 def fate(module: Path, text: str, tests: list[str], seconds: float) -> str:
     """Break a module in a copy of the project, and run tests there."""
     stale = stale_modules(module)
-    ignored = shutil.ignore_patterns(".git", "results", *(f"{name}.*.nb[ic]" for name in stale))
+    ignored = shutil.ignore_patterns(*APART, *(f"{name}.*.nb[ic]" for name in stale))
     with tempfile.TemporaryDirectory() as copy:
         shutil.copytree(ROOT, copy, ignore=ignored, dirs_exist_ok=True)
         Path(copy, module.relative_to(ROOT)).write_text(text, encoding="utf-8")
