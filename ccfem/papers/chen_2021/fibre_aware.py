@@ -4,8 +4,8 @@
 
 Prints the authors' paths, `isocurve`, pruned `isocurve` and `stream_function` at no more fibre than
 theirs (Chen et al. 2021, table 2), tested under the pull that they are planned for and under a
-bearing load on the same hole, beside the bound that no paths exceed. Then the same length in fewer and in
-more layers. Nothing of this is in the paper.
+bearing load on the same hole, beside the bound that no paths exceed. Then the same length in fewer
+and in more layers. Nothing of this is in the paper.
 """
 
 from collections.abc import Callable, Sequence
