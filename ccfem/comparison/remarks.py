@@ -84,6 +84,8 @@ def _about(run: Run, wanted: Wanted, bounded: bool) -> list[str]:
         lines.append(f"not printable as planned: {run.why_not}")
     if run.print_plan is not None:
         lines += run.print_plan.warnings
+    elif run.strands is not None:
+        lines += run.strands.warnings
     if run.empty_layers and run.evaluation is not None:
         lines.append(f"no fibre on {run.empty_layers} of {len(run.evaluation.layers)} layers")
     if run.note:

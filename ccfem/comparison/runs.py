@@ -12,8 +12,11 @@ from ccfem.judging.evaluation import Evaluation
 from ccfem.judging.virtual_testing.strength import FirstFailure
 from ccfem.judging.virtual_testing.virtual_test import Bracket
 from ccfem.paths.planning.strategy import Strategy
+from ccfem.paths.splitting.printed_strands import PrintedStrands
 from ccfem.paths.toolpaths import Toolpaths
+from ccfem.printing.moves import Moves
 from ccfem.printing.print_plan import PrintPlan
+from ccfem.printing.print_totals import PrintTotals
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,11 @@ class Run:
         Of the strategy, and of the slicing where several are compared: "zigzag on planar:z".
     strategy : Strategy
         With the parameters that it ran with.
+    toolpaths : Toolpaths
+        The strands of fibre as they are printed: what is judged, timed, drawn and written.
+    strands : PrintedStrands or None
+        These, and what became of the rest of the planned paths; None where there are no paths, and
+        where they cannot be split into strands (`unprinted`).
     evaluation : Evaluation or None
         None where the strategy failed.
     tested : Tested or None
@@ -66,6 +74,10 @@ class Run:
     print_plan : PrintPlan or None
         The whole part, matrix and fibre; None where the strategy failed, and where no print was
         asked for or possible.
+    moves : Moves or None
+        All that the machine does in that print.
+    print_totals : PrintTotals or None
+        Its time and mass.
     printed_volume : float
         Volume of matrix and fibre of the print plan over that of the part; NaN without a plan.
     length_per_layer : float, mm
@@ -84,7 +96,8 @@ class Run:
         What keeps the paths from being printed as they are: lengths, turns, room, fibre outside the
         part or on nothing; empty if they can be.
     unprinted : str
-        Why the part cannot be printed as planned although a print was asked for; else empty.
+        Why the machine cannot print the part as planned, or why no file of the print can be made
+        although one was asked for; else empty.
     slicing : str
         Name of the slicing; empty where slicings are not compared.
     seconds : mapping of stage to float
@@ -95,7 +108,10 @@ class Run:
     toolpaths: Toolpaths
     evaluation: Evaluation | None
     tested: Tested | None = None
+    strands: PrintedStrands | None = None
     print_plan: PrintPlan | None = None
+    moves: Moves | None = None
+    print_totals: PrintTotals | None = None
     printed_volume: float = float("nan")
     length_per_layer: float = 0.0
     asked: float | None = None
@@ -142,7 +158,7 @@ class Run:
     @property
     def printable(self) -> bool:
         """Whether there are paths, within all limits of the machine."""
-        return self.evaluation is not None and not self.why_not
+        return self.evaluation is not None and not self.why_not and not self.unprinted
 
     @property
     def fails_in(self) -> str:
