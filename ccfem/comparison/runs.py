@@ -93,8 +93,8 @@ class Run:
     untested : str
         Why there is no virtual test although one was asked for; else empty.
     why_not : str
-        What keeps the paths from being printed as they are: lengths, turns, room, fibre outside the
-        part or on nothing; empty if they can be.
+        What keeps the paths from being printed as they are: `unprinted`, and lengths, turns, room,
+        fibre outside the part or on nothing; empty if they can be.
     unprinted : str
         Why the machine cannot print the part as planned, or why no file of the print can be made
         although one was asked for; else empty.
@@ -158,7 +158,7 @@ class Run:
     @property
     def printable(self) -> bool:
         """Whether there are paths, within all limits of the machine."""
-        return self.evaluation is not None and not self.why_not and not self.unprinted
+        return self.evaluation is not None and not self.why_not
 
     @property
     def fails_in(self) -> str:

@@ -298,11 +298,12 @@ def evaluated(run: Run, part: Part, tell: Tell) -> Run:
         return replace(run, failure=why or _no_fibre(part.machine))
 
     def work() -> Run:
-        found = evaluate(
+        evaluation = evaluate(
             run.toolpaths, part.layers, part.stress, part.machine, part.strand, part.build
         )
-        broken = why_not(found.total, part.machine)
-        return replace(run, evaluation=found, why_not="; ".join(broken))
+        broken = why_not(evaluation.total, part.machine)
+        reasons = [*filter(None, [run.unprinted]), *broken]
+        return replace(run, evaluation=evaluation, why_not="; ".join(reasons))
 
     return _stage(run, "evaluate", work)
 
@@ -319,7 +320,8 @@ def with_print(run: Run, part: Part, tell: Tell) -> Run:
         plan = plan_print(*what) if flat else curved_plan(*what, build, part.support)
         moves = part_moves(plan, part.machine)
     except InputError as error:
-        return replace(run, unprinted=str(error))
+        reasons = [str(error), *filter(None, [run.why_not])]
+        return replace(run, unprinted=str(error), why_not="; ".join(reasons))
     share = plan.volume(part.machine) / float(part.stress.mesh.volumes.sum())
     totals = print_totals(moves, part.machine)
     return replace(run, print_plan=plan, moves=moves, print_totals=totals, printed_volume=share)
