@@ -256,7 +256,8 @@ def _merged(
     """Stretches of polylines, by ascending starts, with those that overlap as one."""
     if not len(line):
         return line, start, stop
-    base = np.cumsum(2.0 * size + 1.0)[line]
+    room = 2.0 * size + 1.0
+    base = (np.cumsum(room) - room)[line]
     reach = np.maximum.accumulate(stop + base)
     new = np.concatenate([[True], start[1:] + base[1:] > reach[:-1]])
     number = np.flatnonzero(new)

@@ -151,3 +151,12 @@ def test_folds_are_measured_in_space_and_by_the_radius():
     np.testing.assert_allclose(of(flat @ turn).start, of(flat).start)
     assert of(flat, radius=1.0).counts.tolist() == [0]  # radius / 1.512 < 1
     assert of(flat, radius=1.6).counts.tolist() == [1]
+
+
+def test_folds_of_one_line_are_its_own_beside_a_longer_one():
+    long = np.array([[0.0, 50.0], [300.0, 50.0], [300.0, 51.0], [0.0, 51.0]])
+    rows = [[[0.0, y], [15.0, y]][:: -1 if y % 2 else 1] for y in range(6)]
+    short = np.array([point for row in rows for point in row], dtype=float)
+    offsets = np.array([0, len(long), len(long) + len(short)])
+    found = folds(np.concatenate([long, short]), offsets, np.zeros(2, dtype=bool), 3.85)
+    assert found.counts.tolist() == [1, 5]
