@@ -191,7 +191,7 @@ def plan_print(
         ),
         strands.ended,
     )
-    _check_bed(plan, machine)
+    check_bed(plan, machine)
     return plan
 
 
@@ -237,13 +237,13 @@ def _layers(
             below = Below()
         else:
             k = slab.fibre
-            lines = (strands.fibre[k], strands.short[k])
-            layer, below = fibre_layer(*lines, strands.borders[k], below, *size)
+            fibre, short, border = strands.fibre[k], strands.short[k], strands.borders[k]
+            layer, below = fibre_layer(fibre, short, border, below, *size)
             layers.append(layer)
     return layers
 
 
-def _check_bed(plan: PrintPlan, machine: Machine) -> None:
+def check_bed(plan: PrintPlan, machine: Machine) -> None:
     """Check that everything lies in the space that the printer reaches."""
     points, bed = plan.paths.points, np.array(machine.gcode.bed)
     if not len(points):

@@ -24,6 +24,7 @@ from ccfem.fem.elasticity.support_sets import support_sets
 from ccfem.fem.elasticity.supports import held
 from ccfem.fem.elasticity.system import prepare
 from ccfem.geometry.measures import connected
+from ccfem.printing.before_solving import reasons_not_to_print
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.planar import Planar
 
@@ -151,6 +152,11 @@ def check(part: str | os.PathLike[str] | Case, **parameters: Any) -> Check:
         if isinstance(case.slicing, Planar):
             case.slicing.check(problem.mesh, case.build, case.machine)
     doubts += layers.lines
+    if not layers.lines:
+        machine = case.machine
+        with found.noted():
+            known = case.known_layers()
+            doubts += reasons_not_to_print(problem.mesh, case.build, machine, known)
     fibre: tuple[Layer, ...] = ()
     with found.noted():
         fibre = _fibre_layers(case)
