@@ -88,6 +88,8 @@ def _about(run: Run, wanted: Wanted, bounded: bool) -> list[str]:
         lines += _about_crossings(run.evaluation, meant, bounded)
         if meant and wanted is None:
             lines += _about_open(run.evaluation)
+    if run.strand_verdict.remark:
+        lines.append(run.strand_verdict.remark)
     if run.why_not and run.why_not != run.unprinted:
         lines.append(f"not printable as planned: {run.why_not}")
     if run.print_plan is not None:

@@ -9,6 +9,7 @@ from typing import Any
 from ccfem.base.arrays import freeze, in_brief
 from ccfem.comparison.tested_cases import TestedCases
 from ccfem.judging.evaluation import Evaluation
+from ccfem.judging.evaluation.strand_rules import StrandVerdict
 from ccfem.judging.virtual_testing.strength import FirstFailure
 from ccfem.judging.virtual_testing.virtual_test import Bracket
 from ccfem.paths.planning.strategy import Strategy
@@ -69,6 +70,8 @@ class Run:
         where they cannot be split into strands (`unprinted`).
     evaluation : Evaluation or None
         None where the strategy failed.
+    strand_verdict : StrandVerdict
+        Which strands break which rule, and where.
     tested : Tested or None
         None where the strategy failed, and where no virtual test was asked for or possible.
     print_plan : PrintPlan or None
@@ -107,6 +110,7 @@ class Run:
     strategy: Strategy
     toolpaths: Toolpaths
     evaluation: Evaluation | None
+    strand_verdict: StrandVerdict = field(default_factory=StrandVerdict)
     tested: Tested | None = None
     strands: PrintedStrands | None = None
     print_plan: PrintPlan | None = None

@@ -16,6 +16,7 @@ from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.fem.elasticity.weighted_cases import WeightedCases
 from ccfem.judging.evaluation import evaluate
 from ccfem.judging.evaluation.printable import why_not
+from ccfem.judging.evaluation.strand_rules import strand_verdict
 from ccfem.judging.virtual_testing.equilibrium import BONDED, TENSION
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import RHO_SPAN, Strand
@@ -293,17 +294,25 @@ def evaluated(run: Run, part: Part, tell: Tell) -> Run:
     if run.failure:
         return run
     if not len(run.toolpaths):
-        lost = run.strands is not None and run.strands.warnings
-        why = f"no strand is left to print: {run.strands.warnings[0]}" if lost else ""
-        return replace(run, failure=why or _no_fibre(part.machine))
+        lost = () if run.strands is None else run.strands.warnings
+        why = f"no strand is left to print: {lost[0]}" if lost else _no_fibre(part.machine)
+        return replace(run, failure=why)
 
     def work() -> Run:
         evaluation = evaluate(
             run.toolpaths, part.layers, part.stress, part.machine, part.strand, part.build
         )
-        broken = why_not(evaluation.total, part.machine)
-        reasons = [*filter(None, [run.unprinted]), *broken]
-        return replace(run, evaluation=evaluation, why_not="; ".join(reasons))
+        # Who planned given paths is not known: their folds are no published pattern.
+        given = isinstance(run.strategy, GivenPaths)
+        by_design = not given and bool(getattr(run.strategy, "folds", False))
+        rules = strand_verdict(run.toolpaths, part.layers, part.machine, by_design)
+        reasons = [
+            *filter(None, [run.unprinted]),
+            *(rule.words for rule in rules.broken),
+            *why_not(evaluation.total, part.machine),
+        ]
+        why = "; ".join(reasons)
+        return replace(run, evaluation=evaluation, strand_verdict=rules, why_not=why)
 
     return _stage(run, "evaluate", work)
 
@@ -384,7 +393,12 @@ def _tested(run: Run, tests: Tests, part: Part, tell: Tell, span: Sequence[float
 
     def work() -> Run:
         mesh = tests.models[0][0].unreinforced.mesh
-        strands = cut_strands(run.toolpaths, mesh, machine=part.machine)
+        # Nobody knows whether those who planned given paths planned for the height of crossings.
+        given = isinstance(run.strategy, GivenPaths)
+        crosses = not given and bool(getattr(run.strategy, "crosses", False))
+        strands = cut_strands(
+            run.toolpaths, mesh, machine=part.machine, layers=part.layers, crosses=crosses
+        )
         found = [_test(strands, *model, tests.strand, part, span) for model in tests.models]
         tested = replace(found[0], alternative=[*found[1:], None][0])
         if part.several_cases:

@@ -58,10 +58,13 @@ def _check_room(mesh: TetMesh, build: Sequence[float], machine: Machine) -> None
     ring = 0.5 * np.array(machine.gcode.bed[:2]) + half * turns
     height = float(high[2] - low[2])
     points = np.column_stack([ring, np.full(len(ring), height)])
-    one = np.zeros(1, dtype=np.int64)
-    ends = np.array([0, len(ring)])
     outline = Toolpaths(
-        points, np.tile(_UP, (len(ring), 1)), ends, one, np.full(1, MATRIX), np.ones(1, dtype=bool)
+        points=points,
+        normals=np.tile(_UP, (len(ring), 1)),
+        offsets=np.array([0, len(ring)]),
+        layer=np.zeros(1, dtype=np.int64),
+        kind=np.full(1, MATRIX),
+        closed=np.ones(1, dtype=bool),
     )
     plan = PrintPlan(outline, np.array([height]), np.array([machine.matrix_height]))
     check_bed(plan, machine)
