@@ -20,7 +20,7 @@ from ccfem.judging.evaluation.strand_rules import strand_verdict
 from ccfem.judging.virtual_testing.equilibrium import BONDED, TENSION
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import RHO_SPAN, Strand
-from ccfem.judging.virtual_testing.strands import Strands, cut_strands
+from ccfem.judging.virtual_testing.strands import Strands, carrying_strands
 from ccfem.judging.virtual_testing.strength import first_failure, matrix_peak
 from ccfem.judging.virtual_testing.virtual_test import Bracket, virtual_test
 from ccfem.machine.machine import Machine
@@ -393,12 +393,7 @@ def _tested(run: Run, tests: Tests, part: Part, tell: Tell, span: Sequence[float
 
     def work() -> Run:
         mesh = tests.models[0][0].unreinforced.mesh
-        # Nobody knows whether those who planned given paths planned for the height of crossings.
-        given = isinstance(run.strategy, GivenPaths)
-        crosses = not given and bool(getattr(run.strategy, "crosses", False))
-        strands = cut_strands(
-            run.toolpaths, mesh, machine=part.machine, layers=part.layers, crosses=crosses
-        )
+        strands = carrying_strands(run.toolpaths, run.strategy, part.layers, mesh, part.machine)
         found = [_test(strands, *model, tests.strand, part, span) for model in tests.models]
         tested = replace(found[0], alternative=[*found[1:], None][0])
         if part.several_cases:

@@ -237,9 +237,11 @@ def rows(first):
 def serpentines():
     """Pieces of 15.5 mm under the top, joined by hairpins of 1 mm: one strand."""
     points = []
-    for left in np.arange(1.0, 84.0, 16.5):
-        for k in range(6):
-            piece = [[left, 13.5 - k], [left + 15.5, 13.5 - k]]
+    for column in range(6):
+        left = 1.0 + 16.5 * column
+        for k in range(7):
+            y = 7.5 + k if column % 2 else 13.5 - k
+            piece = [[left, y], [left + 15.5, y]]
             points += piece[::-1] if k % 2 else piece
     return [np.array(points)]
 

@@ -14,6 +14,8 @@ from ccfem.geometry.buckets import Buckets, bucket
 from ccfem.geometry.polylines import starts_segment
 from ccfem.judging.virtual_testing.strand_room import room_of
 from ccfem.machine.machine import Machine
+from ccfem.paths.planning.given_paths import GivenPaths
+from ccfem.paths.planning.strategy import Strategy
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
@@ -155,6 +157,26 @@ def cut_strands(
         outside=outside,
         share=lent,
     )
+
+
+def carrying_strands(
+    toolpaths: Toolpaths,
+    strategy: Strategy,
+    layers: Sequence[Layer],
+    mesh: TetMesh,
+    machine: Machine,
+) -> Strands:
+    """Strands of a strategy in a mesh, with what of them carries, as a comparison tests them.
+
+    Parameters
+    ----------
+    toolpaths : Toolpaths
+        Strands as they are printed (`ccfem.paths.splitting.printed_strands`).
+    """
+    # Nobody knows whether those who planned given paths planned for the height of crossings.
+    given = isinstance(strategy, GivenPaths)
+    crosses = not given and bool(getattr(strategy, "crosses", False))
+    return cut_strands(toolpaths, mesh, machine=machine, layers=layers, crosses=crosses)
 
 
 # Straight steps in the mesh, cut where they pass from one cell to the next.
