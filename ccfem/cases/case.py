@@ -86,6 +86,18 @@ class Case(Shown):
             return layers
         return self.fibre.on(layers, stress.mesh, self.machine)
 
+    def known_layers(self, slicer: Slicer | None = None) -> tuple[Layer, ...]:
+        """Layers that get fibre, where they are known before the part is solved: flat ones.
+
+        Those across another axis than the build direction stand otherwise, and are left out.
+        """
+        chosen = self.slicing if slicer is None else slicer
+        if not isinstance(chosen, Planar) or chosen.axis != "build":
+            return ()
+        mesh = self.problem.mesh
+        layers = chosen.cut(mesh, self.build)
+        return layers if self.fibre is None else self.fibre.on(layers, mesh, self.machine)
+
 
 def check_name(name: str, title: str) -> None:
     """Refuse a name that cannot be that of a folder, and a title that cannot be printed."""

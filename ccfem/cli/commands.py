@@ -50,6 +50,7 @@ from ccfem.cli.run import (
     foreign_stress,
     layers_of,
     load,
+    plan_code,
     run,
     slicings_of,
     with_given_paths,
@@ -507,7 +508,11 @@ def plan(
     out: Out = None,
     force: Force = False,
 ) -> None:
-    """Plan a part by one strategy, by default with its natural amount of fibre."""
+    """Plan a part by one strategy, by default with its natural amount of fibre.
+
+    A plan that cannot be printed as it is is written, with the reason, and ends with exit code 3;
+    with --force it ends with 0.
+    """
 
     def ask() -> Any:
         from ccfem.comparison.request import Request, named_strategies
@@ -533,7 +538,9 @@ def plan(
             support=support,
         )
 
-    run(case, ask, Output(out, force, pictures, drawings_of(drawings), f"-{strategy}", details))
+    output = Output(out, force, pictures, drawings_of(drawings), f"-{strategy}", details)
+    if code := plan_code(run(case, ask, output), force):
+        raise typer.Exit(code)
 
 
 @app.command()

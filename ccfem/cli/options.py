@@ -72,7 +72,9 @@ Slicings = Annotated[
 Force = Annotated[
     bool,
     typer.Option(
-        "--force", help="Replace files with names of results that ccfem did not write, too."
+        "--force",
+        help="Replace files with names of results that ccfem did not write, too; let plan end with "
+        "exit code 0 though it cannot be printed.",
     ),
 ]
 Pictures = Annotated[

@@ -134,7 +134,8 @@ class Output:
     out : Path, optional
         Folder; default ``results/`` and the name of the case with `suffix`.
     force : bool
-        Replace files with names of results that ccfem did not write, too.
+        Replace files with names of results that ccfem did not write, too; a plan that cannot be
+        printed ends with exit code 0.
     pictures : bool
         Also draw PNG files of what the report shows.
     drawings : tuple of {"svg", "dxf"}
@@ -155,8 +156,12 @@ class Output:
         return self.out or Path("results") / f"{case.name}{self.suffix}"
 
 
-def run(name: str, ask: "Callable[[], Request]", output: Output) -> None:
-    """Carry out what is asked of a part, write the results and print the table.
+NOT_PRINTABLE = 3
+"""Exit code of a plan that is written, but cannot be printed as it is."""
+
+
+def run(name: str, ask: "Callable[[], Request]", output: Output) -> "Comparison":
+    """Carry out what is asked of a part, write the results, print the table, and return it.
 
     A failure leaves nothing behind.
 
@@ -186,6 +191,16 @@ def run(name: str, ask: "Callable[[], Request]", output: Output) -> None:
         about = (command, seconds, rest, output.pictures, _text_of(name), output.drawings)
         write_results(comparison, folder, *about)
     print_comparison(comparison, where, time.perf_counter() - _STARTED, output.details)
+    return comparison
+
+
+def plan_code(comparison: "Comparison", force: bool) -> int:
+    """Exit code of a plan: `NOT_PRINTABLE`, with a line on standard error, unless it is forced."""
+    refused = [run for run in comparison.succeeded if not run.printable]
+    for each in refused:
+        accepted = "" if force else " (--force accepts the plan as it is)"
+        print(f"ccfem: not printable as planned: {each.why_not}{accepted}", file=sys.stderr)
+    return NOT_PRINTABLE if refused and not force else 0
 
 
 def _text_of(name: str) -> str:
@@ -249,7 +264,7 @@ def _check(comparison: "Comparison") -> None:
         reasons = "; ".join(f"{run.name}: {run.failure}" for run in comparison.runs)
         raise InputError(f"no strategy could plan '{comparison.case.name}': {reasons}")
     for each in comparison.runs:
-        if each.unprinted:
+        if each.unprinted and comparison.request.print_plans:
             raise InputError(each.unprinted)
 
 

@@ -31,8 +31,11 @@ from ccfem.comparison.remarks import by_importance
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.said_of_cases import cases_rows
+from ccfem.comparison.shown import file_stem
 from ccfem.fem.elasticity.stress_field import StressField, about_cells
 from ccfem.judging.virtual_testing.stiffer import HONEST_PROMISE, IN_SHORT
+from ccfem.printing.export.gcode import clock
+from ccfem.printing.print_totals import PrintTotals
 
 Item = typing.TypeVar("Item")
 
@@ -203,7 +206,19 @@ def print_comparison(
         left = len(lines) - len(shown)
         more = f"{left} more remark{'s' if left > 1 else ''}, " if left else ""
         console.print(f"--details or the report: {more}every index", style="dim", markup=False)
+    for run in runs:
+        if run.print_totals is not None:
+            _print_file(console, where / f"{file_stem(run.strategy_name)}.gcode", run.print_totals)
     _print_where(console, where, seconds)
+
+
+def _print_file(console: Console, file: Path, totals: PrintTotals) -> None:
+    """Print where the file of a print is, its time and its mass."""
+    said = (
+        f"{file}  {clock(totals.seconds)} of printing, {totals.matrix_mass:.2f} g of matrix, "
+        f"{totals.fibre_mass:.2f} g of fibre"
+    )
+    console.print(said, markup=False, soft_wrap=True)
 
 
 def _print_where(console: Console, where: Path, seconds: float) -> None:

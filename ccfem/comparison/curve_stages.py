@@ -132,7 +132,16 @@ def _asked(reach: _Reach, lengths: Sequence[float]) -> list[float]:
 
 def _planned(reach: _Reach, asked: Sequence[float], part: Part) -> list[Run]:
     """Plan one strategy to several lengths; a failure is in all of the runs."""
-    bare = replace(reach.run, evaluation=None, tested=None, print_plan=None, why_not="", note="")
+    bare = replace(
+        reach.run,
+        evaluation=None,
+        tested=None,
+        print_plan=None,
+        moves=None,
+        print_totals=None,
+        why_not="",
+        note="",
+    )
     if isinstance(reach.run.strategy, GivenPaths):
         return [bare for _ in asked]
     return planned_to_lengths(bare, part, asked, reach.known)

@@ -18,13 +18,12 @@ from ccfem.base.csv_table import write_csv
 from ccfem.base.errors import spared
 from ccfem.base.progress import Progress, silent
 from ccfem.base.result_folder import whole_folder
-from ccfem.comparison.headline import TEST_COLUMNS, headline_values
+from ccfem.comparison.headline import TEST_COLUMNS, headline_values, print_values
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.shown import file_stem
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.printing.print_plan import PrintPlan
 
 if TYPE_CHECKING:
     from ccfem.comparison.pictures import Pictures
@@ -225,16 +224,17 @@ def _write_matrix(comparison: Comparison, folder: Path) -> None:
         write_robot_waypoints(file, layer_matrix(layers, machine), layers, machine, MATRIX)
 
 
-def _write_print(folder: Path, name: str, plan: PrintPlan, comparison: Comparison) -> None:
+def _write_print(folder: Path, name: str, run: Run, comparison: Comparison) -> None:
     """Write what a printer and a cell of robots do to print a part: one chain of moves."""
     from ccfem.printing.export.gcode import gcode_of_moves
     from ccfem.printing.export.robot_cell import write_robot_cell
     from ccfem.printing.export.trim_table import write_trims
-    from ccfem.printing.part_moves import part_moves
 
-    case = comparison.case
-    moves = part_moves(plan, case.machine)
-    text = gcode_of_moves(moves, plan, case.machine, f"{case.name}, {name}")
+    case, plan, moves = comparison.case, run.print_plan, run.moves
+    assert plan is not None
+    assert moves is not None
+    doubts = [run.why_not] if run.why_not else []
+    text = gcode_of_moves(moves, plan, case.machine, f"{case.name}, {name}", doubts)
     (folder / f"{name}.gcode").write_text(text, encoding="utf-8", newline="\n")
     write_robot_cell(folder / f"{name}_cell.csv", moves)
     if len(plan.trims):
@@ -257,8 +257,8 @@ def _write_paths(comparison: Comparison, folder: Path) -> None:
             write_robot_waypoints(folder / f"{stem}_waypoints.csv", run.toolpaths, layers, machine)
         if not flat and not comparison.over_slicings:
             _write_matrix(comparison, folder)
-        if run.print_plan is not None:
-            _write_print(folder, stem, run.print_plan, comparison)
+        if run.print_plan is not None and run.moves is not None:
+            _write_print(folder, stem, run, comparison)
     every = Toolpaths.concatenate(run.toolpaths for run in runs)
     number = np.repeat(np.arange(float(len(runs))), [len(run.toolpaths) for run in runs])
     write_paths(every, folder / "paths.vtp", path_data={"strategy": number})
@@ -294,7 +294,7 @@ def results_rows(comparison: Comparison) -> list[dict[str, Any]]:
             rows.append({**own, "layer": layer, "failure": "", **found})
         extra = headline_values(run)
         tested = (column.name for column in TEST_COLUMNS)
-        rows[-1] |= {name: extra[name] for name in tested if name in extra}
+        rows[-1] |= {name: extra[name] for name in tested if name in extra} | print_values(run)
         rows[-1] |= {"printable": run.printable, "why_not": run.why_not, "fails_in": run.fails_in}
         if run.tested is not None and run.tested.cases is not None:
             rows[-1] |= run.tested.cases.values()

@@ -81,6 +81,13 @@ TEST_COLUMNS = (
         "about 1 is right; missing where no print was planned",
     ),
     Column(
+        "whole_print_time",
+        "s",
+        "Time of the whole print as its file states it: matrix, fibre, tool changes and their "
+        "waits, without the first heating.",
+        "> 0, lower is better; missing where no print was planned",
+    ),
+    Column(
         "first_failure_load",
         "N",
         "Load at which the matrix (von Mises stress averaged over a 2 mm ball, away from loads and "
@@ -190,7 +197,9 @@ HEADLINE = (
     Headline("interlayer_load", "delamination load, N", "", "{:.0f}"),
     Headline("fibre_per_layer", "fibre, mm a layer", "", "{:.0f}"),
     Headline("fibre_mass", "fibre, g", "", "{:.3g}"),
+    Headline("matrix_mass", "matrix, g", "", "{:.3g}"),
     Headline("print_time_nearest", "laying fibre, min", "low", "{:.0f}"),
+    Headline("whole_print_time", "whole print, min", "low", "{:.0f}"),
     Headline("efficiency", "efficiency", "high", "{:.3f}"),
     Headline("aligned_stress_10", "within 10°, by stress", "high", "{:.1%}"),
     Headline("coverage_top_20", "coverage of top 20 % stress", "high", "{:.1%}"),
@@ -210,6 +219,7 @@ SHORT = {
     "fibre_per_layer": "fibre, mm a layer",
     "fibre_length": "fibre, mm",
     "print_time_nearest": "laying fibre, min",
+    "whole_print_time": "whole print, min",
 }
 """Columns of the table that a terminal shows first, and what stands beside them."""
 
@@ -247,7 +257,21 @@ def headline_values(run: Run) -> Mapping[str, float]:
         "paths_per_layer": total["paths"] / layers,
         "all_crossings": total["crossings"] + total["self_crossings"],
         "printable": float(run.printable),
-        **({} if run.print_plan is None else {"printed_volume": run.printed_volume}),
+        **print_values(run),
+    }
+
+
+def print_values(run: Run) -> dict[str, float]:
+    """Values of a planned print, which take the place of estimates; empty where there is none."""
+    if run.print_totals is None:
+        return {}
+    total = run.print_totals
+    return {
+        "printed_volume": run.printed_volume,
+        "whole_print_time": total.seconds,
+        "print_time_nearest": total.fibre_seconds,
+        "fibre_mass": total.fibre_mass,
+        "matrix_mass": total.matrix_mass,
     }
 
 
@@ -311,7 +335,7 @@ def cell_text(run: Run, head: Headline) -> tuple[str, str]:
         return "–", ""
     if head.column == "printable":
         return ("yes" if run.printable else "no"), ""
-    if head.column == "print_time_nearest":
+    if head.column in ("print_time_nearest", "whole_print_time"):
         value /= 60.0
     if head.column == "stiffness_ratio_tension" and "stiffness_ratio_low" in values:
         extra = f"{values['stiffness_ratio_low']:.2f}–{values['stiffness_ratio_high']:.2f}"

@@ -93,7 +93,7 @@ def plan_to_stiffness(
     with timed(seconds, "plan"):
         chosen, least = _least_of(candidates, strategy, ratio)
     run = Run(name, strategy, Toolpaths.empty(), None, seconds=seconds)
-    run = with_plan(run, least.planned)
+    run = with_plan(run, least.planned, chosen)
     notes = (_said(ratio, chosen, least), least.planned.note)
     return chosen, replace(run, note="; ".join(filter(None, notes))), least.asked
 

@@ -14,6 +14,8 @@ _SAME = TOLERANCE * (1.0 + 1e-9)
 """Share of the wanted length by which a run may differ and still count as equal."""
 
 _MODES = ("tension", "bonded")
+ALTERNATIVES = ("tension_alternative", "bonded_alternative")
+"""Modes under alternative supports; missing where the part has none, or their test failed."""
 
 _DIGITS = 2
 """Decimals with which tables show a ratio of stiffnesses."""
@@ -151,6 +153,11 @@ def is_tested(run: Run) -> bool:
     return run.tested is not None and all(np.isfinite(merit(run, m)) for m in _MODES)
 
 
+def all_have(runs: Sequence[Run], mode: str) -> bool:
+    """Whether the table shows a stiffness of a mode for every run."""
+    return all(np.isfinite(merit(run, mode)) for run in runs)
+
+
 def order_of(one: Run, other: Run) -> str:
     """Say which of two runs is stiffer, as far as their table shows it.
 
@@ -160,11 +167,10 @@ def order_of(one: Run, other: Run) -> str:
         FIRST or SECOND if one is stiffer than the other by more than `RESOLUTION`, fibres carrying
         tension only, and the table shows none of its stiffnesses, bonded or under alternative
         supports, below that of the other. SAME if no stiffness differs by more than `RESOLUTION`.
-        Else UNDECIDED, and wherever a stiffness is missing.
+        Else UNDECIDED, and wherever a stiffness under the part's own supports is missing. What one
+        of both lacks under alternative supports does not count.
     """
-    modes: tuple[str, ...] = _MODES
-    if all(run.tested is not None and run.tested.alternative is not None for run in (one, other)):
-        modes = (*_MODES, *(f"{mode}_alternative" for mode in _MODES))
+    modes = (*_MODES, *(mode for mode in ALTERNATIVES if all_have((one, other), mode)))
     first, second = (np.array([merit(run, mode) for mode in modes]) for run in (one, other))
     if not np.isfinite([first, second]).all():
         return UNDECIDED

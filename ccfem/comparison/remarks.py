@@ -4,7 +4,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ccfem.comparison.ranking import is_tested, off_length, order_of, ranking, stiffness_ratio
+from ccfem.comparison.ranking import (
+    ALTERNATIVES,
+    all_have,
+    is_tested,
+    off_length,
+    order_of,
+    ranking,
+    stiffness_ratio,
+)
 from ccfem.comparison.request import Wanted
 from ccfem.comparison.runs import Run
 from ccfem.judging.evaluation.evaluation import Evaluation
@@ -80,10 +88,14 @@ def _about(run: Run, wanted: Wanted, bounded: bool) -> list[str]:
         lines += _about_crossings(run.evaluation, meant, bounded)
         if meant and wanted is None:
             lines += _about_open(run.evaluation)
-    if run.why_not:
+    if run.strand_verdict.remark:
+        lines.append(run.strand_verdict.remark)
+    if run.why_not and run.why_not != run.unprinted:
         lines.append(f"not printable as planned: {run.why_not}")
     if run.print_plan is not None:
         lines += run.print_plan.warnings
+    elif run.strands is not None:
+        lines += run.strands.warnings
     if run.empty_layers and run.evaluation is not None:
         lines.append(f"no fibre on {run.empty_layers} of {len(run.evaluation.layers)} layers")
     if run.note:
@@ -94,7 +106,7 @@ def _about(run: Run, wanted: Wanted, bounded: bool) -> list[str]:
 
 def _about_orders(tested: Sequence[Run]) -> list[str]:
     """Say which runs, best first, cannot be ranked against each other; each reason once."""
-    both = any(run.tested is not None and run.tested.alternative is not None for run in tested)
+    both = any(all_have((run,), ALTERNATIVES[0]) for run in tested)
     of = "tension-only and bonded fibres" + (", or both models of the supports," if both else "")
     reasons = {
         UNDECIDED: ("undecided against", f", for {of} do not agree on an order"),

@@ -20,8 +20,7 @@ from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.paths.planning.equal_fibre import check_wanted
 from ccfem.paths.planning.given_paths import GivenPaths
 from ccfem.paths.planning.strategy import Strategy
-from ccfem.printing.line_counts import check_matrix_lines
-from ccfem.printing.print_plan import check_machine
+from ccfem.printing.before_solving import check_print
 from ccfem.slicing.layers.plane import plane_frame
 from ccfem.slicing.layers.slicer import Slicer
 from ccfem.slicing.slicers import as_slicer, from_text
@@ -236,13 +235,19 @@ class Request:
         if isinstance(self.amount, Stiffness):
             self._check_stiffness()
         if self.print_plans:
-            check_machine(self.case.machine)
-            check_matrix_lines(self.case.problem.mesh, self.case.build, self.case.machine)
+            self._check_print()
         elif self.support:
             raise InputError("support is laid in a print: plan that too (print_plans, --gcode)")
         for slicing in self.slicings.values():
             check_propped(slicing.slicer or self.case.slicing, self.support)
         self._check_load_case()
+
+    def _check_print(self) -> None:
+        """Refuse a print that cannot be made whatever is planned, before anything is solved."""
+        case = self.case
+        (slicing,) = self.slicings.values()
+        layers = case.known_layers(slicing.slicer)
+        check_print(case.problem.mesh, case.build, case.machine, layers)
 
     def _check_load_case(self) -> None:
         known = self.case.problem.cases

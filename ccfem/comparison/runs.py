@@ -9,11 +9,15 @@ from typing import Any
 from ccfem.base.arrays import freeze, in_brief
 from ccfem.comparison.tested_cases import TestedCases
 from ccfem.judging.evaluation import Evaluation
+from ccfem.judging.evaluation.strand_rules import StrandVerdict
 from ccfem.judging.virtual_testing.strength import FirstFailure
 from ccfem.judging.virtual_testing.virtual_test import Bracket
 from ccfem.paths.planning.strategy import Strategy
+from ccfem.paths.splitting.printed_strands import PrintedStrands
 from ccfem.paths.toolpaths import Toolpaths
+from ccfem.printing.moves import Moves
 from ccfem.printing.print_plan import PrintPlan
+from ccfem.printing.print_totals import PrintTotals
 
 
 @dataclass(frozen=True)
@@ -59,13 +63,24 @@ class Run:
         Of the strategy, and of the slicing where several are compared: "zigzag on planar:z".
     strategy : Strategy
         With the parameters that it ran with.
+    toolpaths : Toolpaths
+        The strands of fibre as they are printed: what is judged, timed, drawn and written.
+    strands : PrintedStrands or None
+        These, and what became of the rest of the planned paths; None where there are no paths, and
+        where they cannot be split into strands (`unprinted`).
     evaluation : Evaluation or None
         None where the strategy failed.
+    strand_verdict : StrandVerdict
+        Which strands break which rule, and where.
     tested : Tested or None
         None where the strategy failed, and where no virtual test was asked for or possible.
     print_plan : PrintPlan or None
         The whole part, matrix and fibre; None where the strategy failed, and where no print was
         asked for or possible.
+    moves : Moves or None
+        All that the machine does in that print.
+    print_totals : PrintTotals or None
+        Its time and mass.
     printed_volume : float
         Volume of matrix and fibre of the print plan over that of the part; NaN without a plan.
     length_per_layer : float, mm
@@ -81,10 +96,11 @@ class Run:
     untested : str
         Why there is no virtual test although one was asked for; else empty.
     why_not : str
-        What keeps the paths from being printed as they are: lengths, turns, room, fibre outside the
-        part or on nothing; empty if they can be.
+        What keeps the paths from being printed as they are: `unprinted`, and lengths, turns, room,
+        fibre outside the part or on nothing; empty if they can be.
     unprinted : str
-        Why the part cannot be printed as planned although a print was asked for; else empty.
+        Why the machine cannot print the part as planned, or why no file of the print can be made
+        although one was asked for; else empty.
     slicing : str
         Name of the slicing; empty where slicings are not compared.
     seconds : mapping of stage to float
@@ -94,8 +110,12 @@ class Run:
     strategy: Strategy
     toolpaths: Toolpaths
     evaluation: Evaluation | None
+    strand_verdict: StrandVerdict = field(default_factory=StrandVerdict)
     tested: Tested | None = None
+    strands: PrintedStrands | None = None
     print_plan: PrintPlan | None = None
+    moves: Moves | None = None
+    print_totals: PrintTotals | None = None
     printed_volume: float = float("nan")
     length_per_layer: float = 0.0
     asked: float | None = None

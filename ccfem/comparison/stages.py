@@ -16,10 +16,11 @@ from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.fem.elasticity.weighted_cases import WeightedCases
 from ccfem.judging.evaluation import evaluate
 from ccfem.judging.evaluation.printable import why_not
+from ccfem.judging.evaluation.strand_rules import strand_verdict
 from ccfem.judging.virtual_testing.equilibrium import BONDED, TENSION
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import RHO_SPAN, Strand
-from ccfem.judging.virtual_testing.strands import Strands, cut_strands
+from ccfem.judging.virtual_testing.strands import Strands, carrying_strands
 from ccfem.judging.virtual_testing.strength import first_failure, matrix_peak
 from ccfem.judging.virtual_testing.virtual_test import Bracket, virtual_test
 from ccfem.machine.machine import Machine
@@ -34,9 +35,12 @@ from ccfem.paths.planning.given_paths import GivenPaths
 from ccfem.paths.planning.plan import plan
 from ccfem.paths.planning.planned import Planned
 from ccfem.paths.planning.strategy import LengthStrategy
+from ccfem.paths.splitting.printed_strands import printed_strands
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.curved_plan import curved_plan
+from ccfem.printing.part_moves import part_moves
 from ccfem.printing.print_plan import plan_print
+from ccfem.printing.print_totals import print_totals
 from ccfem.printing.support import SupportLayers
 from ccfem.slicing.layers import Layer
 from ccfem.strategies.fibre_aware.plan_cases import plan_cases, plan_cases_to_lengths
@@ -116,21 +120,34 @@ def planned(
             found = plan_to_length(
                 run.strategy, layers, stress, machine, wanted, start, sampled=run.sampled
             )
-        return with_plan(run, found)
+        return with_plan(run, found, part)
 
     bare = replace(run, toolpaths=Toolpaths.empty(), length_per_layer=0.0)
     return _stage(bare, "plan", work)
 
 
-def with_plan(run: Run, found: Planned) -> Run:
-    """Run with a plan."""
-    return replace(
+def with_plan(run: Run, plan: Planned, part: Part) -> Run:
+    """Run with the strands that are printed of a plan, and their length."""
+    run = replace(
         run,
-        strategy=found.strategy,
-        toolpaths=found.toolpaths,
-        length_per_layer=found.length_per_layer,
-        note=found.note,
+        strategy=plan.strategy,
+        toolpaths=plan.toolpaths,
+        length_per_layer=plan.length_per_layer,
+        strands=None,
+        unprinted="",
+        note=plan.note,
     )
+    if not len(plan.toolpaths):
+        return run
+    try:
+        strands = printed_strands(plan.toolpaths, part.layers, part.stress.mesh, part.machine)
+    except InputError as error:
+        return replace(run, unprinted=str(error))
+    run = replace(run, strands=strands)
+    if not strands.warnings:
+        return run
+    length = length_per_layer(strands.fibre, part.layers)
+    return replace(run, toolpaths=strands.fibre, length_per_layer=length)
 
 
 def attempted(run: Run, work: Callable[[], Run]) -> Run:
@@ -168,7 +185,7 @@ def planned_to_lengths(
     if done.failure:
         return [replace(done, asked=length) for length in lengths]
     return [
-        replace(with_plan(done, plan), asked=length)
+        replace(with_plan(done, plan, part), asked=length)
         for plan, length in zip(plans, lengths, strict=True)
     ]
 
@@ -277,14 +294,25 @@ def evaluated(run: Run, part: Part, tell: Tell) -> Run:
     if run.failure:
         return run
     if not len(run.toolpaths):
-        return replace(run, failure=_no_fibre(part.machine))
+        lost = () if run.strands is None else run.strands.warnings
+        why = f"no strand is left to print: {lost[0]}" if lost else _no_fibre(part.machine)
+        return replace(run, failure=why)
 
     def work() -> Run:
-        found = evaluate(
+        evaluation = evaluate(
             run.toolpaths, part.layers, part.stress, part.machine, part.strand, part.build
         )
-        broken = why_not(found.total, part.machine)
-        return replace(run, evaluation=found, why_not="; ".join(broken))
+        # Who planned given paths is not known: their folds are no published pattern.
+        given = isinstance(run.strategy, GivenPaths)
+        by_design = not given and bool(getattr(run.strategy, "folds", False))
+        rules = strand_verdict(run.toolpaths, part.layers, part.machine, by_design)
+        reasons = [
+            *filter(None, [run.unprinted]),
+            *(rule.words for rule in rules.broken),
+            *why_not(evaluation.total, part.machine),
+        ]
+        why = "; ".join(reasons)
+        return replace(run, evaluation=evaluation, strand_verdict=rules, why_not=why)
 
     return _stage(run, "evaluate", work)
 
@@ -292,17 +320,20 @@ def evaluated(run: Run, part: Part, tell: Tell) -> Run:
 def with_print(run: Run, part: Part, tell: Tell) -> Run:
     """Plan the print of the whole part, or say why it cannot be printed."""
     tell(f"planning the print of {run.name}")
-    if run.evaluation is None:
+    if run.evaluation is None or run.strands is None:
         return run
     try:
-        what = (run.toolpaths, part.layers, part.stress.mesh, part.machine)
+        what = (run.strands, part.layers, part.stress.mesh, part.machine)
         flat = all(layer.flat is not None for layer in part.layers)
         build = part.build or (0.0, 0.0, 1.0)
-        found = plan_print(*what) if flat else curved_plan(*what, build, part.support)
+        plan = plan_print(*what) if flat else curved_plan(*what, build, part.support)
+        moves = part_moves(plan, part.machine)
     except InputError as error:
-        return replace(run, unprinted=str(error))
-    share = found.volume(part.machine) / float(part.stress.mesh.volumes.sum())
-    return replace(run, print_plan=found, printed_volume=share)
+        reasons = [str(error), *filter(None, [run.why_not])]
+        return replace(run, unprinted=str(error), why_not="; ".join(reasons))
+    share = plan.volume(part.machine) / float(part.stress.mesh.volumes.sum())
+    totals = print_totals(moves, part.machine)
+    return replace(run, print_plan=plan, moves=moves, print_totals=totals, printed_volume=share)
 
 
 @dataclass(frozen=True)
@@ -362,7 +393,7 @@ def _tested(run: Run, tests: Tests, part: Part, tell: Tell, span: Sequence[float
 
     def work() -> Run:
         mesh = tests.models[0][0].unreinforced.mesh
-        strands = cut_strands(run.toolpaths, mesh, machine=part.machine)
+        strands = carrying_strands(run.toolpaths, run.strategy, part.layers, mesh, part.machine)
         found = [_test(strands, *model, tests.strand, part, span) for model in tests.models]
         tested = replace(found[0], alternative=[*found[1:], None][0])
         if part.several_cases:

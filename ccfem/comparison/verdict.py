@@ -7,6 +7,8 @@ import numpy as np
 
 from ccfem.comparison.headline import headline_values
 from ccfem.comparison.ranking import (
+    ALTERNATIVES,
+    all_have,
     is_tested,
     merit,
     off_length,
@@ -92,7 +94,7 @@ def _stiffer(run: Run, best: Run | None) -> bool:
 def _by_stiffness(order: Sequence[Run], wanted: Wanted) -> str:
     first, second = order[0], order[1]
     found = [order_of(first, run) for run in order[1:]]
-    both = all(run.tested is not None and run.tested.alternative is not None for run in order)
+    both = all_have(order, ALTERNATIVES[0])
     if all(each == FIRST for each in found):
         gain = stiffness_ratio(first) / stiffness_ratio(second)
         return (
@@ -143,13 +145,12 @@ def _ratios(runs: Sequence[Run], mode: str = "tension") -> str:
 
 
 def _under_other(runs: Sequence[Run]) -> str:
-    """Say the same of the alternative supports, where there are some."""
-    if not all(run.tested is not None and run.tested.alternative is not None for run in runs):
-        return ""
-    return (
-        f"; under the alternative supports {_ratios(runs, 'tension_alternative')} (tension only), "
-        f"{_ratios(runs, 'bonded_alternative')} (bonded)"
-    )
+    """Say the same of the alternative supports, where the table shows it."""
+    names = dict(zip(ALTERNATIVES, ("tension only", "bonded"), strict=True))
+    said = [
+        f"{_ratios(runs, mode)} ({name})" for mode, name in names.items() if all_have(runs, mode)
+    ]
+    return f"; under the alternative supports {', '.join(said)}" if said else ""
 
 
 def _fibre(run: Run, wanted: Wanted) -> str:

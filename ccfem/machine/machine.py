@@ -132,6 +132,13 @@ class Machine:
         return self.filament_area + self.coextrusion * max(room, 0.0)
 
     @property
+    def fibre_mass_per_length(self) -> float:
+        """Mass of the fibre filament, g/mm: by `fibre_tex`, else by density and cross-section."""
+        if self.fibre_tex is not None:
+            return 1e-6 * self.fibre_tex
+        return 1e-3 * self.fibre_density * self.filament_area
+
+    @property
     def tail(self) -> float:
         """Length of fibre still to be laid after a cut, mm."""
         if self.cutter_distance is None:

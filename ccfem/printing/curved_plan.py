@@ -13,6 +13,7 @@ from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
 from ccfem.geometry.polylines import along_line, is_closed, pack, starts_segment
 from ccfem.machine.machine import Machine
 from ccfem.paths.linking.print_order import nearest_end_order
+from ccfem.paths.splitting.printed_strands import PrintedStrands, printed_strands
 from ccfem.paths.toolpaths import FIBRE, SUPPORT, Toolpaths
 from ccfem.printing.islands import Islands, clashes, island_order, islands_of, rests_on, steps_of
 from ccfem.printing.laid_layer import COORDINATE_DIGITS
@@ -144,7 +145,7 @@ _UP = np.array([0.0, 0.0, 1.0])
 
 
 def curved_plan(
-    toolpaths: Toolpaths,
+    strands: PrintedStrands | Toolpaths,
     layers: Sequence[Layer],
     mesh: TetMesh,
     machine: Machine,
@@ -165,8 +166,8 @@ def curved_plan(
 
     Parameters
     ----------
-    toolpaths : Toolpaths
-        Fibre; paths of other kinds are left out.
+    strands : PrintedStrands, or Toolpaths
+        Planned paths are first split into the strands that are printed (`printed_strands`).
     layers : sequence of Layer
         From the first printed to the last, some of them curved.
     mesh : TetMesh
@@ -180,10 +181,12 @@ def curved_plan(
     Raises
     ------
     InputError
-        Where a strand is shorter than the cutter allows and `Process.short` is "error", or the head
+        As `printed_strands`, and where the head
         of a machine of three axes would touch the layer that it lays.
     """
-    fibre, dropped = _long_enough(toolpaths.of_kind(FIBRE), machine)
+    if isinstance(strands, Toolpaths):
+        strands = printed_strands(strands, layers, mesh, machine)
+    fibre = strands.fibre
     wanted = plane_frame(build)[2]
     if support is None:
         frame = plane_frame(standing(layers, build))
@@ -222,26 +225,15 @@ def curved_plan(
         np.array([points[owner <= k, 2].max() for k in range(len(steps))]),
         np.array([filled[k].layer.thickness for k in source.tolist()]),
         np.concatenate([laid for _, _, laid in steps]),
-        dropped=dropped,
+        dropped=strands.dropped,
         touched=(before, found.before, found.after),
         warnings=(
+            *strands.warnings,
             *_stands(frame[2], wanted, support),
             *_not_full(filled, mesh),
             *_said(before, found.before, found.after, found.place),
         ),
     )
-
-
-def _long_enough(fibre: Toolpaths, machine: Machine) -> tuple[Toolpaths, float]:
-    """Strands that the cutter allows, and the length of the others."""
-    limit = max(machine.tail, machine.minimum_length) * (1.0 - 1e-6)
-    whole = fibre.lengths >= limit
-    if not whole.all() and machine.process.short == "error":
-        raise InputError(
-            f"{int((~whole).sum())} of {len(fibre)} strands are shorter than the {limit:.4g} mm "
-            "that the cutter allows: plan with that minimum_length, or set process.short = 'drop'"
-        )
-    return fibre.select(whole), float(fibre.lengths[~whole].sum())
 
 
 def _of_step(

@@ -7,21 +7,16 @@ import numpy as np
 import shapely
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
-from ccfem.base.errors import InputError
-from ccfem.geometry.polylines import is_closed, line_length, merge_repeated, pack
+from ccfem.geometry.polylines import is_closed, merge_repeated, pack
 from ccfem.geometry.shapes import Region, strings
 from ccfem.machine.machine import Machine
 from ccfem.paths.linking.print_order import nearest_end_order
 from ccfem.paths.toolpaths import FIBRE, MATRIX, SUPPORT, Toolpaths
 from ccfem.printing.matrix_flow import pad_flow, with_flow
 from ccfem.printing.matrix_lines import MatrixFill
-from ccfem.printing.slabs import LOW
 
 COORDINATE_DIGITS = 3
 """Decimals of coordinates, mm."""
-
-SHORT = 1e-6
-"""Share of the cutter's distance by which a path may be too short through rounding."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +39,7 @@ class Below:
 
 @dataclass(frozen=True)
 class LaidLayer:
-    """Paths of a layer, and the fate of the strands planned on it.
+    """Paths of a layer in the order of printing.
 
     Attributes
     ----------
@@ -52,15 +47,14 @@ class LaidLayer:
         Height of matrix, a line wide, on the step from each point.
     short : (K,) bool array
         Lines of matrix in place of strands that are too short for the cutter.
-    dropped, outside : float, mm
-        Length that is left out, and length outside the part.
+    outside : float, mm
+        Length of fibre outside the part.
     """
 
     paths: Toolpaths
     laid: FloatArray
     short: BoolArray
     warning: str = ""
-    dropped: float = 0.0
     outside: float = 0.0
 
 
@@ -98,6 +92,7 @@ def matrix_layer(
 
 def fibre_layer(
     lines: Sequence[FloatArray],
+    by_matrix: Sequence[FloatArray],
     border: Region,
     below: Below,
     number: int,
@@ -105,43 +100,21 @@ def fibre_layer(
     thickness: float,
     machine: Machine,
 ) -> tuple[LaidLayer, Below]:
-    """Lay strands (n, 2), with matrix instead of those too short; also return the new `Below`.
+    """Lay strands (n, 2), and matrix in place of those too short; also return the new `Below`.
 
     Parameters are those of `matrix_layer`, and the border of the part on the layer.
     """
-    by_matrix, whole = _sorted_by_length(lines, machine)
-    dropped = sum(map(line_length, lines)) - sum(map(line_length, by_matrix + whole))
-    outside = float(shapely.length(shapely.difference(strings(whole), border)).sum())
+    outside = float(shapely.length(shapely.difference(strings(lines), border)).sum())
     few, _ = _printed(by_matrix, height, number, MATRIX)
-    found = Toolpaths.concatenate([few, _printed(whole, height, number, FIBRE)[0]])
+    found = Toolpaths.concatenate([few, _printed(lines, height, number, FIBRE)[0]])
     heights = np.full(len(found.points), thickness)
     short = found.kind == MATRIX
     sections = [machine.matrix_width * thickness] * len(by_matrix)
-    sections += [machine.strand_area] * len(whole)
+    sections += [machine.strand_area] * len(lines)
     after = Below(
-        below.strands + by_matrix + whole, below.sections + sections, below.height + thickness
+        [*below.strands, *by_matrix, *lines], below.sections + sections, below.height + thickness
     )
-    return LaidLayer(found, heights, short, "", dropped, outside), after
-
-
-def _sorted_by_length(
-    lines: Sequence[FloatArray], machine: Machine
-) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Strands that are replaced by matrix, and those that the cutter allows.
-
-    Where strands are left out, and in layers too low for a line of matrix, the matrix above fills
-    their place.
-    """
-    limit = max(machine.tail, machine.minimum_length) * (1.0 - SHORT)
-    whole = [line for line in lines if line_length(line) >= limit]
-    if machine.process.short == "error" and len(whole) < len(lines):
-        raise InputError(
-            f"process.turns cuts strands into pieces below the {limit:g} mm that the cutter "
-            "allows: set it to 'pad', or process.short to 'matrix'"
-        )
-    if machine.process.short != "matrix" or machine.strand_height < LOW:
-        return [], whole
-    return [line for line in lines if line_length(line) < limit], whole
+    return LaidLayer(found, heights, short, "", outside), after
 
 
 def _printed(

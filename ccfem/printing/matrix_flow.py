@@ -21,15 +21,14 @@ from ccfem.base.errors import InputError
 from ccfem.geometry.polylines import starts_segment, subdivide
 from ccfem.geometry.shapes import Region, strings
 from ccfem.machine.machine import Machine
+from ccfem.paths.splitting.slabs import THIN
+from ccfem.paths.splitting.strand_density import StrandDensity
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.printing.strand_density import StrandDensity
 
 _PIECE = 2.0
 """Longest piece, mm, over which the height is constant."""
 _STEP = 0.05
 """Steps in which the height changes along a line, over that of the layer."""
-THIN = 0.05
-"""Least height, mm, of matrix over a strand, where its layer is as high. Our choice."""
 _SCALE = 1.1
 """Largest factor by which a layer is scaled. If lines miss a tenth of a section, as between walls
 nearer than a line is wide, more flow would not reach it either. Our choice."""

@@ -14,7 +14,7 @@ from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.offsets import offset_rings
 from ccfem.geometry.shapes import Region, open_lines, strings
 from ccfem.machine.machine import Machine
-from ccfem.printing.slabs import Slab
+from ccfem.paths.splitting.slabs import Slab
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.planar import Planar
 

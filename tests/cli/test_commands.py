@@ -493,3 +493,28 @@ def test_what_takes_one_load_case_does_not_offer_all(ccfem, command):
     said = " ".join(ccfem(command, "--help")[1].split())
     assert "Load case to take; default the first." in said
     assert "plans for all at once" not in said
+
+
+def test_a_plan_that_cannot_be_printed_says_so_and_ends_with_three(ccfem, folder):
+    tight = ("--set-machine", "limits.tight=0.0", "--set-machine", "minimum_radius=1000")
+    plan = ("plan", "part.toml", "--strategy", "concentric", "--layers", 1, "--no-virtual-test",
+            "--gcode", *tight, "--out", "done")  # fmt: skip
+    code, out, err = ccfem(*plan)
+    assert code == 3
+    (line,) = (line for line in err.splitlines() if "not printable" in line)
+    assert line.startswith("ccfem: not printable as planned: ")
+    assert line.endswith(" (--force accepts the plan as it is)")
+    reason = line.removeprefix("ccfem: not printable as planned: ").partition(" (--force")[0]
+    text = (folder / "done" / "concentric.gcode").read_text()
+    assert f"; NOT PRINTABLE as planned: {reason}\n" in text
+    with (folder / "done" / "results.csv").open() as file:
+        total = next(row for row in csv.DictReader(file) if row["layer"] == "total")
+    assert (total["printable"], total["why_not"]) == ("False", reason)
+    # Where the file is, its time and its mass, as its head states them.
+    (said,) = (line for line in out.splitlines() if "concentric.gcode" in line)
+    clock = re.search(r"normal mode\) = (.+)", text)[1]
+    grams = [float(g) for g in re.search(r"filament used \[g\] = (.+)", text)[1].split(",")]
+    assert f"{clock} of printing, {grams[0]:.2f} g of matrix, {grams[1]:.2f} g of fibre" in said
+    code, _, err = ccfem(*plan, "--force")
+    assert code == 0
+    assert f"not printable as planned: {reason}\n" in err

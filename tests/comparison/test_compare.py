@@ -26,7 +26,7 @@ from ccfem.fem.elasticity.support_kinds import PressingSupport
 from ccfem.fem.elasticity.system import System
 from ccfem.fem.materials import isotropic
 from ccfem.judging.evaluation import evaluate
-from ccfem.machine import GcodeProfile, Machine
+from ccfem.machine import GcodeProfile, Machine, Process
 from ccfem.paths.planning import GivenPaths, plan
 from ccfem.paths.planning.equal_fibre import length_per_layer
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
@@ -114,8 +114,9 @@ def test_fibre_along_the_pull_wins_by_the_rule_of_mixtures():
 
 def test_best_values_are_the_largest_or_the_smallest_as_each_column_says(compared):
     best, sides = best_values(compared.runs, compared.fibre_per_layer), set()
-    # Those of alternative supports are missing where a part has none.
-    for head in (head for head in HEADLINE if not head.column.endswith("_alternative")):
+    # Those of alternative supports, and of a print, are missing where there are none.
+    missing = ("_alternative", "whole_print_time")
+    for head in (head for head in HEADLINE if not head.column.endswith(missing)):
         side = {"low": 0, "high": -1}.get(head.better, 0)
         order = sorted(compared.runs, key=lambda run: headline_values(run)[head.column])
         values = [headline_values(run)[head.column] for run in order]
@@ -414,17 +415,25 @@ def test_the_print_is_planned_where_it_is_asked_for(compared):
 
 
 def test_what_cannot_be_printed_as_planned_is_reported():
-    machine = replace(strip().machine, gcode=GcodeProfile(bed=(50.0, 50.0, 50.0)))
-    options = {"strategies": ["zigzag"], "strand": None, "natural": True, "print_plans": True}
-    result = compare(replace(strip(), machine=machine), **options)
+    machine = replace(strip().machine, process=Process(turns="inside"))
+    case = replace(strip(), machine=machine)
+    lines = [np.array([[10.0, 12.0], [80.0, 12.0]])]
+    given = GivenPaths(Toolpaths.from_plane(lines, case.slicing.cut(case.problem.mesh)[0]), "")
+    options = {"strand": None, "natural": True, "print_plans": True}
+    result = compare(case, {"given": given}, **options)
     (run,) = result.runs
     assert run.print_plan is None
     assert not run.failure
     assert run.evaluation is not None
-    assert run.unprinted.startswith("the part needs 59.2 x 23.2 x 5 mm, but the pri")
-    assert f"zigzag: cannot be printed as planned: {run.unprinted}" in result.remarks
+    assert run.unprinted.startswith("strands leave fibre layer 0 in 1 places, but process.turns")
+    assert run.why_not.startswith(run.unprinted)
+    assert not run.printable
+    assert f"given: cannot be printed as planned: {run.unprinted}" in result.remarks
+    machine = replace(strip().machine, gcode=GcodeProfile(bed=(50.0, 50.0, 50.0)))
+    with pytest.raises(InputError, match=r"the part needs 59.2 x 23.2 x 5 mm, but the printer"):
+        compare(replace(strip(), machine=machine), ["zigzag"], **options)
     with pytest.raises(InputError, match="fibre_speed must be above 0 to print"):
-        compare(replace(strip(), machine=Machine(fibre_speed=0.0)), **options)
+        compare(replace(strip(), machine=Machine(fibre_speed=0.0)), ["zigzag"], **options)
 
 
 def test_thin_fibre_is_reported_not_dropped():

@@ -12,6 +12,7 @@ from ccfem.comparison.files import write_results
 from ccfem.fem.elasticity.problem import Force, Problem, Support
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.materials import printed_pla
+from ccfem.judging.virtual_testing.strands import cut_strands
 from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine
 from ccfem.slicing.slicers.planar import Planar
@@ -41,7 +42,17 @@ def test_every_run_is_tested_under_every_case(compared):
     for run in compared.runs:
         found = run.tested.cases
         alone = [
-            virtual_test(run.toolpaths, fields[name], span=(), machine=compared.case.machine).ratio
+            virtual_test(
+                cut_strands(
+                    run.toolpaths,
+                    fields[name].mesh,
+                    machine=compared.case.machine,
+                    layers=compared.layers,
+                    crosses=False,
+                ),
+                fields[name],
+                span=(),
+            ).ratio
             for name in ("pull", "side")
         ]
         np.testing.assert_allclose(found.tension.ratios, alone, rtol=1e-5)

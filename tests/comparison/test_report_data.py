@@ -10,8 +10,15 @@ from ccfem.body.mesh.box import box_mesh
 from ccfem.comparison.citations import METHODS, bibtex, cited, methods_of, sentence
 from ccfem.comparison.report import charts
 from ccfem.comparison.report.html_report import _coarser
-from ccfem.comparison.report.layer_view import _nearest, angle_on_layer, drawn_paths, in_layer
+from ccfem.comparison.report.layer_view import (
+    _nearest,
+    _paths,
+    angle_on_layer,
+    drawn_paths,
+    in_layer,
+)
 from ccfem.comparison.runs import Run
+from ccfem.judging.evaluation.strand_rules import BrokenRule, StrandVerdict
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer_stress import LayerStress
 from ccfem.slicing.slicers import Planar
@@ -41,6 +48,20 @@ def test_thinned_paths_keep_corners_shape_and_curvature():
     bend = found.curvature[found.offsets[1] : found.offsets[2] - 1]
     np.testing.assert_allclose(bend, 0.1, rtol=0.02)
     assert np.isnan(found.force).all()
+
+
+def test_strands_that_break_a_rule_are_drawn_as_such():
+    lines = [np.array([[5.0, y], [75.0, y]]) for y in (10.0, 20.0, 30.0)]
+    rule = BrokenRule("folds", np.array([2, 0]), np.zeros((2, 3)), "2 of 3 strands fold")
+    paths = Toolpaths.from_plane(lines, LAYER)
+    run = Run("rows", Zigzag(), paths, None, strand_verdict=StrandVerdict((rule,)))
+    drawn = drawn_paths(run, 1.5, 1.0)
+    assert drawn.broken.tolist() == [True, False, True]
+    none = (np.zeros((len(LAYER.triangles), 3, 3)), np.zeros((len(LAYER.points), 3, 3)))
+    stress = LayerStress(LAYER, *none)
+    scales = {"force": 1.0, "angle": 90.0, "curvature": 1.0}
+    assert _paths(drawn, np.array([1, 2]), LAYER, stress, scales)["broken"].tolist() == [0, 1]
+    assert _paths(drawn, np.array([1]), LAYER, stress, scales)["broken"] is None
 
 
 def test_angles_are_to_the_larger_stress():

@@ -135,7 +135,9 @@ def test_an_upright_head_lays_what_it_does_not_touch(part):
         curved_plan(paths, layers, mesh, replace(MACHINE, head_angle=78.0))
     short = replace(MACHINE.process, short="error")
     long = replace(MACHINE, minimum_length=60.0, process=short)
-    with pytest.raises(InputError, match=r"4 of 4 strands are shorter than the 60 mm"):
+    with pytest.raises(
+        InputError, match=r"no shorter than the 60 mm that the cutter allows; 4 of 4"
+    ):
         curved_plan(paths, layers, mesh, long)
 
 

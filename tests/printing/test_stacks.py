@@ -9,8 +9,9 @@ import shapely
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.machine import Machine, Process
+from ccfem.paths.splitting.printed_strands import ended_in_stacks, height_over
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
-from ccfem.printing.print_plan import ended_in_stacks, height_over, plan_print
+from ccfem.printing.print_plan import plan_print
 from ccfem.slicing.slicers.planar import Planar
 
 MACHINE = Machine(minimum_length=20.0, cutter_distance=20.0, matrix_height=0.2)

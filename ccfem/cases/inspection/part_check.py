@@ -36,6 +36,7 @@ from ccfem.fem.elasticity.system import prepare
 from ccfem.fem.elasticity.volume_loads import volume_forces
 from ccfem.geometry.facets import facet_keys
 from ccfem.geometry.measures import connected
+from ccfem.printing.before_solving import reasons_not_to_print
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.planar import Planar
 
@@ -296,6 +297,11 @@ def check(part: str | os.PathLike[str] | Case, **parameters: Any) -> Check:
         if isinstance(case.slicing, Planar):
             case.slicing.check(problem.mesh, case.build, case.machine)
     doubts += layers.lines
+    if not layers.lines:
+        machine = case.machine
+        with found.noted():
+            known = case.known_layers()
+            doubts += reasons_not_to_print(problem.mesh, case.build, machine, known)
     fibre: tuple[Layer, ...] = ()
     with mistakes.noted():
         fibre = _fibre_layers(case)

@@ -45,6 +45,8 @@ class DrawnPaths:
         Whether the piece from each point to the next one is a link.
     force : (P,) array, N
         Axial force in the piece from each point to the next one; NaN where it is not known.
+    broken : (K,) bool array
+        Whether the path breaks a rule for strands (`StrandVerdict`).
     curvature : (P,) array, 1/mm
         At the middle of that piece, as `ccfem.judging.evaluation.indices.curvature` samples it.
     """
@@ -54,6 +56,7 @@ class DrawnPaths:
     layer: IntArray
     link: BoolArray
     force: FloatArray
+    broken: BoolArray
     curvature: FloatArray
 
 
@@ -79,7 +82,8 @@ def drawn_paths(run: Run, step: float, width: float) -> DrawnPaths:
         s = test.strands
         force = _nearest(s.path, s.arc, test.axial_force, number[line], middle)
     curvature = _curvature(paths, width, line, middle)
-    return DrawnPaths(points, offsets, paths.layer, link, force, curvature)
+    broken = run.strand_verdict.strands(len(paths))
+    return DrawnPaths(points, offsets, paths.layer, link, force, broken, curvature)
 
 
 def _thinned(paths: Toolpaths, step: float) -> tuple[FloatArray, IntArray, FloatArray, BoolArray]:
@@ -390,6 +394,7 @@ def _paths(
         "angle": as_bytes(angle_on_layer(plane, stress), scales["angle"]),
         "curvature": as_bytes(paths.curvature[rows], scales["curvature"]),
         "link": paths.link[rows].astype(np.uint8) if paths.link[rows].any() else None,
+        "broken": paths.broken[mine].astype(np.uint8) if paths.broken[mine].any() else None,
         **curved,
     }
 

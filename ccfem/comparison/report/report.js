@@ -277,7 +277,12 @@ function orderOf(paths) {
 }
 const valuesOf = (paths, colour) => (colour === "order" ? orderOf(paths) : paths[colour]);
 
-function legendOf(colour, scales, tested) {
+function legendOf(colour, scales, tested, broken) {
+  const red = broken ? ` <i class="short" style="background:${RED}"></i>not printable` : "";
+  return valueLegend(colour, scales, tested) + red;
+}
+
+function valueLegend(colour, scales, tested) {
   if (colour === "strand") return `<i class="short" style="background:${INK}"></i>strand <i class="short" style="background:${LINK}"></i>link`;
   if (colour === "order") return `first<i style="background:${gradient("order")}"></i>last`;
   if (colour === "layer") return `bottom<i style="background:${gradient("order")}"></i>top`;
@@ -406,20 +411,20 @@ function layersView(layers) {
     pen.stroke();
   }
 
-  // Pieces of one colour are drawn together.
+  // Pieces of one colour are drawn together; strands that break a rule are red in every colouring.
   function strands(pen, paths) {
     const [x, y] = paths.points, values = colour.value === "strand" ? null : valuesOf(paths, colour.value);
     const colours = ramp(colour.value === "order" ? "order" : "value"), groups = new Map();
     for (let k = 0; k + 1 < paths.offsets.length; k++)
       for (let p = paths.offsets[k]; p < paths.offsets[k + 1] - 1; p++) {
-        const key = values ? (values[p] === 255 ? -1 : values[p] & ~3) : paths.link && paths.link[p] ? -2 : 0;
+        const key = paths.broken && paths.broken[k] ? 256 : values ? (values[p] === 255 ? -1 : values[p] & ~3) : paths.link && paths.link[p] ? -2 : 0;
         if (!groups.has(key)) groups.set(key, []);
         groups.get(key).push(p);
       }
     pen.lineWidth = 0.45 * layers.width;
     pen.lineCap = pen.lineJoin = "round";
     for (const key of [...groups.keys()].sort((a, b) => a - b)) {
-      pen.strokeStyle = key === -2 ? LINK : key === -1 ? NONE : values ? css(colours[key]) : INK;
+      pen.strokeStyle = key === 256 ? RED : key === -2 ? LINK : key === -1 ? NONE : values ? css(colours[key]) : INK;
       pen.beginPath();
       let last = -2;
       for (const p of groups.get(key)) {
@@ -474,7 +479,8 @@ function layersView(layers) {
       figures.forEach(drawOne);
       const layer = stack().layers[at.layer];
       byId("layer-said").textContent = `${layer.index} of ${stack().count}, ${layer.where}`;
-      byId("path-legend").innerHTML = legendOf(colour.value, layers.scales, stack().runs.some((run) => run.tested));
+      byId("path-legend").innerHTML = legendOf(colour.value, layers.scales, stack().runs.some((run) => run.tested),
+        stack().runs.some((run) => run.layers.some((layer) => layer.broken)));
       byId("map-legend").innerHTML = below.value === "none" ? "" : below.value === "error"
         ? `error over mean stress 0<i style="background:${gradient("tension")}"></i>${short(layer.error_limit)}`
         : `tension 0<i style="background:${gradient("tension")}"></i>${short(layers.scales.tension)} MPa` +

@@ -1,11 +1,34 @@
-"""The room of fibre: how much of each strand lies beside others and not on them."""
+"""What fibre carries: how much of each strand lies in the part, on nothing else, and is no fold.
+
+A strand is looked at part by part, each about a quarter of a fibre width long (`beads`). Of a part
+carries
+
+* the share that has room among strands of its direction: of m that overlap each has the m-th part;
+* of the rest, the share whose width lies in the section of its layer;
+* of the rest, what lies on no strand that it crosses, unless the strategy crosses by design;
+* nothing in a fold (`ccfem.paths.folds`): the tow is folded over there, and leads no force.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
+import shapely
 
-from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.beads import Beads, beads
+from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
+from ccfem.geometry.polylines import arc_lengths
+from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
+from ccfem.paths.fields.chart import chart_of
+from ccfem.paths.folds import Folds, folds_in
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
+from ccfem.slicing.layers.layer import Layer
+
+_ACROSS = tuple(((np.arange(10) + 0.5) / 10 - 0.5).tolist())
+"""Positions across a band, in widths, that are tested for lying inside: a strand along a border is
+outside by its tenths, and by the first from a twentieth on."""
 
 
 def fibre_beads(toolpaths: Toolpaths, machine: Machine) -> Beads:
@@ -22,26 +45,173 @@ def fibre_beads(toolpaths: Toolpaths, machine: Machine) -> Beads:
     )
 
 
-def room_of(toolpaths: Toolpaths, path: IntArray, arc: FloatArray, machine: Machine) -> FloatArray:
-    """Share of the fibre at places along paths that finds room among strands of its direction.
+def width_inside(
+    middle: FloatArray, direction: FloatArray, width: float, section: Region
+) -> FloatArray:
+    """Share (s,) of the width of parts of strands that lies in a section.
+
+    Parameters
+    ----------
+    middle, direction : (s, 2) arrays, mm and 1
+        In the plane of the section.
+    """
+    share = np.ones(len(middle))
+    inner = section.buffer(-0.5 * width * (1.0 + 1e-6))
+    near = np.arange(len(share))
+    if not inner.is_empty:
+        shapely.prepare(inner)
+        x, y = np.ascontiguousarray(middle.T)
+        near = np.flatnonzero(~shapely.intersects_xy(inner, x, y))
+    if not len(near):
+        return share
+    shapely.prepare(section)
+    side = np.column_stack([-direction[near, 1], direction[near, 0]])
+    share[near] = 0.0
+    for place in _ACROSS:
+        x, y = (middle[near] + place * width * side).T
+        within = shapely.intersects_xy(section, np.ascontiguousarray(x), np.ascontiguousarray(y))
+        share[near] += within / len(_ACROSS)
+    return share
+
+
+class StrandParts(NamedTuple):
+    """Parts of the fibre paths, and what of each carries.
+
+    Attributes
+    ----------
+    beads : Beads
+        The parts, in the order of ``toolpaths.of_kind(FIBRE)``.
+    link : (s,) bool array
+        Parts of links.
+    inside : (s,) array in [0, 1]
+        Share of the width that lies in the section of the layer; 1 where no layers are given.
+    folds : Folds
+        Of the fibre paths.
+    folded : (s,) bool array
+        Parts whose middle lies in a fold.
+    """
+
+    beads: Beads
+    link: BoolArray
+    inside: FloatArray
+    folds: Folds
+    folded: BoolArray
+
+    def carrying(self, crosses: bool) -> FloatArray:
+        """Share (s,) of each part that carries, also where strands cross if they do so by design.
+
+        Where two strands cross, `Beads.every` counts half of each: twice what it misses lies on or
+        under the other one.
+        """
+        alone, every = self.beads.alone, self.beads.every
+        free = alone if crosses else np.clip(2.0 * every - alone, 0.0, alone)
+        return np.asarray(np.where(self.folded, 0.0, free * self.inside))
+
+
+def strand_parts(
+    toolpaths: Toolpaths, machine: Machine, layers: Sequence[Layer] = ()
+) -> StrandParts:
+    """Cut the fibre paths into parts and find what of each carries.
+
+    Parameters
+    ----------
+    layers : sequence of Layer
+        That the paths lie on; without them all width counts as inside.
+    """
+    fibre = toolpaths.of_kind(FIBRE)
+    parts = fibre_beads(toolpaths, machine)
+    count = np.diff(parts.first)
+    arc = (np.arange(len(parts.line)) - parts.first[parts.line] + 0.5) * parts.length
+    # Step of each part: arc lengths of all paths on one axis.
+    along = arc_lengths(fibre.points, fibre.offsets)
+    base = np.concatenate([[0.0], np.cumsum(fibre.lengths + 1.0)])
+    axis = along + np.repeat(base[:-1], np.diff(fibre.offsets))
+    step = np.searchsorted(axis, arc + base[parts.line], side="right") - 1
+    link = fibre.link[step] if len(step) else np.zeros(0, dtype=bool)
+    inside = np.ones(len(parts.line))
+    on = np.repeat(fibre.layer, count)
+    for layer in layers:
+        mine = np.flatnonzero(on == layer.index)
+        if len(mine):
+            plane = _in_plane(layer, parts.middle[mine], parts.direction[mine])
+            inside[mine] = width_inside(*plane, machine.fibre_width, _section(layer))
+    if machine.minimum_radius > 0.0:
+        folds = folds_in(fibre, machine)
+    else:
+        none = np.zeros(0)
+        folds = Folds(np.zeros(0, dtype=np.int64), none, none, fibre.lengths, fibre.closed)
+    return StrandParts(parts, link, inside, folds, _folded(folds, parts.line, arc))
+
+
+def _section(layer: Layer) -> Region:
+    """Section of a flat layer, or of the chart of a curved one."""
+    flat = layer if layer.flat is not None else chart_of(layer).flat
+    return flat.plane.polygon
+
+
+def _in_plane(
+    layer: Layer, middle: FloatArray, direction: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Parts of strands in the plane of their layer, or in its chart."""
+    if layer.flat is not None:
+        return layer.plane.project(middle), layer.plane.project(direction)
+    chart = chart_of(layer)
+    nearest = nearest_on_triangles(layer.points, layer.triangles, middle)
+    corners = chart.flat.points[layer.triangles[nearest.triangle]]
+    image = np.einsum("qk,qkd->qd", nearest.weights, corners)
+    assert chart.flat.turns is not None
+    turned = np.einsum("qij,qj->qi", chart.flat.turns[nearest.triangle], direction)
+    return image[:, :2], turned[:, :2]
+
+
+def _folded(folds: Folds, line: IntArray, arc: FloatArray) -> BoolArray:
+    """Places on strands that lie in a fold."""
+    folded = np.zeros(len(line), dtype=bool)
+    size = folds.lengths[folds.line]
+    for k, start, stop, total in zip(
+        folds.line.tolist(), folds.start.tolist(), folds.stop.tolist(), size.tolist(), strict=True
+    ):
+        first, last = np.searchsorted(line, [k, k + 1])
+        at = arc[first:last]
+        folded[first:last] |= ((at >= start) & (at <= stop)) | (at + total <= stop)
+    return folded
+
+
+def room_of(
+    toolpaths: Toolpaths,
+    path: IntArray,
+    start: FloatArray,
+    stop: FloatArray,
+    machine: Machine,
+    layers: Sequence[Layer] = (),
+    crosses: bool = True,
+) -> FloatArray:
+    """Share of the fibre of pieces of paths that carries.
 
     Parameters
     ----------
     path : (s,) int array
-        Fibre path of each place.
-    arc : (s,) array, mm
-        Arc length of the path there.
+        Fibre path of each piece.
+    start, stop : (s,) arrays, mm
+        Arc lengths of the path at its ends.
     machine : Machine
-        Width and height of a strand.
+        Width and height of a strand, and its least radius.
+    layers, crosses
+        As of `strand_parts` and `StrandParts.carrying`.
 
     Returns
     -------
-    (s,) array in (0, 1]
-        1 where no strand of the same direction is nearer than a width; 1/N in N copies of a line.
+    (s,) array in [0, 1]
+        Mean over each piece: 1 inside the part where no strand of the same direction is nearer than
+        a width; 1/N in N copies of a line; 0 in a fold.
     """
-    found = fibre_beads(toolpaths, machine)
+    parts = strand_parts(toolpaths, machine, layers)
+    length, first = parts.beads.length, parts.beads.first
+    carried = np.concatenate([[0.0], np.cumsum(length * parts.carrying(crosses))])
+    axis = np.concatenate([[0.0], np.cumsum(length)])
     number = (np.cumsum(toolpaths.kind == FIBRE) - 1)[path]
-    first, count = found.first[number], np.diff(found.first)[number]
-    step = np.maximum(found.length[np.minimum(first, len(found.length) - 1)], 1e-300)
-    part = np.clip((arc / step).astype(np.int64), 0, count - 1)
-    return np.asarray(found.alone[first + part])
+    begin, end = axis[first[number]], axis[first[number + 1]]
+    low, high = np.minimum(begin + start, end), np.minimum(begin + stop, end)
+    mean = np.interp(high, axis, carried) - np.interp(low, axis, carried)
+    mean = mean / np.maximum(high - low, 1e-300)
+    return np.asarray(np.clip(mean, 0.0, 1.0))

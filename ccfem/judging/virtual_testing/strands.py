@@ -1,5 +1,6 @@
 """Strands in the mesh: every fibre path cut where it passes from one cell to the next."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -13,7 +14,10 @@ from ccfem.geometry.buckets import Buckets, bucket
 from ccfem.geometry.polylines import starts_segment
 from ccfem.judging.virtual_testing.strand_room import room_of
 from ccfem.machine.machine import Machine
+from ccfem.paths.planning.given_paths import GivenPaths
+from ccfem.paths.planning.strategy import Strategy
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
+from ccfem.slicing.layers.layer import Layer
 
 
 @dataclass(frozen=True)
@@ -38,8 +42,8 @@ class Strands:
     outside : float, mm
         Length of fibre, links left out, that lies outside the mesh and carries nothing.
     share : (s,) array in [0, 1]
-        How much of its stiffness each piece lends: fibre on other fibre has no room, and lends
-        nothing (`ccfem.judging.virtual_testing.strand_room`).
+        How much of its stiffness each piece lends: fibre on other fibre, outside the part and in
+        folds lends nothing (`ccfem.judging.virtual_testing.strand_room`).
     """
 
     cell: IntArray
@@ -71,6 +75,8 @@ def cut_strands(
     mesh: TetMesh,
     most_outside: float = 0.01,
     machine: Machine | None = None,
+    layers: Sequence[Layer] = (),
+    crosses: bool = True,
 ) -> Strands:
     """Cut the fibre paths at the faces of the cells.
 
@@ -85,7 +91,12 @@ def cut_strands(
         Share of the fibre length, links left out, that may lie outside the mesh.
     machine : Machine, optional
         Its strands need room: those of about the same direction that lie nearer than its fibre
-        width share it. Default: every strand counts in full, wherever it lies.
+        width share it; and what is folded by its least radius carries nothing. Default: every
+        strand counts in full, wherever it lies.
+    layers : sequence of Layer
+        That the paths lie on: width outside them carries nothing. Default: all width is inside.
+    crosses : bool, default True
+        Whether strands carry where they lie across other strands: those of strategies that plan so.
 
     Returns
     -------
@@ -132,7 +143,10 @@ def cut_strands(
     middle = 0.5 * (begin + end)
     unit = step / np.maximum(length, 1e-300)[:, None]
     arc = before[segment] + middle * length[segment]
-    lent = np.ones(count) if machine is None else room_of(toolpaths, path[segment], arc, machine)
+    first, last = (before[segment] + at * length[segment] for at in (begin, end))
+    lent = np.ones(count)
+    if machine is not None:
+        lent = room_of(toolpaths, path[segment], first, last, machine, layers, crosses)
     return Strands(
         cell=cell,
         length=piece * share,
@@ -143,6 +157,26 @@ def cut_strands(
         outside=outside,
         share=lent,
     )
+
+
+def carrying_strands(
+    toolpaths: Toolpaths,
+    strategy: Strategy,
+    layers: Sequence[Layer],
+    mesh: TetMesh,
+    machine: Machine,
+) -> Strands:
+    """Strands of a strategy in a mesh, with what of them carries, as a comparison tests them.
+
+    Parameters
+    ----------
+    toolpaths : Toolpaths
+        Strands as they are printed (`ccfem.paths.splitting.printed_strands`).
+    """
+    # Nobody knows whether those who planned given paths planned for the height of crossings.
+    given = isinstance(strategy, GivenPaths)
+    crosses = not given and bool(getattr(strategy, "crosses", False))
+    return cut_strands(toolpaths, mesh, machine=machine, layers=layers, crosses=crosses)
 
 
 # Straight steps in the mesh, cut where they pass from one cell to the next.

@@ -13,10 +13,12 @@ from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.fem.elasticity.weighted_cases import WeightedCases
 from ccfem.judging.virtual_testing.several_cases import specimens, virtual_tests
 from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.judging.virtual_testing.strands import carrying_strands
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.planned import Planned
 from ccfem.paths.planning.strategy import Strategy
 from ccfem.paths.planning.whole_part import full_length
+from ccfem.paths.splitting.printed_strands import printed_strands
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.plan_cases import plan_cases
 from ccfem.strategies.fibre_aware.upper_bound import LEAST, WORST
@@ -80,7 +82,7 @@ def least_fibre(
     """Find the least fibre with which a strategy makes a part so and so stiff.
 
     The gain in stiffness grows about as a power of the length; two plans say which, and the next
-    length follows. Every plan is tested virtually.
+    length follows. Of every plan the strands that are printed are tested virtually.
 
     Several load cases are planned for at once, and every one of them is to be so stiff, over the
     part without fibre in that case: what counts is the one that gains least (`for_every_case`).
@@ -106,12 +108,15 @@ def least_fibre(
     if len(cases) > 1:
         strategy = for_every_case(strategy)
     parts, most = specimens(cases), _MOST * full_length(layers, machine)
+    mesh = parts[0].unreinforced.mesh
     found: dict[float, LeastFibre] = {}
     tried: list[tuple[float, float]] = []
     length = _FIRST * most
     for _ in range(_PLANS):
         planned = plan_cases(strategy, layers, cases, machine, length, strand)
-        ratios = virtual_tests(planned.toolpaths, parts, strand, machine=machine).ratios
+        printed = printed_strands(planned.toolpaths, layers, mesh, machine).fibre
+        strands = carrying_strands(printed, planned.strategy, layers, mesh, machine)
+        ratios = virtual_tests(strands, parts, strand).ratios
         reached = float(ratios.min())
         laid = planned.length_per_layer
         if laid in found:  # no other length lies between

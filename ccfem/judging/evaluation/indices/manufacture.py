@@ -55,13 +55,16 @@ COLUMNS = (
         "print_time_nearest",
         "s",
         "As print_time, with the paths of a layer in another order and walked from either end: "
-        "from the end of each on to the nearest end of another one.",
+        "from the end of each on to the nearest end of another one. Where a print is planned: the "
+        "time of the fibre's tool in its file, waits for heat left out.",
         ">= 0",
     ),
     Column(
         "fibre_mass",
         "g",
-        "Length of the fibre times filament area and density.",
+        "Length of the fibre times the filament's mass per length (fibre_tex of the machine, else "
+        "area and density). Where a print is planned: what its file states, fibre fed beside the "
+        "part included.",
         ">= 0",
     ),
     Column(
@@ -74,7 +77,8 @@ COLUMNS = (
     Column(
         "matrix_mass",
         "g",
-        "Volume that the fibre leaves of the part times the density of the matrix.",
+        "Volume that the fibre leaves of the part times the density of the matrix. Where a print "
+        "is planned: what its file states.",
         ">= 0",
     ),
     Column(
@@ -167,7 +171,7 @@ def manufacture_indices(samples: ManufactureSamples, machine: Machine) -> dict[s
         "long_enough_length": float(length[enough].sum()) / total if len(length) else np.nan,
         "print_time": float(samples.seconds.sum()),
         "print_time_nearest": float(samples.nearest_seconds.sum()),
-        "fibre_mass": 1e-3 * machine.fibre_density * machine.filament_area * total,
+        "fibre_mass": machine.fibre_mass_per_length * total,
         "matrix_length": matrix / line if line > 0.0 else float("inf"),
         "matrix_mass": 1e-3 * machine.matrix_density * matrix,
         "mean_speed": total / float(samples.fibre_seconds.sum()) if total else np.nan,

@@ -6,13 +6,14 @@ import numpy as np
 import shapely
 
 from ccfem.base.arrays import BoolArray, FloatArray
-from ccfem.geometry.beads import Beads, beads
+from ccfem.geometry.beads import beads
 from ccfem.geometry.places import INSIDE, VOID, section_places
 from ccfem.geometry.polylines import sample_midpoints
 from ccfem.geometry.shapes import Region
 from ccfem.judging.evaluation.column import Column
 from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
 from ccfem.judging.evaluation.plane_paths import PlanePaths
+from ccfem.judging.virtual_testing.strand_room import width_inside
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer
 
@@ -89,9 +90,6 @@ COLUMNS = (
     ),
 )
 
-_ACROSS = (-0.375, -0.125, 0.125, 0.375)
-"""Positions across a band, in widths, that are tested for lying inside."""
-
 
 @dataclass(frozen=True)
 class RoomSamples:
@@ -147,7 +145,7 @@ def sample_room(
     up = np.broadcast_to([0.0, 0.0, 1.0], flat.shape)
     same = np.zeros(len(lines), dtype=np.int64)
     found = beads(flat, up, lines.offsets, lines.closed, same, width, machine.strand_height)
-    inside = _inside(found, width, layer.plane.polygon)
+    inside = width_inside(found.middle[:, :2], found.direction[:, :2], width, layer.plane.polygon)
     height = max(layer.thickness, 1e-300)
     return RoomSamples(
         found.length,
@@ -163,27 +161,6 @@ def sample_room(
         np.array([float(layer.areas.sum()) * layer.thickness]),
         np.array([float(late)]),
     )
-
-
-def _inside(found: Beads, width: float, section: Region) -> FloatArray:
-    """Share of the width of each part that lies in the section."""
-    share = np.ones(len(found.length))
-    inner = section.buffer(-0.5 * width * (1.0 + 1e-6))
-    near = np.arange(len(share))
-    if not inner.is_empty:
-        shapely.prepare(inner)
-        x, y = np.ascontiguousarray(found.middle[:, :2].T)
-        near = np.flatnonzero(~shapely.intersects_xy(inner, x, y))
-    if not len(near):
-        return share
-    shapely.prepare(section)
-    side = np.column_stack([-found.direction[near, 1], found.direction[near, 0]])
-    share[near] = 0.0
-    for place in _ACROSS:
-        x, y = (found.middle[near, :2] + place * width * side).T
-        within = shapely.intersects_xy(section, np.ascontiguousarray(x), np.ascontiguousarray(y))
-        share[near] += within / len(_ACROSS)
-    return share
 
 
 def _free_runs(paths: PlanePaths, reach: float, below: Region | None) -> FloatArray:

@@ -12,6 +12,8 @@ from ccfem.slicing.layers import Layer
 
 LOW = 0.1
 """Least height of a line of matrix, mm. Our choice."""
+THIN = 0.05
+"""Least height, mm, of matrix over a strand, where its layer is as high. Our choice."""
 _SAME = 1e-6
 """Heights closer than this, mm, are the same."""
 

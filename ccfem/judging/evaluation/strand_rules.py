@@ -1,0 +1,160 @@
+"""Rules that every strand obeys by itself, or the plan cannot be printed: nothing is pooled.
+
+* A strand needs a run of the cutter's length free of folds (`ccfem.paths.folds`): what lies between
+  two folds and is shorter is a scribble that no head lays. Patterns that turn so by design keep
+  their turns, and are judged by what still carries.
+* Of the area of a strand, its length times a fibre width, no more than a twentieth lies outside the
+  part. Links do not count as outside: those are laid on pads and cut off.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, in_brief
+from ccfem.geometry.polylines import point_at
+from ccfem.judging.virtual_testing.strand_room import StrandParts, strand_parts
+from ccfem.machine.machine import Machine
+from ccfem.paths.folds import WINDOW
+from ccfem.paths.toolpaths import FIBRE, Toolpaths
+from ccfem.slicing.layers.layer import Layer
+
+OUTSIDE = 0.05
+"""Share of a strand's area that may lie outside the part. Our choice: the corners of a strand that
+ends square at an oblique wall, and no more."""
+_ROUNDING = 1e-6
+"""Share of the cutter's length that a run may miss by rounding."""
+
+
+@dataclass(frozen=True)
+class BrokenRule:
+    """A rule, and the strands that break it.
+
+    Attributes
+    ----------
+    rule : {"folds", "outside"}
+    strands : (k,) int array
+        Numbers of the fibre paths, the worst first.
+    places : (k, 3) array, mm
+        Where each breaks it: at its middle fold, and where most of its width is outside.
+    words : str
+        One line: how many, by how much, and where the worst is.
+    """
+
+    rule: str
+    strands: IntArray
+    places: FloatArray
+    words: str
+
+    __repr__ = in_brief
+
+    def __post_init__(self) -> None:
+        freeze(self, strands=int, places=float)
+
+
+@dataclass(frozen=True)
+class StrandVerdict:
+    """What the rules say of all strands.
+
+    Attributes
+    ----------
+    broken : tuple of BrokenRule
+    remark : str
+        What folds that are no reason to refuse the plan cost; empty without any.
+    """
+
+    broken: tuple[BrokenRule, ...] = ()
+    remark: str = ""
+
+    def strands(self, count: int) -> BoolArray:
+        """Mask (count,) of the fibre paths that break a rule."""
+        mask = np.zeros(count, dtype=bool)
+        for rule in self.broken:
+            mask[rule.strands] = True
+        return mask
+
+
+def strand_verdict(
+    toolpaths: Toolpaths, layers: Sequence[Layer], machine: Machine, folds_by_design: bool = False
+) -> StrandVerdict:
+    """Hold every strand against the rules.
+
+    Parameters
+    ----------
+    layers : sequence of Layer
+        That the strands lie on.
+    folds_by_design : bool, default False
+        Whether the strategy's published pattern turns more tightly than the machine's radius: its
+        folds carry nothing, but are no reason to refuse the plan.
+    """
+    fibre = toolpaths.of_kind(FIBRE)
+    parts = strand_parts(toolpaths, machine, layers)
+    folded = () if folds_by_design else _folded(fibre, parts, machine)
+    count, places = int((parts.folds.counts > 0).sum()), len(parts.folds.line)
+    remark = ""
+    if count:
+        design = ", as its pattern is published," if folds_by_design else ""
+        remark = (
+            f"{count} of {len(fibre)} strands turn back on themselves in {places} places{design} "
+            f"by more than 90 degrees within {WINDOW * machine.minimum_radius:.3g} mm: "
+            f"{parts.folds.folded.sum():.0f} mm of fibre in these folds carry nothing"
+        )
+    return StrandVerdict((*folded, *_outside(fibre, parts)), remark)
+
+
+def _folded(fibre: Toolpaths, parts: StrandParts, machine: Machine) -> tuple[BrokenRule, ...]:
+    """Strands without a run of the cutter's length free of folds."""
+    folds = parts.folds
+    least = max(machine.tail, machine.minimum_length)
+    free = folds.longest_free
+    short = np.flatnonzero((folds.counts > 0) & (free < least * (1.0 - _ROUNDING)))
+    if not len(short):
+        return ()
+    order = short[np.argsort(free[short], kind="stable")]
+    lines = list(fibre)
+    places = []
+    for k in order.tolist():
+        at = np.sort(folds.places[folds.line == k])
+        places.append(point_at(lines[k], float(at[len(at) // 2])))
+    return (
+        _broken(
+            "folds",
+            order,
+            np.array(places),
+            f"{len(order)} of {len(fibre)} strands have no {least:g} mm free of turns by more than "
+            f"90 degrees within {WINDOW * machine.minimum_radius:.3g} mm; the worst has "
+            f"{free[order[0]]:.3g} mm",
+        ),
+    )
+
+
+def _outside(fibre: Toolpaths, parts: StrandParts) -> tuple[BrokenRule, ...]:
+    """Strands of which too much lies outside the part."""
+    line, length = parts.beads.line, parts.beads.length
+    away = np.where(parts.link, 0.0, 1.0 - parts.inside)
+    area = np.bincount(line, length, len(fibre))
+    share = np.bincount(line, length * away, len(fibre)) / np.maximum(area, 1e-300)
+    wide = np.flatnonzero(share > OUTSIDE)
+    if not len(wide):
+        return ()
+    order = wide[np.argsort(-share[wide], kind="stable")]
+    places = []
+    for k in order.tolist():
+        first, last = parts.beads.first[k : k + 2]
+        places.append(parts.beads.middle[first + int(away[first:last].argmax())])
+    return (
+        _broken(
+            "outside",
+            order,
+            np.array(places),
+            f"{len(order)} of {len(fibre)} strands lie outside the part by more than "
+            f"{OUTSIDE:.0%} of their width; the worst by {share[order[0]]:.0%}",
+        ),
+    )
+
+
+def _broken(rule: str, strands: IntArray, places: FloatArray, words: str) -> BrokenRule:
+    """Broken rule whose words name the place of the worst strand."""
+    at = ", ".join(f"{x:.1f}" for x in places[0])
+    return BrokenRule(rule, strands, places, f"{words}, at ({at}) mm")

@@ -1,0 +1,7 @@
+"""From planned paths to the strands that are printed: cut at borders and in stacks, long enough."""
+
+from ccfem.base.submodules import submodules
+
+__all__: list[str] = []
+
+__getattr__ = submodules(__name__)

@@ -1,0 +1,82 @@
+"""What is known of a print before the part is solved: machine, number of lines, bed, covers."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ccfem.base.errors import InputError
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.machine.machine import Machine
+from ccfem.paths.splitting.slabs import check_cover, slabs_of
+from ccfem.paths.toolpaths import MATRIX, Toolpaths
+from ccfem.printing.line_counts import check_matrix_lines
+from ccfem.printing.part_moves import part_moves
+from ccfem.printing.print_plan import PrintPlan, check_bed, check_machine
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.plane import plane_frame
+
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+def check_print(
+    mesh: TetMesh, build: Sequence[float], machine: Machine, layers: Sequence[Layer] = ()
+) -> None:
+    """Refuse a print that its machine cannot make, whatever the paths are.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+        The part.
+    build : 3 floats
+        Build direction.
+    layers : sequence of Layer
+        Flat layers that get fibre, if they are known before the part is solved; the part then
+        stands upright, as its layers lie.
+
+    Raises
+    ------
+    InputError
+        For speeds of 0, a cutter farther from the nozzle than the shortest strand is long, more
+        lines than are planned, a part that does not fit on the bed with all that is laid beside it,
+        and layers without room, or without matrix to hold them.
+    """
+    check_machine(machine)
+    check_matrix_lines(mesh, build, machine)
+    if not layers:
+        return
+    _check_room(mesh, build, machine)
+    level = mesh.points[np.unique(mesh.corners)] @ layers[0].plane.frame[2]
+    check_cover(slabs_of(layers, float(level.min()), float(level.max()), machine), machine)
+
+
+def _check_room(mesh: TetMesh, build: Sequence[float], machine: Machine) -> None:
+    """Print the outline of the part's box, once at its top: with all that is laid beside it."""
+    corners = mesh.points[np.unique(mesh.corners)] @ plane_frame(tuple(build)).T
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    half = 0.5 * np.maximum(high - low - machine.matrix_width, 0.0)[:2]
+    turns = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]])
+    ring = 0.5 * np.array(machine.gcode.bed[:2]) + half * turns
+    height = float(high[2] - low[2])
+    points = np.column_stack([ring, np.full(len(ring), height)])
+    outline = Toolpaths(
+        points=points,
+        normals=np.tile(_UP, (len(ring), 1)),
+        offsets=np.array([0, len(ring)]),
+        layer=np.zeros(1, dtype=np.int64),
+        kind=np.full(1, MATRIX),
+        closed=np.ones(1, dtype=bool),
+    )
+    plan = PrintPlan(outline, np.array([height]), np.array([machine.matrix_height]))
+    check_bed(plan, machine)
+    part_moves(plan, machine)
+
+
+def reasons_not_to_print(
+    mesh: TetMesh, build: Sequence[float], machine: Machine, layers: Sequence[Layer] = ()
+) -> list[str]:
+    """Say why `check_print` refuses a print; empty where it does not."""
+    try:
+        check_print(mesh, build, machine, layers)
+    except InputError as error:
+        return [f"cannot be printed: {error}"]
+    return []
