@@ -1,0 +1,274 @@
+"""Folds: turns of a strand that the machine's least radius does not allow.
+
+A tow that is led round a far tighter turn than the machine allows is not bent but folded over. The
+turn is measured as a printer feels it: over an arc length, not at a point. With the machine's least
+radius r a strand *folds* where its tangent turns by more than 90 degrees within
+
+    window = (4 / 3.85) r,
+
+4 mm by default; on a circle of radius r it turns by 59.5 degrees there. A circle folds if its
+radius is less than r / 1.512. A square corner is no fold.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, repeated
+from ccfem.geometry.polylines import arc_lengths, lengths, merge_repeated
+from ccfem.machine.machine import Machine
+from ccfem.paths.toolpaths import Toolpaths
+
+WINDOW = 4.0 / 3.85
+"""Arc length over which a turn is measured, in least radii of the machine."""
+
+ANGLE = np.pi / 2.0
+"""Turn of the tangent within the window beyond which a strand folds, radians."""
+
+_SAMPLES = 40
+"""Samples of the tangent in a window."""
+_SLACK = 2e-3
+"""By how much a turn may exceed the angle, radians: a square corner in rounded coordinates."""
+_SPREAD = 0.25
+"""Largest length, in windows, over which a vertex of a polyline spreads its turn to each side."""
+
+
+@dataclass(frozen=True)
+class Folds:
+    """Where polylines fold, by arc length.
+
+    Attributes
+    ----------
+    line : (f,) int array
+        Polyline of each fold; folds are in the order of the polylines, then of the arc length.
+    start, stop : (f,) arrays, mm
+        Ends of each folded stretch: the shortest ones over which the tangent turns by more than the
+        angle, and all that overlap as one. On a closed polyline, `stop` may exceed the length.
+    lengths : (K,) array, mm
+        Length of each polyline.
+    closed : (K,) bool array
+    """
+
+    line: IntArray
+    start: FloatArray
+    stop: FloatArray
+    lengths: FloatArray
+    closed: BoolArray
+
+    def __post_init__(self) -> None:
+        freeze(self, line=int, start=float, stop=float, lengths=float, closed=bool)
+
+    @property
+    def counts(self) -> IntArray:
+        """Number of folds of each polyline, (K,)."""
+        return np.bincount(self.line, minlength=len(self.lengths))
+
+    @property
+    def places(self) -> FloatArray:
+        """Middle of each fold by arc length, (f,), mm."""
+        return 0.5 * (self.start + self.stop) % np.maximum(self.lengths[self.line], 1e-300)
+
+    def free(self) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Parts of the polylines without folds.
+
+        Returns
+        -------
+        line : (m,) int array
+            Polyline of each part.
+        start, stop : (m,) arrays, mm
+            Its ends by arc length. On a closed polyline with a fold, `stop` may exceed the length:
+            the part runs on over the start.
+        """
+        count = len(self.lengths)
+        # Between two stops of folds, or ends of the line: n folds leave n + 1 parts of an open
+        # line, and n of a closed one, whose last part runs on to its first fold.
+        ring = self.closed & (self.counts > 0)
+        opened = np.flatnonzero(~ring)
+        line = np.concatenate([opened, self.line])
+        start = np.concatenate([np.zeros(len(opened)), self.stop])
+        order = np.lexsort((start, line))
+        line, start = line[order], start[order]
+        shut = np.concatenate([self.line, opened])
+        stop = np.concatenate([self.start, self.lengths[opened]])
+        order = np.lexsort((stop, shut))
+        stop = stop[order]
+        first = np.searchsorted(shut[order], np.arange(count))
+        # On a ring the part after fold k ends at fold k + 1, after the last one at the first.
+        following = np.arange(len(line)) + ring[line]
+        over = ring[line] & (following >= first[line] + self.counts[line])
+        following = np.where(over, first[line], following)
+        stop = stop[following] + np.where(over, self.lengths[line], 0.0)
+        kept = stop > start
+        return line[kept], start[kept], stop[kept]
+
+    @property
+    def longest_free(self) -> FloatArray:
+        """Longest part of each polyline without a fold, (K,), mm."""
+        line, start, stop = self.free()
+        longest = np.zeros(len(self.lengths))
+        np.maximum.at(longest, line, stop - start)
+        return longest
+
+    @property
+    def folded(self) -> FloatArray:
+        """Length of each polyline that lies in folds, (K,), mm."""
+        folded = np.zeros(len(self.lengths))
+        np.add.at(folded, self.line, self.stop - self.start)
+        return folded
+
+
+def folds(points: FloatArray, offsets: IntArray, closed: BoolArray, radius: float) -> Folds:
+    """Find the folds of polylines.
+
+    The tangent is that of the polyline in the space of its points: of strands on a curved layer
+    give the points in space, for so the printer lays them. Each vertex spreads its turn over half a
+    segment to each side, and over a quarter of the window at most, so that a curve folds alike
+    whether its points lie .05 or 2 mm apart.
+
+    Parameters
+    ----------
+    points : (P, d) array, mm
+        In two or three dimensions.
+    offsets : (K + 1,) int array
+        As in CSR.
+    closed : (K,) bool array
+        Closed polylines repeat their first point at their end, and are measured across it.
+    radius : float, mm
+        Least radius of the machine.
+    """
+    points, offsets, closed = np.asarray(points, float), np.asarray(offsets), np.asarray(closed)
+    window = WINDOW * radius
+    size = lengths(points, offsets)
+    line, position, tangent, step = _tangents(points, offsets, closed, window)
+    # From each sample the nearest one ahead to which the tangent turns by more than the angle.
+    samples = np.bincount(line, minlength=len(size))
+    ahead = np.zeros(len(line), dtype=np.int64)
+    first = np.cumsum(samples) - samples
+    number = np.arange(len(line)) - first[line]
+    # A ring goes on behind its last sample with its first one.
+    most = np.minimum(np.floor(window / step + 1e-9), samples - 1).astype(np.int64)[line]
+    most = np.where(closed[line], most, np.minimum(most, samples[line] - 1 - number))
+    limit = np.cos(ANGLE + _SLACK)
+    pending = np.flatnonzero(_may_fold(tangent, first[line], number, samples[line], most))
+    for lag in range(1, int(most.max(initial=0)) + 1):
+        pending = pending[most[pending] >= lag]
+        other = first[line[pending]] + (number[pending] + lag) % samples[line[pending]]
+        turned = np.einsum("ij,ij->i", tangent[pending], tangent[other]) < limit
+        ahead[pending[turned]] = lag
+        pending = pending[~turned]
+    # Shortest stretches: those that hold no other, which would start at the next sample.
+    following = ahead[first[line] + (number + 1) % np.maximum(samples[line], 1)]
+    shortest = (following == 0) | (following >= ahead)
+    at = np.flatnonzero((ahead > 0) & shortest)
+    return Folds(
+        *_merged(line[at], position[at], position[at] + (ahead * step[line])[at], size, closed),
+        lengths=size,
+        closed=closed,
+    )
+
+
+def folds_in(toolpaths: Toolpaths, machine: Machine) -> Folds:
+    """Folds of toolpaths of any kind, in space, by the machine's least radius."""
+    paths = toolpaths
+    return folds(paths.points, paths.offsets, paths.closed, machine.minimum_radius)
+
+
+def _tangents(
+    points: FloatArray, offsets: IntArray, closed: BoolArray, window: float
+) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
+    """Tangents of polylines in equal steps.
+
+    Returns
+    -------
+    line : (s,) int array
+    position : (s,) array, mm
+        Middle of each step by arc length.
+    tangent : (s, d) array
+        Unit vector of the mean tangent over the step.
+    step : (K,) array, mm
+        Length of the steps of each polyline.
+    """
+    points, offsets, _ = merge_repeated(points, offsets)
+    size, along = lengths(points, offsets), arc_lengths(points, offsets)
+    parts = np.maximum(1, np.round(size * (_SAMPLES / window))).astype(np.int64)
+    parts[size == 0.0] = 0
+    step: FloatArray = np.divide(size, parts, out=np.ones(len(size)), where=parts > 0)
+    line, number = repeated(parts)
+    if not len(line):
+        return line, np.zeros(0), np.zeros((0, points.shape[1])), step
+    # The direction of a segment holds between two knots, and is linear from there to the next.
+    owner = np.repeat(np.arange(len(size)), np.diff(offsets))
+    segment = np.flatnonzero(owner[1:] == owner[:-1])
+    vector = points[segment + 1] - points[segment]
+    long = np.linalg.norm(vector, axis=1)
+    direction, off = vector / long[:, None], np.minimum(0.5 * long, _SPREAD * window)
+    knot = np.stack([along[segment] + off, along[segment] + long - off], axis=1).ravel()
+    knot_line, at_knot = np.repeat(owner[segment], 2), np.repeat(direction, 2, axis=0)
+    # Ends: an open line goes on as it is, a ring between its last knot and its first.
+    some = np.flatnonzero(parts > 0)
+    begin = np.searchsorted(knot_line, some)
+    end = np.searchsorted(knot_line, some, side="right") - 1
+    before, after = (size[some] - knot[end])[:, None], knot[begin][:, None]
+    seam = (after * at_knot[end] + before * at_knot[begin]) / (before + after)
+    ring = closed[some][:, None]
+    ends = [np.where(ring, seam, at_knot[k]) for k in (begin, end)]
+    place = np.stack([begin, end + 1], axis=1).ravel()
+    knot = np.insert(knot, place, np.stack([0.0 * size[some], size[some]], axis=1).ravel())
+    at_knot = np.insert(at_knot, place, np.stack(ends, axis=1).reshape(len(place), -1), axis=0)
+    knot_line = np.insert(knot_line, place, np.repeat(some, 2))
+    # Mean over a step: difference of the integral, on one axis for all lines.
+    base = np.cumsum(size + 1.0) - (size + 1.0)
+    axis = knot + base[knot_line]
+    gap = np.diff(axis)
+    integral = np.zeros_like(at_knot)
+    integral[1:] = np.cumsum(0.5 * gap[:, None] * (at_knot[1:] + at_knot[:-1]), axis=0)
+    low, high = number * step[line] + base[line], (number + 1) * step[line] + base[line]
+
+    def integrated(place: FloatArray) -> FloatArray:
+        k = np.clip(np.searchsorted(axis, place, side="right") - 1, 0, len(axis) - 2)
+        way = (place - axis[k])[:, None]
+        slope = (at_knot[k + 1] - at_knot[k]) / np.maximum(gap[k], 1e-300)[:, None]
+        value: FloatArray = integral[k] + way * (at_knot[k] + 0.5 * way * slope)
+        return value
+
+    mean = integrated(high) - integrated(low)
+    tangent: FloatArray = mean / np.maximum(np.linalg.norm(mean, axis=1), 1e-300)[:, None]
+    position: FloatArray = (number + 0.5) * step[line]
+    return line, position, tangent, step
+
+
+def _may_fold(
+    tangent: FloatArray, first: IntArray, number: IntArray, samples: IntArray, most: IntArray
+) -> BoolArray:
+    """Mask of the samples from which the sum of all turns ahead reaches the angle."""
+    following = first + (number + 1) % np.maximum(samples, 1)
+    cosine = np.einsum("ij,ij->i", tangent, tangent[following])
+    total = np.concatenate([[0.0], np.cumsum(np.arccos(np.clip(cosine, -1.0, 1.0)))])
+    here = np.arange(len(number))
+    beyond = np.maximum(number + most - samples, 0)  # samples of a ring that lie over its start
+    turn = total[here + most - beyond] - total[here] + total[first + beyond] - total[first]
+    return np.asarray((most > 0) & (turn >= ANGLE))
+
+
+def _merged(
+    line: IntArray, start: FloatArray, stop: FloatArray, size: FloatArray, closed: BoolArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Stretches of polylines, by ascending starts, with those that overlap as one."""
+    if not len(line):
+        return line, start, stop
+    base = np.cumsum(2.0 * size + 1.0)[line]
+    reach = np.maximum.accumulate(stop + base)
+    new = np.concatenate([[True], start[1:] + base[1:] > reach[:-1]])
+    number = np.flatnonzero(new)
+    line, start = line[number], start[number]
+    stop = np.maximum.reduceat(stop, number)
+    # The last stretch of a ring may run over the start into the first ones.
+    kept = np.ones(len(line), dtype=bool)
+    for k in np.flatnonzero(closed[line] & (stop >= size[line])):
+        for other in np.flatnonzero((line == line[k]) & kept):
+            if other != k and start[other] + size[line[k]] <= stop[k]:
+                stop[k] = max(stop[k], stop[other] + size[line[k]])
+                kept[other] = False
+        if stop[k] - start[k] >= size[line[k]]:
+            start[k], stop[k] = 0.0, size[line[k]]
+    return line[kept], start[kept], stop[kept]

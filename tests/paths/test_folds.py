@@ -1,0 +1,153 @@
+"""Folds of strands against curves whose turns are known."""
+
+import numpy as np
+import pytest
+
+from ccfem.geometry.polylines import pack, resample
+from ccfem.paths.folds import WINDOW, Folds, folds
+
+RADIUS = 3.85
+
+
+def of(*lines, closed=None, radius=RADIUS) -> Folds:
+    lines = [np.array(line, dtype=float) for line in lines]
+    closed = [bool((line[0] == line[-1]).all()) for line in lines] if closed is None else closed
+    return folds(*pack(lines), np.array(closed), radius)
+
+
+def arc(radius, degrees, count=721):
+    angle = np.radians(np.linspace(0.0, degrees, count))
+    points = radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    if degrees == 360:
+        points[-1] = points[0]
+    return points
+
+
+def hairpin(leg, radius, count=200):
+    """Two legs beside each other, joined by a half circle."""
+    half = arc(radius, 180, count) @ [[0.0, 1.0], [-1.0, 0.0]]
+    return np.concatenate([[[-leg, -radius]], half[::-1] * [-1.0, 1.0], [[-leg, radius]]])
+
+
+def stepped(line, step):
+    points, _ = resample(np.asarray(line, float), np.array([0, len(line)]), step)
+    return points
+
+
+def test_window_is_four_millimetres_by_default():
+    assert pytest.approx(4.0) == WINDOW * RADIUS
+
+
+@pytest.mark.parametrize("radius", [0.3, 0.5, 1.0, 2.0])
+def test_hairpin_folds_in_its_half_circle(radius):
+    """Of a half circle every quarter turn folds, so all of it; its legs do not."""
+    folded = of(hairpin(50.0, radius))
+    assert folded.counts.tolist() == [1]
+    middle = 50.0 + 0.5 * np.pi * radius
+    assert folded.places[0] == pytest.approx(middle, abs=0.11)
+    assert folded.folded[0] == pytest.approx(np.pi * radius, abs=0.25)
+    line, start, stop = folded.free()
+    assert line.tolist() == [0, 0]
+    np.testing.assert_allclose(stop - start, 50.0, atol=0.15)
+    assert folded.longest_free[0] == pytest.approx(50.0, abs=0.15)
+
+
+@pytest.mark.parametrize("step", [0.05, 0.3, 1.0, 2.0, None])
+@pytest.mark.parametrize("radius", [2.2, 2.4, 2.7, 3.0, 3.85, 10.0])
+def test_arc_folds_if_it_turns_a_quarter_within_the_window(radius, step):
+    """4 mm of a circle turn by 4 / R: a quarter at R = 2.546, wherever points are taken."""
+    line = arc(radius, 300)
+    folded = of(line if step is None else stepped(line, step))
+    assert (folded.counts[0] > 0) == (radius < 8.0 / np.pi)
+
+
+@pytest.mark.parametrize("radius", [1.0, 2.4, 2.7, 3.85])
+def test_ring_folds_everywhere_or_nowhere(radius):
+    folded = of(arc(radius, 360))
+    around = 2.0 * np.pi * radius
+    assert folded.folded[0] == pytest.approx(around if radius < 8.0 / np.pi else 0.0, rel=1e-3)
+    assert folded.longest_free[0] == pytest.approx(around - folded.folded[0], abs=0.01)
+
+
+def test_polygon_of_many_points_is_its_circle():
+    assert of(arc(5.0, 360, 10_001)).counts.tolist() == [0]
+    assert of(arc(0.2, 360, 10_001)).longest_free.tolist() == [0.0]
+
+
+@pytest.mark.parametrize(("degrees", "fold"), [(60, 0), (90, 0), (95, 1), (150, 1), (180, 1)])
+def test_corner_folds_beyond_a_right_angle(degrees, fold):
+    turn = np.radians(degrees)
+    line = [(-30.0, 0.0), (0.0, 0.0), (30.0 * np.cos(turn), 30.0 * np.sin(turn))]
+    assert of(line).counts.tolist() == [fold]
+    assert of(stepped(line, 0.5)).counts.tolist() == [fold]
+    if fold:
+        assert of(line).places[0] == pytest.approx(30.0, abs=0.1)
+
+
+def test_two_square_corners_fold_within_the_window_only():
+    """A turn back by two corners: a fold if they are less than a window apart."""
+    for apart, fold in [(1.0, 1), (2.5, 1), (6.1, 0)]:
+        line = [(0.0, 0.0), (30.0, 0.0), (30.0, apart), (0.0, apart)]
+        assert of(line).counts.tolist() == [fold], apart
+
+
+def test_turns_to_and_fro_cancel():
+    """Right by 80 degrees and left again within the window is a step aside, no fold."""
+    turn = np.radians(80.0)
+    line = np.cumsum([(0, 0), (30, 0), (2.0 * np.cos(turn), 2.0 * np.sin(turn)), (30, 0)], axis=0)
+    assert of(line).counts.tolist() == [0]
+
+
+@pytest.mark.parametrize("step", [0.05, 2.0])
+def test_verdict_does_not_hang_on_the_points(step):
+    for line, fold in [(hairpin(40.0, 0.5), 1), (hairpin(40.0, 5.0), 0), (arc(30.0, 350), 0)]:
+        assert of(stepped(line, step)).counts.tolist() == [fold]
+
+
+def test_short_strands_and_points():
+    """Shorter than the window: it is the turn that counts. No length: nothing does."""
+    assert of([(0.0, 0.0), (1.0, 0.0)]).longest_free.tolist() == [1.0]
+    assert of([(0.0, 0.0), (1.0, 0.0), (0.0, 0.1)]).counts.tolist() == [1]
+    nothing = of([(1.0, 1.0), (1.0, 1.0)])
+    assert nothing.counts.tolist() == [0]
+    assert nothing.longest_free.tolist() == [0.0]
+    assert len(folds(np.zeros((0, 3)), np.zeros(1, int), np.zeros(0, bool), RADIUS).lengths) == 0
+
+
+def test_closed_strand_is_measured_across_its_start():
+    """A drop whose tip is the start: one fold there, and one free part round the rest."""
+    tip = np.radians(150.0)
+    body = arc(20.0, 360 - 150, 400) @ [[np.cos(tip), np.sin(tip)], [-np.sin(tip), np.cos(tip)]]
+    drop = np.concatenate([[[40.0, 0.0]], body, [[40.0, 0.0]]])
+    folded = of(drop, closed=[True])
+    assert of(drop, closed=[False]).counts.tolist() == [0]
+    assert folded.counts.tolist() == [1]
+    tip_at = folded.places[0]
+    assert min(tip_at, folded.lengths[0] - tip_at) < 0.11
+    line, start, stop = folded.free()
+    assert line.tolist() == [0]
+    assert (stop - start + folded.folded)[0] == pytest.approx(folded.lengths[0])
+
+
+def test_free_parts_and_folds_make_up_each_strand():
+    """Many strands at once, open and closed, with several folds and with none."""
+    square = np.array([(0, 0), (20, 0), (20, 20), (0, 20), (0, 0)], dtype=float)
+    star = np.array([(0, 0), (30, 5), (0, 10), (15, -20), (15, 25), (0, 0)], dtype=float)
+    zigzag = np.array([(0, 0), (30, 0), (30, 1), (0, 1), (0, 2), (30, 2)], dtype=float)
+    folded = of(square, star, zigzag, [(0, 0), (9, 0)])
+    assert folded.counts.tolist() == [0, 5, 2, 0]
+    line, start, stop = folded.free()
+    assert np.bincount(line).tolist() == [1, 5, 3, 1]
+    total = np.bincount(line, stop - start) + folded.folded
+    np.testing.assert_allclose(total, folded.lengths)
+    one_by_one = [of(each).folded[0] for each in (square, star, zigzag, [(0, 0), (9, 0)])]
+    np.testing.assert_allclose(folded.folded, one_by_one)
+
+
+def test_folds_are_measured_in_space_and_by_the_radius():
+    """Turned out of its plane a hairpin folds as before; for a finer machine it is a bend."""
+    flat = hairpin(40.0, 1.0)
+    turn = np.array([[0.6, 0.0, 0.8], [0.0, 1.0, 0.0]])
+    np.testing.assert_allclose(of(flat @ turn).start, of(flat).start)
+    assert of(flat, radius=1.0).counts.tolist() == [0]  # radius / 1.512 < 1
+    assert of(flat, radius=1.6).counts.tolist() == [1]
