@@ -18,6 +18,8 @@ from ccfem.judging.virtual_testing.strands import cut_strands
 from ccfem.machine.machine import Machine
 from ccfem.paths.linking.clearance import trim_to_clearance
 from ccfem.paths.linking.finishing import keep_off_border, linked_paths, long_enough
+from ccfem.paths.linking.joining import Joined
+from ccfem.paths.planning.unfolding import unfolded, unfolded_paths
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.path_profile import Profile, least_price
@@ -204,7 +206,7 @@ class Extraction:
     def strands(self, layer: Layer, field: FloatArray, shift: float) -> list[FloatArray]:
         """Trace the levels, and cut strands that can slide neither off the border nor apart."""
         width = self.machine.fibre_width
-        lines = self.levels(layer, field, shift)
+        lines = self.unfolded(self.levels(layer, field, shift), layer)
         lines = lines_to_slide_in(lines, layer.plane.polygon, self.inset * width)
         return trim_to_clearance(lines, CLEARANCE * width, SHORTEST * width)
 
@@ -224,7 +226,14 @@ class Extraction:
         else:
             found = linked_paths(lines, section, width, limit, least, radius=radius)
         paths = Toolpaths.from_plane(found.lines, layer, link=found.link)
-        return slid_in(paths, layer, self.machine, self.inset, self.radius)
+        paths = slid_in(paths, layer, self.machine, self.inset, self.radius)
+        return unfolded_paths(paths, layer, self.machine)
+
+    def unfolded(self, lines: list[FloatArray], layer: Layer) -> list[FloatArray]:
+        """Lines led round their folds or cut there, before they are linked."""
+        link = [np.zeros(len(line), dtype=bool) for line in lines]
+        least = SHORTEST * self.machine.fibre_width
+        return unfolded(Joined(lines, link), layer.plane.polygon, self.machine, least).lines
 
     def levels(self, layer: Layer, field: FloatArray, shift: float) -> list[FloatArray]:
         """Trace the levels `shift` above whole numbers on a layer, (n, 2), mm."""
