@@ -22,6 +22,7 @@ from ccfem.paths.linking.joining import Joined
 from ccfem.paths.planning.unfolding import unfolded, unfolded_paths
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
+from ccfem.strategies.fibre_aware.hole_wraps import LEVELS, led_round_holes
 from ccfem.strategies.fibre_aware.path_profile import Profile, least_price
 from ccfem.strategies.fibre_aware.prune import profiles
 from ccfem.strategies.fibre_aware.spline_grid import SplineGrid
@@ -208,7 +209,35 @@ class Extraction:
         width = self.machine.fibre_width
         lines = self.unfolded(self.levels(layer, field, shift), layer)
         lines = lines_to_slide_in(lines, layer.plane.polygon, self.inset * width)
-        return trim_to_clearance(lines, CLEARANCE * width, SHORTEST * width)
+        lines = trim_to_clearance(lines, CLEARANCE * width, SHORTEST * width)
+        return self.round_holes(lines, layer)
+
+    def round_holes(self, lines: list[FloatArray], layer: Layer) -> list[FloatArray]:
+        """Lead strands that end at the wall of a hole round it, as many as there is room for.
+
+        Of no, one, two or three strands on each side, take what leaves most in printable strands.
+        """
+        machine, section = self.machine, layer.plane.polygon
+        width = machine.fibre_width
+
+        def printable(strands: list[FloatArray]) -> float:
+            sizes = [line_length(line) for line in strands]
+            return sum(size for size in sizes if size >= machine.minimum_length)
+
+        best, count = lines, len(lines)
+        for levels in range(1, LEVELS + 1):
+            led = led_round_holes(lines, section, width, 0.75 * machine.minimum_radius, levels)
+            if len(led) == count:
+                break  # no further strand to be led round
+            count = len(led)
+            paths = Toolpaths.from_plane(led, layer)
+            paths = slid_out(paths, layer, machine, self.inset, levels, self.radius)
+            room = [layer.plane.project(path) for path in paths]
+            room = lines_to_slide_in(room, section, self.inset * width)
+            room = trim_to_clearance(room, CLEARANCE * width, SHORTEST * width)
+            if printable(room) > printable(best):
+                best = room
+        return best
 
     def linked(self, layer: Layer, lines: list[FloatArray], reach: float = 0.0) -> Toolpaths:
         """Link the strands of one layer, and slide the paths inwards.
@@ -298,6 +327,9 @@ _DEPTH = 0.8
 _ROUNDS = 2
 """Number of slides, each along the normals of the paths after the last one."""
 
+_OUT = 0.25
+"""Steps, in widths, in which strands are slid out of holes: the way out changes as they go."""
+
 _INNER, _APART = 1.01, 1.004
 """Factors on the distances that slides aim at: from the border, and between strands. A slide only
 approaches its aim, and the steps between points cut corners."""
@@ -357,6 +389,21 @@ def slid_in(
         apart = spacing(lines, (layer,), _APART * width, off, come_in=True, radius=radius)
         paths = lines.slid(apart.spread(np.zeros(len(lines.path))))
     return _ends_cut(_back_inside(paths, layer), layer, inset * width, machine)
+
+
+def slid_out(
+    paths: Toolpaths, layer: Layer, machine: Machine, inset: float, depth: float, radius: float
+) -> Toolpaths:
+    """Slide paths that are led through holes out of them, in small steps, and others ahead of them.
+
+    Parameters as of `slid_in`; `depth` is how far inside a hole paths lie, in strand widths.
+    """
+    width, off = machine.fibre_width, _INNER * inset
+    for step in np.append(np.arange(off - depth - 1.0, off, _OUT), off):
+        lines = strand_lines(paths, (layer,), machine, hold=False)
+        apart = spacing(lines, (layer,), _APART * width, step * width, come_in=True, radius=radius)
+        paths = lines.slid(apart.spread(np.zeros(len(lines.path))))
+    return paths
 
 
 def _back_inside(paths: Toolpaths, layer: Layer) -> Toolpaths:
