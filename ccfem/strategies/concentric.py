@@ -64,6 +64,7 @@ class Concentric(Infill):
     turns: Turns = "tight"
 
     ignores_stress: ClassVar[bool] = True
+    folds: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "single": {"joined": False, "rings": 3},
         "start": {"start": (0.0, 0.0)},

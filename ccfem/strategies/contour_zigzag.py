@@ -50,6 +50,7 @@ class ContourZigzag:
     ignores_stress: ClassVar[bool] = True
     in_plane: ClassVar[bool] = True
     direction: ClassVar[str] = "angle"
+    folds: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "single": {"joined": False},
         "printable": {"turns": "printable"},

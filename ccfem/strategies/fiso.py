@@ -229,6 +229,7 @@ class Fiso:
 
     amount: ClassVar[Amount] = SPACING
     in_plane: ClassVar[bool] = True
+    folds: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "apart": {"closest": 1.0},
         "round": {"least_radius": 3.85},

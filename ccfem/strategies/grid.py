@@ -71,6 +71,7 @@ class Grid(Infill):
     amount: ClassVar[Amount] = replace(SPACING, beyond=(("shells", 60),))
     ignores_stress: ClassVar[bool] = True
     direction: ClassVar[str] = "angle"
+    folds: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "both": {"families": "both"},
         "paper": {"lines": "paper"},

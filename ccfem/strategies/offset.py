@@ -50,6 +50,7 @@ class Offset:
     amount: ClassVar[Amount] = SPACING
     ignores_stress: ClassVar[bool] = True
     in_plane: ClassVar[bool] = True
+    folds: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "printable": {"turns": "printable"},
         "cut": {"turns": "cut"},

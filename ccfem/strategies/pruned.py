@@ -18,6 +18,7 @@ from ccfem.judging.virtual_testing.several_cases import specimens
 from ccfem.judging.virtual_testing.strand import RHO, Strand
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.strategy import Amount, LayerPlanner, Strategy
+from ccfem.paths.planning.unfolding import without_folds
 from ccfem.paths.planning.whole_part import WholePart, full_length
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies import create
@@ -164,6 +165,7 @@ class Pruned:
         lengths = [min(length, most) for length in lengths]
         planned = self.overfill * max(lengths)
         paths = plan_by_layers(self._planner(), layers, cases, machine, planned)
+        paths = without_folds(paths, layers, machine)
         in_all = max(lengths) * len(layers)
         bounds = measures(self.objective, cases, layers, in_all, machine, strand)
         goal = Goal(specimens(cases), cases.weights, bounds, self.objective)

@@ -47,6 +47,7 @@ class Zigzag:
     ignores_stress: ClassVar[bool] = True
     in_plane: ClassVar[bool] = True
     direction: ClassVar[str] = "angle"
+    folds: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "printable": {"turns": "printable"},
         "cut": {"turns": "cut"},

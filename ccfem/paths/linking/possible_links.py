@@ -23,7 +23,7 @@ CLOSING_TURN = np.deg2rad(60.0)
 """Largest turn, both ends together, of a link that closes a path to a ring. A path of two
 neighbouring strands that closes on itself could no longer join the next strand."""
 
-_MARGIN, _WINDOWS = 1.05, 1.2
+_MARGIN, _WINDOWS = 1.08, 1.2
 """Factor on the radius by which folds are looked for, and length of the strands beside a link that
 is looked at, in radii: later steps move points a little."""
 

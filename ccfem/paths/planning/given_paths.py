@@ -36,6 +36,7 @@ class GivenPaths:
     flat_layers_only: ClassVar[bool] = True
     amount: ClassVar[Amount] = Amount("", 1.0, 1.0)
     crosses: ClassVar[bool] = True
+    folds: ClassVar[bool] = True
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Return the paths of one layer."""

@@ -64,6 +64,9 @@ class LayerStrategy(Protocol):
         Whether its paths are the same under any load.
     crosses : bool, default False
         Whether strands cross each other on purpose.
+    folds : bool, default False
+        Whether strands may fold (`ccfem.paths.folds`), as those of published patterns that turn
+        back by design. Strands of all others are led round folds or cut there.
     on_axes : bool, default False
         Whether paths follow the axes of the layer, as paths of pixels do, and so do not rotate with
         the part.

@@ -23,7 +23,7 @@ from ccfem.paths.linking.joining import Joined
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
-_MARGIN = 1.05
+_MARGIN = 1.08
 """Factor on the machine's radius by which folds are looked for: what follows moves points by some
 hundredths of a width, and whoever counts folds may take other points of a strand."""
 
@@ -50,8 +50,12 @@ _Marked = tuple[FloatArray, BoolArray]
 
 
 def may_fold(strategy: object) -> bool:
-    """Whether the strands of a strategy may fold: its parameter or class variable `folds`."""
-    return bool(getattr(strategy, "folds", False))
+    """Whether the strands of a strategy may fold.
+
+    Those of published patterns that turn back by design do, and paths of pixels, whose corners lie
+    at every pixel: `folds`, a parameter or class variable, and a `mode` that is "raster".
+    """
+    return bool(getattr(strategy, "folds", False)) or getattr(strategy, "mode", "") == "raster"
 
 
 def unfolded(joined: Joined, section: Region, machine: Machine, least: float) -> Joined:
@@ -135,6 +139,13 @@ def unfolded_paths(
         kind=paths.kind[source],
         closed=paths.closed[source] & [is_closed(line[:, :3]) for line in columns],
         link=np.concatenate(links),
+    )
+
+
+def without_folds(paths: Toolpaths, layers: Sequence[Layer], machine: Machine) -> Toolpaths:
+    """Paths of several layers, led round their folds or cut there: see `unfolded_paths`."""
+    return Toolpaths.concatenate(
+        unfolded_paths(paths.on_layer(layer.index), layer, machine) for layer in layers
     )
 
 
