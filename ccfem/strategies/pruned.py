@@ -24,6 +24,7 @@ from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies import create
 from ccfem.strategies.fibre_aware.cut_and_move import prune_and_move
 from ccfem.strategies.fibre_aware.judges import Goal
+from ccfem.strategies.fibre_aware.plain_plans import plain_plans
 from ccfem.strategies.fibre_aware.plan_cases import plan_by_layers
 from ccfem.strategies.fibre_aware.shortening import TIGHT_SHARES
 from ccfem.strategies.fibre_aware.upper_bound import measures
@@ -39,7 +40,9 @@ _CASES_ROUNDS = 3
 class Pruned:
     """The most useful fibre of another strategy.
 
-    The load is that of the stress given to the strategy. Fibre is taken to carry tension only.
+    The load is that of the stress given to the strategy. Fibre is taken to carry tension only. With
+    the default base, straight rows along the mean tension and contours are pruned and tested too,
+    and the best is taken.
 
     Attributes
     ----------
@@ -171,10 +174,13 @@ class Pruned:
         goal = Goal(specimens(cases), cases.weights, bounds, self.objective)
         rounds = self.rounds if len(cases) == 1 else max(self.rounds, _CASES_ROUNDS)
         cut_by = (rounds, self.strength, self.moves, TIGHT_SHARES[self.turns])
+        tried = [paths]
+        if self.of == "isocurve" and not self.base:
+            tried += plain_plans(cases, layers, machine, curves=False)
         found: list[tuple[Pruned, LayerPlanner]] = []
         for length in lengths:
             wanted = length * len(layers)
-            kept = prune_and_move((paths,), layers, goal, wanted, machine, strand, *cut_by)
+            kept = prune_and_move(tried, layers, goal, wanted, machine, strand, *cut_by)
             coverage = length / full
             overfill = max(planned / full / coverage, 1.0)
             found.append((replace(self, coverage=coverage, overfill=overfill), WholePart(kept)))

@@ -42,6 +42,7 @@ from ccfem.strategies.fibre_aware.heights import (
     nearest_layer,
 )
 from ccfem.strategies.fibre_aware.judges import Goal
+from ccfem.strategies.fibre_aware.plain_plans import plain_plans
 from ccfem.strategies.fibre_aware.shortening import TIGHT_SHARES
 from ccfem.strategies.fibre_aware.smeared import SmearedPart, smeared_cases
 from ccfem.strategies.fibre_aware.spline_grid import SplineGrid
@@ -79,8 +80,10 @@ class StreamFunction:
 
     All layers share one field where the stress is about the same at all heights; otherwise the
     layers form groups over the height with one field each. The fields are designed for slightly too
-    much fibre; of their isocurves, the stretches that are worth most are kept. The load is that of
-    the stress given to the strategy. Fibre is taken to carry tension only.
+    much fibre; of their isocurves, the stretches that are worth most are kept. Straight rows along
+    the mean tension, contours and `isocurve` are cut to the same length and tested too, and the
+    best is taken. The load is that of the stress given to the strategy. Fibre is taken to carry
+    tension only.
 
     Attributes
     ----------
@@ -266,8 +269,9 @@ class StreamFunction:
             strong = design_for_strength(problem, fields, solutions, *how)
             tried = _with_first(candidates(strong), tried)
         cut_by = (_ROUNDS, self.strength, self.moves, TIGHT_SHARES[self.turns])
+        plain = plain_plans(cases, layers, machine)
         return [
-            prune_and_move(some, layers, goal, length, machine, strand, *cut_by)
+            prune_and_move([*some, *plain], layers, goal, length, machine, strand, *cut_by)
             for some, length in zip(tried, in_all, strict=True)
         ]
 
