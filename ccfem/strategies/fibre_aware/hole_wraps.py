@@ -7,6 +7,7 @@ each other, and whoever slides strands off the border (`stream_paths.slid_in`) m
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -20,7 +21,7 @@ from ccfem.geometry.polylines import (
     points_along,
     resample,
 )
-from ccfem.geometry.shapes import Region, strings
+from ccfem.geometry.shapes import Region, Shapes, strings
 from ccfem.paths.linking.joining import Joint, join
 from ccfem.paths.linking.possible_links import ring_arc
 
@@ -49,6 +50,26 @@ _NEAR = 0.9
 """Distance, in widths, below which a strand at the wall is in the way of an arc."""
 
 
+class _Pair(NamedTuple):
+    """Two ends of strands at the wall of a hole, numbered as in `Joint`.
+
+    Anticlockwise round the hole the arc leads from the first to the second. `within` is the number
+    of pairs whose arcs lie between this one and the strands outside.
+    """
+
+    first: int
+    second: int
+    within: int
+
+
+class _Meeting(NamedTuple):
+    """End of a strand at the wall: its place by arc length, and whether it heads anticlockwise."""
+
+    place: float
+    end: int
+    forwards: bool
+
+
 def led_round_holes(
     lines: Sequence[FloatArray],
     section: Region,
@@ -74,127 +95,132 @@ def led_round_holes(
     list of (n, 2) arrays
         Arcs may lie inside the hole: slide them off its wall.
     """
+    if not lines:
+        return []
     joints: list[Joint] = []
-    cut = list(lines)
-    strands = strings(lines) if len(lines) else np.zeros(0, dtype=object)
+    cut, strands = list(lines), strings(lines)
     for part in shapely.get_parts(section):
         for ring in part.interiors:
             room = ring.length + np.pi * width >= 2.0 * np.pi * radius
-            if room and ring.length <= _LARGEST * width:
-                hole = shapely.orient_polygons(shapely.Polygon(ring))
-                for first, second, level in _pairs(lines, hole, width):
-                    if level < levels:
-                        _lead(cut, joints, hole, strands, (first, second, level), width)
+            if not room or ring.length > _LARGEST * width:
+                continue
+            hole = shapely.orient_polygons(shapely.Polygon(ring))
+            for pair in _pairs(_meetings(lines, hole, width), hole.exterior.length):
+                if pair.within >= levels or pair.first // 2 == pair.second // 2:
+                    continue
+                heads = [_cut_back(cut, end, width) for end in pair[:2]]
+                if min(len(head) for head in heads) < 2:
+                    continue
+                others = np.delete(strands, [pair.first // 2, pair.second // 2])
+                between_tips = _arc(heads[0][-1], heads[1][-1], hole, others, pair.within, width)
+                if between_tips is None:
+                    continue
+                for end, head in zip(pair[:2], heads, strict=True):
+                    cut[end // 2] = head if end % 2 else head[::-1]
+                joints.append(Joint(pair.first, pair.second, between_tips))
     return join(cut, joints).lines
 
 
-def _pairs(
-    lines: Sequence[FloatArray], hole: shapely.Polygon, width: float
-) -> list[tuple[int, int, int]]:
-    """Find ends of strands that run along a wall to each other, and how many pairs lie outside.
-
-    Ends are numbered as in `ccfem.paths.linking.joining.Joint`; the arc runs anticlockwise from
-    the first to the second.
-    """
-    wall = hole.exterior
-    ends = np.array([2 * k + side for k, x in enumerate(lines) if not is_closed(x)
-                     for side in (0, 1)], dtype=np.int64)  # fmt: skip
-    if not len(ends):
-        return []
-    tips = np.array([lines[end // 2][-(end % 2)] for end in ends])
-    met = shapely.distance(hole, shapely.points(tips)) <= _REACH * width
-    ends, tips = ends[met], tips[met]
-    place = np.atleast_1d(shapely.line_locate_point(wall, shapely.points(tips)))
-    order = np.argsort(place, kind="stable")
-    around = []
-    for k in order.tolist():
-        line = lines[ends[k] // 2][:: -1 if ends[k] % 2 == 0 else 1]
-        along = along_line(line)
-        step = np.array([-1.0, 1.0]) * 0.5 * width + place[k]
-        before, after = shapely.get_coordinates(
-            shapely.line_interpolate_point(wall, step % wall.length)
-        )
-        heading = line[-1] - points_along(
-            line, along, np.array([max(along[-1] - _HEADING * width, 0.0)])
-        )[0]  # fmt: skip
-        size = np.linalg.norm(heading) * np.linalg.norm(after - before)
-        cosine = float(heading @ (after - before) / max(size, 1e-12))
+def _meetings(lines: Sequence[FloatArray], hole: shapely.Polygon, width: float) -> list[_Meeting]:
+    """Find ends of strands that run along the wall of a hole, in their order round it."""
+    opened = [k for k, line in enumerate(lines) if not is_closed(line)]
+    ends = [2 * k + side for k in opened for side in (0, 1)]
+    wall, meetings = hole.exterior, []
+    for end in ends:
+        head = lines[end // 2] if end % 2 else lines[end // 2][::-1]
+        tip = shapely.Point(head[-1])
+        if shapely.distance(hole, tip) > _REACH * width:
+            continue
+        place, along = float(shapely.line_locate_point(wall, tip)), along_line(head)
+        beside = (place + 0.5 * width * np.array([-1.0, 1.0])) % wall.length
+        before, after = shapely.get_coordinates(shapely.line_interpolate_point(wall, beside))
+        start = points_along(head, along, np.maximum(along[-1:] - _HEADING * width, 0.0))[0]
+        heading, tangent = head[-1] - start, after - before
+        size = float(np.linalg.norm(heading) * np.linalg.norm(tangent))
+        cosine = float(heading @ tangent) / max(size, 1e-12)
         if abs(cosine) >= _ALONG:
-            around.append((float(place[k]), int(ends[k]), cosine > 0.0))
-    # Like brackets: an end that runs forwards opens a pair, the next one that comes towards it
-    # closes it. Pairs within a pair lie farther from the wall.
-    found: list[tuple[int, int, int]] = []
-    opened: list[tuple[float, int, int]] = []
-    used: set[int] = set()
-    for turn in (0.0, wall.length):
-        for at, end, forwards in around:
-            if end in used:
+            meetings.append(_Meeting(place, end, cosine > 0.0))
+    return sorted(meetings)
+
+
+def _pairs(meetings: Sequence[_Meeting], around: float) -> list[_Pair]:
+    """Pair ends like brackets; `around` is the circumference.
+
+    An end that heads anticlockwise opens a pair, and the next one that comes towards it closes it.
+    The arcs of pairs within a pair lie farther from the wall.
+    """
+    arcs: list[tuple[float, float, int, int]] = []  # length, start, and both ends
+    opened: list[_Meeting] = []
+    paired: set[int] = set()
+    for turn in (0.0, around):  # a second time, for pairs across the start of the wall
+        for place, end, forwards in meetings:
+            if end in paired:
                 continue
             if forwards:
-                opened = [one for one in opened if one[1] != end]
-                opened.append((at + turn, end, 0))
+                opened = [meeting for meeting in opened if meeting.end != end]
+                opened.append(_Meeting(place + turn, end, True))
             elif opened:
-                start, other, level = opened.pop()
-                if other == end or at + turn - start > _LONGEST * wall.length:
+                start, other, _ = opened.pop()
+                length = place + turn - start
+                if length > _LONGEST * around:
                     opened.clear()
                     continue
-                used |= {end, other}
-                found.append((other, end, level))
-                if opened:
-                    start, other, outer = opened[-1]
-                    opened[-1] = (start, other, max(outer, level + 1))
-    return found
+                paired |= {end, other}
+                arcs.append((length, start, other, end))
+    pairs: list[_Pair] = []
+    arcs.sort()
+    for k, (length, start, first, second) in enumerate(arcs):
+        inner = [
+            pairs[j].within + 1
+            for j in range(k)
+            if (arcs[j][1] - start) % around + arcs[j][0] <= length
+        ]
+        pairs.append(_Pair(first, second, max(inner, default=0)))
+    return pairs
 
 
-def _lead(
-    cut: list[FloatArray],
-    joints: list[Joint],
+def _cut_back(lines: Sequence[FloatArray], end: int, width: float) -> FloatArray:
+    """Strand, its given end last, without the last bit before the wall; empty if it is short."""
+    head = lines[end // 2] if end % 2 else lines[end // 2][::-1]
+    left = line_length(head) - _CUT * width
+    return between(head, 0.0, left) if left > 2.0 * _CUT * width else head[:0]
+
+
+def _arc(
+    start: FloatArray,
+    stop: FloatArray,
     hole: shapely.Polygon,
-    strands: "np.typing.NDArray[np.object_]",
-    pair: tuple[int, int, int],
+    others: Shapes,
+    within: int,
     width: float,
-) -> None:
-    """Cut two ends back, and add the arc between them."""
-    first, second, level = pair
-    trimmed = {}
-    for end in (first, second):
-        line = cut[end // 2]
-        size = line_length(line)
-        if size < 3.0 * _CUT * width:
-            return
-        span = (_CUT * width, size) if end % 2 == 0 else (0.0, size - _CUT * width)
-        trimmed[end] = between(line, *span)
-    if first // 2 == second // 2:
-        return
+) -> FloatArray | None:
+    """Points (n, 2) between two tips, anticlockwise along the wall; None if they are too near.
+
+    The arc lies half a width outside the wall where that is free, else a width farther in for each
+    strand that is there.
+    """
     wall = hole.exterior
-    tips = [trimmed[end][-(end % 2)] for end in (first, second)]
-    at = shapely.line_locate_point(wall, shapely.points(np.array(tips)))
-    gap = float((at[1] - at[0]) % wall.length)
+    at = shapely.line_locate_point(wall, shapely.points(np.stack([start, stop])))
+    gap, ahead = float((at[1] - at[0]) % wall.length) / wall.length, _CUT * width
 
-    def arc(offset: float) -> FloatArray | None:
-        """Arc at a distance from the wall, below 0 inside the hole."""
-        ring = shapely.buffer(hole, offset)
-        if ring.is_empty or ring.geom_type != "Polygon":
+    def parallel(distance: float) -> FloatArray | None:
+        grown = shapely.buffer(hole, distance)
+        if grown.is_empty or grown.geom_type != "Polygon":
             return None
-        ring = shapely.orient_polygons(ring).exterior
-        scale = ring.length / wall.length
-        start = float(shapely.line_locate_point(ring, shapely.points(tips[0])))
-        length, ahead = gap * scale, _CUT * width
-        if length <= 2.5 * ahead:
+        ring = shapely.orient_polygons(grown).exterior
+        length = gap * ring.length - 2.0 * ahead
+        if length <= 0.5 * ahead:
             return None
-        start = (start + ahead) % ring.length
-        return ring_arc(ring, start, length - 2.0 * ahead)
+        begin = float(shapely.line_locate_point(ring, shapely.Point(start)))
+        return ring_arc(ring, (begin + ahead) % ring.length, length)
 
-    free = arc(0.5 * width)
-    others = np.delete(strands, [first // 2, second // 2])
-    taken = free is not None and bool(
-        shapely.dwithin(shapely.linestrings(free), others, _NEAR * width).any()
-    )
-    path = arc((0.5 - level - taken) * width)
-    if path is None:
-        return
-    whole = np.concatenate([tips[:1], path, tips[1:]])
+    free = parallel(0.5 * width)
+    if free is None:
+        return None
+    near = shapely.dwithin(shapely.linestrings(free), others, _NEAR * width)
+    arc = parallel((0.5 - within - bool(near.any())) * width)
+    if arc is None:
+        return None
+    whole = np.concatenate([start[None], arc, stop[None]])
     points, _ = resample(whole, np.array([0, len(whole)]), 0.5 * width)
-    for end in (first, second):
-        cut[end // 2] = trimmed[end]
-    joints.append(Joint(first, second, points[1:-1]))
+    return points[1:-1]

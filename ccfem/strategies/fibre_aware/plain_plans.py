@@ -71,7 +71,7 @@ def _mean(tension: Tension, size: FloatArray) -> FloatArray:
 
 
 def _longer_side(section: Region) -> FloatArray:
-    """Return the unit vector (2,) along the longer side of the smallest rectangle round a section."""
+    """Return the direction (2,) of the longer side of the smallest rectangle round a section."""
     corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(section))
     sides = np.diff(corners, axis=0)[:2]
     size = np.linalg.norm(sides, axis=1)
