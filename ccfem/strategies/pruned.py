@@ -18,7 +18,7 @@ from ccfem.judging.virtual_testing.several_cases import specimens
 from ccfem.judging.virtual_testing.strand import RHO, Strand
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.strategy import Amount, LayerPlanner, Strategy
-from ccfem.paths.planning.unfolding import without_folds
+from ccfem.paths.planning.unfolding import may_fold, without_folds
 from ccfem.paths.planning.whole_part import WholePart, full_length
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies import create
@@ -108,6 +108,11 @@ class Pruned:
         check_fields(self, "strength", at_least=0.0, at_most=1.0)
         check_fields(self, "moves", at_least=0)
 
+    @property
+    def folds(self) -> bool:
+        """Whether strands may fold: those of a base that turns back by design."""
+        return may_fold(self._planner())
+
     def _planner(self) -> Strategy:
         """Underlying strategy with its parameters."""
         return create(self.of, {**_BASES.get(self.of, {}), **self.base})
@@ -168,7 +173,8 @@ class Pruned:
         lengths = [min(length, most) for length in lengths]
         planned = self.overfill * max(lengths)
         paths = plan_by_layers(self._planner(), layers, cases, machine, planned)
-        paths = without_folds(paths, layers, machine)
+        if not self.folds:
+            paths = without_folds(paths, layers, machine)
         in_all = max(lengths) * len(layers)
         bounds = measures(self.objective, cases, layers, in_all, machine, strand)
         goal = Goal(specimens(cases), cases.weights, bounds, self.objective)

@@ -70,6 +70,9 @@ _ROUNDS = 3
 _CASES_OVERFILL = 1.15
 """Least overfill for several load cases: their tests then have more fibre to choose from."""
 
+_PLAIN_INSET = 0.5
+"""Distance of plain plans from the border, in strand widths: none are tested above it."""
+
 _WIDE = {"tight": 0.0, "cut": 1.3}
 """Radius, in machine radii, below which bends of the field have a cost."""
 
@@ -113,6 +116,7 @@ class StreamFunction:
     inset : float, default 0.5
         Least distance between strands or links and the boundary, in strand widths. At 0.5 whole
         strands lie inside; at 0 they may run along the boundary with half their width outside.
+        Straight rows, tested up to 0.5, lie inside with their width and may end on the boundary.
     objective : {"worst", "sum", "least"}
         How several load cases count: the case farthest from its own stiffest design, the weighted
         mean over the cases, or the case that gains least over the part without fibre.
@@ -269,7 +273,7 @@ class StreamFunction:
             strong = design_for_strength(problem, fields, solutions, *how)
             tried = _with_first(candidates(strong), tried)
         cut_by = (_ROUNDS, self.strength, self.moves, TIGHT_SHARES[self.turns])
-        plain = plain_plans(cases, layers, machine)
+        plain = plain_plans(cases, layers, machine) if self.inset <= _PLAIN_INSET else []
         return [
             prune_and_move([*some, *plain], layers, goal, length, machine, strand, *cut_by)
             for some, length in zip(tried, in_all, strict=True)

@@ -19,6 +19,7 @@ from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress
 from ccfem.strategies import create
+from ccfem.strategies.concentric import Concentric
 from ccfem.strategies.fibre_aware.heights import layers_by_case
 from ccfem.strategies.fibre_aware.plan_cases import plan_by_layers
 
@@ -119,7 +120,7 @@ def plain_plans(
         return Toolpaths.concatenate(planned)
 
     field = cases.heaviest
-    rings = create("concentric").for_part(field, layers, machine)
+    rings = Concentric().for_part(field, layers, machine)
     plans = [rows("tension"), rows("section"), plan_layers(rings, layers, layers, field, machine)]
     if curves:
         plans.append(plan_by_layers(create("isocurve", {"cap": _CAP}), layers, cases, machine))
