@@ -86,10 +86,8 @@ def plan_layers(
         if not fold:
             paths = unfolded_paths(paths, view, machine)
         paths = in_even_steps(paths, machine.fibre_width)
-        if view is layer:
-            return paths
-        paths = chart_of(layer).lifted(paths)
-        return paths if fold else unfolded_paths(paths, layer, machine)
+        paths = paths if view is layer else chart_of(layer).lifted(paths)
+        return paths if fold else unfolded_paths(paths, None, machine)
 
     return Toolpaths.concatenate(in_threads(planned, layers, views))
 

@@ -93,24 +93,26 @@ def unfolded(joined: Joined, section: Region, machine: Machine, least: float) ->
 
 
 def unfolded_paths(
-    paths: Toolpaths, layer: Layer, machine: Machine, least: float | None = None
+    paths: Toolpaths, layer: Layer | None, machine: Machine, least: float | None = None
 ) -> Toolpaths:
     """Fibre of one layer, led round its folds or cut there; on a curved layer it is only cut.
 
     Parameters
     ----------
+    layer : Layer or None
+        None for paths that are final: they are only cut, and folds looked for without a margin.
     least : float, mm, optional
         Pieces of cut paths that are shorter are dropped; by default the machine's least length.
     """
     least, radius = machine.minimum_length if least is None else least, machine.minimum_radius
-    found = folds(paths.points, paths.offsets, paths.closed, _MARGIN * radius)
+    radius *= _MARGIN if layer is not None else 1.0
+    found = folds(paths.points, paths.offsets, paths.closed, radius)
     folded = (found.counts > 0) & (paths.kind == FIBRE)
     if not folded.any():
         return paths
-    flat = layer.flat is not None
     spans = [slice(a, b) for a, b in pairwise(paths.offsets)]
     rounding: _Rounding | None = None
-    if flat:
+    if layer is not None and layer.flat is not None:
         plane = [layer.plane.project(paths.points[span]) for span in spans]
         rounding = _Rounding(plane, layer.plane.polygon, machine)
     columns: list[FloatArray] = []
@@ -118,12 +120,12 @@ def unfolded_paths(
     source = []
     for k, span in enumerate(spans):
         pieces = [(np.hstack([paths.points[span], paths.normals[span]]), paths.link[span])]
-        if folded[k] and rounding is not None:
-            cut = _cut(rounding.led_round(k, plane[k], paths.link[span]), _MARGIN * radius, least)
+        if folded[k] and rounding is not None and layer is not None:
+            cut = _cut(rounding.led_round(k, plane[k], paths.link[span]), radius, least)
             up = paths.normals[span.start]
             pieces = [(_in_space(line, layer, up), link) for line, link in cut]
         elif folded[k]:
-            pieces = _cut(pieces[0], _MARGIN * radius, least)
+            pieces = _cut(pieces[0], radius, least)
         columns += [line for line, _ in pieces]
         links += [link for _, link in pieces]
         source += len(pieces) * [k]
