@@ -27,6 +27,8 @@ ANGLE = np.pi / 2.0
 
 _SAMPLES = 40
 """Samples of the tangent in a window."""
+_SMOOTH = 2
+"""Samples before and behind one over which the tangent is averaged."""
 _SLACK = 2e-3
 """By how much a turn may exceed the angle, radians: a square corner in rounded coordinates."""
 _SPREAD = 0.25
@@ -145,6 +147,7 @@ def folds(points: FloatArray, offsets: IntArray, closed: BoolArray, radius: floa
     ahead = np.zeros(len(line), dtype=np.int64)
     first = np.cumsum(samples) - samples
     number = np.arange(len(line)) - first[line]
+    tangent = _smoothed(tangent, first[line], number, samples[line], closed[line])
     # A ring goes on behind its last sample with its first one.
     most = np.minimum(np.floor(window / step + 1e-9), samples - 1).astype(np.int64)[line]
     most = np.where(closed[line], most, np.minimum(most, samples[line] - 1 - number))
@@ -235,6 +238,25 @@ def _tangents(
     tangent: FloatArray = mean / np.maximum(np.linalg.norm(mean, axis=1), 1e-300)[:, None]
     position: FloatArray = (number + 0.5) * step[line]
     return line, position, tangent, step
+
+
+def _smoothed(
+    tangent: FloatArray,
+    first: IntArray,
+    number: IntArray,
+    samples: IntArray,
+    closed: BoolArray,
+) -> FloatArray:
+    """Average tangents over some samples: a printer does not feel a waver of a tenth of a mm.
+
+    At the ends of open polylines the average is over the samples that there are.
+    """
+    total = np.zeros_like(tangent)
+    for off in range(-_SMOOTH, _SMOOTH + 1):
+        place = number + off
+        inside = (closed | ((place >= 0) & (place < samples))).astype(float)
+        total += inside[:, None] * tangent[first + place % np.maximum(samples, 1)]
+    return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None])
 
 
 def _may_fold(

@@ -37,6 +37,7 @@ from ccfem.paths.linking.joining import Joined
 from ccfem.paths.linking.possible_links import ring_arc
 from ccfem.paths.planning.infill import Turns, with_turns
 from ccfem.paths.planning.strategy import Amount, LayerPlanner
+from ccfem.paths.planning.unfolding import unfolded
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.holes import holes_on
 from ccfem.slicing.layers.layer import Layer
@@ -168,6 +169,8 @@ be trimmed wherever numerical error brings them slightly nearer."""
 _TRIM = 0.98
 """Distance to a longer strand, in strand widths, below which a strand is cut. It is less than 1:
 the chords of curves that run side by side at one width come slightly nearer."""
+_PIECE = 3.0
+"""Length, in strand widths, of the shortest pieces kept for linking."""
 _SPIRAL_LIMIT = 4.0
 """Largest distance, in strand widths, between closed isocurves that are joined to a spiral."""
 
@@ -187,6 +190,7 @@ _LITERAL: Mapping[str, Any] = {
     "trim": False,
     "inset": 0.0,
     "smooth": False,
+    "folds": True,
 }
 
 
@@ -253,6 +257,9 @@ class Isocurve:
         enough is taken, as in the paper.
     turns : {"tight", "printable", "cut"}, default "tight"
         As in `Zigzag`.
+    folds : bool, default False
+        Whether strands may fold (`ccfem.paths.folds`), as in the paper. Otherwise they are led
+        round folds where there is room, and cut there where there is none.
     """
 
     cap: float = 86.0
@@ -278,6 +285,7 @@ class Isocurve:
     inset: float = 0.5
     smooth: bool = True
     turns: Turns = "tight"
+    folds: bool = False
 
     amount: ClassVar[Amount] = Amount(
         "density", most=4.0, least=0.05, beyond=(("floor", 0.0), ("cap", 40.0))
@@ -442,12 +450,15 @@ class _Planner:
         lines = keep_off_border(lines, section, s.inset * width)
         if s.trim:
             lines = trim_to_clearance(
-                [*rings, *lines], _TRIM * width, 3.0 * width, first=len(rings)
+                [*rings, *lines], _TRIM * width, _PIECE * width, first=len(rings)
             )
         else:
             lines = [*rings, *lines]
         if s.spiral:
             lines = spiral(lines, _SPIRAL_LIMIT * width, _nearest(layer, tension.stress), section)
+        if not s.folds:
+            link = [np.zeros(len(line), dtype=bool) for line in lines]
+            lines = unfolded(Joined(lines, link), section, machine, _PIECE * width).lines
         limit, least = s.link_limit * width, machine.minimum_length
         radius = machine.minimum_radius if s.smooth else 0.0
         paths = linked_paths(lines, section, width, limit, least, s.boundary_links, radius)

@@ -18,11 +18,13 @@ from ccfem.judging.virtual_testing.several_cases import specimens
 from ccfem.judging.virtual_testing.strand import RHO, Strand
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.strategy import Amount, LayerPlanner, Strategy
+from ccfem.paths.planning.unfolding import may_fold, without_folds
 from ccfem.paths.planning.whole_part import WholePart, full_length
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies import create
 from ccfem.strategies.fibre_aware.cut_and_move import prune_and_move
 from ccfem.strategies.fibre_aware.judges import Goal
+from ccfem.strategies.fibre_aware.plain_plans import plain_plans
 from ccfem.strategies.fibre_aware.plan_cases import plan_by_layers
 from ccfem.strategies.fibre_aware.shortening import TIGHT_SHARES
 from ccfem.strategies.fibre_aware.upper_bound import measures
@@ -38,7 +40,9 @@ _CASES_ROUNDS = 3
 class Pruned:
     """The most useful fibre of another strategy.
 
-    The load is that of the stress given to the strategy. Fibre is taken to carry tension only.
+    The load is that of the stress given to the strategy. Fibre is taken to carry tension only. With
+    the default base, straight rows along the mean tension and contours are pruned and tested too,
+    and the best is taken.
 
     Attributes
     ----------
@@ -104,6 +108,11 @@ class Pruned:
         check_fields(self, "strength", at_least=0.0, at_most=1.0)
         check_fields(self, "moves", at_least=0)
 
+    @property
+    def folds(self) -> bool:
+        """Whether strands may fold: those of a base that turns back by design."""
+        return may_fold(self._planner())
+
     def _planner(self) -> Strategy:
         """Underlying strategy with its parameters."""
         return create(self.of, {**_BASES.get(self.of, {}), **self.base})
@@ -164,15 +173,20 @@ class Pruned:
         lengths = [min(length, most) for length in lengths]
         planned = self.overfill * max(lengths)
         paths = plan_by_layers(self._planner(), layers, cases, machine, planned)
+        if not self.folds:
+            paths = without_folds(paths, layers, machine)
         in_all = max(lengths) * len(layers)
         bounds = measures(self.objective, cases, layers, in_all, machine, strand)
         goal = Goal(specimens(cases), cases.weights, bounds, self.objective)
         rounds = self.rounds if len(cases) == 1 else max(self.rounds, _CASES_ROUNDS)
         cut_by = (rounds, self.strength, self.moves, TIGHT_SHARES[self.turns])
+        tried = [paths]
+        if self.of == "isocurve" and not self.base:
+            tried += plain_plans(cases, layers, machine, curves=False)
         found: list[tuple[Pruned, LayerPlanner]] = []
         for length in lengths:
             wanted = length * len(layers)
-            kept = prune_and_move((paths,), layers, goal, wanted, machine, strand, *cut_by)
+            kept = prune_and_move(tried, layers, goal, wanted, machine, strand, *cut_by)
             coverage = length / full
             overfill = max(planned / full / coverage, 1.0)
             found.append((replace(self, coverage=coverage, overfill=overfill), WholePart(kept)))

@@ -42,6 +42,7 @@ from ccfem.strategies.fibre_aware.heights import (
     nearest_layer,
 )
 from ccfem.strategies.fibre_aware.judges import Goal
+from ccfem.strategies.fibre_aware.plain_plans import plain_plans
 from ccfem.strategies.fibre_aware.shortening import TIGHT_SHARES
 from ccfem.strategies.fibre_aware.smeared import SmearedPart, smeared_cases
 from ccfem.strategies.fibre_aware.spline_grid import SplineGrid
@@ -69,6 +70,9 @@ _ROUNDS = 3
 _CASES_OVERFILL = 1.15
 """Least overfill for several load cases: their tests then have more fibre to choose from."""
 
+_PLAIN_INSET = 0.5
+"""Distance of plain plans from the border, in strand widths: none are tested above it."""
+
 _WIDE = {"tight": 0.0, "cut": 1.3}
 """Radius, in machine radii, below which bends of the field have a cost."""
 
@@ -79,8 +83,10 @@ class StreamFunction:
 
     All layers share one field where the stress is about the same at all heights; otherwise the
     layers form groups over the height with one field each. The fields are designed for slightly too
-    much fibre; of their isocurves, the stretches that are worth most are kept. The load is that of
-    the stress given to the strategy. Fibre is taken to carry tension only.
+    much fibre; of their isocurves, the stretches that are worth most are kept. Straight rows along
+    the mean tension, contours and `isocurve` are cut to the same length and tested too, and the
+    best is taken. The load is that of the stress given to the strategy. Fibre is taken to carry
+    tension only.
 
     Attributes
     ----------
@@ -110,6 +116,7 @@ class StreamFunction:
     inset : float, default 0.5
         Least distance between strands or links and the boundary, in strand widths. At 0.5 whole
         strands lie inside; at 0 they may run along the boundary with half their width outside.
+        Straight rows, tested up to 0.5, lie inside with their width and may end on the boundary.
     objective : {"worst", "sum", "least"}
         How several load cases count: the case farthest from its own stiffest design, the weighted
         mean over the cases, or the case that gains least over the part without fibre.
@@ -266,8 +273,9 @@ class StreamFunction:
             strong = design_for_strength(problem, fields, solutions, *how)
             tried = _with_first(candidates(strong), tried)
         cut_by = (_ROUNDS, self.strength, self.moves, TIGHT_SHARES[self.turns])
+        plain = plain_plans(cases, layers, machine) if self.inset <= _PLAIN_INSET else []
         return [
-            prune_and_move(some, layers, goal, length, machine, strand, *cut_by)
+            prune_and_move([*some, *plain], layers, goal, length, machine, strand, *cut_by)
             for some, length in zip(tried, in_all, strict=True)
         ]
 

@@ -91,6 +91,17 @@ def test_two_square_corners_fold_within_the_window_only():
         assert of(line).counts.tolist() == [fold], apart
 
 
+def test_wavers_of_a_tenth_of_a_millimetre_are_no_folds():
+    """Points of a planned strand, which turns by more than a right angle over 0.15 mm, and back."""
+    line = [
+        (9.266, 45.939), (9.641, 45.481), (10.016, 45.023), (10.402, 44.575), (10.755, 44.1),
+        (10.726, 43.952), (10.845, 43.973), (10.892, 43.805), (10.906, 43.793), (10.935, 43.693),
+        (11.066, 43.692), (11.083, 43.586), (11.145, 43.576), (11.536, 43.12), (11.928, 42.665),
+    ]  # fmt: skip
+    assert of(line).counts.tolist() == [0]
+    assert of(line[::-1]).counts.tolist() == [0]
+
+
 def test_turns_to_and_fro_cancel():
     """Right by 80 degrees and left again within the window is a step aside, no fold."""
     turn = np.radians(80.0)

@@ -180,7 +180,9 @@ def test_conformal_curves_follow_the_named_hole() -> None:
     radius = np.hypot(*np.moveaxis(mesh.points[mesh.boundary][:, :, :2], -1, 0))
     hole = mesh.boundary[(radius < 8.001).all(axis=1)]
     field = field_of(mesh.with_patches({"hole": hole}), uniform(0.0))
-    paths, _ = planned(Isocurve(conformal=("hole",), spiral=False, link_limit=0.0), field)
+    # Where isocurves are led into the last curve they fold: with folds, their ends are all there.
+    led = Isocurve(conformal=("hole",), spiral=False, link_limit=0.0, folds=True)
+    paths, _ = planned(led, field)
     reach = [np.hypot(line[:, 0], line[:, 1]) for line in paths]
     assert min(r.min() for r in reach) == pytest.approx(9.5, abs=0.05)
     rings = [r for r in reach if np.ptp(r) < 0.05]
@@ -285,7 +287,9 @@ def test_halves_of_a_symmetric_lug_get_the_same_fibre(
     )
     case = read_part(file)
     field = solve(case.problem)["pull"]
-    paths, layers = planned(Isocurve(), field)
+    # Short pieces stay: of two that are alike one may be a hair too short, and go as a whole.
+    layers = Planar(count=1).cut(field.mesh)
+    paths = plan(Isocurve(), layers, field, replace(MACHINE, minimum_length=10.0))
     width = MACHINE.fibre_width
     upper = lower = 0.0
     for line in paths:
@@ -325,7 +329,9 @@ def test_figures_on_the_authors_loop() -> None:
     assert total["outside_width"] <= 0.005
     assert why_not(total, case.machine) == ()
     assert sharpest_strand(paths) <= 90.0
-    linked = plan(Isocurve(smooth=False, link_limit=7.0, inset=0.0), layers, field, MACHINE)
+    linked = plan(
+        Isocurve(smooth=False, link_limit=7.0, inset=0.0, folds=True), layers, field, MACHINE
+    )
     assert np.bincount(linked.layer).max() <= 16
 
 

@@ -11,8 +11,9 @@ from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.geometry.dubins import WORDS, shortest_curve, word_sizes
-from ccfem.geometry.polylines import along_line, is_closed, points_along
+from ccfem.geometry.polylines import along_line, is_closed, pack, points_along
 from ccfem.geometry.shapes import Region, Shapes, strings
+from ccfem.paths.folds import folds
 
 CLEARANCE = 0.9
 """Least distance of a link from other strands, in widths. Ends on a slanted boundary are slightly
@@ -21,6 +22,10 @@ nearer to each other than the strands are."""
 CLOSING_TURN = np.deg2rad(60.0)
 """Largest turn, both ends together, of a link that closes a path to a ring. A path of two
 neighbouring strands that closes on itself could no longer join the next strand."""
+
+_MARGIN, _WINDOWS = 1.08, 1.2
+"""Factor on the radius by which folds are looked for, and length of the strands beside a link that
+is looked at, in radii: later steps move points a little."""
 
 _ON_BORDER = 1e-6
 """Distance, mm, by which rounding may move points off a border."""
@@ -62,7 +67,8 @@ def possible_links(
 ) -> list[Link]:
     """Find links between near ends: straight, along the boundary, and smooth if there is a radius.
 
-    Parameters as in `ccfem.paths.linking.joining.link_ends`. Free space is not checked yet.
+    Parameters as in `ccfem.paths.linking.joining.link_ends`. Free space is not checked yet. With a
+    radius there are no links at which a strand would fold (`ccfem.paths.folds`).
     """
     opened = [k for k, line in enumerate(lines) if not is_closed(line)]
     if not opened or limit <= 0.0:
@@ -78,7 +84,23 @@ def possible_links(
     if radius > 0.0:
         found = smooth_links(lines, ends, limit, width, radius)
         links += [Link(*link, smooth=True) for link in found]
+        links = _without_folds(lines, links, radius)
     return links
+
+
+def _without_folds(lines: Sequence[FloatArray], links: list[Link], radius: float) -> list[Link]:
+    """Links in which the joined strand does not fold, nor where it enters and leaves them."""
+    joined = []
+    for link in links:
+        ends = ((link.first, link.path[0]), (link.second, link.path[-1]))
+        heads = [
+            _head(cut_start(lines[end // 2][:: -1 if end % 2 else 1], place), _WINDOWS * radius)
+            for end, place in ends
+        ]
+        joined.append(np.concatenate([heads[0][:0:-1], link.path, heads[1][1:]]))
+    open_ = np.zeros(len(links), dtype=bool)
+    counts = folds(*pack(joined), open_, _MARGIN * radius).counts
+    return [link for link, count in zip(links, counts.tolist(), strict=True) if not count]
 
 
 def free_links(

@@ -20,6 +20,7 @@ from ccfem.paths.planning.plan import check_layers, plan, plan_layers
 from ccfem.paths.planning.planned import Planned
 from ccfem.paths.planning.short_pieces import about_short_pieces
 from ccfem.paths.planning.strategy import LengthStrategy, Strategy
+from ccfem.paths.planning.unfolding import may_fold
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
@@ -269,7 +270,7 @@ def plan_to_lengths(
         return [
             _planned(
                 told,
-                plan_layers(planner, layers, layers, stress, machine),
+                plan_layers(planner, layers, layers, stress, machine, may_fold(told)),
                 layers,
                 machine,
                 wanted,

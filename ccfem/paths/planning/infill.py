@@ -14,13 +14,14 @@ from ccfem.base.checks import check_choices, check_fields
 from ccfem.base.threads import in_threads
 from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.geometry.even_steps import OFF, even_steps
-from ccfem.geometry.polylines import along_line, angles_between, between, is_closed, points_along
+from ccfem.geometry.polylines import along_line, angles_between, is_closed, points_along
 from ccfem.geometry.sections import corners_only
 from ccfem.geometry.shapes import Region
 from ccfem.geometry.tight_bends import tight_bends, tight_samples
 from ccfem.machine.machine import Machine
 from ccfem.paths.linking.joining import Joined
 from ccfem.paths.planning.strategy import Amount, LayerPlanner
+from ccfem.paths.planning.unfolding import off_links, piece
 from ccfem.paths.raster.bitmap import Bitmap, bitmap
 from ccfem.paths.raster.patterns import Regions
 from ccfem.paths.raster.raster_plan import RasterPlan, raster_plan
@@ -256,7 +257,7 @@ def cut_turns(
         else:
             along = along_line(line)
             pieces = _pieces(line, along, radius, width, least, pitch)
-            parts = [_piece(line, along, mark, *piece) for piece in pieces] or [(line, mark)]
+            parts = [piece(line, along, mark, *ends) for ends in pieces] or [(line, mark)]
         found.lines.extend(part for part, _ in parts)
         found.link.extend(marked for _, marked in parts)
     return found
@@ -287,7 +288,7 @@ def _unbent(
     if not len(a):
         return [(line, link)]
     pieces = _between_bends(line, along, link, a, b, width, least)
-    parts = [_piece(line, along, link, *piece) for piece in pieces]
+    parts = [piece(line, along, link, *ends) for ends in pieces]
     return [each for part in parts for each in _unbent(*part, radius, width, least, True)]
 
 
@@ -313,7 +314,7 @@ def _between_bends(
         stop = np.append(stop[1:], stop[0] + size)
     else:
         start, stop = np.append(0.0, start), np.append(stop, size)
-    start, stop = _off_links(start, stop, along, link)
+    start, stop = off_links(start, stop, along, link)
     kept = stop - start >= least
     start, stop = start[kept], stop[kept]
     # Of two that meet in a turn the first ends a width before the second, or that begins after it.
@@ -327,21 +328,6 @@ def _between_bends(
             start[after] += _room(places, float(start[after]), 1, float(stop[k]), width)
     kept = stop - start >= least
     return list(zip(start[kept].tolist(), stop[kept].tolist(), strict=True))
-
-
-def _off_links(
-    start: FloatArray, stop: FloatArray, along: FloatArray, link: BoolArray
-) -> tuple[FloatArray, FloatArray]:
-    """Move starts and ends of pieces off links to the strands between; to nothing without any."""
-    if not link.any():
-        return start, stop
-    strand, size = np.flatnonzero(~link[:-1]), float(along[-1])
-    first = np.concatenate([along[strand] + k * size for k in range(3)])  # pieces run over the end
-    last = np.concatenate([along[strand + 1] + k * size for k in range(3)])
-    after = np.searchsorted(last, start, side="right")
-    before = np.searchsorted(first, stop) - 1
-    first, last = np.append(first, np.inf), np.append(last, np.inf)
-    return np.maximum(start, first[after]), np.minimum(stop, last[before])
 
 
 def _pieces(
@@ -468,21 +454,3 @@ def _chosen(turns: _Turns, size: float, least: float) -> list[int]:
         cuts.append(k - 1)
         k = int(source[k])
     return cuts[::-1]
-
-
-def _piece(
-    line: FloatArray, along: FloatArray, link: BoolArray, start: float, stop: float
-) -> _Marked:
-    """Part of a line between two places of its arc length, and which of its steps are links."""
-    size = float(along[-1])
-    start, stop = (start % size, start % size + stop - start) if start >= size else (start, stop)
-    if stop <= size:
-        piece = between(line, start, stop)
-    else:
-        piece = np.concatenate([between(line, start, size)[:-1], between(line, 0.0, stop - size)])
-    piece = piece[np.append(True, np.linalg.norm(np.diff(piece, axis=0), axis=1) > 1e-9)]
-    if not link.any():
-        return piece, np.zeros(len(piece), dtype=bool)
-    middle = start + along_line(piece)[:-1] + 0.5 * np.linalg.norm(np.diff(piece, axis=0), axis=1)
-    step = np.searchsorted(along, middle % size, side="right") - 1
-    return piece, np.append(link[step], False)

@@ -13,6 +13,7 @@ from ccfem.geometry.even_steps import OFF, even_steps
 from ccfem.machine.machine import Machine
 from ccfem.paths.fields.chart import chart_of, flat_view
 from ccfem.paths.planning.strategy import LayerPlanner, PartStrategy, Strategy
+from ccfem.paths.planning.unfolding import may_fold, unfolded_paths
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import stress_on
@@ -54,7 +55,7 @@ def plan(
         planner: LayerPlanner = strategy.for_part(stress, views, machine)
     else:
         planner = strategy
-    return plan_layers(planner, layers, views, stress, machine)
+    return plan_layers(planner, layers, views, stress, machine, may_fold(strategy))
 
 
 def plan_layers(
@@ -63,8 +64,12 @@ def plan_layers(
     views: Sequence[Layer],
     stress: PartStress,
     machine: Machine,
+    fold: bool = False,
 ) -> Toolpaths:
     """Paths of all layers by one planner, in steps of at most a fibre width.
+
+    This is the last that changes strands: unless they may fold they are led round folds or cut
+    there (`ccfem.paths.planning.unfolding`).
 
     Parameters
     ----------
@@ -72,12 +77,17 @@ def plan_layers(
         Called from several threads at once, each with a layer of its own.
     views : sequence of Layer
         The same layers as passed to the planner: laid flat if it works in a plane.
+    fold : bool, default False
+        Whether strands may fold.
     """
 
     def planned(layer: Layer, view: Layer) -> Toolpaths:
         paths = planner(view, stress_on(view, stress), machine)
+        if not fold:
+            paths = unfolded_paths(paths, view, machine)
         paths = in_even_steps(paths, machine.fibre_width)
-        return paths if view is layer else chart_of(layer).lifted(paths)
+        paths = paths if view is layer else chart_of(layer).lifted(paths)
+        return paths if fold else unfolded_paths(paths, None, machine)
 
     return Toolpaths.concatenate(in_threads(planned, layers, views))
 

@@ -11,6 +11,7 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.machine.machine import Machine
+from ccfem.paths.planning.unfolding import without_folds
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.judges import (
@@ -109,12 +110,11 @@ def _moved(
 ) -> Toolpaths:
     """Move the paths once for each judge, and cut those that have become longer.
 
-    With several judges the first one chooses among the results and the unmoved paths.
+    The first judge chooses among the results, as they are without folds, and the unmoved paths.
     """
-    radius, found = kept_radius(machine, tight), []
-    for judge in judges:
+    radius, results = kept_radius(machine, tight), []
+    for judge in judges if moves else ():
         slid = moved(kept, layers, mesh, machine, judge, moves, radius=radius)
-        found += [] if slid is kept else [cut(slid, 0.0, 1)]
-    if not found:
-        return kept
-    return stiffest([*found, kept], judges[0]) if len(judges) > 1 else found[0]
+        if slid is not kept:
+            results.append(without_folds(cut(slid, 0.0, 1), layers, machine))
+    return stiffest([*results, kept], judges[0])

@@ -18,8 +18,11 @@ from ccfem.judging.virtual_testing.strands import cut_strands
 from ccfem.machine.machine import Machine
 from ccfem.paths.linking.clearance import trim_to_clearance
 from ccfem.paths.linking.finishing import keep_off_border, linked_paths, long_enough
+from ccfem.paths.linking.joining import Joined
+from ccfem.paths.planning.unfolding import unfolded, unfolded_paths
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
+from ccfem.strategies.fibre_aware.hole_wraps import LEVELS, led_round_holes
 from ccfem.strategies.fibre_aware.path_profile import Profile, least_price
 from ccfem.strategies.fibre_aware.prune import profiles
 from ccfem.strategies.fibre_aware.spline_grid import SplineGrid
@@ -204,9 +207,37 @@ class Extraction:
     def strands(self, layer: Layer, field: FloatArray, shift: float) -> list[FloatArray]:
         """Trace the levels, and cut strands that can slide neither off the border nor apart."""
         width = self.machine.fibre_width
-        lines = self.levels(layer, field, shift)
+        lines = self.unfolded(self.levels(layer, field, shift), layer)
         lines = lines_to_slide_in(lines, layer.plane.polygon, self.inset * width)
-        return trim_to_clearance(lines, CLEARANCE * width, SHORTEST * width)
+        lines = trim_to_clearance(lines, CLEARANCE * width, SHORTEST * width)
+        return self.round_holes(lines, layer)
+
+    def round_holes(self, lines: list[FloatArray], layer: Layer) -> list[FloatArray]:
+        """Lead strands that end at the wall of a hole round it, as many as there is room for.
+
+        Of no, one, two or three strands on each side, take what leaves most in printable strands.
+        """
+        machine, section = self.machine, layer.plane.polygon
+        width = machine.fibre_width
+
+        def printable(strands: list[FloatArray]) -> float:
+            sizes = [line_length(line) for line in strands]
+            return sum(size for size in sizes if size >= machine.minimum_length)
+
+        best, count = lines, len(lines)
+        for levels in range(1, LEVELS + 1):
+            led = led_round_holes(lines, section, width, 0.75 * machine.minimum_radius, levels)
+            if len(led) == count:
+                break  # no further strand to be led round
+            count = len(led)
+            paths = Toolpaths.from_plane(led, layer)
+            paths = slid_out(paths, layer, machine, self.inset, levels, self.radius)
+            room = [layer.plane.project(path) for path in paths]
+            room = lines_to_slide_in(room, section, self.inset * width)
+            room = trim_to_clearance(room, CLEARANCE * width, SHORTEST * width)
+            if printable(room) > printable(best):
+                best = room
+        return best
 
     def linked(self, layer: Layer, lines: list[FloatArray], reach: float = 0.0) -> Toolpaths:
         """Link the strands of one layer, and slide the paths inwards.
@@ -224,7 +255,14 @@ class Extraction:
         else:
             found = linked_paths(lines, section, width, limit, least, radius=radius)
         paths = Toolpaths.from_plane(found.lines, layer, link=found.link)
-        return slid_in(paths, layer, self.machine, self.inset, self.radius)
+        paths = slid_in(paths, layer, self.machine, self.inset, self.radius)
+        return unfolded_paths(paths, layer, self.machine)
+
+    def unfolded(self, lines: list[FloatArray], layer: Layer) -> list[FloatArray]:
+        """Lines led round their folds or cut there, before they are linked."""
+        link = [np.zeros(len(line), dtype=bool) for line in lines]
+        least = SHORTEST * self.machine.fibre_width
+        return unfolded(Joined(lines, link), layer.plane.polygon, self.machine, least).lines
 
     def levels(self, layer: Layer, field: FloatArray, shift: float) -> list[FloatArray]:
         """Trace the levels `shift` above whole numbers on a layer, (n, 2), mm."""
@@ -289,6 +327,9 @@ _DEPTH = 0.8
 _ROUNDS = 2
 """Number of slides, each along the normals of the paths after the last one."""
 
+_OUT = 0.25
+"""Steps, in widths, in which strands are slid out of holes: the way out changes as they go."""
+
 _INNER, _APART = 1.01, 1.004
 """Factors on the distances that slides aim at: from the border, and between strands. A slide only
 approaches its aim, and the steps between points cut corners."""
@@ -348,6 +389,21 @@ def slid_in(
         apart = spacing(lines, (layer,), _APART * width, off, come_in=True, radius=radius)
         paths = lines.slid(apart.spread(np.zeros(len(lines.path))))
     return _ends_cut(_back_inside(paths, layer), layer, inset * width, machine)
+
+
+def slid_out(
+    paths: Toolpaths, layer: Layer, machine: Machine, inset: float, depth: float, radius: float
+) -> Toolpaths:
+    """Slide paths that are led through holes out of them, in small steps, and others ahead of them.
+
+    Parameters as of `slid_in`; `depth` is how far inside a hole paths lie, in strand widths.
+    """
+    width, off = machine.fibre_width, _INNER * inset
+    for step in np.append(np.arange(off - depth - 1.0, off, _OUT), off):
+        lines = strand_lines(paths, (layer,), machine, hold=False)
+        apart = spacing(lines, (layer,), _APART * width, step * width, come_in=True, radius=radius)
+        paths = lines.slid(apart.spread(np.zeros(len(lines.path))))
+    return paths
 
 
 def _back_inside(paths: Toolpaths, layer: Layer) -> Toolpaths:

@@ -1,6 +1,7 @@
 """Links that keep a radius, and those with corners where a path would be too short without."""
 
 import numpy as np
+import pytest
 import shapely
 
 from ccfem.geometry.polylines import line_length
@@ -52,20 +53,21 @@ def test_the_shortest_link_of_a_shift_is_two_arcs():
     assert np.hypot(5.0, 1.0) < line_length(link.path) <= straight + 2.0 * RADIUS * angle + 0.01
 
 
-def test_neighbours_turn_with_corners_only_where_one_is_too_short_and_are_marked():
-    lines = [strand((0.0, 0.0), (30.0, 0.0)), strand((0.0, 1.0), (30.0, 1.0))]
-    apart = link_ends(lines, PLATE, 3.0, WIDTH, radius=RADIUS, enough=25.0)
-    assert len(apart.lines) == 2
-    assert not any(link.any() for link in apart.link)
-    (path,), (link,) = link_ends(lines, PLATE, 3.0, WIDTH, radius=RADIUS, enough=35.0)
-    steps = np.hypot(*np.diff(path, axis=0).T)
-    assert steps[link[:-1]].sum() == 1.0  # the step from one strand to the other
-    assert line_length(path) == 61.0
-
-
-def test_only_as_many_links_with_corners_as_are_needed():
-    """Strands of 20 mm and paths of at least 44 mm: three to a path, not all in one."""
+def test_neighbours_are_not_led_back_beside_each_other():
+    """A turn back within a width is a fold, however short the strands are that it would join."""
     lines = [strand((0.0, float(k)), (20.0, float(k))) for k in range(9)]
-    found = link_ends(lines, PLATE, 1.5, WIDTH, radius=RADIUS, enough=44.0)
-    assert [len(line) for line in found.lines] == 3 * [3 * len(lines[0])]
+    for enough in (10.0, 44.0):
+        apart = link_ends(lines, PLATE, 1.5, WIDTH, radius=RADIUS, enough=enough)
+        assert len(apart.lines) == 9
+        assert not any(link.any() for link in apart.link)
     assert link_ends(lines, PLATE, 1.5, WIDTH).lines[0].shape[0] == sum(map(len, lines))
+
+
+def test_links_with_corners_join_strands_that_are_too_short_and_are_marked():
+    """Strands of 2 mm cannot be cut back for a smooth link a millimetre aside; turns cancel."""
+    lines = [strand((18.0, 0.0), (20.0, 0.0)), strand((21.0, 1.0), (23.0, 1.0))]
+    (path,), (link,) = link_ends(lines, PLATE, 1.5, WIDTH, radius=RADIUS, enough=25.0)
+    steps = np.hypot(*np.diff(path, axis=0).T)
+    assert steps[link[:-1]].sum() == pytest.approx(np.sqrt(2.0))
+    apart = link_ends(lines, PLATE, 1.5, WIDTH, radius=RADIUS, enough=1.5)
+    assert not any(link.any() for link in apart.link)

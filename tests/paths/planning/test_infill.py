@@ -15,6 +15,7 @@ from ccfem.machine.machine import Machine
 from ccfem.paths.planning import plan
 from ccfem.paths.planning.infill import Infill, long_enough
 from ccfem.paths.planning.plan import in_even_steps
+from ccfem.paths.planning.unfolding import may_fold, unfolded_paths
 from ccfem.paths.raster.patterns import grid_regions
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer_stress import stress_on
@@ -89,7 +90,11 @@ def test_a_part_is_planned_as_its_layers_are(strategy, part):
     whole = plan(strategy, layers, stress, MACHINE)
     for layer in layers[:2]:
         alone = strategy(layer, stress_on(layer, stress), MACHINE)
-        alone = in_even_steps(alone, MACHINE.fibre_width)
+        if may_fold(strategy):
+            alone = in_even_steps(alone, MACHINE.fibre_width)
+        else:
+            alone = in_even_steps(unfolded_paths(alone, layer, MACHINE), MACHINE.fibre_width)
+            alone = unfolded_paths(alone, None, MACHINE)
         np.testing.assert_array_equal(whole.on_layer(layer.index).points, alone.points)
     planner(layers[0], stress_on(layers[0], stress), MACHINE)
     held = [x for made in planner.known.values() for x in made if isinstance(x, shapely.Geometry)]

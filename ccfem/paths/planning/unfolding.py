@@ -1,0 +1,319 @@
+"""Strands without folds: led round more widely where there is room, otherwise cut.
+
+A fold (`ccfem.paths.folds`) is replaced by the shortest curve of the machine's least radius from a
+place before it to one behind it (Dubins), or of the least radius that does not fold. Where that
+curve would come too near to another strand or to the border, the strand ends before the fold, and
+another begins behind it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import shapely
+
+from ccfem.base.arrays import BoolArray, FloatArray
+from ccfem.geometry.dubins import shortest_curve
+from ccfem.geometry.polylines import along_line, is_closed, line_length, pack, points_along
+from ccfem.geometry.shapes import Region, strings
+from ccfem.machine.machine import Machine
+from ccfem.paths.folds import WINDOW, Folds, folds
+from ccfem.paths.linking.joining import Joined
+from ccfem.paths.toolpaths import FIBRE, Toolpaths
+from ccfem.slicing.layers.layer import Layer
+
+_MARGIN = 1.08
+"""Factor on the machine's radius by which folds are looked for: what follows moves points by some
+hundredths of a width, and whoever counts folds may take other points of a strand."""
+
+_RADII = (1.0, 0.75)
+"""Radii of curves that replace a fold, in least radii of the machine; a circle of 0.66 folds."""
+
+_REACHES = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0)
+"""Distances before and behind a fold at which a curve may leave the strand, in windows."""
+
+_DETOUR = 1.3
+"""Length of such a curve over that of the strand that it replaces, at most."""
+
+_CLEARANCE, _INSET = 0.9, 0.48
+"""Least distances of such a curve from other strands, and from the border, in widths."""
+
+_STEP = 0.25
+"""Longest step of such a curve, in widths."""
+
+_ROUNDS = 4
+"""Number of times that the pieces of a strand are cut again."""
+
+_Marked = tuple[FloatArray, BoolArray]
+"""Points (n, d) of a line, and the mask (n,) of its steps that are links."""
+
+
+def may_fold(strategy: object) -> bool:
+    """Whether the strands of a strategy may fold.
+
+    Those of published patterns that turn back by design do, and paths of pixels, whose corners lie
+    at every pixel: `folds`, a parameter or class variable, and a `mode` that is "raster".
+    """
+    return bool(getattr(strategy, "folds", False)) or getattr(strategy, "mode", "") == "raster"
+
+
+def unfolded(joined: Joined, section: Region, machine: Machine, least: float) -> Joined:
+    """Lead strands round their folds, or cut them there.
+
+    Parameters
+    ----------
+    joined : Joined
+        Lines (n_i, 2), mm, and which of their steps are links.
+    section : Polygon or MultiPolygon
+        In which they lie.
+    machine : Machine
+        With its least radius and its fibre width.
+    least : float, mm
+        Pieces of cut lines that are shorter are dropped.
+
+    Returns
+    -------
+    Joined
+        Lines without folds as they were; the pieces of each line in its order.
+    """
+    lines, radius = joined.lines, _MARGIN * machine.minimum_radius
+    found = _folds_of(lines, radius)
+    if not len(found.line):
+        return joined
+    rounding = _Rounding(lines, section, machine)
+    result = Joined([], [])
+    for k, marked in enumerate(zip(*joined, strict=True)):
+        pieces = [marked]
+        if found.counts[k]:
+            pieces = _cut(rounding.led_round(k, *marked), radius, least)
+        result.lines.extend(line for line, _ in pieces)
+        result.link.extend(link for _, link in pieces)
+    return result
+
+
+def unfolded_paths(
+    paths: Toolpaths, layer: Layer | None, machine: Machine, least: float | None = None
+) -> Toolpaths:
+    """Fibre of one layer, led round its folds or cut there; on a curved layer it is only cut.
+
+    Parameters
+    ----------
+    layer : Layer or None
+        None for paths that are final: they are only cut, and folds looked for without a margin.
+    least : float, mm, optional
+        Pieces of cut paths that are shorter are dropped; by default the machine's least length.
+    """
+    least, radius = machine.minimum_length if least is None else least, machine.minimum_radius
+    radius *= _MARGIN if layer is not None else 1.0
+    found = folds(paths.points, paths.offsets, paths.closed, radius)
+    folded = (found.counts > 0) & (paths.kind == FIBRE)
+    if not folded.any():
+        return paths
+    spans = [slice(a, b) for a, b in pairwise(paths.offsets)]
+    rounding: _Rounding | None = None
+    if layer is not None and layer.flat is not None:
+        plane = [layer.plane.project(paths.points[span]) for span in spans]
+        rounding = _Rounding(plane, layer.plane.polygon, machine)
+    columns: list[FloatArray] = []
+    links: list[BoolArray] = []
+    source = []
+    for k, span in enumerate(spans):
+        pieces = [(np.hstack([paths.points[span], paths.normals[span]]), paths.link[span])]
+        if folded[k] and rounding is not None and layer is not None:
+            cut = _cut(rounding.led_round(k, plane[k], paths.link[span]), radius, least)
+            up = paths.normals[span.start]
+            pieces = [(_in_space(line, layer, up), link) for line, link in cut]
+        elif folded[k]:
+            pieces = _cut(pieces[0], radius, least)
+        columns += [line for line, _ in pieces]
+        links += [link for _, link in pieces]
+        source += len(pieces) * [k]
+    if not columns:
+        return Toolpaths.empty()
+    stacked = np.concatenate(columns)
+    return replace(
+        paths,
+        points=stacked[:, :3],
+        normals=stacked[:, 3:] / np.linalg.norm(stacked[:, 3:], axis=1)[:, None],
+        offsets=np.concatenate([[0], np.cumsum([len(line) for line in columns])]),
+        layer=paths.layer[source],
+        kind=paths.kind[source],
+        closed=paths.closed[source] & [is_closed(line[:, :3]) for line in columns],
+        link=np.concatenate(links),
+    )
+
+
+def without_folds(paths: Toolpaths, layers: Sequence[Layer], machine: Machine) -> Toolpaths:
+    """Paths of several layers, led round their folds or cut there: see `unfolded_paths`."""
+    return Toolpaths.concatenate(
+        unfolded_paths(paths.on_layer(layer.index), layer, machine) for layer in layers
+    )
+
+
+def piece(
+    line: FloatArray, along: FloatArray, link: BoolArray, start: float, stop: float
+) -> _Marked:
+    """Part of a line (n, c) between two places of its arc length, and which of its steps are links.
+
+    On a closed line `stop` may exceed the length; the part then runs on over the start.
+
+    Parameters
+    ----------
+    along : (n,) array, mm
+        Arc length at its points; all its columns are interpolated by it.
+    """
+    size = float(along[-1])
+    if start >= size:
+        start, stop = start - size, stop - size
+    twice = np.append(along[:-1], along + size)
+    inner = twice[(twice > start + 1e-9) & (twice < stop - 1e-9)]
+    place = np.concatenate([[start], inner, [stop]])
+    place = place[np.append(True, np.diff(place) > 1e-9)]
+    middle = 0.5 * (place[1:] + place[:-1])
+    place = np.where(place > size, place - size, place)
+    step = np.searchsorted(along, np.where(middle > size, middle - size, middle), "right") - 1
+    marks = np.append(link[np.clip(step, 0, len(link) - 2)], False)
+    return points_along(line, along, place), marks
+
+
+def off_links(
+    start: FloatArray, stop: FloatArray, along: FloatArray, link: BoolArray
+) -> tuple[FloatArray, FloatArray]:
+    """Move starts and ends of pieces off links to the strands between; to nothing without any."""
+    if not link.any():
+        return start, stop
+    strand, size = np.flatnonzero(~link[:-1]), float(along[-1])
+    first = np.concatenate([along[strand] + k * size for k in range(3)])  # pieces run over the end
+    last = np.concatenate([along[strand + 1] + k * size for k in range(3)])
+    after = np.searchsorted(last, start, side="right")
+    before = np.searchsorted(first, stop) - 1
+    first, last = np.append(first, np.inf), np.append(last, np.inf)
+    return np.maximum(start, first[after]), np.minimum(stop, last[before])
+
+
+def _folds_of(lines: Sequence[FloatArray], radius: float) -> Folds:
+    """Folds of lines (n_i, c); the first three columns of more than three are the points."""
+    points, offsets = pack(list(lines))
+    closed = np.array([is_closed(line) for line in lines], dtype=bool)
+    return folds(points[:, :3], offsets, closed, radius)
+
+
+def _in_space(line: FloatArray, layer: Layer, normal: FloatArray) -> FloatArray:
+    """Points in space and their normals, (n, 6), of a line (n, 2) on a flat layer."""
+    points = layer.plane.to_space(line)
+    return np.hstack([points, np.broadcast_to(normal, points.shape)])
+
+
+def _cut(marked: _Marked, radius: float, least: float) -> list[_Marked]:
+    """Parts of a line (n, c) without folds that are long enough; the line itself where none is."""
+    pieces, again = [marked], _ROUNDS
+    while again:
+        found = _folds_of([line for line, _ in pieces], radius)
+        if not len(found.line):
+            break
+        again -= 1
+        number, start, stop = found.free()
+        parts: list[_Marked] = []
+        for k, (line, link) in enumerate(pieces):
+            if not found.counts[k]:
+                parts.append((line, link))
+                continue
+            along, own = along_line(line[:, :3]), number == k
+            a, b = off_links(start[own], stop[own], along, link)
+            long = b - a >= least
+            parts += [
+                piece(line, along, link, *ends) for ends in zip(a[long], b[long], strict=True)
+            ]
+        pieces = parts
+        if not pieces:
+            break
+    return pieces
+
+
+class _Rounding:
+    """Curves that replace folds, and the room for them."""
+
+    def __init__(self, lines: Sequence[FloatArray], section: Region, machine: Machine) -> None:
+        self.width, self.radius = machine.fibre_width, machine.minimum_radius
+        self.window = WINDOW * self.radius
+        self.room = shapely.buffer(section, -_INSET * self.width)
+        shapely.prepare(self.room)
+        self.strands = strings(lines)
+        self.tree = shapely.STRtree(self.strands)
+        self.curves: list[shapely.LineString] = []
+
+    def led_round(self, k: int, line: FloatArray, link: BoolArray) -> _Marked:
+        """Lead line number k (n, 2) round as many of its folds as there is room for."""
+        found = _folds_of([line], _MARGIN * self.radius)
+        if is_closed(line):
+            # From the middle of the longest part without folds on, a ring is like an open line.
+            _, start, stop = found.free()
+            if not len(start):
+                return line, link
+            longest = int(np.argmax(stop - start))
+            middle, along = 0.5 * float(start[longest] + stop[longest]), along_line(line)
+            line, link = piece(line, along, link, middle, middle + float(along[-1]))
+            line[-1] = line[0]
+            found = _folds_of([line], _MARGIN * self.radius)
+        for start, stop in zip(found.start[::-1], found.stop[::-1], strict=True):
+            line, link = self._without(k, line, link, float(start), float(stop)) or (line, link)
+        return line, link
+
+    def _without(
+        self, k: int, line: FloatArray, link: BoolArray, start: float, stop: float
+    ) -> _Marked | None:
+        """Line with a curve in place of the fold between two places; None without room for it."""
+        along = along_line(line)
+        size = float(along[-1])
+        for radius in _RADII:
+            for reach in _REACHES:
+                a, b = start - reach * self.window, stop + reach * self.window
+                if a < 0.0 or b > size:
+                    break
+                curve = self._curve(line, along, a, b, radius * self.radius)
+                if line_length(curve) > _DETOUR * (b - a):
+                    continue
+                before = along < a - 1e-9
+                after = along > b + 1e-9
+                longer = np.concatenate([line[before], curve, line[after]])
+                near = slice(
+                    max(int(np.searchsorted(along, a - self.window)) - 1, 0),
+                    int(before.sum() + len(curve) + (along[after] < b + self.window).sum() + 1),
+                )
+                if len(_folds_of([longer[near]], _MARGIN * self.radius).line):
+                    continue
+                if not self._clear(k, curve, line[along < a - 2.0 * self.width],
+                                   line[along > b + 2.0 * self.width]):  # fmt: skip
+                    continue
+                marked = bool(link[np.searchsorted(along, a) : np.searchsorted(along, b)].any())
+                marks = [link[before], np.full(len(curve), marked), link[after]]
+                self.curves.append(shapely.linestrings(curve))
+                whole = np.concatenate(marks)
+                whole[-1] = False
+                return longer, whole
+        return None
+
+    def _curve(
+        self, line: FloatArray, along: FloatArray, a: float, b: float, radius: float
+    ) -> FloatArray:
+        """Shortest curve of a radius that leaves a line at one place and meets it at another."""
+
+        def pose(place: float) -> FloatArray:
+            near = np.clip(place + 0.5 * self.width * np.array([-1.0, 1.0]), 0.0, along[-1])
+            (x, y), (u, v) = points_along(line, along, near)
+            here = points_along(line, along, np.array([place]))[0]
+            return np.array([*here, np.arctan2(v - y, u - x)])
+
+        return shortest_curve(pose(a), pose(b), radius, _STEP * self.width)
+
+    def _clear(self, k: int, curve: FloatArray, *rest: FloatArray) -> bool:
+        """Whether a curve keeps its distances from the border, other strands and its own line."""
+        string, apart = shapely.linestrings(curve), _CLEARANCE * self.width
+        if not shapely.covers(self.room, string):
+            return False
+        near = self.tree.query(string, predicate="dwithin", distance=apart)
+        if (near != k).any():
+            return False
+        parts = [*self.curves, *(shapely.linestrings(part) for part in rest if len(part) > 1)]
+        return not (parts and shapely.dwithin(string, np.array(parts), apart).any())

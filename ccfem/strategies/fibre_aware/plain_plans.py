@@ -1,0 +1,127 @@
+"""Plans that cost little: a designed plan is tested against them, and has to be better."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from ccfem.base.arrays import FloatArray
+from ccfem.base.tensor import largest_in_plane
+from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.geometry.shapes import Region, open_lines
+from ccfem.machine.machine import Machine
+from ccfem.paths.fields.layer_tension import layer_tension
+from ccfem.paths.fields.tensile import Tension
+from ccfem.paths.planning.infill import long_enough
+from ccfem.paths.planning.plan import plan_layers
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.strategies import create
+from ccfem.strategies.concentric import Concentric
+from ccfem.strategies.fibre_aware.heights import layers_by_case
+from ccfem.strategies.fibre_aware.plan_cases import plan_by_layers
+
+_CAP = 60.0
+"""Percentile of the stress at which isocurves lie side by side: more fibre than is kept."""
+
+
+@dataclass(frozen=True)
+class StraightRows:
+    """Straight rows a strand's width apart: a `LayerPlanner` for flat layers.
+
+    The outermost rows lie half a width inside the section. Rows end at the border where that keeps
+    all their width inside, else half a width before it.
+
+    Attributes
+    ----------
+    along : {"tension", "section"}
+        Whether they follow the mean tension of a layer or the longer side of its section.
+    """
+
+    along: str = "tension"
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        """Plan the rows of one layer; none where it has no tension."""
+        tension, width = layer_tension(stress), machine.fibre_width
+        section = layer.plane.polygon
+        room = shapely.buffer(section, -0.5 * width)
+        size = layer.areas * np.where(tension.defined, tension.stress, 0.0)
+        if not size.any() or room.is_empty:
+            return Toolpaths.empty()
+        along = _longer_side(section) if self.along == "section" else _mean(tension, size)
+        across = np.array([-along[1], along[0]])
+        corners = shapely.get_coordinates(room)
+        low, high = (corners @ across).min(), (corners @ across).max()
+        count = int((high - low) / width * (1.0 + 1e-9)) + 1
+        middle = np.linspace(low, high, count)[:, None] * across
+        reach = np.abs(corners @ along).max() + width
+        rows = shapely.linestrings(np.stack([middle - reach * along, middle + reach * along], 1))
+        # Rows on an edge must not be lost by rounding.
+        inside = shapely.intersection(rows, shapely.buffer(room, 1e-6 * width))
+        lines = [_drawn_to_border(line, section, width) for line in open_lines(inside)]
+        return long_enough(Toolpaths.from_plane(lines, layer), None, machine)
+
+
+def _mean(tension: Tension, size: FloatArray) -> FloatArray:
+    """Average the directions of tension, (2,), by their tensors: directions have no sign."""
+    x, y = tension.direction.T
+    _, _, angle = largest_in_plane(size @ np.stack([x * x, y * y, x * y], axis=1))
+    return np.array([np.cos(angle), np.sin(angle)])
+
+
+def _longer_side(section: Region) -> FloatArray:
+    """Return the direction (2,) of the longer side of the smallest rectangle round a section."""
+    corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(section))
+    sides = np.diff(corners, axis=0)[:2]
+    size = np.linalg.norm(sides, axis=1)
+    longest: FloatArray = (sides / size[:, None])[int(np.argmax(size))]
+    return longest
+
+
+def _drawn_to_border(line: FloatArray, section: Region, width: float) -> FloatArray:
+    """Row (2, 2) with its ends drawn out to the border where the strand stays inside there."""
+    step = (line[-1] - line[0]) / np.linalg.norm(line[-1] - line[0])
+    for end, way in ((0, -step), (-1, step)):
+        ray = shapely.linestrings([line[end], line[end] + width * way])
+        out = shapely.intersection(ray, section)
+        whole = shapely.buffer(out, 0.5 * width, cap_style="flat")
+        if out.length and shapely.covers(shapely.buffer(section, 1e-3 * width), whole):
+            line = line.copy()
+            line[end] = line[end] + out.length * way
+    return line
+
+
+def plain_plans(
+    cases: WeightedCases, layers: Sequence[Layer], machine: Machine, curves: bool = True
+) -> list[Toolpaths]:
+    """Plan straight rows, contours and isocurves, each with more fibre than is usually kept.
+
+    Parameters
+    ----------
+    layers : sequence of Layer
+        Flat ones. Each is planned for one load case, as many for each as its weight says.
+    curves : bool, default True
+        Whether to plan isocurves too.
+
+    Returns
+    -------
+    list of Toolpaths
+        Without folds.
+    """
+    case = layers_by_case(cases.weights, layers)
+
+    def rows(along: str) -> Toolpaths:
+        planned = []
+        for k, field in enumerate(cases.fields):
+            shown = [layer for layer, number in zip(layers, case, strict=True) if number == k]
+            planned.append(plan_layers(StraightRows(along), shown, shown, field, machine))
+        return Toolpaths.concatenate(planned)
+
+    field = cases.heaviest
+    rings = Concentric().for_part(field, layers, machine)
+    plans = [rows("tension"), rows("section"), plan_layers(rings, layers, layers, field, machine)]
+    if curves:
+        plans.append(plan_by_layers(create("isocurve", {"cap": _CAP}), layers, cases, machine))
+    return plans

@@ -1,0 +1,159 @@
+"""Strands led round their folds or cut there, against curves known by hand."""
+
+import sys
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+import shapely
+
+from ccfem.body.mesh import box_mesh
+from ccfem.geometry.polylines import along_line, is_closed, line_length, pack
+from ccfem.geometry.tight_bends import tight_bends
+from ccfem.machine import Machine
+from ccfem.paths.folds import folds, folds_in
+from ccfem.paths.linking.joining import Joined
+from ccfem.paths.planning.plan import plan_layers
+from ccfem.paths.planning.strategy import Amount
+from ccfem.paths.planning.unfolding import may_fold, piece, unfolded, unfolded_paths
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.slicers import Planar
+from ccfem.strategies import create, named
+
+MACHINE = Machine()
+WIDE = shapely.box(-100.0, -100.0, 100.0, 100.0)
+
+
+def corner(degrees, leg=50.0):
+    turn = np.radians(degrees)
+    tip = leg * np.array([np.cos(turn), np.sin(turn)])
+    return np.array([[-leg, 0.0], [0.0, 0.0], tip])
+
+
+def freed(*lines, section=WIDE, least=MACHINE.minimum_length, link=None):
+    link = [np.zeros(len(line), dtype=bool) for line in lines] if link is None else link
+    return unfolded(Joined([np.asarray(x, float) for x in lines], link), section, MACHINE, least)
+
+
+def count(lines):
+    return folds(*pack(lines), np.array([is_closed(x) for x in lines]), MACHINE.minimum_radius)
+
+
+@pytest.mark.parametrize("degrees", [100, 120, 140])
+def test_corner_with_room_is_led_round_by_the_least_radius(degrees):
+    """A fillet of radius r passes a corner of turn a at r / cos(a / 2) - r, or a bit farther."""
+    line, radius, turn = corner(degrees), MACHINE.minimum_radius, np.radians(degrees)
+    (round_,) = freed(line).lines
+    np.testing.assert_array_equal(round_[[0, -1]], line[[0, -1]])
+    assert not len(tight_bends(round_, along_line(round_), False, 0.98 * radius, 1.0))
+    passed = shapely.distance(shapely.Point(0.0, 0.0), shapely.linestrings(round_))
+    fillet = radius / np.cos(0.5 * turn) - radius
+    # The sharper corner is led round outside, by less of a way.
+    assert 0.999 * fillet <= passed < 1.5 * fillet if degrees < 130 else passed < fillet
+
+
+def test_strands_in_corners_side_by_side_keep_their_distance():
+    """Where there is no room to lead one round it is cut; none comes near to its neighbour."""
+    turn = np.radians(130.0)
+    inwards = 1.1 * np.array([-1.0 / np.tan(0.5 * (np.pi - turn)), 1.0])
+    lines = freed(*(corner(130) + k * inwards for k in range(5)), least=10.0).lines
+    assert not len(count(lines).line)
+    assert len(lines) > 5
+    strands = shapely.linestrings(lines[0]), *map(shapely.linestrings, lines[1:])
+    for k, strand in enumerate(strands):
+        others = np.delete(np.array(strands), k)
+        far = shapely.difference(shapely.MultiLineString(list(others)), strand.buffer(1e-6))
+        assert shapely.distance(strand, far) > 0.5
+    assert sum(map(line_length, lines)) > 0.8 * 500.0
+
+
+def test_hairpin_between_strands_is_cut_and_short_pieces_go():
+    rows = [[(0.0, y), (60.0, y)] for y in (-1.0, 2.0)]
+    hairpin = [(0.0, 0.0), (60.0, 0.0), (60.0, 1.0), (30.0, 1.0)]
+    lines = freed(rows[0], hairpin, rows[1]).lines
+    assert [len(lines), len(count(lines).line)] == [3, 0]
+    assert line_length(lines[1]) == pytest.approx(60.0, abs=1.5)
+
+
+def test_strands_without_folds_are_left_alone():
+    lines = [corner(90), corner(30)]
+    result = freed(*lines)
+    for line, given in zip(result.lines, lines, strict=True):
+        assert line is given
+
+
+def test_pieces_begin_and_end_with_strand_not_with_link():
+    """The link, 2 mm long, goes with the fold; neither piece keeps a part of it."""
+    line = np.array([(0.0, 0.0), (60.0, 0.0), (60.0, 2.0), (0.0, 2.0)])
+    link = np.array([False, True, False, False])
+    rows = [[(0.0, y), (70.0, y)] for y in (-1.0, 1.0, 3.0)]
+    plain = [np.zeros(2, dtype=bool)] * 3
+    lines, marks = freed(rows[0], line, rows[1], rows[2], link=[plain[0], link, *plain[1:]])
+    pieces = [(x, m) for x, m in zip(lines, marks, strict=True) if x[0, 1] in (0.0, 2.0)]
+    assert len(pieces) == 2
+    for points, mark in pieces:
+        assert not mark.any()
+        assert np.ptp(points[:, 1]) == pytest.approx(0.0)
+
+
+def test_ring_stays_closed_where_it_is_led_round():
+    """A drop with a tip of 120 degrees becomes a ring without a fold."""
+    angle = np.radians(np.linspace(60.0, 300.0, 200))
+    drop = 20.0 * np.column_stack([np.cos(angle), np.sin(angle)])
+    drop = np.concatenate([[[40.0, 0.0]], drop, [[40.0, 0.0]]])
+    (ring,) = freed(drop).lines
+    assert is_closed(ring)
+    assert not len(count([ring]).line)
+    assert line_length(ring) == pytest.approx(line_length(drop), abs=6.0)
+
+
+def test_piece_of_a_ring_runs_on_over_its_start():
+    ring = np.array([(0, 0), (10, 0), (10, 10), (0, 10), (0, 0)], dtype=float)
+    link = np.array([False, False, True, False, False])
+    part, marks = piece(ring, along_line(ring), link, 25.0, 45.0)
+    np.testing.assert_allclose(part, [(5, 10), (0, 10), (0, 0), (5, 0)])
+    assert marks.tolist() == [True, False, False, False]
+
+
+@dataclass(frozen=True)
+class Hairpins:
+    """A hairpin beside the wall of every layer."""
+
+    folds: bool = False
+    amount: ClassVar[Amount] = Amount("folds", 1.0, 1.0)
+
+    def __call__(self, layer, stress, machine):
+        low = layer.plane.points.min(axis=0) + 2.0
+        line = low + np.array([(0.0, 0.0), (70.0, 0.0), (70.0, 1.0), (0.0, 1.0)])
+        return Toolpaths.from_plane([line, line[:2] + np.array([0.0, 2.0])], layer)
+
+
+def test_planning_ends_without_folds_unless_they_are_wanted(monkeypatch):
+    layers = Planar(count=2).cut(box_mesh((80.0, 20.0, 4.0), (8, 2, 2)))
+    monkeypatch.setattr(sys.modules[plan_layers.__module__], "stress_on", lambda *_: None)
+    kept, led = (
+        plan_layers(Hairpins(fold), layers, layers, None, MACHINE, fold) for fold in (True, False)
+    )
+    assert folds_in(kept, MACHINE).counts.tolist() == [1, 0, 1, 0]
+    assert folds_in(led, MACHINE).counts.tolist() == 6 * [0]
+    assert led.lengths.min() >= MACHINE.minimum_length
+
+
+def test_paths_in_space_are_cut_with_their_normals():
+    """On a curved layer a fold is cut out; every point keeps a unit normal."""
+    layer = Planar(count=1).cut(box_mesh((80.0, 20.0, 4.0), (8, 2, 2)))[0]
+    paths = Hairpins()(layer, None, MACHINE)
+
+    class Curved:
+        flat = None
+
+    cut = unfolded_paths(paths, Curved(), MACHINE)
+    assert len(cut) == 3
+    assert folds_in(cut, MACHINE).counts.tolist() == [0, 0, 0]
+    np.testing.assert_allclose(np.linalg.norm(cut.normals, axis=1), 1.0)
+
+
+def test_only_published_patterns_may_fold():
+    turning_back = {"concentric", "contour_zigzag", "fiso", "grid", "offset", "zigzag"}
+    assert {name for name in named() if may_fold(create(name))} == turning_back
