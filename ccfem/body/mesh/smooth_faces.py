@@ -11,10 +11,13 @@ from scipy.sparse.csgraph import connected_components
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.base.checks import check_number
+from ccfem.body.mesh.round_walls import RoundWall
 from ccfem.geometry.facets import facet_keys
 
 FEATURE_ANGLE = 30.0
 """Angle between facets, degrees, from which an edge separates two faces."""
+COARSE_ANGLE = 40.0
+"""Feature angle, degrees, at which a bore of 9 facets is a round wall, and an octagon is none."""
 _FLAT = 1.0
 """Root mean square angle, degrees, of the normals of a plane to their mean."""
 _SEAM = 0.5
@@ -81,19 +84,21 @@ class Face:
     def __post_init__(self) -> None:
         freeze(self, facets=int, centre=float, direction=float)
 
+    @property
+    def wall(self) -> RoundWall | None:
+        """The cylinder, cone or sphere that the face lies on; None where it lies on none."""
+        if self.kind not in ("cylinder", "cone", "sphere"):
+            return None
+        return RoundWall(self.centre, self.direction, self.radius, self.slope, self.hollow)
+
     def normals_at(self, places: FloatArray) -> FloatArray | None:
         """Outward unit normals (k, 3) of a round face at places (k, 3), mm, on it or near it.
 
         They point from the axis or the centre, wherever a place lies between it and the wall, as
         the middle of a chord does. None for a face that is not round.
         """
-        if self.kind not in ("cylinder", "cone", "sphere"):
-            return None
-        arm = places - self.centre
-        arm -= np.outer(arm @ self.direction, self.direction)
-        radial = arm / np.maximum(np.linalg.norm(arm, axis=1), 1e-300)[:, None]
-        normal = (radial - self.slope * self.direction) / np.hypot(1.0, self.slope)
-        return np.asarray(-normal if self.hollow else normal)
+        wall = self.wall
+        return None if wall is None else wall.normals_at(places)
 
     @property
     def about(self) -> str:
@@ -199,6 +204,82 @@ def given_faces(
     """
     surface = _surface(np.asarray(points, dtype=float), np.asarray(triangles, dtype=np.int64))
     return tuple(_face(surface, np.asarray(rows, dtype=np.int64)) for rows in groups)
+
+
+def round_walls(
+    points: ArrayLike, triangles: ArrayLike, faces: Iterable[Face]
+) -> tuple[RoundWall, ...]:
+    """Round walls among the faces of a surface, as large as these.
+
+    Parameters
+    ----------
+    points : (n, 3) array, mm
+    triangles : (t, 3) int array
+    faces : iterable of Face
+        Those of another shape that is nearly round, as an oval hole has, are left out.
+
+    Returns
+    -------
+    tuple of RoundWall
+        The tolerance of each is the largest distance of its triangles from it, at their corners and
+        at the middles of their sides: what is meshed anew lies on these triangles.
+    """
+    points, triangles = np.asarray(points, dtype=float), np.asarray(triangles, dtype=np.int64)
+    fitted = (_true_wall(face, points[triangles[face.facets]]) for face in faces)
+    return tuple(wall for wall in fitted if wall is not None)
+
+
+def _true_wall(face: Face, corners: FloatArray) -> RoundWall | None:
+    """Wall that triangles with corners (k, 3, 3) are chords of; None where there is none."""
+    wall = face.wall
+    if wall is None:
+        return None
+    nodes = np.unique(corners.reshape(-1, 3), axis=0)
+    distance, _ = wall.distances(nodes)
+    # Nodes lie on the wall or, where triangles were cut, on its chords: inside, never outside.
+    beyond = max(float(np.quantile(distance, 0.9)), 0.0)
+    distance -= beyond
+    near = np.abs(distance) <= _EXACT * wall.radius
+    if not near.all() and ((distance > _EXACT * wall.radius).any() or face.kind != "cylinder"):
+        return None
+    if not near.all():
+        arm = nodes - wall.centre
+        axes = np.linalg.svd(wall.direction[None])[2][1:]
+        turn = np.sort(np.arctan2(arm[near] @ axes[1], arm[near] @ axes[0]))
+        gaps = np.diff(turn, append=turn[:1] + 2.0 * np.pi)
+        open_ = np.radians(360.0 - face.turn)  # the gap of a wall that does not close
+        if (gaps > np.radians(COARSE_ANGLE)).sum() > (open_ > np.radians(COARSE_ANGLE)):
+            return None
+    places = np.concatenate([corners, 0.5 * (corners + np.roll(corners, 1, axis=1))])
+    height = (nodes - wall.centre) @ wall.direction
+    wall = replace(wall, radius=wall.radius + beyond)
+    return replace(
+        wall,
+        tolerance=float(np.abs(wall.distances(places.reshape(-1, 3))[0]).max()),
+        low=float(height.min()),
+        high=float(height.max()),
+    )
+
+
+def guessed_walls(points: FloatArray, boundary: IntArray) -> tuple[tuple[RoundWall, ...], IntArray]:
+    """Round walls of a mesh that nothing is known of, and the wall (b,) of each boundary facet.
+
+    Parameters
+    ----------
+    points : (n, 3) array, mm
+    boundary : (b, 3) int array
+        Outward.
+    """
+    walls: list[RoundWall] = []
+    wall_of = np.full(len(boundary), -1)
+    rest = np.arange(len(boundary))
+    for angle in (COARSE_ANGLE, FEATURE_ANGLE):
+        for face in smooth_faces(points, boundary[rest], angle):
+            for wall in round_walls(points, boundary[rest], [face]):
+                wall_of[rest[face.facets]] = len(walls)
+                walls.append(wall)
+        rest = np.flatnonzero(wall_of < 0)
+    return tuple(walls), wall_of
 
 
 @dataclass(frozen=True)

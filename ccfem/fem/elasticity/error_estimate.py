@@ -12,8 +12,10 @@ import numpy as np
 from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray, read_only, seen_only
+from ccfem.body.mesh.curved_cells import gradients_at
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.assembly import cell_gradients
+from ccfem.fem.elasticity.recovery import times, voigt_strain
 
 
 @dataclass(frozen=True)
@@ -75,12 +77,14 @@ def estimate_error(
     samples = SAMPLES[mesh.order]
     stress = np.empty((m, len(samples), 6))
     _stress(*arguments, samples, stress)
+    _curved_stress(mesh, displacement, stiffness, ease, samples, stress)
     patches = stress_patches(mesh, stress, np.trace(stiffness, axis1=1, axis2=2))
     corner = stress
     if mesh.order == 2:
         # Linear in a cell, so the values at its corners determine it.
         corner = np.empty((m, 4, 6))
         _stress(*arguments, np.eye(4), corner)
+        _curved_stress(mesh, displacement, stiffness, ease, np.eye(4), corner)
     compliance = np.linalg.inv(stiffness)
     error, energy = np.empty(m), np.empty(m)
     compare = _compare_linear if mesh.order == 1 else _compare_quadratic
@@ -127,6 +131,24 @@ def _stress(cells, gradients, u, stiffness, free, edges, at, result):  # type: i
                 for j in range(6):
                     total += c[i, j] * (strain[j] - ease[j])
                 result[cell, q, i] = total
+
+
+def _curved_stress(
+    mesh: TetMesh,
+    displacement: FloatArray,
+    stiffness: FloatArray,
+    free: FloatArray,
+    at: FloatArray,
+    result: FloatArray,
+) -> None:
+    """Put the stress of the cells with curved sides in place of that of their straight ones."""
+    rows = mesh.curved
+    nodes, u = mesh.points[mesh.cells[rows]], displacement[mesh.cells[rows]]
+    law = stiffness[rows] if len(stiffness) > 1 else stiffness[0]
+    ease = free[rows] if len(free) > 1 else free
+    for q, place in enumerate(at):
+        gradient = np.swapaxes(u, 1, 2) @ gradients_at(nodes, place)
+        result[rows, q] = times(law, voigt_strain(gradient) - ease)
 
 
 @njit(cache=True)

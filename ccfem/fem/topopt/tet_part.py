@@ -319,7 +319,7 @@ def relaxed(cut: CutMesh, passes: int = 30) -> TetMesh:
             wanted[surface] += factor * np.einsum("kij,kj->ki", free[surface], step)
         wanted[inside] = (inner @ wanted)[inside]
         points = _safely_moved(mesh.cells, points, wanted)
-    return TetMesh(points, mesh.cells, mesh.patches, mesh.axes)
+    return TetMesh(points, mesh.cells, mesh.patches, mesh.axes, mesh.walls)
 
 
 def _both_ways(edges: IntArray) -> IntArray:
