@@ -143,6 +143,8 @@ def _curved_stress(
 ) -> None:
     """Put the stress of the cells with curved sides in place of that of their straight ones."""
     rows = mesh.curved
+    if not len(rows):
+        return
     nodes, u = mesh.points[mesh.cells[rows]], displacement[mesh.cells[rows]]
     law = stiffness[rows] if len(stiffness) > 1 else stiffness[0]
     ease = free[rows] if len(free) > 1 else free

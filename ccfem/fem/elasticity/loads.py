@@ -134,7 +134,9 @@ def _bearing(mesh: LoadedBody, load: Bearing) -> FloatArray:
     """
     facets, area, normal = _outward(mesh, load.patch)
     if mesh.points.shape[1] == 3:
-        normal = facet_normals(mesh, facets, mesh.points[facets].mean(axis=1)[:, None])[:, 0]
+        # Where the resultant of what a facet gives to its nodes acts.
+        places = mesh.points[mesh.facet_nodes(facets)[:, -3:]].mean(axis=1)
+        normal = facet_normals(mesh, facets, places[:, None])[:, 0]
     force = _vector(mesh, load)
     touched = normal @ force < 0.0
     for _ in range(50):
