@@ -28,8 +28,6 @@ _PIECE = 2.0
 """Longest piece, mm, over which the height is constant."""
 _STEP = 0.05
 """Steps in which the height changes along a line, over that of the layer."""
-THIN = 0.05
-"""Least height, mm, of matrix over a strand, where its layer is as high. Our choice."""
 _SCALE = 1.1
 """Largest factor by which a layer is scaled. If lines miss a tenth of a section, as between walls
 nearer than a line is wide, more flow would not reach it either. Our choice."""
@@ -88,7 +86,7 @@ def with_flow(
     if sections is None:
         sections = [machine.strand_area] * len(strands)
     volume = height + below - _density(strands, sections, middle, machine)
-    least = min(THIN, height)
+    least = min(machine.least_line, height)
     warning = _check(volume, length, height, below, least, machine)
     wanted = np.maximum(volume, least)
     # Of neighbouring pieces with the same height level only the first keeps its point.
@@ -107,6 +105,9 @@ def with_flow(
     room = section.area * (height + below) - float(inside @ np.asarray(sections))
     scale = room / (machine.matrix_width * (laid * long).sum())
     laid *= np.clip(scale, 1.0 / _SCALE, _SCALE)
+    # No line thinner than the machine prints; those in gaps are narrower instead.
+    floor = np.full(len(laid), least) if shares is None else least * shares[line]
+    laid = np.where(long > 0.0, np.maximum(laid, floor), 0.0)
     fewer = replace(
         paths,
         points=points[kept],
@@ -140,7 +141,7 @@ def pad_flow(
         offsets=offsets,
         link=np.zeros(len(points), dtype=bool),
     )
-    return finer, np.maximum(volume, min(THIN, height))
+    return finer, np.maximum(volume, min(machine.least_line, height))
 
 
 def _density(

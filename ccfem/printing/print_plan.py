@@ -24,7 +24,6 @@ from ccfem.printing.laid_layer import (
     fibre_layer,
     matrix_layer,
 )
-from ccfem.printing.matrix_flow import THIN
 from ccfem.printing.matrix_lines import MatrixFill, matrix_fills
 from ccfem.printing.slabs import Slab, check_cover, slabs_of
 from ccfem.printing.strand_density import StrandDensity
@@ -221,7 +220,7 @@ def _on_slabs(
         lines = [] if slab.fibre is None else kept[slab.fibre]
         above = slabs[min(number + 1, len(slabs) - 1)]
         if slab.fibre is not None and above.fibre is None and machine.process.stacks == "end":
-            room = above.upper - slab.lower - THIN
+            room = above.upper - slab.lower - machine.least_line
             short = ended_in_stacks(lines, borders[slab.fibre], room, machine)
             lines, ended = short.lines, ended + short.removed
             if short.places:
@@ -507,7 +506,7 @@ def height_over(lines: Sequence[FloatArray], section: Region, machine: Machine) 
     # Half of what is let pass: lines of matrix do not see the same places as this grid.
     few = int(0.5 * _ENOUGH * section.area / density.cell**2)
     most = float(high[few]) if few < len(high) else 0.0
-    return max(most + THIN - machine.strand_height, 0.0)
+    return max(most + machine.least_line - machine.strand_height, 0.0)
 
 
 def ended_in_stacks(
