@@ -73,8 +73,8 @@ class GcodeProfile:
     Attributes
     ----------
     start, end : tuple of str
-        Lines at the start and the end of the file of so many {layers}. Coordinates must be absolute and extrusion
-        relative (G90, M83) after the start.
+        Lines at the start and the end of a file of so many {layers}. Coordinates must be absolute
+        and extrusion relative (G90, M83) after the start.
     tool : tuple of str
         Lines that select a tool; {tool} is its number.
     cut : tuple of str

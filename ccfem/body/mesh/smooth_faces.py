@@ -32,6 +32,9 @@ _COLUMNS = 4
 _EXACT, _MANY, _ALIKE = 5e-3, 12, 0.97
 """Largest distance of the nodes of a cone or a sphere from it, in radii, their least number, and
 least mean cosine between its normals and those of its facets: a free-form face is neither."""
+_DEPTH, _FEW = 0.05, 0.02
+"""Largest distance of nodes from a wall over its depth, and the share of it that fewer nodes than
+these may use: a cylinder passes through any five."""
 _STEPS = 4
 """Steps towards the nearest cylinder: each doubles the digits."""
 _CLOSED = 0.02
@@ -235,21 +238,20 @@ def _true_wall(face: Face, corners: FloatArray) -> RoundWall | None:
     if wall is None:
         return None
     nodes = np.unique(corners.reshape(-1, 3), axis=0)
-    distance, _ = wall.distances(nodes)
+    distance, normal = wall.distances(nodes)
     # Nodes lie on the wall or, where triangles were cut, on its chords: inside, never outside.
     beyond = max(float(np.quantile(distance, 0.9)), 0.0)
     distance -= beyond
-    near = np.abs(distance) <= _EXACT * wall.radius
-    if not near.all() and ((distance > _EXACT * wall.radius).any() or face.kind != "cylinder"):
+    # A shallow wall of a large radius is near to many faces, one of few nodes to any.
+    mean = normal.mean(axis=0)
+    mean /= max(float(np.linalg.norm(mean)), 0.5)
+    depth = wall.radius * (1.0 - float((normal @ mean).min()))
+    slack = min(_EXACT * wall.radius, _DEPTH * depth) * (1.0 if len(nodes) >= _MANY else _FEW)
+    near = np.abs(distance) <= slack
+    if not near.all() and ((distance > slack).any() or face.kind != "cylinder"):
         return None
-    if not near.all():
-        arm = nodes - wall.centre
-        axes = np.linalg.svd(wall.direction[None])[2][1:]
-        turn = np.sort(np.arctan2(arm[near] @ axes[1], arm[near] @ axes[0]))
-        gaps = np.diff(turn, append=turn[:1] + 2.0 * np.pi)
-        open_ = np.radians(360.0 - face.turn)  # the gap of a wall that does not close
-        if (gaps > np.radians(COARSE_ANGLE)).sum() > (open_ > np.radians(COARSE_ANGLE)):
-            return None
+    if not near.all() and not _chords(face, nodes - wall.centre, distance, near):
+        return None
     places = np.concatenate([corners, 0.5 * (corners + np.roll(corners, 1, axis=1))])
     height = (nodes - wall.centre) @ wall.direction
     wall = replace(wall, radius=wall.radius + beyond)
@@ -259,6 +261,28 @@ def _true_wall(face: Face, corners: FloatArray) -> RoundWall | None:
         low=float(height.min()),
         high=float(height.max()),
     )
+
+
+def _chords(face: Face, arm: FloatArray, distance: FloatArray, near: BoolArray) -> bool:
+    """Whether nodes inside a cylinder lie on chords between columns of nodes that are near it.
+
+    Parameters
+    ----------
+    arm : (k, 3) array, mm
+        Of the nodes, from a point of the axis.
+    distance : (k,) array, mm
+        Of the nodes from the wall; negative inside.
+    near : (k,) bool array
+        Nodes on the wall.
+    """
+    axes = np.linalg.svd(face.direction[None])[2][1:]
+    turn = np.sort(np.arctan2(arm[near] @ axes[1], arm[near] @ axes[0]))
+    if 1 + (np.diff(turn) > 1e-3).sum() < _COLUMNS:
+        return False
+    gaps = np.sort(np.diff(turn, append=turn[:1] + 2.0 * np.pi))
+    gaps = gaps[: len(gaps) - (face.turn < 359.0)]  # a wall that does not close has one more
+    chord = face.radius * (1.0 - np.cos(0.5 * gaps[-1]))
+    return bool(gaps[-1] < np.radians(COARSE_ANGLE)) and bool((distance > -1.1 * chord).all())
 
 
 def guessed_walls(points: FloatArray, boundary: IntArray) -> tuple[tuple[RoundWall, ...], IntArray]:
