@@ -11,6 +11,7 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.cell_mesh import CellMesh
 from ccfem.body.mesh.curved_cells import (
     EDGES,
+    STRAIGHT,
     barycentric,
     curved_cells,
     curved_volumes,
@@ -26,6 +27,9 @@ from ccfem.geometry.measures import signed_volumes
 
 _FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 """Corner nodes of the face opposite to each corner, outward for a positive cell."""
+
+_SEEN = 1e-3
+"""Least gap between a side and the wall that it does not follow, over its length."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -111,6 +115,26 @@ class TetMesh(CellMesh, Shown):
         result = weights.copy()
         result[curved] = barycentric(nodes, np.einsum("ka,kai->ki", at, nodes[:, :4]), at)
         return result
+
+    @cached_property
+    def chords(self) -> tuple[int, float]:
+        """Sides of quadratic cells on round walls that stay straight, and the largest gap, mm.
+
+        They would fold a cell if they followed the wall.
+        """
+        if self.order == 1:
+            return 0, 0.0
+        _, normal = self.facet_areas(self.boundary)
+        walls = (self.round_walls, self.wall_of)
+        sides, places = side_middles(self.points, self.boundary, normal, *walls)
+        ends = self.cells[:, EDGES].reshape(-1, 2)
+        middle = self.points[self.cells[:, 4:].reshape(-1)[positions(sides, ends)]]
+        chord = self.points[sides]
+        length = np.linalg.norm(chord[:, 1] - chord[:, 0], axis=1)
+        gap = np.linalg.norm(places - middle, axis=1)
+        off = np.linalg.norm(middle - chord.mean(axis=1), axis=1)
+        stay = (off <= STRAIGHT * length) & (gap > _SEEN * length)
+        return int(stay.sum()), float(gap[stay].max(initial=0.0))
 
     @property
     def facets(self) -> IntArray:
