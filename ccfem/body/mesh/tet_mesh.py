@@ -79,9 +79,8 @@ class TetMesh(CellMesh, Shown):
     @cached_property
     def curved(self) -> IntArray:
         """Rows of the quadratic cells that have a curved side."""
-        if self.order == 1:
-            return read_only(np.zeros(0, dtype=np.int64), int)
-        return read_only(curved_cells(self.points, self.cells), int)
+        none = np.zeros(0, dtype=np.int64)
+        return read_only(none if self.order == 1 else curved_cells(self.points, self.cells), int)
 
     @cached_property
     def aspects(self) -> FloatArray:
@@ -108,7 +107,7 @@ class TetMesh(CellMesh, Shown):
         (k, 4) array
             Those at which the shape functions of the cells map to the places.
         """
-        curved = np.flatnonzero(np.isin(cell, self.curved)) if len(self.curved) else []
+        curved = np.flatnonzero(np.isin(cell, self.curved))
         if not len(curved):
             return weights
         nodes, at = self.points[self.cells[cell[curved]]], weights[curved]

@@ -79,10 +79,11 @@ def extrude(
 
 def _outline_walls(polygon: shapely.Polygon, height: float) -> tuple[RoundWall, ...]:
     """Round walls of the prism on an outline as it was given, not as its mesh has it."""
-    corners, triangles = [], []
+    corners: list[FloatArray] = []
+    triangles: list[IntArray] = []
     for ring in shapely.get_rings(shapely.orient_polygons(polygon)):
         low = np.pad(shapely.get_coordinates(ring)[:-1], ((0, 0), (0, 1)))
-        start, here = sum(map(len, corners)), np.arange(len(low))
+        start, here = sum(len(known) for known in corners), np.arange(len(low))
         after = np.roll(here, -1)
         above, after_above = here + len(low), after + len(low)
         corners += [low, low + np.array([0.0, 0.0, height])]

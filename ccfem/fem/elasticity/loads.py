@@ -76,6 +76,8 @@ class _Curved:
 
     def replaced(self, result: FloatArray, forces: FloatArray, exact: FloatArray) -> FloatArray:
         """Nodal forces with the exact ones (c, 6, 3) of these facets for those spread evenly."""
+        if not len(self.rows):
+            return result
         for column in self.nodes.T[3:]:
             np.subtract.at(result, column, forces[self.rows] / 3.0)
         np.add.at(result, self.nodes, exact)
