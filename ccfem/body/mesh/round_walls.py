@@ -37,6 +37,8 @@ class RoundWall:
         Distance within which nodes lie on it.
     low, high : float, mm
         Where it begins and ends along its direction, from the centre.
+    area : float, mm^2
+        Of the part of the boundary that lies on it.
     """
 
     centre: FloatArray
@@ -47,6 +49,7 @@ class RoundWall:
     tolerance: float = 0.0
     low: float = -np.inf
     high: float = np.inf
+    area: float = 0.0
 
     def __post_init__(self) -> None:
         freeze(self, centre=float, direction=float)
@@ -59,8 +62,16 @@ class RoundWall:
 
     @property
     def row(self) -> FloatArray:
-        """The wall as numbers, (12,)."""
-        rest = (self.slope, self.radius, self.hollow, self.tolerance, self.low, self.high)
+        """The wall as numbers, (13,)."""
+        rest = (
+            self.slope,
+            self.radius,
+            self.hollow,
+            self.tolerance,
+            self.low,
+            self.high,
+            self.area,
+        )
         return np.array([*self.centre, *self.direction, *rest])
 
     def distances(self, places: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -260,6 +260,7 @@ def _true_wall(face: Face, corners: FloatArray) -> RoundWall | None:
         tolerance=float(np.abs(wall.distances(places.reshape(-1, 3))[0]).max()),
         low=float(height.min()),
         high=float(height.max()),
+        area=face.area,
     )
 
 

@@ -28,6 +28,8 @@ from ccfem.geometry.measures import signed_volumes
 _FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 """Corner nodes of the face opposite to each corner, outward for a positive cell."""
 
+_COVERED = 0.8
+"""Least area of the facets on a wall, over its own: four chords of a circle have 0.9."""
 _SEEN = 1e-3
 """Least gap between a side and the wall that it does not follow, over its length."""
 
@@ -171,10 +173,11 @@ class TetMesh(CellMesh, Shown):
     @cached_property
     def _walls(self) -> tuple[tuple[RoundWall, ...], IntArray]:
         if self.walls is not None:
-            _, normal = self.facet_areas(self.boundary)
+            area, normal = self.facet_areas(self.boundary)
             known = walls_of_facets(self.walls, self.points[self.boundary], normal)
-            # Where none has a facet, the mesh was moved since it was made.
-            if not len(self.walls) or (known >= 0).any():
+            covered = np.bincount(known + 1, area, len(self.walls) + 1)[1:]
+            # Where the boundary misses one, the mesh was moved or bent since it was made.
+            if all(covered > _COVERED * np.array([wall.area for wall in self.walls])):
                 return self.walls, known
         return guessed_walls(self.points, self.boundary)
 

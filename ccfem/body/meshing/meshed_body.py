@@ -163,7 +163,7 @@ def _write(path: Path, mesh: TetMesh, findings: tuple[str, ...]) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         named: dict[str, Any] = {_PATCH + name: facets for name, facets in mesh.patches.items()}
-        named["walls"] = np.array([wall.row for wall in mesh.walls or ()]).reshape(-1, 12)
+        named["walls"] = np.array([wall.row for wall in mesh.walls or ()]).reshape(-1, 13)
         named |= {"points": mesh.points, "cells": mesh.cells, "findings": np.array(findings, "U")}
         with whole_file(path) as temporary:
             np.savez(temporary, **named)
