@@ -77,13 +77,14 @@ def _matrix_slabs(
     if upper - lower <= _SAME:
         return []
     # Lines over fibre reach down between its strands, and count as high as that.
-    most = machine.highest_matrix(0.0 if first or on_matrix else machine.strand_height)
+    over = 0.0 if first or on_matrix else machine.strand_height
+    most = machine.highest_matrix(over)
     low = min(machine.process.first_layer_height, most)
     if first and low > 0.0 and upper - lower > low + LOW:
         start = Slab(lower, lower + low)
         return [start, *_matrix_slabs(lower + low, upper, machine, False, on_matrix=True)]
     count = int(np.ceil((upper - lower) / most - _SAME))
-    wanted = min(wanted, most)
+    wanted = min(wanted, machine.highest_line - over)
     if wanted > (upper - lower) / count + _SAME:
         if upper - lower - wanted < LOW:
             return [Slab(lower, upper)]
