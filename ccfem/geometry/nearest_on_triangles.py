@@ -50,7 +50,7 @@ def nearest_on_triangles(points: FloatArray, triangles: IntArray, queries: Float
     """
     middles = points[triangles].mean(axis=1)
     reach = np.linalg.norm(points[triangles] - middles[:, None], axis=2).max(axis=1)
-    found = Nearest(
+    nearest = Nearest(
         np.zeros(len(queries), dtype=np.int64),
         np.zeros((len(queries), 3)),
         np.zeros((len(queries), 3)),
@@ -58,13 +58,13 @@ def nearest_on_triangles(points: FloatArray, triangles: IntArray, queries: Float
     )
     surface = _Surface(np.asarray(points), np.asarray(triangles, dtype=np.int64), middles, reach)
     left = _look(
-        surface, np.arange(len(triangles)), queries, np.arange(len(queries)), _FIRST, found
+        surface, np.arange(len(triangles)), queries, np.arange(len(queries)), _FIRST, nearest
     )
     if len(left):
         size = np.frexp(reach)[1]
         for each in np.unique(size)[::-1]:  # the largest first: they are few and reach far
-            _look(surface, np.flatnonzero(size == each), queries, left, _ROUNDS, found)
-    return found
+            _look(surface, np.flatnonzero(size == each), queries, left, _ROUNDS, nearest)
+    return nearest
 
 
 @dataclass(frozen=True)
@@ -83,11 +83,11 @@ def _look(
     queries: FloatArray,
     rows: IntArray,
     rounds: tuple[int, ...],
-    found: Nearest,
+    nearest: Nearest,
 ) -> IntArray:
     """Check some triangles for some queries; return those whose nearest one is not yet certain.
 
-    `found` is updated where a triangle is nearer. Each round checks a number of triangles whose
+    `nearest` is updated where a triangle is nearer. Each round checks a number of triangles whose
     middles are nearest.
     """
     tree = cKDTree(surface.middles[members])
@@ -98,8 +98,8 @@ def _look(
         for part in np.array_split(rows, 1 + len(rows) * count // _AT_ONCE):
             away, near = tree.query(queries[part], k=count)
             away, near = away.reshape(len(part), count), near.reshape(len(part), count)
-            _take_nearer(surface, members[near], queries, part, found)
-            sure = away[:, -1] - reach >= (1.0 - _EXACT) * found.distance[part]
+            _take_nearer(surface, members[near], queries, part, nearest)
+            sure = away[:, -1] - reach >= (1.0 - _EXACT) * nearest.distance[part]
             unsure.append(part[~sure])
         rows = np.concatenate(unsure)
         if count == len(members) or not len(rows):
@@ -108,17 +108,17 @@ def _look(
 
 
 def _take_nearer(
-    surface: _Surface, near: IntArray, queries: FloatArray, rows: IntArray, found: Nearest
+    surface: _Surface, near: IntArray, queries: FloatArray, rows: IntArray, nearest: Nearest
 ) -> None:
-    """Put the nearest of the triangles (r, k) into `found` where it is nearer."""
+    """Put the nearest of the triangles (r, k) into `nearest` where it is nearer."""
     given = (seen_only(each) for each in (surface.points, surface.triangles, queries[rows]))
     triangle, weights = _nearest(*given, near)
     feet = np.einsum("qk,qkd->qd", weights, surface.points[surface.triangles[triangle]])
     distance = np.linalg.norm(feet - queries[rows], axis=1)
-    better = distance < found.distance[rows]
+    better = distance < nearest.distance[rows]
     to = rows[better]
-    found.triangle[to], found.weights[to] = triangle[better], weights[better]
-    found.points[to], found.distance[to] = feet[better], distance[better]
+    nearest.triangle[to], nearest.weights[to] = triangle[better], weights[better]
+    nearest.points[to], nearest.distance[to] = feet[better], distance[better]
 
 
 @njit(cache=True, nogil=True)

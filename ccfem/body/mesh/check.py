@@ -288,15 +288,15 @@ def _patches(
     """
     patches, dropped = {}, 0
     for name, facets in groups.items():
-        found = match_boundary(mended, facets)
-        lost = len(facets) - len(found)
+        kept = match_boundary(mended, facets)
+        lost = len(facets) - len(kept)
         if lost and len(removed):
             faces = removed[:, TetMesh.faces].reshape(-1, 3)
             carries = are_among(faces, facets).reshape(-1, 4).any(axis=1)
             both = np.concatenate([facets, faces[np.repeat(carries, 4)]])
-            found = match_boundary(mended, both)
-            lost = max(len(facets) - len(found), 0)
-        patches[name] = found
+            kept = match_boundary(mended, both)
+            lost = max(len(facets) - len(kept), 0)
+        patches[name] = kept
         dropped += lost
     return patches, dropped
 
