@@ -214,8 +214,9 @@ def _mirror(indptr, indices, i, diagonal, data):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _gather_linear(  # type: ignore[no-untyped-def]
-    indptr, indices, start, touching, cells, which, gradients, scale, stiffness, data
+    where, cells, which, gradients, scale, stiffness, data
 ):
+    indptr, indices, start, touching = where
     slot = np.empty(indptr.size - 1, np.int32)
     diagonal = np.empty(indptr.size - 1, np.int32)
     t = np.empty((6, 3))
@@ -240,8 +241,9 @@ def _gather_linear(  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _gather_quadratic(  # type: ignore[no-untyped-def]
-    indptr, indices, start, touching, cells, which, gradients, scale, stiffness, first, second, data
+    where, cells, which, gradients, scale, stiffness, terms, data
 ):
+    (indptr, indices, start, touching), (first, second) = where, terms
     # Gradient of shape function a: sum of its terms phi_s g_s. A corner i has one term,
     # (4 L_i - 1) g_i; the edge (i, j) has two, 4 L_j g_i and 4 L_i g_j. Written with the corner
     # that the linear factor belongs to, any two terms integrate to 16 (1 + [same]) / 20, less 1
@@ -326,11 +328,12 @@ def assemble(
     if density is not None:
         scale *= density[where.order]
     data = np.zeros((len(where.indices), 3, 3))
-    arguments = (where.indptr, where.indices, where.start, where.touching, cells, seen_only(which))
+    rows = (where.indptr, where.indices, where.start, where.touching)
+    arguments = (rows, cells, seen_only(which), gradients, scale, stiffness)
     if mesh.order == 1:
-        _gather_linear(*arguments, gradients, scale, stiffness, data)
+        _gather_linear(*arguments, data)
     else:
-        _gather_quadratic(*arguments, gradients, scale, stiffness, _FIRST, _SECOND, data)
+        _gather_quadratic(*arguments, (_FIRST, _SECOND), data)
     n = 3 * len(mesh.points)
     matrix = sp.bsr_array((data, where.indices, where.indptr), shape=(n, n))
     for start in range(0, len(mesh.curved), _BATCH):
