@@ -39,6 +39,8 @@ class RoundWall:
         Where it begins and ends along its direction, from the centre.
     area : float, mm^2
         Of the part of the boundary that lies on it.
+    start : (3,) array, mm, optional
+        A place on it where the points of sections begin, so that they turn with the part.
     """
 
     centre: FloatArray
@@ -50,9 +52,10 @@ class RoundWall:
     low: float = -np.inf
     high: float = np.inf
     area: float = 0.0
+    start: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        freeze(self, centre=float, direction=float)
+        freeze(self, centre=float, direction=float, start=float)
 
     @classmethod
     def from_row(cls, row: FloatArray) -> "RoundWall":

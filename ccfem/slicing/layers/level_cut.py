@@ -1,7 +1,7 @@
 """Cutting a tetrahedral mesh at a level of a nodal field."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -177,7 +177,12 @@ def wall_edges(
     """Round walls that a section cuts, and the border edges (k, 2) that lie on each."""
     facets = {k: mesh.boundary[mesh.wall_of == k] for k in range(len(mesh.round_walls))}
     edges = _edges_on(mesh, facets, border, nodes)
-    return tuple((mesh.round_walls[k], rows) for k, rows in edges.items() if len(rows))
+    starts = {k: mesh.points[corners.min()] for k, corners in facets.items() if len(corners)}
+    return tuple(
+        (replace(mesh.round_walls[k], start=starts[k]), rows)
+        for k, rows in edges.items()
+        if len(rows)
+    )
 
 
 def _edges_on(

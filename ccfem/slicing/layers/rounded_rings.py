@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+import shapely
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.body.mesh.round_walls import RoundWall, moved_onto
@@ -41,7 +42,7 @@ def rounded_rings(
     -------
     tuple of (k, 2) arrays, mm
         Plane coordinates of each loop, within 0.005 mm of its walls; the first point is not
-        repeated. Circles of equal centre and radius have equal points.
+        repeated. Their points turn with the part, and are equal for equal walls on all layers.
     """
     of_edge = {
         (start, end): k
@@ -79,7 +80,8 @@ def _curve(plane: Plane, run: FloatArray, wall: RoundWall) -> FloatArray:
     """Curve (k, 2) of a wall from the first to the last point of a run (k, 2) of chords."""
     along = np.linalg.norm(np.cross(wall.direction, plane.frame[2]))
     if wall.slope == 0.0 and wall.direction.any() and along < _ALONG:
-        return _arc(run, plane.project(wall.centre), wall.radius)
+        start = run[0] if wall.start is None else plane.project(wall.start)
+        return _arc(run, plane.project(wall.centre), wall.radius, start)
     closed = np.array_equal(run[0], run[-1])
     inner = _moved(plane, run[:-1] if closed else run[1:-1], wall)
     run = np.concatenate([inner, inner[:1]] if closed else [run[:1], inner, run[-1:]])
@@ -94,23 +96,21 @@ def _curve(plane: Plane, run: FloatArray, wall: RoundWall) -> FloatArray:
     return np.concatenate([between, run[-1:]])
 
 
-def _arc(run: FloatArray, centre: FloatArray, radius: float) -> FloatArray:
-    """Arc (k, 2) of a circle along a run, with points at angles that are the same for every run."""
+def _arc(run: FloatArray, centre: FloatArray, radius: float, start: FloatArray) -> FloatArray:
+    """Arc (k, 2) of a circle along a run: even steps from end to end, or round from a start."""
     half = np.arccos(max(1.0 - _SAGITTA / radius, np.cos(np.pi / _LEAST)))
-    step = np.pi / 2.0 / np.ceil(np.pi / 4.0 / half)
+    if np.array_equal(run[0], run[-1]):
+        arm = start - centre
+        ring = shapely.Polygon(run)
+        turn = 2.0 * np.pi if ring.exterior.is_ccw else -2.0 * np.pi
+        count = 4 * int(np.ceil(np.pi / 4.0 / half))
+        angle = np.arctan2(arm[1], arm[0]) + turn * np.arange(count + 1) / count
+        return np.asarray(centre + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1))
     arm = run - centre
     angle = np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]))
-    start, stop = angle[0] / step, angle[-1] / step
-    forth = stop > start
-    low, high = (start, stop) if forth else (stop, start)
-    ticks = np.arange(np.ceil(low + 1e-3), np.floor(high - 1e-3) + 1.0)
-    if np.array_equal(run[0], run[-1]):  # a whole circle begins at a tick
-        ticks = np.arange(round(high - low) + 1.0)
-    if not forth:
-        ticks = ticks[::-1]
-    places = centre + radius * np.stack([np.cos(ticks * step), np.sin(ticks * step)], axis=1)
-    if np.array_equal(run[0], run[-1]):
-        return places
+    count = max(int(np.ceil(abs(angle[-1] - angle[0]) / (2.0 * half) - 1e-9)), 1)
+    inner = np.linspace(angle[0], angle[-1], count + 1)[1:-1]
+    places = centre + radius * np.stack([np.cos(inner), np.sin(inner)], axis=1)
     return np.concatenate([run[:1], places, run[-1:]])
 
 
