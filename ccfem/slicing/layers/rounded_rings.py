@@ -104,7 +104,8 @@ def _arc(run: FloatArray, centre: FloatArray, radius: float, start: FloatArray) 
         ring = shapely.Polygon(run)
         turn = 2.0 * np.pi if ring.exterior.is_ccw else -2.0 * np.pi
         count = 4 * int(np.ceil(np.pi / 4.0 / half))
-        angle = np.arctan2(arm[1], arm[0]) + turn * np.arange(count + 1) / count
+        # Half a step on: at the start itself corners meet ties of patterns along the axes.
+        angle = np.arctan2(arm[1], arm[0]) + turn * (np.arange(count + 1) + 0.5) / count
         return np.asarray(centre + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1))
     arm = run - centre
     angle = np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]))
