@@ -20,7 +20,7 @@ KNOWN = {
     # No M280 and no M218: servos by name, offsets in the macros T0 and T1.
     "klipper": COMMON | HEATERS | {"SET_SERVO", "SET_PRESSURE_ADVANCE", "T0", "T1"},
     "reprap_duet": COMMON | {"M280", "G10", "M116", "M568", "M572", "T0", "T1"},
-    "aura_like": COMMON | HEATERS | {"M280", "M1001", "M1002", "M532", "T0", "T1"},
+    "aura_like": COMMON | HEATERS | {"M280", "M1001", "M1002", "M530", "M532", "T0", "T1"},
 }
 LONGEST = {"klipper": 50.0}
 """max_extrude_only_distance of Klipper; EXTRUDE_MAXLENGTH of Marlin is 200."""

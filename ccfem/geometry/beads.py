@@ -110,7 +110,7 @@ def beads(
     direction, straight, often = _chords(own, length, line, first, closed)
     direction = direction - np.einsum("ij,ij->i", direction, normal)[:, None] * normal
     direction /= np.maximum(np.linalg.norm(direction, axis=1), 1e-300)[:, None]
-    found = share_room(
+    shares = share_room(
         bucket(middle, middle, 1.05 * width),
         middle,
         direction,
@@ -126,7 +126,7 @@ def beads(
         height,
         float(np.cos(SAME_DIRECTION)),
     )
-    return Beads(line, first, length, middle, direction, normal, *found.T)
+    return Beads(line, first, length, middle, direction, normal, *shares.T)
 
 
 def _normals(
@@ -141,13 +141,13 @@ def _normals(
     path = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     bent = np.zeros(len(offsets) - 1, dtype=bool)
     bent[path[(np.abs(normals - first[path]) > 1e-12).any(axis=1)]] = True
-    found = first[line]
+    normal = first[line]
     for k in np.flatnonzero(bent).tolist():
         at = slice(offsets[k], offsets[k + 1])
         mine = np.flatnonzero(line == k)
         apart = np.linalg.norm(middle[mine][:, None] - points[at][None], axis=2)
-        found[mine] = normals[at][apart.argmin(axis=1)]
-    return found
+        normal[mine] = normals[at][apart.argmin(axis=1)]
+    return normal
 
 
 @njit(cache=True, nogil=True)
@@ -254,7 +254,7 @@ def _shared(  # type: ignore[no-untyped-def]
     layer, line, apart, ring, width, height, same_cosine, reach
 ):  # fmt: skip  # pragma: no cover
     half = 0.5 * width
-    found = np.empty((len(middle), 4))
+    shares = np.empty((len(middle), 4))
     room = 64
     at, change, order = np.empty(room), np.empty((room, 4)), np.empty(room, np.int64)
     low, high = np.empty(3, np.int64), np.empty(3, np.int64)
@@ -312,8 +312,8 @@ def _shared(  # type: ignore[no-untyped-def]
                             order[events] = events
                             events += 1
         if events == 0:
-            found[k, 0], found[k, 1] = 1.0 / often[k], 1.0 / often[k]
-            found[k, 2], found[k, 3] = fold[k], 1.0
+            shares[k, 0], shares[k, 1] = 1.0 / often[k], 1.0 / often[k]
+            shares[k, 2], shares[k, 3] = fold[k], 1.0
             continue
         _sort(order[:events], at)
         current[0], current[1], current[2], current[3] = often[k], often[k], fold[k], 1.0
@@ -331,9 +331,9 @@ def _shared(  # type: ignore[no-untyped-def]
             if e < events:
                 for i in range(4):
                     current[i] += change[order[e], i]
-        found[k, 0], found[k, 1] = alone / width, every / width
-        found[k, 2], found[k, 3] = fill / width, most
-    return found
+        shares[k, 0], shares[k, 1] = alone / width, every / width
+        shares[k, 2], shares[k, 3] = fill / width, most
+    return shares
 
 
 @njit(cache=True, nogil=True)

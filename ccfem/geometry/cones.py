@@ -79,7 +79,7 @@ def _in_cones(
         off = np.linalg.norm(points - np.repeat(centre, size, axis=0), axis=1)
         radius = np.maximum.reduceat(off, first)
     half = np.radians(half_angle)
-    found = _point_in_cones(
+    tips_inside = _point_in_cones(
         *(seen_only(np.asarray(each, dtype=np.float64)) for each in (tips, axes, points)),
         seen_only(np.asarray(when, dtype=np.int64)),
         ends.astype(np.int64),
@@ -89,7 +89,7 @@ def _in_cones(
         np.array([np.cos(half), np.sin(half), length]),
         columns,
     )
-    return np.asarray(found)
+    return np.asarray(tips_inside)
 
 
 @njit(cache=True, nogil=True)
@@ -98,13 +98,13 @@ def _point_in_cones(  # type: ignore[no-untyped-def]
 ):  # pragma: no cover, compiled
     """Do the same number by number."""
     cosine, sine, length = cone[0], cone[1], cone[2]
-    found = np.full((len(tips), max(columns, 1)), -1)
+    inside = np.full((len(tips), max(columns, 1)), -1)
     for k in range(len(tips)):
         for b in range(len(group)):
             if group[b] >= when[k]:
                 break
             g = group[b] if columns else 0
-            if found[k, g] >= 0:
+            if inside[k, g] >= 0:
                 continue
             a = centre[b, 0] - tips[k, 0]
             c = centre[b, 1] - tips[k, 1]
@@ -123,8 +123,8 @@ def _point_in_cones(  # type: ignore[no-untyped-def]
                 if up <= 0.0 or up > length:
                     continue
                 if (a * a + c * c + d * d) * cosine * cosine < up * up:
-                    found[k, g] = p
+                    inside[k, g] = p
                     break
-            if columns == 0 and found[k, 0] >= 0:
+            if columns == 0 and inside[k, 0] >= 0:
                 break
-    return found
+    return inside

@@ -58,7 +58,7 @@ def _near(
     Their boxes overlap, and neither has both ends clearly on one side of the other. A pair is
     listed once for every cell that it shares.
     """
-    found = 0
+    count = 0
     pairs = np.empty((64, 2), np.int64)
     side = np.empty(4)
     for cell in range(len(starts) - 1):
@@ -86,14 +86,14 @@ def _near(
                     side[k] = 0.0 if abs(across) <= limit else across
                 if side[0] * side[1] > 0.0 or side[2] * side[3] > 0.0:
                     continue
-                if found == len(pairs):
-                    longer = np.empty((2 * found, 2), np.int64)
-                    for k in range(found):
+                if count == len(pairs):
+                    longer = np.empty((2 * count, 2), np.int64)
+                    for k in range(count):
                         longer[k, 0], longer[k, 1] = pairs[k, 0], pairs[k, 1]
                     pairs = longer
-                pairs[found, 0], pairs[found, 1] = min(i, j), max(i, j)
-                found += 1
-    return pairs[:found]
+                pairs[count, 0], pairs[count, 1] = min(i, j), max(i, j)
+                count += 1
+    return pairs[:count]
 
 
 def _crosses(i: IntArray, j: IntArray, points: FloatArray, following: IntArray) -> BoolArray:

@@ -186,15 +186,15 @@ class _Border:
 
     def foot(self, site: IntArray, points: FloatArray) -> FloatArray:
         """Point of the border nearest to each point, on the two pieces beside a sample."""
-        found, least = self.points[site], np.full(len(site), np.inf)
+        foot_nearest, least = self.points[site], np.full(len(site), np.inf)
         for other in (self.before[site], self.after[site]):
             a, side = self.points[site], self.points[other] - self.points[site]
             t = np.einsum("ij,ij->i", points - a, side) / np.einsum("ij,ij->i", side, side)
             foot = a + np.clip(t, 0.0, 1.0)[:, None] * side
             gap = np.linalg.norm(points - foot, axis=1)
-            found = np.where((gap < least)[:, None], foot, found)
+            foot_nearest = np.where((gap < least)[:, None], foot, foot_nearest)
             least = np.minimum(least, gap)
-        return found
+        return foot_nearest
 
 
 @dataclass(frozen=True)
@@ -260,11 +260,11 @@ def _equidistant(
 
     Qhull places undetermined vertices, of collinear sites, at (-10.101, -10.101).
     """
-    found = np.zeros(len(vertices), dtype=bool)
+    on_axis = np.zeros(len(vertices), dtype=bool)
     least, _ = cKDTree(sites).query(vertices[wanted])
     own = np.linalg.norm(vertices[wanted] - sites[nearest[wanted]], axis=1)
-    found[wanted] = own <= (1.0 + _NEARER) * least
-    return found
+    on_axis[wanted] = own <= (1.0 + _NEARER) * least
+    return on_axis
 
 
 def _without_soft_ends(edges: IntArray, firm: BoolArray, count: int) -> BoolArray:

@@ -163,14 +163,14 @@ def _parallels(
             for part in shapely.get_parts(covered)
             for ring in (part.exterior, *part.interiors)
         ]
-        found = [
+        smoothed = [
             shapely.LineString(line)
             for ring, owner in zip(
                 fronts, _owners(fronts, near, sides, owners, distance, pitch), strict=True
             )
             for line in _own_pieces(ring, owner, 3.0 * _OFF * pitch)
         ]
-        smooth = shapely.simplify(np.array(found, dtype=object), _TOLERANCE * pitch)
+        smooth = shapely.simplify(np.array(smoothed, dtype=object), _TOLERANCE * pitch)
         inside = open_lines(shapely.intersection(smooth, region))
         idle = 0 if inside else idle + 1
         lines += inside
@@ -273,17 +273,17 @@ _LEAST = 0.3
 
 def strips(lines: Sequence[FloatArray], pitch: float) -> Region:
     """Area of strands a pitch wide each, with ends cut square: a (Multi)Polygon, mm."""
-    found = shapely.buffer(
+    region = shapely.buffer(
         shapely.multilinestrings([shapely.LineString(line) for line in lines]),
         0.5 * pitch,
         cap_style="flat",
         join_style="mitre",
         mitre_limit=1.5,
     )
-    if shapely.is_valid(found):
-        return found
+    if shapely.is_valid(region):
+        return region
     # Mitred corners may leave a border that touches itself, for which differences would fail.
-    parts = shapely.get_parts(shapely.make_valid(found))
+    parts = shapely.get_parts(shapely.make_valid(region))
     areas = parts[shapely.get_dimensions(parts) == 2]
     return shapely.union_all(areas)
 
@@ -401,12 +401,12 @@ class _Obstacles:
     def angle(self, point: FloatArray, way: FloatArray, own: int) -> float:
         """Acute angle, radians, between a way and the nearest piece ahead; 0 where none is near."""
         here = shapely.Point(point)
-        found = self.tree.query(here, predicate="dwithin", distance=1.2 * self.half)
-        found = found[self.owner[found] != own]
-        if not len(found):
+        near = self.tree.query(here, predicate="dwithin", distance=1.2 * self.half)
+        near = near[self.owner[near] != own]
+        if not len(near):
             return 0.0
-        gap = shapely.distance(self.tree.geometries[found], here)
+        gap = shapely.distance(self.tree.geometries[near], here)
         # The border is the edge of a strand, half a pitch before its middle.
-        gap = gap + np.where(self.owner[found] < 0, self.half, 0.0)
-        x, y = self.along[found[np.argmin(gap)]]
+        gap = gap + np.where(self.owner[near] < 0, self.half, 0.0)
+        x, y = self.along[near[np.argmin(gap)]]
         return float(abs(np.arcsin(np.clip(way[0] * y - way[1] * x, -1.0, 1.0))))

@@ -126,10 +126,10 @@ def resample(points: FloatArray, offsets: IntArray, step: float) -> tuple[FloatA
     parts = np.maximum(1, np.round(total / step).astype(np.int64))
     ends = np.concatenate([[0], np.cumsum(parts + 1)])
     line, number = repeated(parts + 1)
-    found, _ = sample_at(points, offsets, line, number * (total / parts)[line])
+    samples, _ = sample_at(points, offsets, line, number * (total / parts)[line])
     if len(total):
-        found[ends[:-1]], found[ends[1:] - 1] = points[offsets[:-1]], points[offsets[1:] - 1]
-    return found, ends
+        samples[ends[:-1]], samples[ends[1:] - 1] = points[offsets[:-1]], points[offsets[1:] - 1]
+    return samples, ends
 
 
 def sample_midpoints(
@@ -154,10 +154,10 @@ def sample_midpoints(
     line, number = repeated(parts)
     size = np.divide(total, parts, out=np.zeros(len(total)), where=parts > 0)[line]
     middle = np.asarray((number + 0.5) * size, dtype=np.float64)
-    found, segment = sample_at(points, offsets, line, middle)
+    samples, segment = sample_at(points, offsets, line, middle)
     tangent = points[np.minimum(segment + 1, len(points) - 1)] - points[segment]
     norm = np.linalg.norm(tangent, axis=1)
-    return found, tangent / np.maximum(norm, 1e-300)[:, None], size, line
+    return samples, tangent / np.maximum(norm, 1e-300)[:, None], size, line
 
 
 def subdivide(
@@ -275,8 +275,8 @@ def middle_of_longest_run(ring: BoolArray) -> int:
 def point_at(line: FloatArray, position: float) -> FloatArray:
     """Point (d,) of one polyline (n, d) at an arc length from its start."""
     offsets = np.array([0, len(line)])
-    found, _ = sample_at(line, offsets, np.zeros(1, dtype=np.int64), np.array([position]))
-    return found[0]
+    samples, _ = sample_at(line, offsets, np.zeros(1, dtype=np.int64), np.array([position]))
+    return samples[0]
 
 
 def between(line: FloatArray, start: float, end: float) -> FloatArray:

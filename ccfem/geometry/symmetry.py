@@ -28,12 +28,12 @@ def mirrors_of(region: Region) -> tuple[int, ...]:
 
     The mirror passes through the middle of its extent.
     """
-    found = []
+    axes = []
     for axis in (0, 1):
         image = shapely.transform(region, lambda p, a=axis: mirror_image(p, region, a))
         if shapely.symmetric_difference(region, image).area <= _ALIKE * region.area:
-            found.append(axis)
-    return tuple(found)
+            axes.append(axis)
+    return tuple(axes)
 
 
 def mirror_image(points: FloatArray, region: Region, axis: int) -> FloatArray:
@@ -65,17 +65,17 @@ def mirror_lines(region: Region) -> tuple[Mirror, ...]:
         away = np.linalg.norm(border, axis=1)
         x, y = border[[np.argmax(away), np.argmin(away)]].T
         angles = (np.arctan2(y, x)[:, None] + np.pi * np.arange(_STEPS) / _STEPS).ravel()
-    found: list[Mirror] = []
+    mirrors: list[Mirror] = []
     for angle in angles:
         along = np.array([np.cos(angle), np.sin(angle)]).round(15)
         mirror = Mirror(_middle(region, centre, along), along)
-        if len(found) == 2:
+        if len(mirrors) == 2:
             break
         image = shapely.transform(region, lambda points, m=mirror: reflected(points, m))
-        across = all(abs(each.direction @ mirror.direction) < 1e-6 for each in found)
+        across = all(abs(each.direction @ mirror.direction) < 1e-6 for each in mirrors)
         if across and shapely.symmetric_difference(region, image).area <= _ALIKE * region.area:
-            found.append(mirror)
-    return tuple(found)
+            mirrors.append(mirror)
+    return tuple(mirrors)
 
 
 def _middle(region: Region, centre: FloatArray, along: FloatArray) -> FloatArray:

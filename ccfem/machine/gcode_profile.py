@@ -14,8 +14,8 @@ _ALWAYS = (
     *("matrix_standby", "fibre_standby", "tool", "wait"),
 )
 _FIELDS = {
-    "start": (),
-    "end": (),
+    "start": ("layers",),
+    "end": ("layers",),
     "tool": (),
     "cut": (),
     "standby": ("temperature",),
@@ -26,7 +26,7 @@ _FIELDS = {
     "fan": ("fan",),
     "path_start": ("length",),
     "path_end": ("length",),
-    "layer": ("layer",),
+    "layer": ("layer", "number"),
 }
 """Kinds of lines, and the fields that each knows beside those that all know."""
 _FIELD = re.compile(r"\{(\w*)\}")
@@ -73,8 +73,8 @@ class GcodeProfile:
     Attributes
     ----------
     start, end : tuple of str
-        Lines at the start and the end of the file. Coordinates must be absolute and extrusion
-        relative (G90, M83) after the start.
+        Lines at the start and the end of a file of so many {layers}. Coordinates must be absolute
+        and extrusion relative (G90, M83) after the start.
     tool : tuple of str
         Lines that select a tool; {tool} is its number.
     cut : tuple of str
@@ -92,7 +92,7 @@ class GcodeProfile:
     path_start, path_end : tuple of str
         Lines before and after a strand of {length} mm.
     layer : tuple of str
-        Lines at the start of {layer}, counted from 0.
+        Lines at the start of {layer}, counted from 0; {number} is counted from 1.
     offset : tuple of 3 floats, mm
         Of the fibre nozzle from the matrix nozzle.
     offset_by : {"firmware", "gcode"}
@@ -107,8 +107,9 @@ class GcodeProfile:
         the working space of Chen et al. 2021, section 5.2.
     lift, lift_speed : float, mm and mm/s
         How far the nozzle rises before it travels.
-    retract, retract_speed : float, mm and mm/s
-        Matrix filament drawn back before travel.
+    retract, fibre_retract, retract_speed : float, mm and mm/s
+        Matrix filament drawn back before travel, that of the matrix head and that of the fibre head
+        (`Machine.coextrusion`).
     feed_speed : float, mm/s
         Speed at which new fibre is fed from the cutter to the tip of the nozzle.
     matrix_angle, matrix_turn : float, degrees
@@ -160,6 +161,7 @@ class GcodeProfile:
     lift: float = 1.0
     lift_speed: float = 10.0
     retract: float = 1.0
+    fibre_retract: float = 0.0
     retract_speed: float = 30.0
     feed_speed: float = 10.0
     matrix_angle: float = 45.0

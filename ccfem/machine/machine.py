@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from ccfem.base.arrays import in_brief
+from ccfem.base.errors import InputError
 from ccfem.machine.gcode_profile import GcodeProfile
 from ccfem.machine.kinematics import Kinematics
 from ccfem.machine.limits import Limits
@@ -12,6 +13,10 @@ from ccfem.machine.speed_table import SpeedTable
 
 _CUTTER_DISTANCE = 42.0
 """Chen et al. 2021, section 5.2, mm."""
+
+
+_WIDTHS = (0.8, 2.5)
+"""Least and largest width of a line, over the bore of its nozzle. Our choice."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +57,12 @@ class Machine:
         Standstill after a cut. Our choice.
     matrix_width : float, mm
         Width of a line of matrix.
+    matrix_nozzle : float, mm, optional
+        Bore of the matrix nozzle. Default: `matrix_width`.
+    line_shape : float
+        Largest height of a line of matrix over its width. The paper's lines are as high as wide.
+    least_line : float, mm
+        Least height of a line of matrix. Our choice.
     matrix_diameter : float, mm
         Of the matrix filament.
     fibre_density, matrix_density : float, g/cm^3
@@ -96,6 +107,9 @@ class Machine:
     cutter_distance: float | None = None
     cut_wait: float = 1.0
     matrix_width: float = 0.8
+    matrix_nozzle: float | None = None
+    line_shape: float = 1.0
+    least_line: float = 0.05
     matrix_diameter: float = 1.75
     fibre_density: float = 1.4
     matrix_density: float = 1.24
@@ -117,6 +131,35 @@ class Machine:
 
     def __post_init__(self) -> None:
         check_ranges(self)
+        least, most = (factor * (self.matrix_nozzle or self.matrix_width) for factor in _WIDTHS)
+        if not least <= self.matrix_width <= most:
+            raise InputError(
+                f"machine.matrix_width must be from {least:.3g} to {most:.3g} mm, {_WIDTHS[0]:g} "
+                f"to {_WIDTHS[1]:g} bores of machine.matrix_nozzle; got {self.matrix_width:g}: "
+                "correct one of them"
+            )
+        if self.least_line > self.highest_line:
+            raise InputError(
+                f"machine.least_line must be at most the {self.highest_line:.3g} mm that "
+                f"line_shape allows a line to be high; got {self.least_line:g}: give less"
+            )
+
+    @property
+    def highest_line(self) -> float:
+        """Largest height of a line of matrix, mm: what its shape allows at its width."""
+        return self.line_shape * self.matrix_width
+
+    def highest_matrix(self, over: float) -> float:
+        """Largest height of a layer of matrix whose lines fill what is open below them too, mm.
+
+        Parameters
+        ----------
+        over : float, mm
+            Height of the fibre layer below it, between the strands of which they reach down; 0 on
+            matrix.
+        """
+        highest = max(self.highest_line - over, min(self.least_line, self.highest_line))
+        return min(self.matrix_height, highest) if self.matrix_height else highest
 
     @property
     def strand_height(self) -> float:

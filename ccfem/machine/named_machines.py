@@ -110,19 +110,19 @@ def updated(machine: Machine, *tables: Mapping[str, Any], where: str = "machine"
     >>> updated(Machine(), machine_table("aura_like"), {"process": {"start_speed": 3.0}}).tail
     46.0
     """
-    found = _as_table(machine)
+    merged = _as_table(machine)
     for table in tables:
-        found = _merged(found, _whole_table(table))
-    return from_table(Machine, found, where)
+        merged = _merged(merged, _whole_table(table))
+    return from_table(Machine, merged, where)
 
 
 def _merged(under: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     """Merge two tables; the second one wins, and tables in both are merged in turn."""
-    found = dict(under)
+    merged = dict(under)
     for key, value in over.items():
-        both = isinstance(value, Mapping) and isinstance(found.get(key), Mapping)
-        found[key] = _merged(found[key], value) if both else value
-    return found
+        both = isinstance(value, Mapping) and isinstance(merged.get(key), Mapping)
+        merged[key] = _merged(merged[key], value) if both else value
+    return merged
 
 
 def _as_table(value: object) -> dict[str, Any]:

@@ -40,9 +40,9 @@ class Process:
         patents on cutting and ironing.
     strand_lift : float, mm
         The nozzle rises so much more than `GcodeProfile.lift` after a strand.
-    tool_lift, tool_retract : float, mm
+    tool_lift, tool_retract, tool_fibre_retract : float, mm
         Before a change of tools the nozzle rises so far above all that is printed, and so much
-        matrix filament is drawn back (Aura: 5 and 15).
+        matrix filament of the matrix head, and of the fibre head, is drawn back (Aura: 5, 15, 12).
     short : {"matrix", "drop", "error"}
         Strands below `Machine.minimum_length`: laid by the matrix nozzle, left out, or refused.
     cover : float, mm
@@ -90,6 +90,7 @@ class Process:
     strand_lift: float = 0.5
     tool_lift: float = 5.0
     tool_retract: float = 15.0
+    tool_fibre_retract: float = 0.0
     short: Literal["matrix", "drop", "error"] = "matrix"
     cover: float = 0.15
     turns: Literal["pad", "cut", "inside"] = "pad"

@@ -64,7 +64,9 @@ def beside(plan: PrintPlan, machine: Machine) -> Beside:
     strand = None
     if process.prime != "none":
         right, middle = low[0] - _GAP, 0.5 * (low[1] + high[1])
-        block = _block(right, middle, machine)
+        matrix = np.setdiff1d(plan.paths.layer, plan.paths.layer[plan.paths.kind == FIBRE])
+        least = float(plan.thickness[matrix].min(initial=machine.highest_line))
+        block = _block(right, middle, least, machine)
     if process.prime != "none" and bool((plan.paths.kind == FIBRE).any()):
         long = machine.tail + _BAR_MORE
         left = 0.5 * (low[0] + high[0] - long)
@@ -89,11 +91,13 @@ def _head_aside(plan: PrintPlan, machine: Machine) -> float:
     return machine.head_length / float(np.cos(half)) * float(np.sin(min(tilt + half, np.pi / 2)))
 
 
-def _block(right: float, middle: float, machine: Machine) -> list[FloatArray]:
-    """Lines of the block, given its right side."""
+def _block(right: float, middle: float, height: float, machine: Machine) -> list[FloatArray]:
+    """Lines of the block, given its right side; on layers so high they hold the primed volume."""
     process, width = machine.process, machine.matrix_width
     size = process.prime_size
     if process.prime == "block":
+        # Loops over the whole block hold its volume but for half a line round it.
+        size = max(size, np.sqrt(1.01 * process.prime_volume / height) + width)
         insets = (np.arange(max(int(0.5 * size / width), 1)) + 0.5) * width
         half = 0.5 * size - insets[insets < 0.5 * size]
         corners = np.array([[1, -1], [1, 1], [-1, 1], [-1, -1], [1, -1]])

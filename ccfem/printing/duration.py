@@ -28,7 +28,8 @@ def durations(moves: Moves, machine: Machine, heating: bool = True) -> FloatArra
     """
     seconds = np.zeros(len(moves))
     fed = moves.event == FEED
-    seconds[fed] = np.abs(moves.feed[fed]) / moves.speed[fed]
+    length = np.maximum(np.abs(moves.feed[fed]), np.abs(moves.beside[fed]))
+    seconds[fed] = length / moves.speed[fed]
     still = np.isin(moves.event, [CUT, WAIT])
     seconds[still] = moves.amount[still]
     moving = np.flatnonzero(np.isin(moves.event, [TRAVEL, LAY]) & (moves.length > 0.0))

@@ -21,7 +21,6 @@ from ccfem.base.errors import InputError
 from ccfem.geometry.polylines import starts_segment, subdivide
 from ccfem.geometry.shapes import Region, strings
 from ccfem.machine.machine import Machine
-from ccfem.paths.splitting.slabs import THIN
 from ccfem.paths.splitting.strand_density import StrandDensity
 from ccfem.paths.toolpaths import Toolpaths
 
@@ -87,7 +86,7 @@ def with_flow(
     if sections is None:
         sections = [machine.strand_area] * len(strands)
     volume = height + below - _density(strands, sections, middle, machine)
-    least = min(THIN, height)
+    least = min(machine.least_line, height)
     warning = _check(volume, length, height, below, least, machine)
     wanted = np.maximum(volume, least)
     # Of neighbouring pieces with the same height level only the first keeps its point.
@@ -106,6 +105,9 @@ def with_flow(
     room = section.area * (height + below) - float(inside @ np.asarray(sections))
     scale = room / (machine.matrix_width * (laid * long).sum())
     laid *= np.clip(scale, 1.0 / _SCALE, _SCALE)
+    # No line thinner than the machine prints; those in gaps are narrower instead.
+    floor = np.full(len(laid), least) if shares is None else least * shares[line]
+    laid = np.where(long > 0.0, np.maximum(laid, floor), 0.0)
     fewer = replace(
         paths,
         points=points[kept],
@@ -139,7 +141,7 @@ def pad_flow(
         offsets=offsets,
         link=np.zeros(len(points), dtype=bool),
     )
-    return finer, np.maximum(volume, min(THIN, height))
+    return finer, np.maximum(volume, min(machine.least_line, height))
 
 
 def _density(

@@ -299,6 +299,9 @@ def change_tool(recorder: Recorder, tool: int, top: float, machine: Machine) -> 
         if old == 0 and process.tool_retract > recorder.drawn_back:
             recorder.feed(recorder.drawn_back - process.tool_retract, profile.retract_speed)
             recorder.drawn_back = process.tool_retract
+        if old == 1 and machine.coextrusion:
+            back = max(process.tool_fibre_retract, recorder.beside_back)
+            recorder.draw_back_beside(back, profile.retract_speed)
         cool = machine.fibre_standby if old else machine.matrix_standby
         recorder.note(STANDBY, cool, old)
     recorder.tool = tool
@@ -347,6 +350,7 @@ def lay_strand(
     round_it = machine.coextrusion * room / matrix_area(machine)
     total = float(positions[-1])
     recorder.travel(points[0], across[0])
+    recorder.draw_back_beside(0.0, profile.retract_speed)
     recorder.note(PATH_START, total)
     tail = line_length(points[cut:])
     if machine.tail > 0.0:
@@ -376,6 +380,8 @@ def lay_strand(
     recorder.note(PATH_END, total)
     if process.ironing_length > 0.0:
         _iron(recorder, points, across, positions, machine)
+    if machine.coextrusion:
+        recorder.draw_back_beside(profile.fibre_retract, profile.retract_speed)
     recorder.retreat(process.strand_lift)
 
 

@@ -29,6 +29,7 @@ class Recorder:
         self.layer = 0
         self.strand = -1
         self.drawn_back = 0.0
+        self.beside_back = 0.0
 
     def note(self, event: int, value: float = 0.0, tool: int | None = None) -> None:
         """Note what happens where the nozzle stands."""
@@ -40,6 +41,12 @@ class Recorder:
         each = np.diff(np.linspace(0.0, length, count + 1).round(_FEED_DIGITS))
         for part in each.tolist():
             self._row(FEED, feed=part, beside=beside * part / length, speed=speed)
+
+    def draw_back_beside(self, length: float, speed: float) -> None:
+        """Draw the fibre head's own matrix back by a length in all, mm; 0 brings it forward."""
+        if length != self.beside_back:
+            self._row(FEED, feed=0.0, beside=self.beside_back - length, speed=speed)
+            self.beside_back = length
 
     def travel(self, place: FloatArray, normal: FloatArray) -> None:
         """Go above all that is printed to a place, and down to it.

@@ -14,6 +14,7 @@ from scipy.special import roots_jacobi
 
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.box import box_mesh
+from ccfem.body.mesh.curved_cells import gradients_at, jacobians, shape_values
 from ccfem.fem.elasticity import Force, Problem, Support, solve
 from ccfem.fem.elasticity.assembly import cell_gradients
 from ccfem.fem.elasticity.error_estimate import estimate_error
@@ -150,23 +151,22 @@ def true_error(mesh, u, exact):
     """Twice the energy of the error of each cell, integrated to degree seven."""
     rules = [roots_jacobi(4, power, 0) for power in (2, 1, 0)]
     (r, wr), (s, ws), (t, wt) = [(0.5 * (x + 1.0), w / w.sum()) for x, w in rules]
-    gradients, edges = cell_gradients(mesh), TetMesh.edges
+    gradients, nodes = cell_gradients(mesh), mesh.points[mesh.cells]
     total = np.zeros(len(mesh.cells))
     for i, a in enumerate(r):
         for j, b in enumerate(s):
             for k, c in enumerate(t):
                 at = np.array([a, b * (1 - a), c * (1 - a) * (1 - b)])
                 at = np.append(at, 1.0 - at.sum())
-                slopes = gradients
+                slopes, volumes = gradients, mesh.volumes
+                place = np.einsum("a,mak->mk", at, nodes[:, :4])
                 if mesh.order == 2:
-                    p, q = edges.T
-                    middle = 4.0 * (at[p, None] * gradients[:, q] + at[q, None] * gradients[:, p])
-                    slopes = np.hstack([(4.0 * at - 1.0)[:, None] * gradients, middle])
+                    slopes, volumes = gradients_at(nodes, at), jacobians(nodes, at) / 6.0
+                    place = np.einsum("a,mak->mk", shape_values(at), nodes)
                 slope = np.einsum("map,maq->mpq", u[mesh.cells], slopes)
                 found = stress_of(0.5 * (slope + slope.swapaxes(1, 2)))
-                place = np.einsum("a,mak->mk", at, mesh.points[mesh.corners])
                 off = energy_of(exact_stress(exact, place) - found)
-                total += wr[i] * ws[j] * wt[k] * mesh.volumes * off
+                total += wr[i] * ws[j] * wt[k] * volumes * off
     return total
 
 

@@ -1,5 +1,6 @@
 """Machines by name and from files: what wins over what, and that a printout is the machine."""
 
+import re
 import tomllib
 from dataclasses import replace
 
@@ -128,3 +129,36 @@ def test_the_list_names_all(capsys):
 def test_a_case_is_printed_by_another_machine():
     case = read("bar", element_size=12.0)
     assert machine_choice("chen2021", ["fibre_speed=4"])(case.machine).fibre_speed == 4.0
+
+
+def test_an_a4_is_spoken_to_as_its_own_slicer_does():
+    """Words and sizes of brace.gcode, a session of Aura 2.4.8, in pyGCodeDecode 1.5.1."""
+    machine = machine_from({"profile": "aura_like"})
+    profile, fill = machine.gcode, machine.gcode.fill
+    assert fill(profile.fan, {"tool": 0, "fan": 255}) == ["M106 P1 S255"]
+    assert fill(profile.fan, {"tool": 1, "fan": 128}) == ["M106 P1 S128"]
+    assert fill(profile.layer, {"layer": 0, "number": 1}) == ["M532 L1"]
+    values = dict.fromkeys(("bed_temperature", "matrix_temperature", "fibre_standby"), 45.0)
+    start = fill(profile.start, {"layers": 99, **values})
+    assert start[0] == "M530 L99"
+    assert start.index("M530 S1") == start.index("G28") + 1
+    assert profile.end[-1] == "M530 S0"
+    # Retraction of its two heads on travel, and before a change of tools, mm of filament.
+    assert (profile.retract, profile.fibre_retract) == (4.5, 5.0)
+    assert (machine.process.tool_retract, machine.process.tool_fibre_retract) == (15.0, 12.0)
+    # EntitySizes: .4 wide and .1 or .2 high, by a nozzle of .4; fibre .78 wide.
+    assert (machine.matrix_nozzle, machine.matrix_width, machine.fibre_width) == (0.4, 0.4, 0.78)
+    assert machine.least_line == 0.1 <= 0.2 <= machine.highest_line
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"matrix_nozzle": 0.4}, "matrix_width must be from 0.32 to 1 mm, 0.8 to 2.5 bores of"),
+        ({"least_line": 0.9}, "least_line must be at most the 0.8 mm that line_shape allows"),
+        ({"line_shape": 1.2}, "line_shape must be from 0.05 to 1; got 1.2"),
+    ],
+)
+def test_lines_that_no_nozzle_lays_are_refused(table, message):
+    with pytest.raises(InputError, match=re.escape(message)):
+        updated(Machine(**({"matrix_width": 1.2} if "matrix_nozzle" in table else {})), table)

@@ -88,12 +88,12 @@ def in_own_process(
         if not out.exists():
             raise ChildError(f"the library crashed ({_ending(done.returncode)})")
         with np.load(out, allow_pickle=False) as file:
-            found = {name: file[name] for name in file.files}
-    if "refused" in found:
-        raise InputError(str(found["refused"]))
-    if "failed" in found:
-        raise ChildError(str(found["failed"]))
-    return found
+            answer = {name: file[name] for name in file.files}
+    if "refused" in answer:
+        raise InputError(str(answer["refused"]))
+    if "failed" in answer:
+        raise ChildError(str(answer["failed"]))
+    return answer
 
 
 def _ending(code: int) -> str:

@@ -21,15 +21,15 @@ def read_grid(path: str) -> dict[str, Any]:
     grid = _output(vtkXMLUnstructuredGridReader(), path)
     if grid.GetPoints() is None or not grid.GetNumberOfCells():
         raise ValueError("no points or no cells")
-    found: dict[str, Any] = {"points": vtk_to_numpy(grid.GetPoints().GetData())}
+    arrays: dict[str, Any] = {"points": vtk_to_numpy(grid.GetPoints().GetData())}
     types = vtk_to_numpy(grid.GetCellTypesArray())
     offsets = vtk_to_numpy(grid.GetCells().GetOffsetsArray()).astype(np.int64)
     nodes = vtk_to_numpy(grid.GetCells().GetConnectivityArray()).astype(np.int64)
     if len(offsets) != len(types) + 1:
         raise ValueError("cells do not fit their types")
-    found["types"] = types
+    arrays["types"] = types
     for kind in np.unique(types).tolist():
-        found[f"cells:{kind}"] = _rows(nodes, offsets, types == kind, _NODES.get(kind, 0))
+        arrays[f"cells:{kind}"] = _rows(nodes, offsets, types == kind, _NODES.get(kind, 0))
     for where, data in (
         ("point", grid.GetPointData()),
         ("cell", grid.GetCellData()),
@@ -39,15 +39,15 @@ def read_grid(path: str) -> dict[str, Any]:
             array = data.GetAbstractArray(k)
             name = f"{where}:{array.GetName()}"
             if not hasattr(array, "GetComponentName") or array.IsA("vtkStringArray"):
-                found[name] = np.array(
+                arrays[name] = np.array(
                     [array.GetValue(i) for i in range(array.GetNumberOfValues())]
                 )
                 continue
-            found[name] = vtk_to_numpy(array)
+            arrays[name] = vtk_to_numpy(array)
             names = [array.GetComponentName(i) or "" for i in range(array.GetNumberOfComponents())]
             if any(names):
-                found[f"components:{name}"] = np.array(names)
-    return found
+                arrays[f"components:{name}"] = np.array(names)
+    return arrays
 
 
 def _rows(

@@ -50,7 +50,7 @@ def bisected(mesh: TetMesh, chosen: BoolArray) -> tuple[TetMesh, IntArray]:
     cut = (n, key[order], rank[halved][order], n + order)
     cells, parent = _cut(mesh.cells, *cut)
     patches = {name: _cut(facets, *cut)[0] for name, facets in mesh.patches.items()}
-    return TetMesh(points, cells, patches, mesh.axes), parent
+    return TetMesh(points, cells, patches, mesh.axes, mesh.walls), parent
 
 
 def _cut(

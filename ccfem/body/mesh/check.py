@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.checks import FARTHEST
 from ccfem.base.errors import InputError
-from ccfem.body.mesh.flaws import STRAIGHT
+from ccfem.body.mesh.curved_cells import unfolded
 from ccfem.body.mesh.pairing import FREE
 from ccfem.body.mesh.patches import match_boundary
 from ccfem.body.mesh.tet_mesh import TetMesh
@@ -39,7 +39,7 @@ class MeshReport:
     unused : int
         Nodes that no cell uses: taken out.
     moved : int
-        Mid-side nodes that were off the middle of their edge: moved there.
+        Mid-side nodes of cells that their curved sides fold: moved to the middle of their edge.
     farthest : float, mm
         The longest of these moves.
     dropped : int
@@ -86,8 +86,8 @@ class MeshReport:
             (self.unused, f"{self.unused} nodes belonged to no cell: taken out"),
             (
                 self.moved,
-                f"{self.moved} mid-side nodes moved to the middle of their straight edge, by up to "
-                f"{self.farthest:.3g} mm: mesh curved walls finer where that is too far",
+                f"{self.moved} mid-side nodes of folded cells moved to the middle of their edge, "
+                f"by up to {self.farthest:.3g} mm: mesh curved walls finer where that is too far",
             ),
             (self.dropped, f"{self.dropped} patch facets were not on the boundary: left out"),
             (self.coincident, f"{self.coincident} nodes lie on another one: {together}"),
@@ -110,8 +110,8 @@ def check_mesh(mesh: TetMesh, merge: bool = False) -> tuple[TetMesh, MeshReport]
     """Mend a mesh and say what was found.
 
     Cells are turned to positive volume; flat and repeated cells, unused nodes and patch facets
-    inside the part are taken out; mid-side nodes are moved to the middle of their edges, since
-    all elements of ccfem are straight-sided. Separate pieces stay.
+    inside the part are taken out; sides of quadratic cells may be curved, but those of cells that
+    fold are made straight. Separate pieces stay.
 
     Parameters
     ----------
@@ -151,9 +151,9 @@ def check_mesh(mesh: TetMesh, merge: bool = False) -> tuple[TetMesh, MeshReport]
     cells = leader[mesh.cells] if merged else np.array(mesh.cells)
     keep, flat, repeated, turned = _sort_out(mesh.points, cells)
     cells[turned] = cells[turned][:, _TURNED[cells.shape[1]]]
-    points, moved, farthest = _straight(mesh.points, cells[keep])
+    points, moved, farthest = _unfolded(mesh.points, cells[keep])
     changed = merged or moved > 0 or bool(turned.any()) or not keep.all()
-    mended = TetMesh(points, cells[keep]) if changed else mesh
+    mended = TetMesh(points, cells[keep], walls=mesh.walls) if changed else mesh
     _check_faces(mended)
     hanging = hanging_nodes(mended)
     if merged and len(hanging):
@@ -188,7 +188,7 @@ def check_mesh(mesh: TetMesh, merge: bool = False) -> tuple[TetMesh, MeshReport]
         return mesh, report
     number = np.cumsum(still) - 1
     named = {name: number[facets] for name, facets in patches.items()}
-    return TetMesh(points[still], number[mended.cells], named), report
+    return TetMesh(points[still], number[mended.cells], named, walls=mesh.walls), report
 
 
 def about_slivers(mesh: TetMesh) -> str:
@@ -249,20 +249,14 @@ def _sort_out(points: FloatArray, cells: IntArray) -> tuple[BoolArray, int, int,
     return ~flat & ~repeated, int(flat.sum()), int(repeated.sum()), volumes < 0.0
 
 
-def _straight(points: FloatArray, cells: IntArray) -> tuple[FloatArray, int, float]:
-    """Points with the mid-side nodes at the middle of their edges; how many moved, and how far."""
+def _unfolded(points: FloatArray, cells: IntArray) -> tuple[FloatArray, int, float]:
+    """Points with the middles of folded cells on their chords; how many moved, and how far."""
     if cells.shape[1] == 4:
         return points, 0, 0.0
-    ends = points[cells[:, TetMesh.edges]]
-    middle = ends.mean(axis=2)
-    gap = np.linalg.norm(points[cells[:, 4:]] - middle, axis=2)
-    off = gap > 0.1 * STRAIGHT * np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
-    if not off.any():
-        return points, 0, 0.0
-    points = np.array(points)
-    moved = cells[:, 4:][off]
-    points[moved] = middle[off]
-    return points, len(np.unique(moved)), float(gap.max())
+    mended = unfolded(points, cells, np.unique(cells[:, 4:]))
+    gap = np.linalg.norm(mended - points, axis=1)
+    moved = int(np.count_nonzero(gap))
+    return (mended, moved, float(gap.max())) if moved else (points, 0, 0.0)
 
 
 def _check_faces(mesh: TetMesh) -> None:
@@ -294,15 +288,15 @@ def _patches(
     """
     patches, dropped = {}, 0
     for name, facets in groups.items():
-        found = match_boundary(mended, facets)
-        lost = len(facets) - len(found)
+        kept = match_boundary(mended, facets)
+        lost = len(facets) - len(kept)
         if lost and len(removed):
             faces = removed[:, TetMesh.faces].reshape(-1, 3)
             carries = are_among(faces, facets).reshape(-1, 4).any(axis=1)
             both = np.concatenate([facets, faces[np.repeat(carries, 4)]])
-            found = match_boundary(mended, both)
-            lost = max(len(facets) - len(found), 0)
-        patches[name] = found
+            kept = match_boundary(mended, both)
+            lost = max(len(facets) - len(kept), 0)
+        patches[name] = kept
         dropped += lost
     return patches, dropped
 

@@ -3,16 +3,13 @@
 import numpy as np
 
 from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.body.mesh.curved_cells import CELL_POINTS, NODES, curved_cells, jacobians
 from ccfem.body.mesh.pairing import CROWDED, FOLDED
-
-STRAIGHT = 1e-6
-"""Distance of a mid-side node from the middle of its edge, over the edge, that counts as none."""
 
 
 def first_flaw(
     points: FloatArray,
     cells: IntArray,
-    edges: IntArray,
     volumes: FloatArray,
     partners: IntArray,
 ) -> str:
@@ -23,8 +20,6 @@ def first_flaw(
     points : (n, 3) array, mm
         Finite.
     cells : (m, 4) or (m, 10) int array
-    edges : (6, 2) int array
-        Corners at the ends of the edge of each mid-side node.
     volumes : (m,) array, mm^3
     partners : (4 m,) int array
         From `ccfem.body.mesh.pairing.pair_facets`.
@@ -43,26 +38,19 @@ def first_flaw(
             f"on one side, or to more than two; the first at ({at}) mm): mend it with "
             "ccfem.body.mesh.check_mesh, or mesh the part again"
         )
-    return "" if cells.shape[1] == 4 else _curved(points, cells, edges)
+    return "" if cells.shape[1] == 4 else _folded(points, cells)
 
 
-def _curved(points: FloatArray, cells: IntArray, edges: IntArray) -> str:
-    """Say where sides are curved: all elements of ccfem are straight-sided."""
-    off = length = 0.0
-    count = 0
-    for k, (i, j) in enumerate(edges):
-        start, end = points[cells[:, i]], points[cells[:, j]]
-        gap = np.linalg.norm(points[cells[:, 4 + k]] - 0.5 * (start + end), axis=1)
-        side = np.linalg.norm(end - start, axis=1)
-        count += int(np.count_nonzero(gap > STRAIGHT * side))
-        worst = gap.argmax()
-        if gap[worst] > off:
-            off, length = float(gap[worst]), float(side[worst])
-    if not count:
+def _folded(points: FloatArray, cells: IntArray) -> str:
+    """Say which quadratic cell its curved sides turn inside out."""
+    curved = curved_cells(points, cells)
+    nodes = points[cells[curved]]
+    least = np.min([jacobians(nodes, at) for at in (*NODES, *CELL_POINTS)], axis=0)
+    folded = curved[least <= 0.0]
+    if not len(folded):
         return ""
+    at = ", ".join(f"{x:.4g}" for x in points[cells[folded[0], :4]].mean(axis=0))
     return (
-        f"{count} edges of quadratic cells are curved, by up to {off:.3g} mm on an edge of "
-        f"{length:.3g} mm, but ccfem needs straight ones: straighten them with "
-        "ccfem.body.mesh.check_mesh, which reports how far it moved the nodes; use a finer mesh if "
-        "that is too far"
+        f"{len(folded)} quadratic cells are turned inside out by their curved sides, the first at "
+        f"({at}) mm: straighten them with ccfem.body.mesh.check_mesh, or use a finer mesh there"
     )

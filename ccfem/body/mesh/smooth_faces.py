@@ -11,10 +11,13 @@ from scipy.sparse.csgraph import connected_components
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.base.checks import check_number
+from ccfem.body.mesh.round_walls import RoundWall
 from ccfem.geometry.facets import facet_keys
 
 FEATURE_ANGLE = 30.0
 """Angle between facets, degrees, from which an edge separates two faces."""
+COARSE_ANGLE = 40.0
+"""Feature angle, degrees, at which a bore of 9 facets is a round wall, and an octagon is none."""
 _FLAT = 1.0
 """Root mean square angle, degrees, of the normals of a plane to their mean."""
 _SEAM = 0.5
@@ -29,6 +32,9 @@ _COLUMNS = 4
 _EXACT, _MANY, _ALIKE = 5e-3, 12, 0.97
 """Largest distance of the nodes of a cone or a sphere from it, in radii, their least number, and
 least mean cosine between its normals and those of its facets: a free-form face is neither."""
+_DEPTH, _FEW = 0.05, 0.02
+"""Largest distance of nodes from a wall over its depth, and the share of it that fewer nodes than
+these may use: a cylinder passes through any five."""
 _STEPS = 4
 """Steps towards the nearest cylinder: each doubles the digits."""
 _CLOSED = 0.02
@@ -81,19 +87,21 @@ class Face:
     def __post_init__(self) -> None:
         freeze(self, facets=int, centre=float, direction=float)
 
+    @property
+    def wall(self) -> RoundWall | None:
+        """The cylinder, cone or sphere that the face lies on; None where it lies on none."""
+        if self.kind not in ("cylinder", "cone", "sphere"):
+            return None
+        return RoundWall(self.centre, self.direction, self.radius, self.slope, self.hollow)
+
     def normals_at(self, places: FloatArray) -> FloatArray | None:
         """Outward unit normals (k, 3) of a round face at places (k, 3), mm, on it or near it.
 
         They point from the axis or the centre, wherever a place lies between it and the wall, as
         the middle of a chord does. None for a face that is not round.
         """
-        if self.kind not in ("cylinder", "cone", "sphere"):
-            return None
-        arm = places - self.centre
-        arm -= np.outer(arm @ self.direction, self.direction)
-        radial = arm / np.maximum(np.linalg.norm(arm, axis=1), 1e-300)[:, None]
-        normal = (radial - self.slope * self.direction) / np.hypot(1.0, self.slope)
-        return np.asarray(-normal if self.hollow else normal)
+        wall = self.wall
+        return None if wall is None else wall.normals_at(places)
 
     @property
     def about(self) -> str:
@@ -199,6 +207,104 @@ def given_faces(
     """
     surface = _surface(np.asarray(points, dtype=float), np.asarray(triangles, dtype=np.int64))
     return tuple(_face(surface, np.asarray(rows, dtype=np.int64)) for rows in groups)
+
+
+def round_walls(
+    points: ArrayLike, triangles: ArrayLike, faces: Iterable[Face]
+) -> tuple[RoundWall, ...]:
+    """Round walls among the faces of a surface, as large as these.
+
+    Parameters
+    ----------
+    points : (n, 3) array, mm
+    triangles : (t, 3) int array
+    faces : iterable of Face
+        Those of another shape that is nearly round, as an oval hole has, are left out.
+
+    Returns
+    -------
+    tuple of RoundWall
+        The tolerance of each is the largest distance of its triangles from it, at their corners and
+        at the middles of their sides: what is meshed anew lies on these triangles.
+    """
+    points, triangles = np.asarray(points, dtype=float), np.asarray(triangles, dtype=np.int64)
+    fitted = (_true_wall(face, points[triangles[face.facets]]) for face in faces)
+    return tuple(wall for wall in fitted if wall is not None)
+
+
+def _true_wall(face: Face, corners: FloatArray) -> RoundWall | None:
+    """Wall that triangles with corners (k, 3, 3) are chords of; None where there is none."""
+    wall = face.wall
+    if wall is None:
+        return None
+    nodes = np.unique(corners.reshape(-1, 3), axis=0)
+    distance, normal = wall.distances(nodes)
+    # Nodes lie on the wall or, where triangles were cut, on its chords: inside, never outside.
+    beyond = max(float(np.quantile(distance, 0.9)), 0.0)
+    distance -= beyond
+    # A shallow wall of a large radius is near to many faces, one of few nodes to any.
+    mean = normal.mean(axis=0)
+    mean /= max(float(np.linalg.norm(mean)), 0.5)
+    depth = wall.radius * (1.0 - float((normal @ mean).min()))
+    slack = min(_EXACT * wall.radius, _DEPTH * depth) * (1.0 if len(nodes) >= _MANY else _FEW)
+    near = np.abs(distance) <= slack
+    if not near.all() and ((distance > slack).any() or face.kind != "cylinder"):
+        return None
+    if not near.all() and not _chords(face, nodes - wall.centre, distance, near):
+        return None
+    places = np.concatenate([corners, 0.5 * (corners + np.roll(corners, 1, axis=1))])
+    height = (nodes - wall.centre) @ wall.direction
+    wall = replace(wall, radius=wall.radius + beyond)
+    return replace(
+        wall,
+        tolerance=float(np.abs(wall.distances(places.reshape(-1, 3))[0]).max()),
+        low=float(height.min()),
+        high=float(height.max()),
+        area=face.area,
+    )
+
+
+def _chords(face: Face, arm: FloatArray, distance: FloatArray, near: BoolArray) -> bool:
+    """Whether nodes inside a cylinder lie on chords between columns of nodes that are near it.
+
+    Parameters
+    ----------
+    arm : (k, 3) array, mm
+        Of the nodes, from a point of the axis.
+    distance : (k,) array, mm
+        Of the nodes from the wall; negative inside.
+    near : (k,) bool array
+        Nodes on the wall.
+    """
+    axes = np.linalg.svd(face.direction[None])[2][1:]
+    turn = np.sort(np.arctan2(arm[near] @ axes[1], arm[near] @ axes[0]))
+    if 1 + (np.diff(turn) > 1e-3).sum() < _COLUMNS:
+        return False
+    gaps = np.sort(np.diff(turn, append=turn[:1] + 2.0 * np.pi))
+    gaps = gaps[: len(gaps) - (face.turn < 359.0)]  # a wall that does not close has one more
+    chord = face.radius * (1.0 - np.cos(0.5 * gaps[-1]))
+    return bool(gaps[-1] < np.radians(COARSE_ANGLE)) and bool((distance > -1.1 * chord).all())
+
+
+def guessed_walls(points: FloatArray, boundary: IntArray) -> tuple[tuple[RoundWall, ...], IntArray]:
+    """Round walls of a mesh that nothing is known of, and the wall (b,) of each boundary facet.
+
+    Parameters
+    ----------
+    points : (n, 3) array, mm
+    boundary : (b, 3) int array
+        Outward.
+    """
+    walls: list[RoundWall] = []
+    wall_of = np.full(len(boundary), -1)
+    rest = np.arange(len(boundary))
+    for angle in (COARSE_ANGLE, FEATURE_ANGLE):
+        for face in smooth_faces(points, boundary[rest], angle):
+            for wall in round_walls(points, boundary[rest], [face]):
+                wall_of[rest[face.facets]] = len(walls)
+                walls.append(wall)
+        rest = np.flatnonzero(wall_of < 0)
+    return tuple(walls), wall_of
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from ccfem.body.isolated.process import ChildError, in_own_process
 from ccfem.body.mesh.check import check_mesh
 from ccfem.body.mesh.face_names import face_name
 from ccfem.body.mesh.patches import match_boundary
+from ccfem.body.mesh.smooth_faces import given_faces, round_walls
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.body.meshing.fidelity import fidelity
 from ccfem.body.meshing.volume import check_edge_length
@@ -86,13 +87,18 @@ def mesh_cad(
     made = _made("cad_volume", path, edge_length, scale)
     if not len(made["cells"]):
         raise InputError(f"{path}: Gmsh left no cells in its solids: shorten edge_length")
-    mesh = TetMesh(made["points"], made["cells"])
+    faces = given_faces(
+        fine.surface.points,
+        fine.surface.triangles,
+        [np.flatnonzero(fine.face == k) for k in np.unique(fine.face)],
+    )
+    walls = round_walls(fine.surface.points, fine.surface.triangles, faces)
+    mesh = TetMesh(made["points"], made["cells"], walls=walls)
     groups: dict[str, list[IntArray]] = {}
     for k, name in enumerate(made["names"].tolist(), 1):
         facets = match_boundary(mesh, made["triangles"][made["face"] == k])
-        for each in (face_name(k), name):
-            if each:
-                groups.setdefault(each, []).append(facets)
+        for label in filter(None, (face_name(k), name)):
+            groups.setdefault(label, []).append(facets)
     mesh = mesh.with_patches({name: np.concatenate(those) for name, those in groups.items()})
     mesh = check_mesh(mesh)[0]
     return mesh, fidelity(fine.surface, mesh).about("Gmsh")

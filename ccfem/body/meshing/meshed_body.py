@@ -17,6 +17,7 @@ from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
 from ccfem.base.whole import existing_file, whole_file
 from ccfem.body.files.surface import Surface, read_surface
+from ccfem.body.mesh.round_walls import RoundWall
 from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.body.meshing.cad import is_cad, mesh_cad
@@ -89,7 +90,7 @@ def mesh_body(
 # Meshes that were made before, kept by what they were made of.
 
 
-_FORMAT = 2
+_FORMAT = 3
 """Raised when meshing changes, or what is said of it: meshes of before are made anew."""
 _MOST = 100
 """Meshes that are kept; the ones not used for longest go."""
@@ -127,9 +128,9 @@ def kept(
     about = {**asked, "format": _FORMAT, **{name: _version(name) for name in ("gmsh", "pytetwild")}}
     key = hashlib.sha256(json.dumps(about, sort_keys=True).encode() + b"\0" + content).hexdigest()
     path = folder / f"{key}.npz"
-    found = _read(path)
-    if found is not None:
-        return found
+    known = _read(path)
+    if known is not None:
+        return known
     mesh, findings = make()
     _write(path, mesh, findings)
     return mesh, findings
@@ -150,8 +151,9 @@ def _read(path: Path) -> tuple[TetMesh, tuple[str, ...]] | None:
         os.utime(path, follow_symlinks=os.utime not in os.supports_follow_symlinks)
         findings = tuple(arrays.pop("findings").tolist())
         points, cells = arrays.pop("points"), arrays.pop("cells")
+        walls = tuple(map(RoundWall.from_row, arrays.pop("walls")))
         patches = {name.removeprefix(_PATCH): facets for name, facets in arrays.items()}
-        return TetMesh(points, cells, patches), findings
+        return TetMesh(points, cells, patches, walls=walls), findings
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
         return None
 
@@ -161,6 +163,7 @@ def _write(path: Path, mesh: TetMesh, findings: tuple[str, ...]) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         named: dict[str, Any] = {_PATCH + name: facets for name, facets in mesh.patches.items()}
+        named["walls"] = np.array([wall.row for wall in mesh.walls or ()]).reshape(-1, 13)
         named |= {"points": mesh.points, "cells": mesh.cells, "findings": np.array(findings, "U")}
         with whole_file(path) as temporary:
             np.savez(temporary, **named)

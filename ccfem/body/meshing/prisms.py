@@ -8,6 +8,8 @@ from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.numbering import reverse_cuthill_mckee
+from ccfem.body.mesh.round_walls import RoundWall
+from ccfem.body.mesh.smooth_faces import round_walls, smooth_faces
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.body.meshing.planform import triangulate
 
@@ -72,7 +74,23 @@ def extrude(
     cells = np.concatenate([lower, lower + 1], axis=2)[:, :, _SPLIT].reshape(-1, 4)
     inside_out = TetMesh(points.reshape(-1, 3), cells).volumes < 0.0
     cells[inside_out] = cells[inside_out][:, [0, 2, 1, 3]]
-    return TetMesh(points.reshape(-1, 3), cells)
+    return TetMesh(points.reshape(-1, 3), cells, walls=_outline_walls(polygon, height))
+
+
+def _outline_walls(polygon: shapely.Polygon, height: float) -> tuple[RoundWall, ...]:
+    """Round walls of the prism on an outline as it was given, not as its mesh has it."""
+    corners: list[FloatArray] = []
+    triangles: list[IntArray] = []
+    for ring in shapely.get_rings(shapely.orient_polygons(polygon)):
+        low = np.pad(shapely.get_coordinates(ring)[:-1], ((0, 0), (0, 1)))
+        start, here = sum(len(known) for known in corners), np.arange(len(low))
+        after = np.roll(here, -1)
+        above, after_above = here + len(low), after + len(low)
+        corners += [low, low + np.array([0.0, 0.0, height])]
+        triangles.append(start + np.stack([here, after, after_above], axis=1))
+        triangles.append(start + np.stack([here, after_above, above], axis=1))
+    points, sides = np.concatenate(corners), np.concatenate(triangles)
+    return round_walls(points, sides, smooth_faces(points, sides))
 
 
 def _numbered_along(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:

@@ -1,5 +1,6 @@
 """Closed surface to tetrahedra, with Gmsh or fTetWild, each in a process of its own."""
 
+from dataclasses import replace
 from importlib.util import find_spec
 from typing import Literal, get_args
 
@@ -11,16 +12,21 @@ from ccfem.base.errors import InputError
 from ccfem.body.files.surface import Surface
 from ccfem.body.isolated.process import ChildError, in_own_process
 from ccfem.body.mesh.check import check_mesh
+from ccfem.body.mesh.curved_cells import nodes_on_walls
 from ccfem.body.mesh.in_metres import in_metres
-from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE, smooth_faces
+from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE, round_walls, smooth_faces
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.body.meshing.fidelity import Fidelity, fidelity
-from ccfem.geometry.measures import connected
+from ccfem.geometry.measures import connected, signed_volumes
 
 Mesher = Literal["auto", "gmsh", "ftetwild"]
 
 _MOST = 2e7
 """Number of cells above which an edge length is taken for a mistake of units."""
+_ENVELOPE = 1e-3
+"""Distance of fTetWild's meshes from the surface, over the diagonal."""
+_FLAT = 0.3
+"""Least volume of a cell whose nodes move onto a round wall, over what it was."""
 _LOST = 0.2
 """Share of the volume that no mesh may lose or gain."""
 _PATIENCE = {"gmsh": 30.0, "ftetwild": 300.0}
@@ -68,9 +74,9 @@ def fill(
     if mesher != "ftetwild" and find_spec("gmsh") is not None:
         try:
             mesh = _by_gmsh(surface, edge_length, None if mesher == "gmsh" else patience["gmsh"])
-            found = fidelity(surface, mesh)
-            if mesher == "gmsh" or found.good:
-                return mesh, found, "Gmsh"
+            fit = fidelity(surface, mesh)
+            if mesher == "gmsh" or fit.good:
+                return mesh, fit, "Gmsh"
         except (ChildError, InputError) as error:
             why = str(error)
     if mesher == "gmsh":
@@ -93,14 +99,14 @@ def fill(
             "meshing left no cells inside the surface: check that it is closed, does not cut "
             "itself, and that the edge length suits its thickness"
         )
-    mesh = check_mesh(TetMesh(made["points"], made["cells"]))[0]
-    found = fidelity(surface, mesh)
-    if abs(found.volume) > _LOST:
+    mesh = on_round_walls(TetMesh(made["points"], made["cells"]), surface, _ENVELOPE)
+    fit = fidelity(surface, mesh)
+    if abs(fit.volume) > _LOST:
         raise InputError(
-            f"the mesh of the surface has {1.0 + found.volume:.1%} of its volume: shorten "
+            f"the mesh of the surface has {1.0 + fit.volume:.1%} of its volume: shorten "
             "edge_length, or mesh the part in another program"
         )
-    return mesh, found, "fTetWild"
+    return mesh, fit, "fTetWild"
 
 
 def check_edge_length(surface: Surface, edge_length: float) -> float:
@@ -121,13 +127,13 @@ def check_edge_length(surface: Surface, edge_length: float) -> float:
 
 def _walls(surface: Surface) -> FloatArray:
     """Round walls of a surface, (k, 8): middle of the axis, direction, radius, half the length."""
-    found: list[FloatArray] = []
+    rows: list[FloatArray] = []
     for face in smooth_faces(surface.points, surface.triangles):
         if face.kind == "cylinder":
             nodes = surface.points[np.unique(surface.triangles[face.facets])]
             half = 0.5 * float(np.ptp(nodes @ face.direction))
-            found.append(np.array([*face.centre, *face.direction, face.radius, half]))
-    return np.array(found).reshape(-1, 8)
+            rows.append(np.array([*face.centre, *face.direction, face.radius, half]))
+    return np.array(rows).reshape(-1, 8)
 
 
 def _by_gmsh(surface: Surface, edge_length: float, seconds: float | None) -> TetMesh:
@@ -150,4 +156,44 @@ def _by_gmsh(surface: Surface, edge_length: float, seconds: float | None) -> Tet
     )
     if not len(made["cells"]):
         raise InputError("it left no cells")
-    return check_mesh(TetMesh(made["points"], made["cells"]))[0]
+    return on_round_walls(TetMesh(made["points"], made["cells"]), surface)
+
+
+def on_round_walls(mesh: TetMesh, surface: Surface, envelope: float = 0.0) -> TetMesh:
+    """Check a mesh of a surface, and move its nodes from chords of round walls onto these walls.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+        Linear.
+    surface : Surface
+        Whose round walls are those of the part.
+    envelope : float, default 0
+        Distance of the mesh from it, over the diagonal.
+
+    Returns
+    -------
+    TetMesh
+        It knows these walls. Nodes that would flatten a cell stay.
+    """
+    slack = envelope * float(np.linalg.norm(np.ptp(surface.points, axis=0)))
+    faces = smooth_faces(surface.points, surface.triangles)
+    walls = tuple(
+        replace(wall, tolerance=wall.tolerance + slack)
+        for wall in round_walls(surface.points, surface.triangles, faces)
+    )
+    mesh = check_mesh(replace(mesh, walls=walls))[0]
+    _, normals = mesh.facet_areas(mesh.boundary)
+    nodes, places = nodes_on_walls(mesh.points, mesh.boundary, normals, walls, mesh.wall_of)
+    moved = np.zeros(len(mesh.points), dtype=bool)
+    moved[nodes] = True
+    points = mesh.points.copy()
+    points[nodes] = places
+    while True:
+        flat = signed_volumes(points, mesh.cells) < _FLAT * mesh.volumes
+        stays = np.unique(mesh.cells[flat])
+        stays = stays[moved[stays]]
+        if not len(stays):
+            return replace(mesh, points=points)
+        points[stays] = mesh.points[stays]
+        moved[stays] = False

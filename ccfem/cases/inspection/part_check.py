@@ -299,7 +299,7 @@ def check(part: str | os.PathLike[str] | Case, **parameters: Any) -> Check:
     doubts += layers.lines
     if not layers.lines:
         machine = case.machine
-        with found.noted():
+        with mistakes.noted():
             known = case.known_layers()
             doubts += reasons_not_to_print(problem.mesh, case.build, machine, known)
     fibre: tuple[Layer, ...] = ()

@@ -3,6 +3,7 @@
 Each row of blocks is the sum over the cells round its node, so no element matrix is ever stored.
 Quadratic cells with straight sides are integrated exactly: their gradients are linear in the
 barycentric coordinates, so every block combines the sixteen products of the four corner gradients.
+The few with a side on a round wall get the difference from their straight ones, by quadrature.
 """
 
 from dataclasses import dataclass
@@ -14,6 +15,13 @@ from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray, freeze, seen_only
 from ccfem.body.mesh.cell_mesh import CellMesh
+from ccfem.body.mesh.curved_cells import (
+    CELL_POINTS,
+    CELL_WEIGHTS,
+    gradients_at,
+    jacobians,
+    straightened,
+)
 from ccfem.body.mesh.tet_mesh import TetMesh
 
 
@@ -206,8 +214,9 @@ def _mirror(indptr, indices, i, diagonal, data):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _gather_linear(  # type: ignore[no-untyped-def]
-    indptr, indices, start, touching, cells, which, gradients, scale, stiffness, data
+    where, cells, which, gradients, scale, stiffness, data
 ):
+    indptr, indices, start, touching = where
     slot = np.empty(indptr.size - 1, np.int32)
     diagonal = np.empty(indptr.size - 1, np.int32)
     t = np.empty((6, 3))
@@ -232,8 +241,9 @@ def _gather_linear(  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _gather_quadratic(  # type: ignore[no-untyped-def]
-    indptr, indices, start, touching, cells, which, gradients, scale, stiffness, first, second, data
+    where, cells, which, gradients, scale, stiffness, terms, data
 ):
+    (indptr, indices, start, touching), (first, second) = where, terms
     # Gradient of shape function a: sum of its terms phi_s g_s. A corner i has one term,
     # (4 L_i - 1) g_i; the edge (i, j) has two, 4 L_j g_i and 4 L_i g_j. Written with the corner
     # that the linear factor belongs to, any two terms integrate to 16 (1 + [same]) / 20, less 1
@@ -274,6 +284,8 @@ def _gather_quadratic(  # type: ignore[no-untyped-def]
         _mirror(indptr, indices, i, diagonal, data)
 
 
+_BATCH = 4096
+"""Curved cells whose matrices are formed at once."""
 _FIRST = np.concatenate([np.arange(4), TetMesh.edges[:, 0]])
 _SECOND = np.concatenate([np.arange(4), TetMesh.edges[:, 1]])
 
@@ -289,7 +301,7 @@ def assemble(
     Parameters
     ----------
     mesh : TetMesh
-        Linear, or quadratic with straight sides.
+        Linear, or quadratic with sides that may be curved.
     stiffness : (6, 6) or (m, 6, 6) array, MPa
         Symmetric, in the global frame, for all cells or for each.
     density : (m,) array, optional
@@ -316,13 +328,40 @@ def assemble(
     if density is not None:
         scale *= density[where.order]
     data = np.zeros((len(where.indices), 3, 3))
-    arguments = (where.indptr, where.indices, where.start, where.touching, cells, seen_only(which))
+    pattern = (where.indptr, where.indices, where.start, where.touching)
+    arguments = (pattern, cells, seen_only(which), gradients, scale, stiffness)
     if mesh.order == 1:
-        _gather_linear(*arguments, gradients, scale, stiffness, data)
+        _gather_linear(*arguments, data)
     else:
-        _gather_quadratic(*arguments, gradients, scale, stiffness, _FIRST, _SECOND, data)
+        _gather_quadratic(*arguments, (_FIRST, _SECOND), data)
     n = 3 * len(mesh.points)
-    return sp.bsr_array((data, where.indices, where.indptr), shape=(n, n))
+    matrix = sp.bsr_array((data, where.indices, where.indptr), shape=(n, n))
+    for start in range(0, len(mesh.curved), _BATCH):
+        rows = mesh.curved[start : start + _BATCH]
+        nodes = mesh.points[mesh.cells[rows]]
+        law = stiffness[rows] if len(stiffness) > 1 else stiffness
+        blocks = _cell_matrices(nodes, law) - _cell_matrices(straightened(nodes), law)
+        if density is not None:
+            blocks *= density[rows, None, None]
+        add_blocks(matrix, mesh.cells[rows], blocks)
+    return matrix
+
+
+def _cell_matrices(nodes: FloatArray, stiffness: FloatArray) -> FloatArray:
+    """Stiffness (c, 30, 30), N/mm, of quadratic cells with nodes (c, 10, 3), by quadrature."""
+    total = np.zeros((len(nodes), 30, 30))
+    strain = np.zeros((len(nodes), 6, 10, 3))
+    for weight, at in zip(CELL_WEIGHTS, CELL_POINTS, strict=True):
+        x, y, z = np.moveaxis(gradients_at(nodes, at), 2, 0)
+        # Voigt strain of a unit displacement of each node along each axis.
+        strain[:, 0, :, 0], strain[:, 1, :, 1], strain[:, 2, :, 2] = x, y, z
+        strain[:, 3, :, 1], strain[:, 3, :, 2] = z, y
+        strain[:, 4, :, 0], strain[:, 4, :, 2] = z, x
+        strain[:, 5, :, 0], strain[:, 5, :, 1] = y, x
+        b = strain.reshape(len(nodes), 6, 30)
+        volume = weight / 6.0 * jacobians(nodes, at)
+        total += volume[:, None, None] * (np.swapaxes(b, 1, 2) @ (stiffness @ b))
+    return total
 
 
 @njit(cache=True)

@@ -12,8 +12,10 @@ import numpy as np
 from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray, read_only, seen_only
+from ccfem.body.mesh.curved_cells import gradients_at
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.assembly import cell_gradients
+from ccfem.fem.elasticity.recovery import times, voigt_strain
 
 
 @dataclass(frozen=True)
@@ -75,18 +77,21 @@ def estimate_error(
     samples = SAMPLES[mesh.order]
     stress = np.empty((m, len(samples), 6))
     _stress(*arguments, samples, stress)
+    _curved_stress(mesh, displacement, stiffness, ease, samples, stress)
     patches = stress_patches(mesh, stress, np.trace(stiffness, axis1=1, axis2=2))
     corner = stress
     if mesh.order == 2:
         # Linear in a cell, so the values at its corners determine it.
         corner = np.empty((m, 4, 6))
         _stress(*arguments, np.eye(4), corner)
+        _curved_stress(mesh, displacement, stiffness, ease, np.eye(4), corner)
     compliance = np.linalg.inv(stiffness)
     error, energy = np.empty(m), np.empty(m)
     compare = _compare_linear if mesh.order == 1 else _compare_quadratic
     corners = seen_only(mesh.corners)
-    compare(mesh.points, corners, mesh.volumes, edges, patches.of_corner, patches.centre,
-            patches.size, patches.coefficients, corner, compliance, error, energy)  # fmt: skip
+    polynomials = (patches.of_corner, patches.centre, patches.size, patches.coefficients)
+    cells = (mesh.points, corners, mesh.volumes, edges)
+    compare(*cells, polynomials, corner, compliance, (error, energy))
     return ErrorEstimate(error, float(energy.sum()))
 
 
@@ -129,6 +134,26 @@ def _stress(cells, gradients, u, stiffness, free, edges, at, result):  # type: i
                 result[cell, q, i] = total
 
 
+def _curved_stress(
+    mesh: TetMesh,
+    displacement: FloatArray,
+    stiffness: FloatArray,
+    free: FloatArray,
+    at: FloatArray,
+    result: FloatArray,
+) -> None:
+    """Put the stress of the cells with curved sides in place of that of their straight ones."""
+    rows = mesh.curved
+    if not len(rows):
+        return
+    nodes, u = mesh.points[mesh.cells[rows]], displacement[mesh.cells[rows]]
+    law = stiffness[rows] if len(stiffness) > 1 else stiffness[0]
+    ease = free[rows] if len(free) > 1 else free
+    for q, place in enumerate(at):
+        gradient = np.swapaxes(u, 1, 2) @ gradients_at(nodes, place)
+        result[rows, q] = times(law, voigt_strain(gradient) - ease)
+
+
 @njit(cache=True)
 def _linear_energy(values, s):  # type: ignore[no-untyped-def]
     """Mean of ``v . S v`` over a cell for a field that is linear in it, from its corner values."""
@@ -146,10 +171,10 @@ def _linear_energy(values, s):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _compare_linear(  # type: ignore[no-untyped-def]
-    points, corners, volumes, edges, of_corner, centre, size, coefficients, stress, compliance,
-    error, energy,
-):  # fmt: skip
+    points, corners, volumes, edges, polynomials, stress, compliance, result
+):
     """Energies of the difference from the recovered stress, and of the stress of the cells."""
+    (of_corner, _, _, coefficients), (error, energy) = polynomials, result
     difference = np.empty((4, 6))
     for cell in range(len(corners)):
         s = compliance[cell if len(compliance) > 1 else 0]
@@ -167,14 +192,14 @@ def _compare_linear(  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _compare_quadratic(  # type: ignore[no-untyped-def]
-    points, corners, volumes, edges, of_corner, centre, size, coefficients, stress, compliance,
-    error, energy,
-):  # fmt: skip
+    points, corners, volumes, edges, polynomials, stress, compliance, result
+):
     """Do the same for quadratic cells: ten nodes determine the difference, which is quadratic.
 
     The integrals of the products of the shape functions are those of the quadratic tetrahedron,
     over the volume: 6, 1, -4, -6, 32, 16 and 8 over 420.
     """
+    (of_corner, centre, size, coefficients), (error, energy) = polynomials, result
     difference, image = np.empty((10, 6)), np.empty((10, 6))
     p = np.empty(10)
     for cell in range(len(corners)):
@@ -279,16 +304,18 @@ def stress_patches(mesh: TetMesh, stress: FloatArray, stiffness: FloatArray) -> 
     else:
         kind -= kind.min()
         kinds = int(kind.max()) + 1
-        groups, of_corner = np.unique(mesh.corners * kinds + kind[:, None], return_inverse=True)
-        nodes = groups // kinds
+        pairs, of_corner = np.unique(mesh.corners * kinds + kind[:, None], return_inverse=True)
+        nodes = pairs // kinds
     of_corner = seen_only(of_corner.reshape(-1, 4))
     start, cells = _cells_round(of_corner, len(nodes))
     at = SAMPLES[mesh.order]
     terms = 4 if mesh.order == 1 else 10
     size = np.zeros(len(nodes))
     coefficients = np.zeros((len(nodes), terms, 6))
-    _fit(mesh.points, seen_only(mesh.corners), of_corner, nodes, start, cells, at, stress,
-         _LEAST[mesh.order], _RIDGE, size, coefficients)  # fmt: skip
+    groups = (of_corner, nodes, start, cells)
+    settings = (_LEAST[mesh.order], _RIDGE)
+    result = (size, coefficients)
+    _fit(mesh.points, seen_only(mesh.corners), groups, at, stress, *settings, result)
     return Patches(of_corner, mesh.points[nodes], size, coefficients)
 
 
@@ -367,8 +394,9 @@ def _cholesky(matrix, right):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _fit(  # type: ignore[no-untyped-def]
-    points, corners, of_corner, nodes, start, cells, at, stress, least, ridge, size, coefficients
+    points, corners, groups, at, stress, least, ridge, result
 ):
+    (of_corner, nodes, start, cells), (size, coefficients) = groups, result
     terms = coefficients.shape[1]
     p = np.empty(terms)
     gram, right = np.empty((terms, terms)), np.empty((terms, 6))

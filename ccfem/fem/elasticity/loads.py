@@ -1,12 +1,14 @@
 """Nodal forces of loads, consistent with linear and quadratic facets."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError
+from ccfem.body.mesh.curved_cells import STRAIGHT, facet_integrals
 from ccfem.fem.elasticity.body import LoadedBody, SupportedProblem
 from ccfem.fem.elasticity.load_kinds import (
     Bearing,
@@ -45,6 +47,43 @@ def _outward(mesh: LoadedBody, name: str) -> tuple[IntArray, FloatArray, FloatAr
     return facets, *mesh.facet_areas(facets)
 
 
+@dataclass(frozen=True)
+class _Curved:
+    """Quadratic facets with a side on a round wall: their rows, nodes and integrals."""
+
+    rows: IntArray
+    nodes: IntArray
+    area: FloatArray
+    vector: FloatArray
+
+    @classmethod
+    def among(cls, mesh: LoadedBody, facets: IntArray) -> "_Curved":
+        nodes = mesh.facet_nodes(facets)
+        if nodes.shape[1] != 6:
+            none = np.zeros(0, dtype=np.int64)
+            return cls(none, none.reshape(0, 6), np.zeros((0, 6)), np.zeros((0, 6, 3)))
+        corners, middles = mesh.points[nodes[:, :3]], mesh.points[nodes[:, 3:]]
+        after = np.roll(corners, -1, axis=1)
+        gap = np.linalg.norm(middles - 0.5 * (corners + after), axis=2)
+        off = gap > STRAIGHT * np.linalg.norm(after - corners, axis=2)
+        rows = np.flatnonzero(off.any(axis=1))
+        return cls(rows, nodes[rows], *facet_integrals(mesh.points[nodes[rows]]))
+
+    def true_areas(self, area: FloatArray) -> FloatArray:
+        """Areas (k,), mm^2, of all facets, of those of their corners."""
+        area[self.rows] = self.area.sum(axis=1)
+        return area
+
+    def replaced(self, result: FloatArray, forces: FloatArray, exact: FloatArray) -> FloatArray:
+        """Nodal forces with the exact ones (c, 6, 3) of these facets for those spread evenly."""
+        if not len(self.rows):
+            return result
+        for column in self.nodes.T[3:]:
+            np.subtract.at(result, column, forces[self.rows] / 3.0)
+        np.add.at(result, self.nodes, exact)
+        return result
+
+
 def _spread(mesh: LoadedBody, facets: IntArray, forces: FloatArray) -> FloatArray:
     """Nodal forces (n, 3) of forces (k, 3) spread evenly over facets; (n, 2) of (k, 2) on a sheet.
 
@@ -67,19 +106,26 @@ def _vector(mesh: LoadedBody, load: Force | Traction | Bearing | PointForce) -> 
 
 def _force(mesh: LoadedBody, load: Force) -> FloatArray:
     facets = patch_facets(mesh, load.patch)
-    area, _ = mesh.facet_areas(facets)
-    return _spread(mesh, facets, area[:, None] / area.sum() * _vector(mesh, load))
+    curved = _Curved.among(mesh, facets)
+    area = curved.true_areas(mesh.facet_areas(facets)[0])
+    forces, vector = area[:, None] / area.sum() * _vector(mesh, load), _vector(mesh, load)
+    exact = curved.area[:, :, None] / area.sum() * vector
+    return curved.replaced(_spread(mesh, facets, forces), forces, exact)
 
 
 def _traction(mesh: LoadedBody, load: Traction) -> FloatArray:
     facets = patch_facets(mesh, load.patch)
-    area, _ = mesh.facet_areas(facets)
-    return _spread(mesh, facets, area[:, None] * _vector(mesh, load))
+    curved = _Curved.among(mesh, facets)
+    forces = mesh.facet_areas(facets)[0][:, None] * _vector(mesh, load)
+    exact = curved.area[:, :, None] * _vector(mesh, load)
+    return curved.replaced(_spread(mesh, facets, forces), forces, exact)
 
 
 def _pressure(mesh: LoadedBody, load: Pressure) -> FloatArray:
     facets, area, normal = _outward(mesh, load.patch)
-    return _spread(mesh, facets, -load.magnitude * area[:, None] * normal)
+    curved = _Curved.among(mesh, facets)
+    forces = -load.magnitude * area[:, None] * normal
+    return curved.replaced(_spread(mesh, facets, forces), forces, -load.magnitude * curved.vector)
 
 
 def _bearing(mesh: LoadedBody, load: Bearing) -> FloatArray:
@@ -90,7 +136,9 @@ def _bearing(mesh: LoadedBody, load: Bearing) -> FloatArray:
     """
     facets, area, normal = _outward(mesh, load.patch)
     if mesh.points.shape[1] == 3:
-        normal = facet_normals(mesh, facets, mesh.points[facets].mean(axis=1)[:, None])[:, 0]
+        # Where the resultant of what a facet gives to its nodes acts.
+        places = mesh.points[mesh.facet_nodes(facets)[:, -3:]].mean(axis=1)
+        normal = facet_normals(mesh, facets, places[:, None])[:, 0]
     force = _vector(mesh, load)
     touched = normal @ force < 0.0
     for _ in range(50):

@@ -8,7 +8,9 @@ from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.cell_mesh import CellMesh
 from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE, smooth_faces
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.body import LoadedBody
+from ccfem.geometry.facets import positions
 
 _COARSE = 50.0
 """Feature angle, degrees, at which a bore of 8 facets is a round wall, and a hexagon is none."""
@@ -64,12 +66,21 @@ def nearest_node(mesh: CellMesh | LoadedBody, point: Sequence[float], what: str)
 def facet_normals(mesh: LoadedBody, facets: IntArray, places: FloatArray) -> FloatArray:
     """Outward unit normals (k, q, 3) of facets (k, 3) at places on them (k, q, 3), mm.
 
-    On round walls they are those of the cylinder that their nodes lie on: the normals of its facets
-    are off by degrees, which holds a part against turning on a bore. Elsewhere those of the facets.
+    On round walls they are those of the wall, be the patch ever so small a part of it: the normals
+    of its facets are off by degrees, which holds a part against turning on a bore. Elsewhere those
+    of the facets.
     """
     _, normal = mesh.facet_areas(facets)
     result = np.repeat(normal[:, None], places.shape[1], axis=1)
     rows = np.arange(len(facets))
+    if isinstance(mesh, TetMesh):
+        at = positions(facets, mesh.boundary)
+        wall = np.where(at >= 0, mesh.wall_of[at], -1)
+        for k in np.unique(wall[wall >= 0]).tolist():
+            on_wall = wall == k
+            normals = mesh.round_walls[k].normals_at(places[on_wall].reshape(-1, 3))
+            result[on_wall] = normals.reshape(-1, *result.shape[1:])
+        rows = np.flatnonzero(wall < 0)
     for angle in (_COARSE, FEATURE_ANGLE):
         flat = []
         for face in smooth_faces(mesh.points, facets[rows], angle):

@@ -21,6 +21,7 @@ from ccfem.base.arrays import FloatArray
 from ccfem.base.checks import BED, SPRING
 from ccfem.base.errors import InputError, SolveError
 from ccfem.body.mesh.in_metres import about_size
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.body.mesh.wall_cells import coarse_wall
 from ccfem.fem.elasticity.held import Held, rigid_modes
 from ccfem.fem.elasticity.load_kinds import (
@@ -106,7 +107,7 @@ def about_problem(
             share = 0.0 if at_rest is None else held_share(problem, load, at_rest)
             lines.append(about_held_share(name, load, share))
     lines += _shared_facets(problem, names)
-    lines.append(_about_walls(problem, error))
+    lines += [_about_walls(problem, error), _about_chords(problem.mesh)]
     if problem.mesh.order == 1 and problem.order == 1 and linear_locks(problem):
         lines.append(
             "the material hardly changes its volume, and linear cells lock then: displacements are "
@@ -239,6 +240,17 @@ def _about_walls(problem: Problem, error: float) -> str:
     return (
         f"walls of {wall.thickness:.3g} mm, as at ({at}) mm, have one cell across, with edges of "
         f"{wall.edge:.3g} mm, {spoilt}"
+    )
+
+
+def _about_chords(mesh: TetMesh) -> str:
+    """Say where quadratic cells do not follow a round wall."""
+    count, gap = mesh.chords
+    if not count:
+        return ""
+    return (
+        f"{count} sides of quadratic cells on round walls stay straight, up to {gap:.3g} mm off "
+        "the wall, since their cells would fold: use shorter edges there"
     )
 
 

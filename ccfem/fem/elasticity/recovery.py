@@ -3,8 +3,9 @@
 import numpy as np
 import scipy.sparse as sp
 
-from ccfem.base.arrays import FloatArray
+from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.tensor import from_voigt
+from ccfem.body.mesh.curved_cells import NODES, gradients_at
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.assembly import cell_gradients
 
@@ -32,7 +33,7 @@ def times(stiffness: FloatArray, strain: FloatArray) -> FloatArray:
     return (strain.reshape(len(strain), -1, 6) @ stiffness.transpose(0, 2, 1)).reshape(strain.shape)
 
 
-def shape_gradients(gradients: FloatArray, at: FloatArray, edges: FloatArray) -> FloatArray:
+def shape_gradients(gradients: FloatArray, at: FloatArray, edges: IntArray) -> FloatArray:
     """Gradients (m, 10, 3) of the quadratic shape functions at barycentric coordinates (4,)."""
     corner = (4.0 * at - 1.0)[:, None] * gradients
     i, j = edges.T
@@ -40,11 +41,18 @@ def shape_gradients(gradients: FloatArray, at: FloatArray, edges: FloatArray) ->
     return np.concatenate([corner, middle], axis=1)
 
 
+def _gradients(mesh: TetMesh, gradients: FloatArray, at: FloatArray) -> FloatArray:
+    """Gradients (m, 10, 3) of the shape functions of all cells, those with curved sides too."""
+    result = shape_gradients(gradients, at, mesh.edges)
+    result[mesh.curved] = gradients_at(mesh.points[mesh.cells[mesh.curved]], at)
+    return result
+
+
 def cell_strain(mesh: TetMesh, displacement: FloatArray) -> FloatArray:
     """Voigt strain (m, 6) with engineering shear, at the centroid of each cell."""
     gradients = cell_gradients(mesh)
     if mesh.order == 2:
-        gradients = shape_gradients(gradients, np.full(4, 0.25), mesh.edges)
+        gradients = _gradients(mesh, gradients, np.full(4, 0.25))
     return voigt_strain(displacement[mesh.cells].transpose(0, 2, 1) @ gradients)
 
 
@@ -54,8 +62,7 @@ def strain_at_nodes(mesh: TetMesh, displacement: FloatArray) -> FloatArray:
         return np.repeat(cell_strain(mesh, displacement)[:, None], 4, axis=1)
     gradients = cell_gradients(mesh)
     u = displacement[mesh.cells].transpose(0, 2, 1)
-    barycentric = np.concatenate([np.eye(4), np.eye(4)[mesh.edges].mean(axis=1)])
-    at_nodes = [voigt_strain(u @ shape_gradients(gradients, at, mesh.edges)) for at in barycentric]
+    at_nodes = [voigt_strain(u @ _gradients(mesh, gradients, at)) for at in NODES]
     return np.stack(at_nodes, axis=1)
 
 

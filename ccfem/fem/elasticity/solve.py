@@ -169,7 +169,7 @@ def solve_system(
     solver = system.factorise(matrix, backend, each * len(alone))
     record = SolveRecord(solver.backend, 0, 0.0, assembled - started, 0.0, system.held.unknowns)
     because = solver.because
-    fields, found = {}, {}
+    fields, displacement = {}, {}
     started = assembled
     for case in alone:
         work = partial(_solution, matrix, system.held_in(case), system.forces_in(case), tolerance)
@@ -182,7 +182,7 @@ def solve_system(
             solver = system.factorise(matrix, direct_backend())
             contact, energy = work(solver)
         solution, solver = contact.solution, contact.solver
-        found[case] = contact.held.expand(solution.values)
+        displacement[case] = contact.held.expand(solution.values)
         now = perf_counter()
         record = replace(
             record,
@@ -194,10 +194,13 @@ def solve_system(
             energy_error=energy,
             solve_seconds=now - started,
         )
-        fields[case] = system.field(case, found[case], matrix, record)
+        fields[case] = system.field(case, displacement[case], matrix, record)
         started = perf_counter()
     for name, factors in sums.items():
-        total = sum((k * found[case] for case, k in factors.items()), np.zeros_like(found[case]))
+        total = sum(
+            (k * displacement[case] for case, k in factors.items()),
+            np.zeros_like(displacement[case]),
+        )
         fields[name] = system.field(name, total, matrix, replace(record, iterations=0))
     return fields
 
@@ -209,14 +212,14 @@ def _solution(
     if held.presses is None:
         rhs = held.right_hand_side(matrix, forces)
         solution = solver.solve(rhs, tolerance=tolerance)
-        found = Contact(held, solver, rhs, solution, solution.iterations)
+        contact = Contact(held, solver, rhs, solution, solution.iterations)
     else:
-        found = find_contact(matrix, held, forces, solver, tolerance)
-    energy = found.solver.energy_error(found.right, found.solution)
+        contact = find_contact(matrix, held, forces, solver, tolerance)
+    energy = contact.solver.energy_error(contact.right, contact.solution)
     if not energy <= _ENERGY:
         raise SolveError(
             f"{solver.backend}: the energy of the error may be {energy:.1e} of that of the "
             f"displacement, above {_ENERGY:.0e}, at a relative residual of "
-            f"{found.solution.residual:.1e}"
+            f"{contact.solution.residual:.1e}"
         )
-    return found, energy
+    return contact, energy

@@ -134,16 +134,16 @@ class Solver:
         """
         if not self.exact:
             return preconditioned_cg(self.matrix, rhs, self, x0, tolerance)
-        found = judged(self.matrix, self.apply(rhs), rhs, self.size)
+        solution = judged(self.matrix, self.apply(rhs), rhs, self.size)
         for _ in range(_REFINEMENTS):
-            if found.residual <= tolerance:
+            if solution.residual <= tolerance:
                 break
-            x = found.values + self.apply(rhs - self.matrix @ found.values)
+            x = solution.values + self.apply(rhs - self.matrix @ solution.values)
             better = judged(self.matrix, x, rhs, self.size)
-            if not better.residual < found.residual:
+            if not better.residual < solution.residual:
                 break
-            found = better
-        return checked(found, tolerance, self.backend)
+            solution = better
+        return checked(solution, tolerance, self.backend)
 
     @cached_property
     def size(self) -> float:
@@ -190,19 +190,19 @@ def preconditioned_cg(
     """
     # The recursive residual drifts from the true one: aim lower, and restart from the result if the
     # true one is still too large.
-    found, total = None, 0
+    best, total = None, 0
     for _ in range(1 + _REFINEMENTS):
         x, more, lowest = conjugate_gradient(matrix, rhs, solver.apply, x0, 0.5 * tolerance)
         total += more
-        lowest = min(lowest, found.lowest) if found is not None and more else lowest
+        lowest = min(lowest, best.lowest) if best is not None and more else lowest
         better = judged(matrix, x, rhs, solver.size, total, lowest)
-        if found is not None and not better.residual < 0.5 * found.residual:
+        if best is not None and not better.residual < 0.5 * best.residual:
             break
-        found, x0 = better, x
-        if reached(found, tolerance):
+        best, x0 = better, x
+        if reached(best, tolerance):
             break
-    assert found is not None
-    return checked(found, tolerance, solver.backend)
+    assert best is not None
+    return checked(best, tolerance, solver.backend)
 
 
 def direct_backend() -> str:

@@ -11,6 +11,7 @@ from ccfem.base.checks import check_number
 from ccfem.base.display import Shown
 from ccfem.base.errors import InputError
 from ccfem.base.tensor import strain_from_voigt, to_voigt
+from ccfem.body.mesh.curved_cells import shape_values
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.error_estimate import ErrorEstimate, estimate_error
 from ccfem.fem.elasticity.load_kinds import patches_in_use
@@ -91,9 +92,7 @@ def displacement_at(
     """Displacement (k, 3), mm, at barycentric coordinates (k, 4) of cells (k,)."""
     values = weights
     if mesh.order == 2:
-        i, j = mesh.edges.T
-        middle = 4.0 * weights[:, i] * weights[:, j]
-        values = np.hstack([weights * (2.0 * weights - 1.0), middle])
+        values = shape_values(mesh.local_coordinates(cell, weights))
     return np.einsum("ka,kai->ki", values, displacement[mesh.cells[cell]])
 
 

@@ -237,69 +237,71 @@ def _moves(support: AnySupport) -> str:
     return getattr(support, "patch", "")
 
 
-def _patch(found: _Collected, support: Support, move: Sequence[float] | None) -> None:
-    nodes = patch_nodes(found.mesh, support.patch)
+def _patch(collected: _Collected, support: Support, move: Sequence[float] | None) -> None:
+    nodes = patch_nodes(collected.mesh, support.patch)
     value = support.value if move is None else move
-    found.components(nodes, support.components, value, f"patch '{support.patch}'")
+    collected.components(nodes, support.components, value, f"patch '{support.patch}'")
 
 
-def _edge(found: _Collected, support: EdgeSupport, move: Sequence[float] | None) -> None:
-    nodes = edge_nodes(found.mesh, support.patches)
-    found.components(nodes, support.components, support.value, f"the edge of {support.patches}")
+def _edge(collected: _Collected, support: EdgeSupport, move: Sequence[float] | None) -> None:
+    nodes = edge_nodes(collected.mesh, support.patches)
+    collected.components(nodes, support.components, support.value, f"the edge of {support.patches}")
 
 
-def _point(found: _Collected, support: PointSupport, move: Sequence[float] | None) -> None:
-    node = np.array([nearest_node(found.mesh, support.point, "a point support")])
-    found.components(node, support.components, support.value, f"the point {support.point}")
+def _point(collected: _Collected, support: PointSupport, move: Sequence[float] | None) -> None:
+    node = np.array([nearest_node(collected.mesh, support.point, "a point support")])
+    collected.components(node, support.components, support.value, f"the point {support.point}")
 
 
-def _sliding(found: _Collected, support: SlidingSupport, move: Sequence[float] | None) -> None:
-    nodes = patch_nodes(found.mesh, support.patch)
+def _sliding(collected: _Collected, support: SlidingSupport, move: Sequence[float] | None) -> None:
+    nodes = patch_nodes(collected.mesh, support.patch)
     if support.normal is None:
-        facets = patch_facets(found.surface, support.patch)
-        normals = patch_normals(found.surface, facets, nodes)
+        facets = patch_facets(collected.surface, support.patch)
+        normals = patch_normals(collected.surface, facets, nodes)
     else:
         normal = unit_vector(support.normal, "normal of the sliding support")
         normals = np.tile(normal, (len(nodes), 1))
     values = np.full(len(nodes), support.value) if move is None else normals @ np.asarray(move)
-    found.oblique.append((nodes, normals, values))
+    collected.oblique.append((nodes, normals, values))
 
 
-def _pressing(found: _Collected, support: PressingSupport, move: Sequence[float] | None) -> None:
-    mesh = found.mesh
-    facets, nodes = patch_facets(found.surface, support.patch), patch_nodes(mesh, support.patch)
+def _pressing(
+    collected: _Collected, support: PressingSupport, move: Sequence[float] | None
+) -> None:
+    mesh = collected.mesh
+    facets, nodes = patch_facets(collected.surface, support.patch), patch_nodes(mesh, support.patch)
     if len(mesh.cells[0]) > len(mesh.corners[0]):
         nodes = np.setdiff1d(nodes, facets)
     if support.normal is None:
-        normals = patch_normals(found.surface, facets, nodes)
+        normals = patch_normals(collected.surface, facets, nodes)
     else:
         normal = unit_vector(support.normal, "normal of the pressing support")
         normals = np.tile(normal, (len(nodes), 1))
-    found.pressing.append((nodes, normals))
+    collected.pressing.append((nodes, normals))
 
 
-def _rigid(found: _Collected, support: RigidPatch, move: Sequence[float] | None) -> None:
+def _rigid(collected: _Collected, support: RigidPatch, move: Sequence[float] | None) -> None:
     value = support.value if move is None else move
     held = np.array([[c in letters for c in "xyz"] for letters in
                      (support.components, support.rotations)])  # fmt: skip
     centre = None if support.centre is None else np.array(support.centre)
     angle = np.radians(support.angle)
     label = f"rigid patch '{support.patch}'"
-    _add_body(found, label, support.patch, centre, np.eye(3), held, np.array([value, angle]))
+    _add_body(collected, label, support.patch, centre, np.eye(3), held, np.array([value, angle]))
 
 
-def _pin(found: _Collected, support: Pin, move: Sequence[float] | None) -> None:
+def _pin(collected: _Collected, support: Pin, move: Sequence[float] | None) -> None:
     axis = unit_vector(support.axis, "axis of the pin")
     axes = np.linalg.svd(axis[None])[2].T
     axes[:, 0] = axis
     held = np.array([[not support.slides, True, True], [False, True, True]])
     value = np.array([axes.T @ np.array(support.value if move is None else move), np.zeros(3)])
     label = f"the pin in patch '{support.patch}'"
-    _add_body(found, label, support.patch, np.array(support.point), axes, held, value)
+    _add_body(collected, label, support.patch, np.array(support.point), axes, held, value)
 
 
 def _add_body(
-    found: _Collected,
+    collected: _Collected,
     label: str,
     patch: str,
     centre: FloatArray | None,
@@ -308,13 +310,13 @@ def _add_body(
     value: FloatArray,
 ) -> None:
     """Make a patch a rigid body; `value` is its translation and its rotation, mm and radians."""
-    facets, nodes = patch_facets(found.mesh, patch), patch_nodes(found.mesh, patch)
+    facets, nodes = patch_facets(collected.mesh, patch), patch_nodes(collected.mesh, patch)
     if centre is None:
-        area, _ = found.surface.facet_areas(facets)
-        centre = area @ found.mesh.points[facets].mean(axis=1) / area.sum()
-    size = float(np.linalg.norm(found.mesh.points[nodes] - centre, axis=1).max())
+        area, _ = collected.surface.facet_areas(facets)
+        centre = area @ collected.mesh.points[facets].mean(axis=1) / area.sum()
+    size = float(np.linalg.norm(collected.mesh.points[nodes] - centre, axis=1).max())
     body = Body(nodes, np.asarray(centre, dtype=np.float64), axes, size)
-    found.rigid.append(_Rigid(label, body, held, value * np.array([[1.0], [size]])))
+    collected.rigid.append(_Rigid(label, body, held, value * np.array([[1.0], [size]])))
 
 
 _KINDS: dict[type, Callable[..., None]] = {
@@ -418,9 +420,9 @@ def _pressing_axes(
     held: FloatArray, at: FloatArray, directions: Sequence[FloatArray], node: int
 ) -> list[FloatArray]:
     """Find unit directions (3,) along which a node presses, at right angles to what is held."""
-    found: list[FloatArray] = []
+    basis: list[FloatArray] = []
     for direction in directions:
-        cosines = [abs(float(direction @ other)) for other in found]
+        cosines = [abs(float(direction @ other)) for other in basis]
         if any(cosine > _ALIKE for cosine in cosines):
             continue
         if any(cosine > _ACROSS for cosine in cosines):
@@ -435,8 +437,8 @@ def _pressing_axes(
                 "between their patches"
             )
         rest = direction - held.T @ along
-        for other in found:
+        for other in basis:
             rest = rest - (rest @ other) * other
         if np.linalg.norm(rest) > _PARALLEL:
-            found.append(rest / np.linalg.norm(rest))
-    return found
+            basis.append(rest / np.linalg.norm(rest))
+    return basis

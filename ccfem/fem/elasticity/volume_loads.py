@@ -5,11 +5,13 @@ import numpy as np
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
 from ccfem.base.tensor import strain_to_voigt
+from ccfem.body.mesh.curved_cells import gradient_integrals, integrals
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.assembly import cell_gradients
 from ccfem.fem.elasticity.load_kinds import BodyForce, Gravity, Temperature
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.recovery import times
+from ccfem.geometry.measures import signed_volumes
 
 _TONNES = 1e-9
 """Tonnes per mm^3 in a gram per cm^3; a tonne times a mm/s^2 is a newton."""
@@ -29,11 +31,13 @@ def volume_forces(problem: Problem, load: BodyForce | Gravity) -> FloatArray:
     else:
         density = _mass_density(problem, load)
         force = density[:, None] * (_TONNES * 1e3 * np.asarray(load.acceleration))
-    force = force * mesh.volumes[:, None]
     shares = np.full(4, 0.25) if mesh.order == 1 else np.array([-0.05] * 4 + [0.2] * 6)
+    volumes = mesh.volumes[:, None] * shares
+    if len(mesh.curved):
+        volumes[mesh.curved] = integrals(mesh.points[mesh.cells[mesh.curved]])
     result = np.zeros(mesh.points.shape)
     for k in range(3):
-        weights = force[:, k, None] * shares
+        weights = force[:, k, None] * volumes
         result[:, k] = np.bincount(mesh.cells.reshape(-1), weights.reshape(-1), len(result))
     return result
 
@@ -103,14 +107,16 @@ def strain_forces(mesh: TetMesh, stress: FloatArray) -> FloatArray:
 
     They are ``int B^T s dV``: the effect of an initial stress -s on the part.
     """
-    s = stress[:, [0, 5, 4, 5, 1, 3, 4, 3, 2]].reshape(-1, 3, 3) * mesh.volumes[:, None, None]
-    per_corner = cell_gradients(mesh) @ s
-    if mesh.order == 1:
-        nodes, forces = mesh.cells, per_corner
-    else:
+    s = stress[:, [0, 5, 4, 5, 1, 3, 4, 3, 2]].reshape(-1, 3, 3)
+    gradients = cell_gradients(mesh)
+    volumes = signed_volumes(mesh.points, mesh.corners)[:, None, None]
+    nodes, forces = mesh.cells, volumes * (gradients @ s)
+    if mesh.order == 2:
         # Gradients of corner functions have mean zero, those of a midpoint that of its corners.
         i, j = mesh.edges.T
-        nodes, forces = mesh.cells[:, 4:], per_corner[:, i] + per_corner[:, j]
+        forces = np.concatenate([np.zeros_like(forces), forces[:, i] + forces[:, j]], axis=1)
+        curved = gradient_integrals(mesh.points[mesh.cells[mesh.curved]])
+        forces[mesh.curved] = curved @ s[mesh.curved]
     result = np.zeros(mesh.points.shape)
     for k in range(3):
         result[:, k] = np.bincount(nodes.reshape(-1), forces[..., k].reshape(-1), len(result))

@@ -46,10 +46,10 @@ class StressData:
 def component_of(name: str) -> int:
     """Voigt component that a name like xx, Sxx, sigma_xz, S11 or SZX means; -1 for none."""
     letters = re.sub(r"[^a-z0-9]", "", name.lower())
-    found = re.fullmatch(r"(?:s|sig|sigma|stress|t)?([xyz123]{2})", letters)
-    if found is None:
+    match = re.fullmatch(r"(?:s|sig|sigma|stress|t)?([xyz123]{2})", letters)
+    if match is None:
         return -1
-    pair = "".join(sorted(found[1].translate(str.maketrans("123", "xyz"))))
+    pair = "".join(sorted(match[1].translate(str.maketrans("123", "xyz"))))
     return COMPONENTS.index(pair)
 
 
@@ -61,11 +61,11 @@ def component_order(names: Sequence[str], what: str) -> list[int]:
     InputError
         Where a component is missing or comes twice.
     """
-    found = [component_of(name) for name in names]
-    if sorted(k for k in found if k >= 0) != list(range(6)):
+    components = [component_of(name) for name in names]
+    if sorted(k for k in components if k >= 0) != list(range(6)):
         given = ", ".join(repr(name) for name in names)
         raise InputError(
             f"{what} must name the components xx, yy, zz, yz, xz and xy, each once (as Sxx or S11 "
             f"too); got {given}: name them"
         )
-    return [found.index(k) for k in range(6)]
+    return [components.index(k) for k in range(6)]

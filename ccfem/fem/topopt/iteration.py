@@ -49,12 +49,12 @@ def iterate(
         if converged or len(changes) == parameters.max_iterations:
             break
         gradient = space.sensitivities(variables, density, response.energy)
-        found = variables.copy()
-        found[free] = optimality_criteria(
+        updated = variables.copy()
+        updated[free] = optimality_criteria(
             variables[free], gradient[free], per_volume, target, parameters.move
         )
-        changes.append(float(np.abs(found - variables).max()))
-        variables = found
+        changes.append(float(np.abs(updated - variables).max()))
+        variables = updated
         if turn is not None:
             model = turn(model, response, factor)
         share = float(volumes @ density / volumes.sum())

@@ -64,10 +64,10 @@ def _contour(nodes: FloatArray, threshold: float, size: float) -> list[FloatArra
     ]
     values = np.concatenate([nodes.reshape(-1), 0.25 * inner.reshape(-1)])
     # One level only: the next lies far outside the range of densities.
-    found = isocontours(
+    contours = isocontours(
         size * np.concatenate([corners, middles]), np.concatenate(triangles), values, threshold, 9.0
     )
-    return found.lines()
+    return contours.lines()
 
 
 def _smoothed(ring: FloatArray, step: float) -> FloatArray:
@@ -182,10 +182,10 @@ def outline(
 
     if threshold is None:
         share = float(density[known].mean()) if volume_fraction is None else volume_fraction
-        found = _with_area(region, domain, share * domain.area)
+        chosen = _with_area(region, domain, share * domain.area)
     else:
-        found = region(threshold)
-    pieces = shapely.get_parts(_cleaned(found, size, domain, least_hole * size**2))
+        chosen = region(threshold)
+    pieces = shapely.get_parts(_cleaned(chosen, size, domain, least_hole * size**2))
     if not len(pieces):
         raise InputError("the outline is empty: lower the threshold or raise the volume fraction")
     if keep is None:
@@ -212,12 +212,12 @@ def _domain(inside: BoolArray, size: float) -> Any:
 def _with_area(region: Any, domain: Any, area: float) -> Any:
     """Region with nearly a wanted area in the domain, by bisection on the threshold."""
     low, high = 0.0, 1.0
-    found = region(0.5)
+    chosen = region(0.5)
     for _ in range(14):
         middle = 0.5 * (low + high)
-        found = region(middle)
-        excess = found.intersection(domain).area - area
+        chosen = region(middle)
+        excess = chosen.intersection(domain).area - area
         if abs(excess) <= 1e-3 * area:
             break
         low, high = (middle, high) if excess > 0.0 else (low, middle)
-    return found
+    return chosen

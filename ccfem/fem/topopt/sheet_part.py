@@ -147,7 +147,7 @@ def sheet_outline(design: Design, flat: FlatPart, edge_length: float, solid: Any
     domain = shapely.difference(flat.planform, void)
     shift = shapely.transform(domain, lambda points: points - origin)
     keep = [node for own in _anchors(problem) for node in own[[dense[own].argmax()]]]
-    found = outline(
+    region = outline(
         np.where(inside, image, 0.0),
         edge_length,
         design.volume_fraction,
@@ -156,17 +156,17 @@ def sheet_outline(design: Design, flat: FlatPart, edge_length: float, solid: Any
         keep=plane[keep] - origin,
         apart=design.apart,
     )
-    found = shapely.transform(found, lambda points: points + origin)
+    region = shapely.transform(region, lambda points: points + origin)
     if not shapely.is_empty(solid):
-        found = _with_solid(found, shapely.intersection(solid, domain), domain, edge_length)
+        region = _with_solid(region, shapely.intersection(solid, domain), domain, edge_length)
     ends = flat.ends()
-    return without_short_edges(found, flat.planform, ends, _SHORTEST * edge_length)
+    return without_short_edges(region, flat.planform, ends, _SHORTEST * edge_length)
 
 
-def _with_solid(found: Any, solid: Any, domain: Any, edge_length: float) -> Any:
+def _with_solid(region: Any, solid: Any, domain: Any, edge_length: float) -> Any:
     """Outline with areas that stay full, joined to it by rounded corners."""
     round_ = 0.5 * edge_length
-    joined = shapely.union(found, solid)
+    joined = shapely.union(region, solid)
     joined = shapely.intersection(joined.buffer(round_).buffer(-round_), domain)
     pieces = shapely.get_parts(shapely.union(joined, solid))
     return max(pieces, key=lambda piece: piece.area)
@@ -186,12 +186,12 @@ def _anchors(problem: Problem) -> list[IntArray]:
     """Nodes of every loaded and held patch, and at the points of point forces."""
     mesh = problem.mesh
     used = set(patches_in_use(problem.supports, problem.loads)) - set(_FACES)
-    found = [np.unique(mesh.patch(name)) for name in sorted(used)]
+    nodes = [np.unique(mesh.patch(name)) for name in sorted(used)]
     for load in (load for case in problem.loads.values() for load in case):
         if isinstance(load, PointForce):
             away = np.linalg.norm(mesh.points - np.array(load.point), axis=1)
-            found.append(np.array([away.argmin()]))
-    return found
+            nodes.append(np.array([away.argmin()]))
+    return nodes
 
 
 def sheet_part(problem: Problem, flat: FlatPart, planform: Any, edge_length: float) -> Problem:
@@ -253,8 +253,8 @@ def without_short_edges(outline: Any, whole: Any, keep: FloatArray, least: float
         if len(keep):
             rank[shapely.distance(places, points) <= _ON] = 2
         rings.append(_shortened(vertices, rank, least))
-    found = shapely.Polygon(rings[0], rings[1:])
-    return found if found.is_valid else outline
+    polygon = shapely.Polygon(rings[0], rings[1:])
+    return polygon if polygon.is_valid else outline
 
 
 def _shortened(vertices: FloatArray, rank: IntArray, least: float) -> FloatArray:

@@ -109,14 +109,14 @@ def cut_mesh(mesh: TetMesh, values: FloatArray, level: float) -> CutMesh:
     turned = signed_volumes(points, cells) < 0.0
     cells[turned] = cells[turned][:, [0, 2, 1, 3]]
     used, number = np.unique(cells, return_inverse=True)
-    found = TetMesh(points[used], number.reshape(-1, 4))
+    kept = TetMesh(points[used], number.reshape(-1, 4))
     own = np.repeat(np.arange(n)[:, None], 2, axis=1)
-    facet = _facets(mesh, np.concatenate([own, ends])[used][found.boundary])
+    facet = _facets(mesh, np.concatenate([own, ends])[used][kept.boundary])
     patches = {}
     for name, facets in mesh.patches.items():
         chosen = are_among(mesh.boundary, facets)
-        patches[name] = found.boundary[chosen[facet] & (facet >= 0)]
-    return CutMesh(found.with_patches(patches), facet)
+        patches[name] = kept.boundary[chosen[facet] & (facet >= 0)]
+    return CutMesh(kept.with_patches(patches), facet)
 
 
 def _cells(mesh: TetMesh, inside: BoolArray, keys: IntArray) -> IntArray:
@@ -128,12 +128,12 @@ def _cells(mesh: TetMesh, inside: BoolArray, keys: IntArray) -> IntArray:
 
     above = inside[mesh.cells]
     count = above.sum(axis=1)
-    found = [mesh.cells[count == 4]]
+    pieces = [mesh.cells[count == 4]]
     prisms = [np.zeros((0, 6), dtype=np.int64)]
     for order in _LONE:
         first = above[:, order[0]]
         a, b, c, d = mesh.cells[(count == 1) & first][:, order].T
-        found.append(np.stack([a, cut(a, b), cut(a, c), cut(a, d)], axis=1))
+        pieces.append(np.stack([a, cut(a, b), cut(a, c), cut(a, d)], axis=1))
         a, b, c, d = mesh.cells[(count == 3) & ~first][:, order].T
         prisms.append(np.stack([b, c, d, cut(a, b), cut(a, c), cut(a, d)], axis=1))
     for order in _PAIRS:
@@ -144,8 +144,8 @@ def _cells(mesh: TetMesh, inside: BoolArray, keys: IntArray) -> IntArray:
     prism = np.take_along_axis(prism, _PRISMS[prism.argmin(axis=1)], axis=1)
     third = prism[:, [1, 5]].min(axis=1) > prism[:, [2, 4]].min(axis=1)
     rows = np.arange(len(prism))[:, None, None]
-    found.append(prism[rows, _SPLITS[third.astype(np.int64)]].reshape(-1, 4))
-    return np.concatenate(found)
+    pieces.append(prism[rows, _SPLITS[third.astype(np.int64)]].reshape(-1, 4))
+    return np.concatenate(pieces)
 
 
 def _facets(mesh: TetMesh, nodes: IntArray) -> IntArray:
@@ -267,15 +267,15 @@ def _cleaned(field: _Field, level: float) -> FloatArray | None:
 
 def _level(field: _Field, volume: float) -> float | None:
     """Level whose part has a wanted volume, by bisection; None where none has."""
-    low, high, found, middle = 0.0, 1.0, 0.0, 0.5
+    low, high, inside, middle = 0.0, 1.0, 0.0, 0.5
     for _ in range(20):
         middle = 0.5 * (low + high)
         cleaned = _cleaned(field, middle)
-        found = 0.0 if cleaned is None else volume_above(field.mesh, cleaned, middle)
-        if abs(found - volume) <= 1e-3 * volume:
+        inside = 0.0 if cleaned is None else volume_above(field.mesh, cleaned, middle)
+        if abs(inside - volume) <= 1e-3 * volume:
             return middle
-        low, high = (middle, high) if found > volume else (low, middle)
-    return middle if abs(found - volume) <= 0.02 * volume else None
+        low, high = (middle, high) if inside > volume else (low, middle)
+    return middle if abs(inside - volume) <= 0.02 * volume else None
 
 
 # Smoothing of a mesh that was cut out of another: its cut faces, and the cells behind them.
@@ -319,7 +319,7 @@ def relaxed(cut: CutMesh, passes: int = 30) -> TetMesh:
             wanted[surface] += factor * np.einsum("kij,kj->ki", free[surface], step)
         wanted[inside] = (inner @ wanted)[inside]
         points = _safely_moved(mesh.cells, points, wanted)
-    return TetMesh(points, mesh.cells, mesh.patches, mesh.axes)
+    return TetMesh(points, mesh.cells, mesh.patches, mesh.axes, mesh.walls)
 
 
 def _both_ways(edges: IntArray) -> IntArray:

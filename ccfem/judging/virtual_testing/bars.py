@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray, freeze
+from ccfem.body.mesh.curved_cells import gradients_at
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.assembly import cell_gradients
 from ccfem.judging.virtual_testing.strands import Strands
@@ -154,4 +155,10 @@ def _slopes(strands: Strands, mesh: TetMesh) -> FloatArray:
     weight[:, 0] += 1.0
     i, j = mesh.edges.T
     middle = 4.0 * (weight[:, i] * slope[:, j] + weight[:, j] * slope[:, i])
-    return np.hstack([(4.0 * weight - 1.0) * slope, middle])
+    result = np.hstack([(4.0 * weight - 1.0) * slope, middle])
+    # In the few cells with a side on a round wall the shape functions follow that.
+    rows = np.flatnonzero(np.isin(strands.cell, mesh.curved))
+    at = mesh.local_coordinates(strands.cell[rows], weight[rows])
+    curved = gradients_at(mesh.points[mesh.cells[strands.cell[rows]]], at)
+    result[rows] = np.einsum("sak,sk->sa", curved, strands.tangent[rows])
+    return result

@@ -27,7 +27,7 @@ from ccfem.geometry.polylines import (
 )
 from ccfem.geometry.shapes import Region, strings
 from ccfem.machine.machine import Machine
-from ccfem.paths.splitting.slabs import LOW, THIN, Slab, slabs_of
+from ccfem.paths.splitting.slabs import LOW, Slab, slabs_of
 from ccfem.paths.splitting.strand_density import StrandDensity
 from ccfem.paths.toolpaths import FIBRE, MATRIX, Toolpaths
 from ccfem.slicing.layers import Layer
@@ -324,7 +324,7 @@ def _end_in_stacks(
     for slab, above in pairwise(printed_slabs(lines, layers, borders, mesh, machine)):
         if slab.fibre is None or above.fibre is not None:
             continue
-        room = above.upper - slab.lower - THIN
+        room = above.upper - slab.lower - machine.least_line
         short = ended_in_stacks(lines[slab.fibre], borders[slab.fibre], room, machine)
         if short.places:
             planned = pieces[slab.fibre]
@@ -386,7 +386,7 @@ def height_over(lines: Sequence[FloatArray], section: Region, machine: Machine) 
     # Half of what is let pass: lines of matrix do not see the same places as this grid.
     few = int(0.5 * _ENOUGH * section.area / density.cell**2)
     most = float(high[few]) if few < len(high) else 0.0
-    return max(most + THIN - machine.strand_height, 0.0)
+    return max(most + machine.least_line - machine.strand_height, 0.0)
 
 
 def ended_in_stacks(

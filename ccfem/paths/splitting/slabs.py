@@ -11,9 +11,7 @@ from ccfem.machine.machine import Machine
 from ccfem.slicing.layers import Layer
 
 LOW = 0.1
-"""Least height of a line of matrix, mm. Our choice."""
-THIN = 0.05
-"""Least height, mm, of matrix over a strand, where its layer is as high. Our choice."""
+"""Least height of a layer of matrix, mm. Our choice."""
 _SAME = 1e-6
 """Heights closer than this, mm, are the same."""
 
@@ -44,7 +42,8 @@ def slabs_of(
         Ends of the part along the build direction.
     over : mapping, optional
         Height of matrix, mm, that levels the strands of a fibre layer, by its index: the first
-        layer of matrix over it is so high where there is room, up to `Machine.matrix_width`.
+        layer of matrix over it is so high where there is room, and where the shape of its lines
+        allows it (`Machine.highest_matrix`).
     """
     slabs: list[Slab] = []
     level, wanted = bottom, 0.0
@@ -64,7 +63,12 @@ def slabs_of(
 
 
 def _matrix_slabs(
-    lower: float, upper: float, machine: Machine, first: bool, wanted: float = 0.0
+    lower: float,
+    upper: float,
+    machine: Machine,
+    first: bool,
+    wanted: float = 0.0,
+    on_matrix: bool = False,
 ) -> list[Slab]:
     """Matrix layers of equal height that fill a gap, the first of all lower; none without a gap.
 
@@ -72,17 +76,20 @@ def _matrix_slabs(
     """
     if upper - lower <= _SAME:
         return []
-    low = min(machine.process.first_layer_height, machine.matrix_height)
+    # Lines over fibre reach down between its strands, and count as high as that.
+    over = 0.0 if first or on_matrix else machine.strand_height
+    most = machine.highest_matrix(over)
+    low = min(machine.process.first_layer_height, most)
     if first and low > 0.0 and upper - lower > low + LOW:
         start = Slab(lower, lower + low)
-        return [start, *_matrix_slabs(lower + low, upper, machine, first=False)]
-    count = int(np.ceil((upper - lower) / machine.matrix_height - _SAME))
-    wanted = min(wanted, machine.matrix_width)
+        return [start, *_matrix_slabs(lower + low, upper, machine, False, on_matrix=True)]
+    count = int(np.ceil((upper - lower) / most - _SAME))
+    wanted = min(wanted, machine.highest_line - over)
     if wanted > (upper - lower) / count + _SAME:
         if upper - lower - wanted < LOW:
             return [Slab(lower, upper)]
         start = Slab(lower, lower + wanted)
-        return [start, *_matrix_slabs(lower + wanted, upper, machine, first=False)]
+        return [start, *_matrix_slabs(lower + wanted, upper, machine, False, on_matrix=True)]
     edges = np.linspace(lower, upper, count + 1).tolist()
     return [Slab(a, b) for a, b in pairwise(edges)]
 

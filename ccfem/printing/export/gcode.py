@@ -106,7 +106,7 @@ def gcode_of_moves(
     warm = machine.process if machine.process.warm_height > 0.0 else None
     values["bed_temperature"] += warm.warm_bed if warm else 0.0
     values["matrix_temperature"] += warm.warm_matrix if warm else 0.0
-    lines.fill("start", **values)
+    lines.fill("start", **values, layers=len(plan.top))
     columns = (moves.event, moves.tool, moves.feed, moves.beside, speed, moves.amount)
     rows = zip(*(column.tolist() for column in columns), start.tolist(), axes.tolist(), strict=True)
     about = zip(
@@ -129,7 +129,7 @@ def gcode_of_moves(
             lines.feed(tool, feed, beside, speed)
         else:
             lines.happen(event, tool, value, strand)
-    lines.fill("end")
+    lines.fill("end", layers=len(plan.top))
     return "\n".join([*gcode_head(moves, plan, machine, title, doubts), *lines.lines]) + "\n"
 
 
@@ -272,7 +272,7 @@ class _Lines:
             f";LAYER:{number}",
         ]
         self._said, self._line = ("", "", ""), None
-        self.fill("layer", layer=number)
+        self.fill("layer", layer=number, number=number + 1)
 
 
 # The head of a G-code file: how long it takes, how much it needs, where it lies.

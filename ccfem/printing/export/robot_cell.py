@@ -57,7 +57,7 @@ def write_robot_cell(path: str | Path, moves: Moves) -> None:
         _named(event, feed, amount, tool)
         for event, feed, amount, tool in zip(
             moves.event.tolist(),
-            moves.feed.tolist(),
+            np.where(moves.feed == 0.0, moves.beside, moves.feed).tolist(),
             moves.amount.tolist(),
             moves.tool.tolist(),
             strict=True,

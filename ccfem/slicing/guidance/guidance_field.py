@@ -171,12 +171,14 @@ def guidance_field(
         matrix = matrix + gradient_energy(gradients, cells, share, count)
         sources.append(gradient_source(gradients, cells, direction, share, count))
     solve = _factorised(matrix)
-    found = np.stack([solve(source) for source in sources])
-    energies = _energies(np.array(sources) @ found.T, signs)
-    rising = np.einsum("e,eid,kei,d->k", volume, gradients, found[:, cells], build, optimize=True)
+    solutions = np.stack([solve(source) for source in sources])
+    energies = _energies(np.array(sources) @ solutions.T, signs)
+    rising = np.einsum(
+        "e,eid,kei,d->k", volume, gradients, solutions[:, cells], build, optimize=True
+    )
     best = _lowest(energies, rising)
     values = np.zeros(n)
-    values[used] = (np.array(best) @ found)[: len(used)]
+    values[used] = (np.array(best) @ solutions)[: len(used)]
     gradient = np.einsum("eid,ei->ed", gradients, values[mesh.corners])
     mean = float((volume * np.linalg.norm(gradient, axis=1)).sum() / volume.sum())
     if not mean > 0.0:
@@ -195,7 +197,7 @@ def _groups(
     slab: float,
 ) -> list[tuple[IntArray, IntArray, int]]:
     """Nodes of each joint, the group of each node, and the number of groups; none for "axis"."""
-    found: list[tuple[IntArray, IntArray, int]] = []
+    parts: list[tuple[IntArray, IntArray, int]] = []
     for joint in joints if form != "axis" else ():
         nodes = np.unique(cells[joint.region])
         height, direction = np.inf, np.zeros(3)
@@ -206,8 +208,8 @@ def _groups(
                     "which way the layers are stacked there, or leave it out of the joints"
                 )
             height, direction = slab, joint.direction
-        found.append((nodes, *slabs(points, nodes, direction, height)))
-    return found
+        parts.append((nodes, *slabs(points, nodes, direction, height)))
+    return parts
 
 
 def _lowest(energies: dict[tuple[int, ...], float], rising: FloatArray) -> tuple[int, ...]:
@@ -284,13 +286,13 @@ def _energies(product: FloatArray, wanted: Sequence[int] | None) -> dict[tuple[i
     if count <= _MOST_SIGNS:
         rest = itertools.product((1, -1), repeat=count - 1)
         return {(1, *others): energy((1, *others)) for others in rest}
-    found: dict[tuple[int, ...], float] = {}
+    energies: dict[tuple[int, ...], float] = {}
     signs = (1,) * count
-    while signs not in found:
-        found[signs] = energy(signs)
+    while signs not in energies:
+        energies[signs] = energy(signs)
         flips = [(*signs[:k], -signs[k], *signs[k + 1 :]) for k in range(1, count)]
         signs = min([signs, *flips], key=energy)
-    return found
+    return energies
 
 
 # Equal values of a field within groups of nodes: the paper's term for the joints.

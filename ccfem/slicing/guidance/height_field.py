@@ -86,14 +86,14 @@ def height_field(
             return plain
         return _least(mesh, direction, up, solve)
     bounds = Bounds(*lengths, up)
-    found = plain
+    field = plain
     for tried in _BLENDS if blend is None else (blend,):
         kept = bounded(_mixed(direction, up, tried), bounds, solve)
-        found = HeightField(kept.values, kept.gradient, up, tried)
-        rising = not inverted_share(mesh, found.gradient, up) > 0.0
-        if rising and mesh.volumes @ bounds.outside(found.gradient) <= _LEFT * mesh.volumes.sum():
+        field = HeightField(kept.values, kept.gradient, up, tried)
+        rising = not inverted_share(mesh, field.gradient, up) > 0.0
+        if rising and mesh.volumes @ bounds.outside(field.gradient) <= _LEFT * mesh.volumes.sum():
             break
-    return found
+    return field
 
 
 def inverted_share(mesh: TetMesh, gradient: FloatArray, up: FloatArray) -> float:
@@ -110,18 +110,18 @@ def _least(
 ) -> HeightField:
     """Field with the least blend that leaves no cell upside down, by bisection."""
     low, high = 0.0, 0.5
-    found = _blended(direction, up, high, solve)
-    while inverted_share(mesh, found.gradient, up) > 0.0 and high < _LARGEST:
+    field = _blended(direction, up, high, solve)
+    while inverted_share(mesh, field.gradient, up) > 0.0 and high < _LARGEST:
         low, high = high, 2.0 * high
-        found = _blended(direction, up, high, solve)
+        field = _blended(direction, up, high, solve)
     while high - low > _CLOSE:
         middle = 0.5 * (low + high)
         tried = _blended(direction, up, middle, solve)
         if inverted_share(mesh, tried.gradient, up) > 0.0:
             low = middle
         else:
-            high, found = middle, tried
-    return found
+            high, field = middle, tried
+    return field
 
 
 def _blended(
@@ -130,8 +130,8 @@ def _blended(
     blend: float,
     solve: Callable[[FloatArray], HeightField],
 ) -> HeightField:
-    found = solve(_mixed(direction, up, blend))
-    return HeightField(found.values, found.gradient, up, blend)
+    field = solve(_mixed(direction, up, blend))
+    return HeightField(field.values, field.gradient, up, blend)
 
 
 def _mixed(direction: FloatArray, up: FloatArray, blend: float) -> FloatArray:

@@ -86,8 +86,8 @@ def joint_of(
     if not len(facets):
         raise InputError(f"joint '{name}' is an empty patch: name one that has facets")
     wall, radius, axis = np.unique(facets), 0.0, None
-    if (found := _cylinder(mesh, facets)) is not None:
-        axis, centre, radius = found
+    if (cylinder := _cylinder(mesh, facets)) is not None:
+        axis, centre, radius = cylinder
         wall = _whole_wall(mesh, wall, axis, centre, radius)
     elif (rough := _rough_cylinder(mesh, facets)) is not None:
         axis, radius = rough
@@ -127,16 +127,16 @@ def joints_of(
                 f"directions names '{name}', which is no joint; the joints are: "
                 f"{', '.join(names) or 'none'}"
             )
-    found: list[Joint] = []
+    joints: list[Joint] = []
     for name in names:
         joint = joint_of(stress.mesh, name, rings, directions.get(name))
-        shared = [len(np.intersect1d(joint.wall, other.wall)) for other in found]
+        shared = [len(np.intersect1d(joint.wall, other.wall)) for other in joints]
         if not any(
             both > 0.5 * min(len(joint.wall), len(other.wall))
-            for both, other in zip(shared, found, strict=True)
+            for both, other in zip(shared, joints, strict=True)
         ):
-            found.append(joint)
-    return tuple(found)
+            joints.append(joint)
+    return tuple(joints)
 
 
 def joining_pairs(joints: Sequence[Joint], stress: PartStress) -> list[tuple[int, int]] | None:

@@ -65,9 +65,9 @@ def normal_field(mesh: TetMesh, regions: StressRegions, build: FloatArray) -> No
     best: tuple[int, ...] = ()
     energy = np.inf
     for senses in _candidates(parts, one, other, area):
-        found = _energy(parts, np.array((*senses, 1.0)), one, other, area)
-        if found < energy * (1.0 - 1e-9):
-            best, energy = senses, found
+        trial = _energy(parts, np.array((*senses, 1.0)), one, other, area)
+        if trial < energy * (1.0 - 1e-9):
+            best, energy = senses, trial
     mixed = np.tensordot(np.array((*best, 1.0)), parts, axes=1)
     size = np.linalg.norm(mixed, axis=1)[:, None]
     direction = np.where(size > _NOTHING, mixed / np.maximum(size, 1e-300), build)
@@ -111,7 +111,7 @@ def _candidates(
     form = np.tensordot(jump, jump, axes=((1, 2), (1, 2)))
     random = np.random.default_rng(0)
     starts = [_agreeing(form), *(random.choice((-1.0, 1.0), count) for _ in range(_STARTS))]
-    found: dict[tuple[int, ...], float] = {}
+    energies: dict[tuple[int, ...], float] = {}
     for sense in starts:
         while True:
             # Change by a flip: 4 times the sum of the row without its diagonal, times its sign.
@@ -125,8 +125,8 @@ def _candidates(
             if flipped is not None:
                 near[flipped] = -near[flipped]
             near = near * near[0]
-            found[tuple(near.astype(int).tolist())] = float(near @ form @ near)
-    return sorted(found, key=lambda senses: found[senses])[:_MOST_TRIED]
+            energies[tuple(near.astype(int).tolist())] = float(near @ form @ near)
+    return sorted(energies, key=lambda senses: energies[senses])[:_MOST_TRIED]
 
 
 def _agreeing(form: FloatArray) -> FloatArray:

@@ -20,7 +20,7 @@ def holes_on(layer: Layer, patches: Iterable[str]) -> list[shapely.Polygon]:
     for name in patches:
         check_known("patch", name, sorted(layer.patches))
         touched |= set(layer.patches[name].ravel().tolist())
-    rings = [shapely.Polygon(layer.plane.points[loop]) for loop in layer.loops if len(loop) > 2]
+    rings = [shapely.Polygon(ring) for ring in layer.plane.rings if len(ring) > 2]
     loops = [loop for loop in layer.loops if len(loop) > 2]
     return [
         ring

@@ -10,9 +10,11 @@ import shapely
 from ccfem.base.arrays import FloatArray, IntArray, freeze, read_only
 from ccfem.base.display import Shown
 from ccfem.base.errors import InputError
+from ccfem.body.mesh.round_walls import RoundWall
 from ccfem.geometry.measures import connected
 from ccfem.geometry.shapes import Region
 from ccfem.slicing.layers.plane import Plane
+from ccfem.slicing.layers.rounded_rings import rounded_rings
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,8 @@ class Layer(Shown):
         x, y and normal of each triangle represent. Tensors are rotated by it (`stress_on`).
     point_turns : (n, 3, 3) array, optional
         The same at the points.
+    walls : tuple of RoundWall and (k, 2) int array
+        Round walls of a flat layer, and the boundary edges (point indices) that are chords of each.
     """
 
     points: FloatArray
@@ -66,6 +70,7 @@ class Layer(Shown):
     local_thickness: FloatArray = None  # type: ignore[assignment]
     turns: FloatArray | None = None
     point_turns: FloatArray | None = None
+    walls: tuple[tuple[RoundWall, IntArray], ...] = ()
 
     def __post_init__(self) -> None:
         if self.local_thickness is None:
@@ -138,7 +143,7 @@ class Layer(Shown):
                 "what works on curved layers"
             )
         points = self.flat.project(self.points)
-        return FlatLayer(self.flat.frame, self.flat.height, points, self.loops)
+        return FlatLayer(self.flat.frame, self.flat.height, points, self.loops, self.walls)
 
 
 @dataclass(frozen=True)
@@ -151,19 +156,30 @@ class FlatLayer(Plane):
         Plane coordinates of the layer's points.
     loops : tuple of (k,) int arrays
         Boundary loops of the layer.
+    walls : tuple of RoundWall and (k, 2) int array
+        As of the layer.
     """
 
     points: FloatArray
     loops: tuple[IntArray, ...]
+    walls: tuple[tuple[RoundWall, IntArray], ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
         freeze(self, points=float)
 
     @cached_property
+    def rings(self) -> tuple[FloatArray, ...]:
+        """Plane coordinates (k, 2) of the boundary loops, along round walls where they lie on some.
+
+        The first point is not repeated.
+        """
+        return rounded_rings(self, self.points, self.loops, self.walls)
+
+    @cached_property
     def polygon(self) -> Region:
         """Section: a valid (Multi)Polygon with holes, mm."""
-        rings = [shapely.Polygon(self.points[loop]) for loop in self.loops if len(loop) > 2]
+        rings = [shapely.Polygon(ring) for ring in self.rings if len(ring) > 2]
         outer = [ring for ring in rings if ring.exterior.is_ccw]
         holes = [ring for ring in rings if not ring.exterior.is_ccw]
         section = shapely.union_all([shapely.make_valid(ring) for ring in outer])

@@ -1,12 +1,17 @@
 """Cutting a tetrahedral mesh at a level of a nodal field."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.body.mesh.round_walls import RoundWall
 from ccfem.body.mesh.tet_mesh import TetMesh
+
+Group = TypeVar("Group", str, int)
 
 
 @dataclass(frozen=True)
@@ -163,9 +168,30 @@ def chain(border: IntArray) -> tuple[IntArray, ...]:
 
 def patch_edges(mesh: TetMesh, border: IntArray, nodes: IntArray) -> dict[str, IntArray]:
     """Border edges (k, 2) that lie on each patch of the mesh."""
+    return _edges_on(mesh, mesh.patches, border, nodes)
+
+
+def wall_edges(
+    mesh: TetMesh, border: IntArray, nodes: IntArray
+) -> tuple[tuple[RoundWall, IntArray], ...]:
+    """Round walls that a section cuts, and the border edges (k, 2) that lie on each."""
+    facets = {k: mesh.boundary[mesh.wall_of == k] for k in range(len(mesh.round_walls))}
+    edges = _edges_on(mesh, facets, border, nodes)
+    starts = {k: mesh.points[corners.min()] for k, corners in facets.items() if len(corners)}
+    return tuple(
+        (replace(mesh.round_walls[k], start=starts[k]), rows)
+        for k, rows in edges.items()
+        if len(rows)
+    )
+
+
+def _edges_on(
+    mesh: TetMesh, groups: Mapping[Group, IntArray], border: IntArray, nodes: IntArray
+) -> dict[Group, IntArray]:
+    """Border edges (k, 2) that lie on the facets of each group."""
     ends = nodes[border].reshape(-1, 4)
     patches = {}
-    for name, facets in mesh.patches.items():
+    for name, facets in groups.items():
         belongs = np.zeros(len(mesh.points), dtype=bool)
         belongs[facets] = True
         candidates = np.flatnonzero(belongs[ends].all(axis=1))

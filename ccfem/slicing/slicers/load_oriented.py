@@ -205,13 +205,13 @@ class LoadOriented:
 
     def __call__(self, stress: PartStress, build: Vector, machine: Machine) -> tuple[Layer, ...]:
         """Cut a part into curved layers, none of which lies upside down."""
-        found = self.slice(stress, build)
-        if found.inverted > 0.0:
+        sliced = self.slice(stress, build)
+        if sliced.inverted > 0.0:
             raise InputError(
-                f"layers lie upside down in {100.0 * found.inverted:.2g} % of the part: raise "
+                f"layers lie upside down in {100.0 * sliced.inverted:.2g} % of the part: raise "
                 "load_oriented.blend, or leave it out to use the smallest value that is enough"
             )
-        return found.layers
+        return sliced.layers
 
     def slice(self, stress: PartStress, build: Vector = (0.0, 0.0, 1.0)) -> LoadOrientedSlicing:
         """Cut a part into curved layers, and return the data they were made from too.
@@ -250,7 +250,7 @@ class LoadOriented:
                 "stress: give a smaller thickness"
             )
         edge = self.shortest_edge or _SHORTEST * mean_edge(mesh)
-        found = layers_within(
+        stack = layers_within(
             mesh, field.values, step, self.thinnest, self.thickest, edge, self.least_area
         )
         best = best_plane(stress.stress, mesh.volumes, regions.critical)
@@ -260,5 +260,5 @@ class LoadOriented:
         )
         inverted = inverted_share(mesh, field.gradient, field.up)
         return LoadOrientedSlicing(
-            found.layers, regions, normals, field, step, inverted, ours, flat, least, best
+            stack.layers, regions, normals, field, step, inverted, ours, flat, least, best
         )

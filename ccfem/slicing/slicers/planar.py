@@ -12,7 +12,7 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.level_cut import border_edges, chain, cut_at_zero, patch_edges
+from ccfem.slicing.layers.level_cut import border_edges, chain, cut_at_zero, patch_edges, wall_edges
 from ccfem.slicing.layers.pitch import check_heights
 from ccfem.slicing.layers.plane import Plane, plane_frame
 from ccfem.slicing.layers.slicer import Vector
@@ -209,6 +209,7 @@ def _cut(
         index=index,
         thickness=thickness,
         patches=patch_edges(mesh, border, cut.nodes),
+        walls=wall_edges(mesh, border, cut.nodes),
     )
 
 

@@ -127,15 +127,23 @@ def test_merging_keeps_patches(box):
     assert report.dropped == len(box.patches["right"])
 
 
-def test_curved_midsides_are_straightened(box):
+def test_curved_sides_stay_unless_they_fold_a_cell(box):
     quadratic = box.quadratic()
     points = np.array(quadratic.points)
     points[-3:] += 0.01
     mended, report = check_mesh(TetMesh(points, quadratic.cells, quadratic.patches))
-    assert report.moved == 3
-    assert report.farthest == pytest.approx(0.01 * 3**0.5)
-    assert any("by up to 0.0173 mm" in line for line in report.findings)
-    assert np.allclose(mended.points, quadratic.points)
+    assert report.moved == 0
+    np.testing.assert_array_equal(mended.points, points)
+    # Pulled beyond a quarter of its edge, a middle folds the cells there.
+    node = quadratic.cells[0, 4]
+    start, end = quadratic.points[quadratic.cells[0, :2]]
+    points = np.array(quadratic.points)
+    points[node] += 0.4 * (end - start)
+    mended, report = check_mesh(TetMesh(points, quadratic.cells, quadratic.patches))
+    length = 0.4 * np.linalg.norm(end - start)
+    assert (report.moved, report.farthest) == (1, pytest.approx(length))
+    assert any(f"by up to {length:.3g} mm" in line for line in report.findings)
+    np.testing.assert_allclose(mended.points, quadratic.points, atol=1e-12)
 
 
 def two_blocks(divisions):

@@ -51,8 +51,11 @@ def test_flaws_of_a_mesh_come_with_their_cure():
     quadratic = mesh.quadratic()
     assert quadratic.flaw == ""
     points = np.array(quadratic.points)
-    points[-2:] += 0.01
-    assert "by up to 0.0173 mm" in TetMesh(points, quadratic.cells).flaw
+    start, end = quadratic.points[quadratic.cells[0, :2]]
+    points[quadratic.cells[0, 4]] += 0.1 * (end - start)
+    assert TetMesh(points, quadratic.cells).flaw == ""
+    points[quadratic.cells[0, 4]] += 0.3 * (end - start)
+    assert "turned inside out by their curved sides" in TetMesh(points, quadratic.cells).flaw
 
 
 @pytest.mark.parametrize("size", [2**20, 2**21, 2**24, 2**31])

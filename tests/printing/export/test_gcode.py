@@ -157,11 +157,11 @@ def test_matrix_fills_the_section_at_the_middle_of_its_layer():
     mesh = replace(box, points=np.column_stack([plane, box.points[:, 2]]))
     layers = Planar(count=1).cut(mesh)
     line = np.array([[10.0, 30.0], [70.0, 30.0]])
-    machine = replace(MACHINE, matrix_height=1.45)
+    machine = replace(MACHINE, matrix_height=1.45)  # lines are no higher than wide: 0.8
     plan = plan_print(Toolpaths.from_plane([line], layers[0]), layers, mesh, machine)
     matrix = plan.paths.of_kind(MATRIX)
     middles = (plan.top - 0.5 * plan.thickness)[np.unique(matrix.layer)]
-    assert len(middles) == 6
+    assert len(middles) == 9
     for number, middle in zip(np.unique(matrix.layer), middles, strict=True):
         size = np.ptp(matrix.on_layer(number).points[:, :2], axis=0)
         wanted = np.array([80.0, 60.0]) - middle - machine.matrix_width

@@ -1,0 +1,85 @@
+"""A hole of 12 mm is one of 12 mm, and nothing holds a part against turning on it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+from ccfem.base.errors import InputError
+from ccfem.body.files.surface import Surface
+from ccfem.body.mesh import TetMesh
+from ccfem.body.meshing import extrude
+from ccfem.body.meshing.cad import mesh_cad
+from ccfem.body.meshing.volume import fill
+from ccfem.fem.elasticity import Problem
+from ccfem.fem.elasticity.support_kinds import PressingSupport, SlidingSupport
+from ccfem.fem.elasticity.supports import held
+from ccfem.fem.materials import isotropic
+from ccfem.slicing.slicers import Planar
+
+ANGLE = np.radians(37.0)
+TURN = np.array(
+    [[np.cos(ANGLE), -np.sin(ANGLE), 0.0], [np.sin(ANGLE), np.cos(ANGLE), 0.0], [0.0, 0.0, 1.0]]
+)
+CENTRE, RADIUS = np.array([20.0, 18.0, 0.0]), 6.0
+
+
+def outline(sides: int) -> shapely.Polygon:
+    hole = shapely.Point(CENTRE).buffer(RADIUS, quad_segs=sides // 4)
+    return shapely.box(0, 0, 40, 40).difference(hole)
+
+
+def of_stl(turn: np.ndarray) -> TetMesh:
+    """A surface of 24 chords a turn, as coarse as they come, with nodes on these chords too."""
+    source = extrude(outline(24), 4.0, 1.0)
+    triangles = source.boundary if np.linalg.det(turn) > 0.0 else source.boundary[:, ::-1]
+    return fill(Surface(source.points @ turn.T, triangles), 3.0, "gmsh")[0]
+
+
+@pytest.fixture(scope="module", params=["planform", "turned", "mirrored", "cad"])
+def body(request, tmp_path_factory):
+    """A mesh with edges of 3 mm, and a point of the axis of its hole."""
+    if request.param == "planform":
+        return extrude(outline(128), 4.0, 3.0), CENTRE
+    gmsh = pytest.importorskip("gmsh")
+    if request.param == "cad":
+        path = tmp_path_factory.mktemp("cad") / "plate.step"
+        gmsh.initialize(interruptible=False)
+        gmsh.option.setNumber("General.Terminal", 0)
+        block = gmsh.model.occ.addBox(0, 0, 0, 40, 40, 4)
+        pin = gmsh.model.occ.addCylinder(*CENTRE[:2], -1, 0, 0, 6, RADIUS)
+        gmsh.model.occ.cut([(3, block)], [(3, pin)])
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(path))
+        gmsh.finalize()
+        return mesh_cad(path, 3.0)[0], CENTRE
+    turn = TURN if request.param == "turned" else TURN @ np.diag([1.0, -1.0, 1.0])
+    return of_stl(turn), turn @ CENTRE
+
+
+def test_a_hole_takes_the_pin_that_it_was_drawn_for(body):
+    """At the mesh's chords it took one of 11.6 mm."""
+    mesh, centre = body
+    for layer in Planar(count=2).cut(mesh):
+        (hole,) = layer.plane.polygon.interiors
+        pin = 2.0 * hole.distance(shapely.Point(layer.plane.project(centre)))
+        assert pin == pytest.approx(2.0 * RADIUS, abs=0.02)
+
+
+@pytest.mark.parametrize("kind", [SlidingSupport, PressingSupport])
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("share", [1.0, 0.2])
+def test_a_part_that_slides_on_its_bore_is_free_to_turn(body, kind, order, share):
+    """On the whole bore, and on a fifth of its facets, which alone would show no cylinder."""
+    mesh, _ = body
+    (wall,) = np.unique(mesh.wall_of[mesh.wall_of >= 0])
+    bore = mesh.boundary[mesh.wall_of == wall]
+    bore = bore[:: round(1.0 / share)]
+    low = mesh.boundary[(mesh.points[mesh.boundary][..., 2] < 1e-6).all(axis=1)]
+    mesh = replace(mesh, patches={"bore": bore, "low": low})
+    mesh = mesh.quadratic() if order == 2 else mesh
+    supports = (kind("bore"), SlidingSupport("low"))
+    problem = Problem(mesh, isotropic(100.0, 0.3), supports, {}, order=order)
+    with pytest.raises(InputError, match=r"the part is free to .*rotate about the axis through"):
+        held(problem)
