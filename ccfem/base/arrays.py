@@ -82,8 +82,8 @@ def _frozen(given: Any, kind: Any) -> Any:
         return None
     if isinstance(given, Mapping):
         inner = {
-            key: one if kind is dict and not isinstance(one, Mapping) else _frozen(one, kind)
-            for key, one in given.items()
+            key: value if kind is dict and not isinstance(value, Mapping) else _frozen(value, kind)
+            for key, value in given.items()
         }
         return MappingProxyType(inner)
     return tuple(given) if kind is tuple else read_only(given, kind)

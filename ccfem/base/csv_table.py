@@ -45,5 +45,5 @@ def as_text(text: str) -> str:
     try:
         float(text)
     except ValueError:
-        return _FORMULA.sub(lambda found: found[0] + "'", text)
+        return _FORMULA.sub(lambda match: match[0] + "'", text)
     return text

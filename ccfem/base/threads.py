@@ -33,6 +33,6 @@ def in_threads(
     processors = int(os.environ.get("CCFEM_NUM_THREADS", 0)) or os.cpu_count() or 1
     count = min(processors, processors if most is None else most, max(len(items[0]), 1))
     if count == 1:
-        return [work(*each) for each in zip(*items, strict=True)]
+        return [work(*arguments) for arguments in zip(*items, strict=True)]
     with ThreadPoolExecutor(count) as pool:
         return list(pool.map(work, *items))

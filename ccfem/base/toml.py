@@ -89,21 +89,21 @@ def from_table(make: Callable[..., T], table: object, where: str, infinite: bool
         )
     parameters = inspect.signature(make).parameters
     hints = typing.get_type_hints(make)
-    found, values = Mistakes(), {}
+    mistakes, values = Mistakes(), {}
     for key in table:
         if key not in parameters:
-            found.lines.append(
+            mistakes.lines.append(
                 f"{where} has no key '{key}'; it has: {known_names(str(key), parameters)}"
             )
     for name, parameter in parameters.items():
         if name in table:
-            with found.noted():
+            with mistakes.noted():
                 values[name] = _converted(table[name], hints[name], f"{where}.{name}", infinite)
         elif parameter.default is inspect.Parameter.empty:
-            found.lines.append(
+            mistakes.lines.append(
                 f"{where} needs the key '{name}'; its keys are: {', '.join(parameters)}"
             )
-    found.complain()
+    mistakes.complain()
     try:
         return make(**values)
     except InputError as error:
@@ -140,12 +140,12 @@ def _converted(value: object, hint: Any, where: str, infinite: bool) -> Any:
     for option in get_args(hint) if union else (hint,):
         if isinstance(value, Mapping) and _is_dataclass(option):
             return from_table(option, value, where, infinite)
-    found = _fitted(value, hint, infinite)
-    if found is _UNFIT:
+    converted = _fitted(value, hint, infinite)
+    if converted is _UNFIT:
         raise InputError(
             f"{where} must be {described(hint)}; got {shown(value)}: {cure_of(value, hint)}"
         )
-    return found
+    return converted
 
 
 def cure_of(value: object, hint: Any) -> str:

@@ -54,7 +54,7 @@ def parameters_by_strategy(
     only : str, optional
         The one strategy that there is.
     """
-    found: dict[str, dict[str, Any]] = {} if only is None else {only: {}}
+    by_strategy: dict[str, dict[str, Any]] = {} if only is None else {only: {}}
     for text in texts:
         path, value = assignment(text)
         owner, dot, name = path.partition(".")
@@ -67,11 +67,11 @@ def parameters_by_strategy(
                 f"--set expects a parameter of {only}, the one strategy here; got '{text}': "
                 f"write {name}=VALUE or {only}.{name}=VALUE"
             )
-        table = found.setdefault(owner, {})
+        table = by_strategy.setdefault(owner, {})
         *outer, last = name.split(".")
         for key in outer:
             table = table.setdefault(key, {})
             if not isinstance(table, dict):
                 raise InputError(f"--set {text}: {owner}.{key} has a value already: give one only")
         table[last] = value
-    return found
+    return by_strategy

@@ -110,19 +110,19 @@ def support(
     stress = solve(part.problem, backend=backend)[load_case or names[0]]
     chosen = layers_of(layers, None, slicing)
     slicer = as_slicer(part.slicing if chosen is None else chosen)
-    own, found = slice_with_support(slicer, stress, part.build, part.machine, angle, lift)
-    columns = found.columns
+    stack, support_stack = slice_with_support(slicer, stress, part.build, part.machine, angle, lift)
+    columns = support_stack.columns
     x, y, z = columns.up.tolist()
     if np.abs(columns.up - plane_frame(part.build)[2]).max() > 1e-3:
         print(f"the part stands with ({x:.3f}, {y:.3f}, {z:.3f}) upwards: else layers look down")
     print(
-        f"{len(found.layers)} layers of support below {len(own)} of the part, "
-        f"{found.thickness:.3g} mm in the mean: {columns.volume:.5g} mm^3; "
+        f"{len(support_stack.layers)} layers of support below {len(stack)} of the part, "
+        f"{support_stack.thickness:.3g} mm in the mean: {columns.volume:.5g} mm^3; "
         f"{columns.contact:.5g} mm^2 of the part rest on it, it stands on "
         f"{columns.standing:.5g} mm^2 of the part"
     )
     if out is not None:
-        paths = support_paths(found, part.machine)
+        paths = support_paths(support_stack, part.machine)
         write_paths(paths, out)
         print(f"{out}: {len(paths)} paths of matrix, {paths.lengths.sum() / 1000.0:.4g} m")
 

@@ -34,11 +34,11 @@ def attributes(what: Callable[..., Any]) -> dict[str, Attribute]:
     """
     parts = _SECTION.split(inspect.getdoc(what) or "")
     sections = dict(zip(parts[1::2], parts[2::2], strict=True))
-    found = {}
+    attributes_by_name = {}
     # An entry begins at the left margin; the lines below it are indented.
     for text in re.split(r"\n(?=\S)", sections.get("Attributes") or sections.get("Parameters", "")):
         head, _, body = text.partition("\n")
         names, _, kind = head.partition(" : ")
         entry = Attribute(re.sub(r",? *(default .*|optional)$", "", kind), " ".join(body.split()))
-        found.update(dict.fromkeys((name.strip() for name in names.split(",")), entry))
-    return found
+        attributes_by_name.update(dict.fromkeys((name.strip() for name in names.split(",")), entry))
+    return attributes_by_name

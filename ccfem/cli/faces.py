@@ -33,14 +33,19 @@ def list_faces(body: Path, angle: float, scale: float, picture: Path) -> None:
         File of the picture.
     """
     check_picture(picture)
-    found = faces_of(body, angle, scale)
-    points, triangles, faces, names = found.points, found.triangles, found.faces, found.names
+    listing = faces_of(body, angle, scale)
+    points, triangles, faces, names = (
+        listing.points,
+        listing.triangles,
+        listing.faces,
+        listing.names,
+    )
     columns = ("face", "area, mm^2", "at", "what", "name")[: 5 if any(names) else 4]
     table = Table(box=None, padding=(0, 2, 0, 0))
     for column in columns:
         table.add_column(column, justify="right" if column in columns[:2] else "left")
-    for k, (number, face) in enumerate(zip(found.numbers, faces, strict=True)):
-        at = place_text(found.point_on(face))
+    for k, (number, face) in enumerate(zip(listing.numbers, faces, strict=True)):
+        at = place_text(listing.point_on(face))
         row = (str(number), f"{face.area:.4g}", at, face.shape, *names[k : k + 1])
         table.add_row(*row[: len(columns)])
     console = Console(highlight=False, markup=False)
@@ -50,12 +55,12 @@ def list_faces(body: Path, angle: float, scale: float, picture: Path) -> None:
         of[face.facets] = k
     colour = [_COLOURS[k % len(_COLOURS)] for k in of.tolist()]
     largest = sorted(range(len(faces)), key=lambda k: -faces[k].area)[:_NAMED]
-    labels = [_label(points, triangles, faces[k], found.numbers[k]) for k in sorted(largest)]
+    labels = [_label(points, triangles, faces[k], listing.numbers[k]) for k in sorted(largest)]
     draw_part(points, triangles, colour, labels, picture, title=f"{body.name}: {len(faces)} faces")
     about = "" if is_cad(body) else f" at a feature angle of {angle:g} degrees"
     console.print(
         f"{len(faces)} faces{about}; picture: {picture}\n"
-        + (f"warning: {found.doubt}\n" if found.doubt else "")
+        + (f"warning: {listing.doubt}\n" if listing.doubt else "")
         + 'in a part file: [patches.NAME] with rule = "face", at = [...] and normal, or axis and '
         "radius; lengths are mm"
     )

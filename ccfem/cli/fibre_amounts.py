@@ -79,49 +79,53 @@ def front(
     where = out if out is not None else Path("results") / f"{part.name}-front"
     with whole_folder(where, _FILES, force) as folder, progress_bar(lines=True) as progress:
         numbers = None if counts is None else [int(count) for count in counts]
-        found = front_of(request, numbers, points, strengths, progress)
-        frame = found.to_frame()
+        fibre_front = front_of(request, numbers, points, strengths, progress)
+        frame = fibre_front.to_frame()
         write_csv(folder / "front.csv", [*frame], frame.itertuples(index=False))
         with spared("front.png", []):
-            found.plot().savefig(folder / "front.png")
+            fibre_front.plot().savefig(folder / "front.png")
         if len(strengths) > 1:
             with spared("trade.png", []):
-                found.plot_trade().savefig(folder / "trade.png")
+                fibre_front.plot_trade().savefig(folder / "trade.png")
         command = shlex.join(["ccfem", *sys.argv[1:]])
         (folder / "command.txt").write_text(command + "\n", encoding="utf-8")
-    _say(found)
-    for line in dict.fromkeys(found.findings):
+    _say(fibre_front)
+    for line in dict.fromkeys(fibre_front.findings):
         print(f"warning: {line}")
     drawn = [f"{name}, " for name in ("front.png", "trade.png") if (where / name).exists()]
     print(f"\n{where}: {''.join(drawn)}front.csv")
 
 
-def _say(found: "FibreFront") -> None:
+def _say(fibre_front: "FibreFront") -> None:
     """Print a table: the part without fibre, then the plans; marked are those of the fronts."""
     from ccfem.cli.front_table import front_table
     from ccfem.paths.planning.equal_fibre import TOLERANCE
 
-    print("\n".join(front_table(found)))
-    for count, reason in found.refused.items():
+    print("\n".join(front_table(fibre_front)))
+    for count, reason in fibre_front.refused.items():
         print(f"{count:>6} no plan: {reason}")
-    if found.stiffest.any():
+    if fibre_front.stiffest.any():
         print("* none with as little fibre is better. One of them again:")
     else:
         print("None can be printed as planned. The one with most fibre again:")
     best = max(
-        (each for each, kept in zip(found.points, found.stiffest.tolist(), strict=True) if kept),
-        key=lambda each: each.least_ratio,
-        default=found.points[-1],
+        (
+            point
+            for point, kept in zip(fibre_front.points, fibre_front.stiffest.tolist(), strict=True)
+            if kept
+        ),
+        key=lambda point: point.least_ratio,
+        default=fibre_front.points[-1],
     )
     weight = f" --set strength={best.strength:g}" if best.strength else ""
-    loads = " --load-case all" if found.cases_bounds else ""
+    loads = " --load-case all" if fibre_front.cases_bounds else ""
     print(
-        f"ccfem plan ...{loads} --strategy {found.strategy} --layers {best.layers} "
+        f"ccfem plan ...{loads} --strategy {fibre_front.strategy} --layers {best.layers} "
         f"--fibre-per-layer {best.asked:.0f}{weight}"
     )
-    laid = best.length_per_layer
-    if laid < (1.0 - TOLERANCE) * best.asked:
+    length = best.length_per_layer
+    if length < (1.0 - TOLERANCE) * best.asked:
         print(
-            f"of which it lays {laid:.0f} mm a layer, its most, as that plan will say; asked for "
-            f"{laid:.0f} it may lay less"
+            f"of which it lays {length:.0f} mm a layer, its most, as that plan will say; asked for "
+            f"{length:.0f} it may lay less"
         )

@@ -37,7 +37,7 @@ def fit_material(
     options : mapping
         Keyword arguments of `ccfem.compare`.
     """
-    curves = [each.resolve() for each in (unreinforced, reinforced) if each is not None]
+    curves = [curve.resolve() for curve in (unreinforced, reinforced) if curve is not None]
     if out.resolve() in curves:
         raise InputError(f"--out {out} is the curve of a test: name another file for the material")
     check_writable(out)
@@ -54,10 +54,13 @@ def fit_material(
         paths = planned.toolpaths
     for line in (*case.findings, *about_problem(case.problem)):
         print(f"warning: {line}")
-    found = calibrate(case.problem, without, with_fibre, paths, options["load_case"], out.stem)
-    found.write(out)
-    rho = "" if found.rho is None else f", rho {found.rho:.3g} mm^2"
+    calibration = calibrate(
+        case.problem, without, with_fibre, paths, options["load_case"], out.stem
+    )
+    calibration.write(out)
+    rho = "" if calibration.rho is None else f", rho {calibration.rho:.3g} mm^2"
     print(
-        f"{out}: modulus {found.modulus:.4g} MPa, matrix strength {found.tensile_strength:.3g} MPa"
+        f"{out}: modulus {calibration.modulus:.4g} MPa, "
+        f"matrix strength {calibration.tensile_strength:.3g} MPa"
         f"{rho}; use it with --calibration {out}"
     )

@@ -63,10 +63,10 @@ def _table(text: str) -> dict[str, Any]:
         raise InputError(
             f"--set-machine expects KEY=VALUE; got '{text}': write for example process.lift=2"
         )
-    found: dict[str, Any] = {last: value}
+    table: dict[str, Any] = {last: value}
     for key in reversed(outer):
-        found = {key: found}
-    return found
+        table = {key: table}
+    return table
 
 
 def machines(
@@ -120,12 +120,12 @@ def machine_file(name: str) -> str:
 def _lines(value: Any, where: str) -> list[str]:
     """Lines of a table and of those inside it."""
     about, inner, lines = attributes(type(value)), [], [f"[{where}]"]
-    for one in dataclasses.fields(value):
-        entry = getattr(value, one.name)
+    for field in dataclasses.fields(value):
+        entry = getattr(value, field.name)
         if dataclasses.is_dataclass(entry):
-            inner += ["", *_lines(entry, f"{where}.{one.name}")]
+            inner += ["", *_lines(entry, f"{where}.{field.name}")]
             continue
-        kind, meaning = about.get(one.name, ("", ""))
+        kind, meaning = about.get(field.name, ("", ""))
         words = ", ".join(
             word for word in kind.split(", ") if word.startswith(("mm", "deg", "g/", "s", "K/"))
         )
@@ -133,7 +133,7 @@ def _lines(value: Any, where: str) -> list[str]:
         if said and said != (lines[-1] if lines else ""):
             lines += textwrap.wrap(said, _WIDTH - 2, initial_indent="# ", subsequent_indent="# ")
         lines.append(
-            f"# {one.name} is not set" if entry is None else f"{one.name} = {_text(entry)}"
+            f"# {field.name} is not set" if entry is None else f"{field.name} = {_text(entry)}"
         )
     return lines + inner
 

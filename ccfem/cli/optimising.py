@@ -130,12 +130,12 @@ def optimise(
         options["weights"] |= dict(assignment(text) for text in weight)
     files = _files(Path(f"{whole.name}-optimised.toml") if out is None else out, force)
     with progress_bar(lines=True) as progress:
-        told = _now_and_then(progress)
-        found = find(whole, volume_fraction, method, progress=told, **options)  # type: ignore[arg-type]
+        report = _now_and_then(progress)
+        optimised = find(whole, volume_fraction, method, progress=report, **options)  # type: ignore[arg-type]
     # Another run may have written them since.
     files = _files(files[0], force)
-    _write(found, files, case)
-    _say(found, files)
+    _write(optimised, files, case)
+    _say(optimised, files)
 
 
 def _now_and_then(progress: "Progress") -> "Progress":
@@ -165,7 +165,7 @@ def _files(part: Path, force: bool) -> tuple[Path, Path, Path, Path]:
     return files  # type: ignore[return-value]
 
 
-def _write(found: "Optimised", files: Sequence[Path], case: str) -> None:
+def _write(optimised: "Optimised", files: Sequence[Path], case: str) -> None:
     """Write all files, or none of them."""
     import shlex
     import sys
@@ -177,7 +177,7 @@ def _write(found: "Optimised", files: Sequence[Path], case: str) -> None:
     from ccfem.comparison.plot.design_picture import design_picture
 
     _, mesh, picture, history = files
-    design, new = found.design, found.case
+    design, new = optimised.design, optimised.case
     text = part_text(
         new,
         mesh.name,
@@ -195,7 +195,7 @@ def _write(found: "Optimised", files: Sequence[Path], case: str) -> None:
         to_part, to_mesh, to_picture, to_history = (
             stack.enter_context(whole_file(file)) for file in files
         )
-        figure = design_picture(design, found.planform, new.problem.mesh, heading)
+        figure = design_picture(design, optimised.planform, new.problem.mesh, heading)
         to_picture.write_bytes(png(figure))
         to_history.write_text(
             "\n".join(["iteration,compliance_N_mm,largest_change", *rows, ""]), encoding="utf-8"
@@ -204,15 +204,15 @@ def _write(found: "Optimised", files: Sequence[Path], case: str) -> None:
         to_part.write_text(text, encoding="utf-8")
 
 
-def _say(found: "Optimised", files: Sequence[Path]) -> None:
+def _say(optimised: "Optimised", files: Sequence[Path]) -> None:
     """Print what was found."""
-    design, mesh = found.design, found.case.problem.mesh
+    design, mesh = optimised.design, optimised.case.problem.mesh
     part, _, picture, history = files
     print(
         f"{design.iterations} iterations: compliance {design.compliance[0]:.4g} to "
         f"{design.compliance[-1]:.4g} N mm at {design.volume_fraction:.3f} of the volume"
     )
-    for line in found.remarks:
+    for line in optimised.remarks:
         print(f"note: {line}")
     print(
         f"{part}: {len(mesh.cells):,} cells, patches {', '.join(sorted(mesh.patches))}; "

@@ -84,7 +84,7 @@ def _refined(case: "Case") -> "Case":
     from ccfem.fem.elasticity.refinement import refine
 
     problem = refine(case.problem)
-    before, after = (len(each.mesh.cells) for each in (case.problem, problem))
+    before, after = (len(solved.mesh.cells) for solved in (case.problem, problem))
     said = f"{before:,} cells were refined to {after:,} by their estimated error"
     findings = (*case.findings, said) if after > before else case.findings
     return replace(case, problem=problem, findings=findings)

@@ -55,7 +55,7 @@ def print_cases() -> None:
     for name, make in sorted(named_cases().items()):
         console.print(f"[bold]{name}[/bold]  {_first_line(make)}")
         parameters = inspect.signature(make).parameters.values()
-        given = ", ".join(f"{each.name} = {each.default!r}" for each in parameters)
+        given = ", ".join(f"{parameter.name} = {parameter.default!r}" for parameter in parameters)
         console.print(f"    {given}", markup=False)
 
 
@@ -88,7 +88,7 @@ def print_member(kind: str, name: str) -> None:
     """
     known = _members(kind)
     check_known(kind, name, sorted(known))
-    member, by_class = known[name], {each.__name__: each for each in known.values()}
+    member, by_class = known[name], {class_.__name__: class_ for class_ in known.values()}
     console = Console(highlight=False)
     console.print(f"[bold]{name}[/bold]")
     for paragraph in about(member):
@@ -371,7 +371,7 @@ def _headline_table(runs: Sequence[Run], best: Mapping[str, float], details: boo
     """One column a run, one row an index; indices that no run has are left out."""
     table = Table(header_style="bold", box=box.SIMPLE_HEAD)
     values = [headline_values(run) for run in runs]
-    heads = [head for head in HEADLINE if any(head.column in found for found in values)]
+    heads = [head for head in HEADLINE if any(head.column in row for row in values)]
     if not details:
         heads = [dataclasses.replace(h, title=SHORT[h.column]) for h in heads if h.column in SHORT]
     table.add_column("", min_width=_longest_word(head.title for head in heads))
@@ -379,9 +379,9 @@ def _headline_table(runs: Sequence[Run], best: Mapping[str, float], details: boo
         table.add_column(run.name, justify="right", no_wrap=True)
     for head in heads:
         cells = []
-        for run, found in zip(runs, values, strict=True):
+        for run, row in zip(runs, values, strict=True):
             text, extra = cell_text(run, head)
-            if run.printable and found.get(head.column) == best.get(head.column, np.nan):
+            if run.printable and row.get(head.column) == best.get(head.column, np.nan):
                 text = f"[bold green]{text}[/]"
             cells.append(f"{text} [dim]({extra})[/]" if extra else text)
         table.add_row(head.title, *cells)

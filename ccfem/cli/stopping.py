@@ -39,14 +39,14 @@ def say(number: int) -> int:
 
 def end_at_once() -> None:
     """Let signals end the process where it stands, from now on."""
-    for each in _HEEDED:
-        signal.signal(each, _end)
+    for signal_number in _HEEDED:
+        signal.signal(signal_number, _end)
 
 
 def unwind() -> None:
     """Let signals raise `Stopped`, from now on."""
-    for each in _HEEDED:
-        signal.signal(each, _raise)
+    for signal_number in _HEEDED:
+        signal.signal(signal_number, _raise)
     sys.unraisablehook = _unraisable
     sys.excepthook = _uncaught
 

@@ -43,12 +43,12 @@ def methods_of(record: Mapping[str, Any]) -> list[str]:
         As in ``results.json``.
     """
     stacks = record.get("slicings") or {"": record}
-    runs = [run for one in stacks.values() for run in one["strategies"]]
-    found = [method for run in runs for method in run.get("methods", [run["name"]])]
-    found += [one["slicer"] for one in stacks.values() if one.get("slicer")]
+    runs = [run for stack in stacks.values() for run in stack["strategies"]]
+    methods = [method for run in runs for method in run.get("methods", [run["name"]])]
+    methods += [stack["slicer"] for stack in stacks.values() if stack.get("slicer")]
     solver = record.get("solver", {})
-    found += [str(solver.get("backend", "")), "error" if solver.get("error") is not None else ""]
-    return [method for method in dict.fromkeys(found) if method]
+    methods += [str(solver.get("backend", "")), "error" if solver.get("error") is not None else ""]
+    return [method for method in dict.fromkeys(methods) if method]
 
 
 def cited(methods: Iterable[str]) -> list[str]:

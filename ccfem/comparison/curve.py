@@ -53,11 +53,11 @@ class Curve:
 
     def at(self, length: float) -> tuple[Run, ...]:
         """Return the run of each strategy that lays a length, mm per layer."""
-        found = []
+        closest = []
         for points in self.points.values():
             runs = [run for wanted, run in points if wanted == length]
-            found += [run for run in runs if not off_length(run, length)][:1]
-        return tuple(found)
+            closest += [run for run in runs if not off_length(run, length)][:1]
+        return tuple(closest)
 
     @property
     def common(self) -> tuple[float, ...]:
@@ -76,10 +76,10 @@ class Curve:
                 if runs
             )
             return (f"No length of fibre is one that all reach: {spans} mm a layer.",)
-        found = [verdict(self.at(length), length) for length in self.common]
-        if not any(found):
+        verdicts = [verdict(self.at(length), length) for length in self.common]
+        if not any(verdicts):
             return ("Along the curve no two strategies can be printed as planned.",)
-        return tuple(said for said in found if said)
+        return tuple(said for said in verdicts if said)
 
     @property
     def frame(self) -> "pd.DataFrame":

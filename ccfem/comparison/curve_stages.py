@@ -90,7 +90,7 @@ def _reach(run: Run, part: Part, tell: Tell) -> _Reach | None:
 
     if attempted(run, work).failure or not ends[0][1].length_per_layer > 0.0:
         return None
-    least, most = (one.length_per_layer for one in ends[0])
+    least, most = (extreme.length_per_layer for extreme in ends[0])
     return _Reach(run, least, most, ends[0])
 
 
@@ -100,7 +100,7 @@ def _common(
     """Lengths that all reach: the ends of the reach of all, and one between."""
     if not reaches:
         return tuple(sorted(set(given)))
-    low, high = max(one.least for one in reaches), min(one.most for one in reaches)
+    low, high = max(reach.least for reach in reaches), min(reach.most for reach in reaches)
     if low > high:
         return ()
     if high < (1.0 + _APART) * low:

@@ -280,13 +280,13 @@ def _cut(request: Request, basis: Solved) -> tuple[dict[str, Part], dict[str, st
     """
     if not request.named:
         return {"": basis.cut(request.slicings[""].slicer, request.support)}, {}
-    own = _own_thickness(request, basis)
+    thickness = _own_thickness(request, basis)
     parts: dict[str, Part] = {}
     refused: dict[str, str] = {}
     for name, slicing in request.slicings.items():
         slicer: Any = slicing.slicer
         if slicing.as_thick:
-            slicer = replace(slicer, count=None, thickness=own)
+            slicer = replace(slicer, count=None, thickness=thickness)
         try:
             part = basis.cut(slicer)
         except InputError as error:
@@ -338,12 +338,12 @@ def _planned(request: Request, parts: Mapping[str, Part], tell: Tell) -> tuple[l
     first = min(lengths, key=lengths.__getitem__)
     setting, least = alone[first][0], lengths[first]
     runs = []
-    for name, (own, setter) in alone.items():
+    for name, (runs_alone, setter) in alone.items():
         length = least / len(parts[name].layers)
         if name == first and setter is not None:
             length = setting[setter].length_per_layer
             held: Wanted = length
-        runs += to_length(own, setter if name == first else None, length, parts[name], tell)
+        runs += to_length(runs_alone, setter if name == first else None, length, parts[name], tell)
     return runs, InAll(least) if request.named else held
 
 
@@ -363,8 +363,8 @@ def _spread(
             tell(f"planning {run.name}")
             longer: list[Run] = []
             for planned_run in planned_to_lengths(run, part, (lengths / len(part.layers)).tolist()):
-                laid = longer[-1].length_per_layer if longer else -1.0
-                if planned_run.length_per_layer > (1.0 + _ALIKE) * laid:
+                length = longer[-1].length_per_layer if longer else -1.0
+                if planned_run.length_per_layer > (1.0 + _ALIKE) * length:
                     longer.append(planned_run)
             runs += longer
     return runs
@@ -471,13 +471,13 @@ def presses(cases: WeightedCases) -> bool:
     return any(isinstance(support, PressingSupport) for support in supports)
 
 
-def _lengths_to_bound(laid: Sequence[float], alike: float) -> list[float]:
+def _lengths_to_bound(lengths: Sequence[float], alike: float) -> list[float]:
     """Lengths to be bounded, mm: of every run, and between them for the curve.
 
     Lengths within the factor `alike` share a bound, that of the largest.
     """
     taken: list[float] = []
-    for length in sorted(laid, reverse=True):
+    for length in sorted(lengths, reverse=True):
         if not taken or alike * length < taken[-1]:
             taken.append(length)
     between = [0.5 * (longer + shorter) for longer, shorter in itertools.pairwise([*taken, 0.0])]

@@ -283,15 +283,15 @@ def results_rows(comparison: Comparison) -> list[dict[str, Any]]:
     """
     rows: list[dict[str, Any]] = []
     for run in comparison.runs:
-        own = {"slicing": run.slicing} if comparison.over_slicings else {}
-        own |= {"strategy": run.strategy_name}
+        labels = {"slicing": run.slicing} if comparison.over_slicings else {}
+        labels |= {"strategy": run.strategy_name}
         if run.evaluation is None:
-            rows.append({**own, "layer": "total", "failure": run.failure, "printable": False})
+            rows.append({**labels, "layer": "total", "failure": run.failure, "printable": False})
             continue
         values = run.evaluation.values
         for k, layer in enumerate((*run.evaluation.layers, "total")):
-            found = {name: value[k].item() for name, value in values.items()}
-            rows.append({**own, "layer": layer, "failure": "", **found})
+            scalars = {name: value[k].item() for name, value in values.items()}
+            rows.append({**labels, "layer": layer, "failure": "", **scalars})
         extra = headline_values(run)
         tested = (column.name for column in TEST_COLUMNS)
         rows[-1] |= {name: extra[name] for name in tested if name in extra} | print_values(run)
@@ -448,7 +448,7 @@ def _run_record(run: Run) -> dict[str, Any]:
 def _methods(run: Run) -> list[str]:
     """Name the strategy of a run, and those that stand among its parameters."""
     inner = [value for value in run.parameters.values() if dataclasses.is_dataclass(value)]
-    return [member_name(each) for each in (run.strategy, *inner)]
+    return [member_name(member) for member in (run.strategy, *inner)]
 
 
 def _alternative_failure(run: Run) -> dict[str, Any] | None:
@@ -458,13 +458,13 @@ def _alternative_failure(run: Run) -> dict[str, Any] | None:
 
 
 def _versions() -> dict[str, str]:
-    found = {"python": platform.python_version(), "system": platform.platform()}
+    versions = {"python": platform.python_version(), "system": platform.platform()}
     for package in _PACKAGES:
         try:
-            found[package] = version(package)
+            versions[package] = version(package)
         except PackageNotFoundError:
-            found[package] = "not installed"
-    return found
+            versions[package] = "not installed"
+    return versions
 
 
 def _plain(value: Any) -> Any:

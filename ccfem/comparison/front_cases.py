@@ -68,17 +68,17 @@ class PointCases:
 
     def values(self) -> dict[str, float]:
         """Values by column, as `TestedCases.values` names them, with the bound of each case."""
-        found: dict[str, float] = {}
+        values: dict[str, float] = {}
         shares = self.bound.shares(self.ratios)
         for k, name in enumerate(self.names):
-            found[f"stiffness_ratio_tension[{name}]"] = float(self.ratios[k])
-            found[f"bound[{name}]"] = float(self.bound.singles[k])
-            found[f"share_of_bound[{name}]"] = float(shares[k])
-            found[f"first_failure_factor[{name}]"] = float(self.factors[k])
-        found["worst_share_of_bound"] = self.share
-        found["most_share_of_bound"] = 1.0 / self.bound.least
-        found["above_bound"] = self.bound.gap(self.ratios)
-        return found
+            values[f"stiffness_ratio_tension[{name}]"] = float(self.ratios[k])
+            values[f"bound[{name}]"] = float(self.bound.singles[k])
+            values[f"share_of_bound[{name}]"] = float(shares[k])
+            values[f"first_failure_factor[{name}]"] = float(self.factors[k])
+        values["worst_share_of_bound"] = self.share
+        values["most_share_of_bound"] = 1.0 / self.bound.least
+        values["above_bound"] = self.bound.gap(self.ratios)
+        return values
 
 
 def stiffness_panels(
@@ -103,13 +103,13 @@ def stiffness_panels(
         Lengths, mm, and ratios that no paths exceed in all cases at once.
     """
     start = (0.0, 1.0)
-    values = {WORST: [each.share for each in plans]}
-    alone: Curves = {WORST: [start, *((length, 1.0 / one.least) for length, one in bounds)]}
+    values = {WORST: [point.share for point in plans]}
+    alone: Curves = {WORST: [start, *((length, 1.0 / bound.least) for length, bound in bounds)]}
     together: Curves = {}
     for k, name in enumerate(plans[0].names):
         label = f"{name}: times unreinforced stiffness"
-        values[label] = [float(each.ratios[k]) for each in plans]
-        alone[label] = [start, *((length, float(one.singles[k])) for length, one in bounds)]
-        at_once = ((length, float(one.singles[k]) / one.least) for length, one in bounds)
+        values[label] = [float(point.ratios[k]) for point in plans]
+        alone[label] = [start, *((length, float(bound.singles[k])) for length, bound in bounds)]
+        at_once = ((length, float(bound.singles[k]) / bound.least) for length, bound in bounds)
         together[label] = [start, *at_once]
     return values, alone, together

@@ -138,7 +138,7 @@ class FibreFront:
 
     def __repr__(self) -> str:
         cases = self.points[0].cases
-        best = max(self.points, key=lambda each: each.least_ratio)
+        best = max(self.points, key=lambda point: point.least_ratio)
         said = "" if cases is None else f" in every one of {len(cases.names)} load cases"
         return (
             f"FibreFront of '{self.case}' by {self.strategy}: {len(self.points)} plans, up to "
@@ -153,26 +153,26 @@ class FibreFront:
         With several load cases every plan is measured by what no paths of its own length exceed in
         each: no plan with as little fibre reaches a larger share of that in its worst case.
         """
-        cases = [each.cases for each in self.points if each.cases is not None]
+        cases = [point.cases for point in self.points if point.cases is not None]
         if not cases:
-            return self._front(1.0, [each.ratio for each in self.points])
+            return self._front(1.0, [point.ratio for point in self.points])
         marks = []
-        for k, own in enumerate(cases):
-            shares = [own.share_of(other.ratios) for other in cases]
-            marks.append(self._front(own.share_of(np.ones(len(own.names))), shares)[k])
+        for k, ratios in enumerate(cases):
+            shares = [ratios.share_of(other.ratios) for other in cases]
+            marks.append(self._front(ratios.share_of(np.ones(len(ratios.names))), shares)[k])
         return np.array(marks)
 
     @property
     def strongest(self) -> BoolArray:
         """Printable plans that nothing with as little fibre, or none, exceeds in first failure."""
-        return self._front(self.bare, [_failure(each) for each in self.points])
+        return self._front(self.bare, [_failure(point) for point in self.points])
 
     def _front(self, bare: float, values: Sequence[float]) -> BoolArray:
         # Plans to one length differ by what the shortest strand leaves: these count as equal.
-        laid = np.array([each.length for each in self.points])
-        asked = np.array([each.asked_in_all for each in self.points])
+        laid = np.array([point.length for point in self.points])
+        asked = np.array([point.asked_in_all for point in self.points])
         lengths = np.where(np.abs(laid - asked) <= TOLERANCE * asked, asked, laid)
-        printable = np.array([not each.why_not for each in self.points])
+        printable = np.array([not point.why_not for point in self.points])
         across = np.append(0.0, np.where(printable, lengths, np.nan))
         return on_front(across, np.append(bare, values))[1:]
 
@@ -184,15 +184,15 @@ class FibreFront:
         none exceed in all at once; and the multiple of the loads at which one of them fails.
         """
         stiffest, strongest = self.stiffest.tolist(), self.strongest.tolist()
-        cases = [each.cases for each in self.points if each.cases is not None]
+        cases = [point.cases for point in self.points if point.cases is not None]
         if cases:
             values, bounds, together = stiffness_panels(cases, self.cases_bounds)
         else:
-            values = {_STIFFNESS: [each.ratio for each in self.points]}
+            values = {_STIFFNESS: [point.ratio for point in self.points]}
             bounds, together = {_STIFFNESS: [(0.0, 1.0), *self.bounds]}, {}
         panels = {label: self._curves(some, stiffest) for label, some in values.items()}
         scale, label = (1.0, _FACTOR) if cases else (1e-3, _FAILURE)
-        panels[label] = self._curves([scale * _failure(each) for each in self.points], strongest)
+        panels[label] = self._curves([scale * _failure(point) for point in self.points], strongest)
         return amount_curves(
             panels,
             _in_metres(bounds),
@@ -219,19 +219,19 @@ class FibreFront:
             When no two plans of one length differ in how much strength counted.
         """
         curves: dict[tuple[int, float], list[FrontPoint]] = {}
-        for each in self.points:
-            curves.setdefault((each.layers, each.asked), []).append(each)
+        for point in self.points:
+            curves.setdefault((point.layers, point.asked), []).append(point)
         several = [some for some in curves.values() if len(some) > 1]
         if not several:
             raise InputError(
                 "a trade needs plans of one length for several strengths; got none: give --strength"
             )
-        counts = {each.layers for some in several for each in some}
+        counts = {point.layers for some in several for point in some}
         alike = len(counts) == 1
         on = f", {_layers(*counts)}" if alike else ""
         named = {
             f"{1e-3 * some[0].length:.3g} m" + ("" if alike else f", {_layers(some[0].layers)}"): [
-                _traded(each) for each in some
+                _traded(point) for point in some
             ]
             for some in several
         }
@@ -246,18 +246,18 @@ class FibreFront:
 
         rows = [
             {
-                "layers": each.layers,
-                "strength": each.strength,
-                "fibre": each.length,
-                "fibre_per_layer": each.asked,
-                **_columns(each),
-                "fails_in": each.fails_in,
-                "printable": not each.why_not,
-                "why_not": each.why_not,
+                "layers": point.layers,
+                "strength": point.strength,
+                "fibre": point.length,
+                "fibre_per_layer": point.asked,
+                **_columns(point),
+                "fails_in": point.fails_in,
+                "printable": not point.why_not,
+                "why_not": point.why_not,
                 "stiffest": stiffest,
                 "strongest": strongest,
             }
-            for each, stiffest, strongest in zip(
+            for point, stiffest, strongest in zip(
                 self.points, self.stiffest.tolist(), self.strongest.tolist(), strict=True
             )
         ]

@@ -175,8 +175,10 @@ def _curves(runs: Sequence[Run]) -> tuple[dict[str, FloatArray], dict[str, Float
     rates, bends = {}, {}
     for run in runs:
         samples = run.evaluation.samples if run.evaluation is not None else ()
-        rates[run.name] = matching_curve(along_fibre(pool([each.alignment for each in samples])))
-        bends[run.name] = np.concatenate([each.curvature.curvature for each in samples])
+        rates[run.name] = matching_curve(
+            along_fibre(pool([sample.alignment for sample in samples]))
+        )
+        bends[run.name] = np.concatenate([sample.curvature.curvature for sample in samples])
     return rates, bends
 
 
@@ -197,7 +199,7 @@ def _forces(
             view = flat_view(layer)
             coloured[run.name] = force_on_paths(middle, tangent, length, force, view)
     flat = flat_view(layer)
-    end = max((one.limits[1] for one in coloured.values()), default=0.0)
+    end = max((lines.limits[1] for lines in coloured.values()), default=0.0)
     return {
         run.name: _force(
             run,

@@ -90,12 +90,12 @@ def best_values(runs: Sequence[Run], wanted: Wanted) -> dict[str, float]:
             for run in runs
             if run.evaluation is not None and headline_values(run).get(head.column) != found
         ]
-        own = next(
+        measured = next(
             cell_text(run, head)[0]
             for run in equal
             if headline_values(run).get(head.column) == found
         )
-        if own not in texts:
+        if measured not in texts:
             best[head.column] = found
     return best
 
@@ -118,10 +118,10 @@ def off_length(run: Run, wanted: Wanted) -> bool:
     if wanted is None:
         return False
     if isinstance(wanted, InAll):
-        laid, length = run.length, wanted.length
+        planned, length = run.length, wanted.length
     else:
-        laid, length = run.length_per_layer, wanted
-    return not (1.0 - _SAME) * length <= laid <= (1.0 + _SAME) * length
+        planned, length = run.length_per_layer, wanted
+    return not (1.0 - _SAME) * length <= planned <= (1.0 + _SAME) * length
 
 
 def stiffness_ratio(run: Run, mode: str = "tension") -> float:
@@ -140,11 +140,11 @@ def merit(run: Run, mode: str = "tension") -> float:
     return stiffness_ratio(run, mode)
 
 
-def stiffness_ratios(one: Run, other: Run) -> tuple[float, float]:
+def stiffness_ratios(first: Run, other: Run) -> tuple[float, float]:
     """Stiffness of one run over that of another, tension only and bonded; NaN where untested."""
     return (
-        stiffness_ratio(one) / stiffness_ratio(other),
-        stiffness_ratio(one, "bonded") / stiffness_ratio(other, "bonded"),
+        stiffness_ratio(first) / stiffness_ratio(other),
+        stiffness_ratio(first, "bonded") / stiffness_ratio(other, "bonded"),
     )
 
 
@@ -176,9 +176,9 @@ def order_of(one: Run, other: Run) -> str:
         return UNDECIDED
     if np.maximum(first / second, second / first).max() <= 1.0 + RESOLUTION:
         return SAME
-    for found, high, low in ((FIRST, first, second), (SECOND, second, first)):
+    for order, high, low in ((FIRST, first, second), (SECOND, second, first)):
         pairs = zip(high.tolist(), low.tolist(), strict=True)
         below = any(round(a, _DIGITS) < round(b, _DIGITS) for a, b in pairs)
         if high[0] > (1.0 + RESOLUTION) * low[0] and not below:
-            return found
+            return order
     return UNDECIDED

@@ -55,10 +55,12 @@ def remarks(runs: Sequence[Run], wanted: Wanted, bound: UpperBound | None = None
     for run in order:
         for line in _about(run, wanted, bound is not None):
             lines.setdefault(line, []).append(run.name)
-    found = [f"{', '.join(names)}: {line}" for line, names in lines.items()]
+    lines_said = [f"{', '.join(names)}: {line}" for line, names in lines.items()]
     tested = [run for run in order if is_tested(run) and not off_length(run, wanted)]
-    found += _about_orders(tested)
-    return [*found, bound_remark(tested, bound)] if bound is not None and tested else found
+    lines_said += _about_orders(tested)
+    return (
+        [*lines_said, bound_remark(tested, bound)] if bound is not None and tested else lines_said
+    )
 
 
 def by_importance(lines: Sequence[str]) -> list[str]:
@@ -113,10 +115,10 @@ def _about_orders(tested: Sequence[Run]) -> list[str]:
         SAME: ("no difference to", f": less than {RESOLUTION:.0%}, the resolution of the test"),
     }
     lines = []
-    for found, (words, reason) in reasons.items():
+    for order, (words, reason) in reasons.items():
         pairs = []
         for k, run in enumerate(tested):
-            others = [other.name for other in tested[k + 1 :] if order_of(run, other) == found]
+            others = [other.name for other in tested[k + 1 :] if order_of(run, other) == order]
             if others:
                 pairs.append(f"{run.name}: {words} {', '.join(others)}")
         if pairs:
@@ -175,13 +177,13 @@ def open_remarks(runs: Sequence[Run], layers: Sequence[Layer], width: float) -> 
     width : float, mm
         Of the fibre.
     """
-    found = []
+    texts = []
     for run in runs:
         if run.evaluation is None or not _filling(run):
             continue
         cover = run.evaluation.values["coverage"][:-1]
         worst = int(run.evaluation.layers[int(cover.argmin())])
-        layer = next(each for each in layers if each.index == worst)
+        layer = next(candidate for candidate in layers if candidate.index == worst)
         if cover.min() >= _FULL or layer.flat is None:
             continue
         left = open_places(plane_paths(run.toolpaths, layer), width)
@@ -194,11 +196,11 @@ def open_remarks(runs: Sequence[Run], layers: Sequence[Layer], width: float) -> 
             if largest
             else ""
         )
-        found.append(
+        texts.append(
             f"{run.name}: {left.narrow:.1%} of layer {layer.index} is gaps too narrow for another "
             f"strand (between diverging strands, along the border){wide}"
         )
-    return found
+    return texts
 
 
 def _filling(run: Run) -> bool:

@@ -341,7 +341,7 @@ class Request:
                     "over several slicings there are no layers: drop layers or slicings"
                 )
             return cls(case, strategies, named_slicings(slicings), amount, **more)
-        given = [each for each in strategies.values() if isinstance(each, GivenPaths)]
+        given = [strategy for strategy in strategies.values() if isinstance(strategy, GivenPaths)]
         if given and layers is None:
             layers = tuple(given[0].heights(plane_frame(case.build)[2]).tolist())
         slicing = Slicing(None if layers is None else as_slicer(layers))

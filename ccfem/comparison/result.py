@@ -292,8 +292,8 @@ class Comparison:
     def _count(self, slicing: str) -> str:
         """Say how many layers a slicing has, and how many of them hold fibre of any run."""
         runs = (run for run in self.succeeded if run.slicing == slicing)
-        laid = {int(k) for run in runs for k in run.toolpaths.layer.tolist()}
-        return f"{len(self.stacks[slicing])} ({len(laid)} with fibre)"
+        indices = {int(k) for run in runs for k in run.toolpaths.layer.tolist()}
+        return f"{len(self.stacks[slicing])} ({len(indices)} with fibre)"
 
     @property
     def frame(self) -> "pd.DataFrame":

@@ -134,10 +134,12 @@ class Run:
     def __repr__(self) -> str:
         if self.failure:
             return f"Run {self.name!r}: failed: {self.failure}"
-        laid = f"{len(self.toolpaths)} paths, {self.length_per_layer:.0f} mm of fibre a layer"
+        amount = f"{len(self.toolpaths)} paths, {self.length_per_layer:.0f} mm of fibre a layer"
         if self.tested is None:
-            return f"Run {self.name!r}: {laid}"
-        return f"Run {self.name!r}: {laid}, {self.tested.bracket.tension.ratio:.2f} times as stiff"
+            return f"Run {self.name!r}: {amount}"
+        return (
+            f"Run {self.name!r}: {amount}, {self.tested.bracket.tension.ratio:.2f} times as stiff"
+        )
 
     def _repr_html_(self) -> str:
         remarks = (self.note, self.why_not, self.untested)

@@ -25,16 +25,23 @@ def cases_verdict(runs: Sequence[Run], wanted: Wanted, bound: UpperBound | None)
     order = [run for run in comparable(runs, wanted) if is_tested(run)]
     if len(order) < 2:
         return ""
-    first, found = order[0], [order_of(order[0], other) for other in order[1:]]
+    first, orders = order[0], [order_of(order[0], other) for other in order[1:]]
     of = (
         "of the upper bound for that case alone"
         if bound is not None
         else "the unreinforced stiffness"
     )
     reached = f"{merit(first):.0%} {of}" if bound is not None else f"{merit(first):.2f} times {of}"
-    group = [first, *(run for run, each in zip(order[1:], found, strict=True) if each != FIRST)]
+    group = [
+        first,
+        *(
+            run
+            for run, order_of_run in zip(order[1:], orders, strict=True)
+            if order_of_run != FIRST
+        ),
+    ]
     names = f"{first.name} and {', '.join(run.name for run in group[1:])}"
-    if all(each == FIRST for each in found):
+    if all(order_of_run == FIRST for order_of_run in orders):
         said = (
             f"{first.name} serves all load cases best: the worst of them reaches {reached}, "
             f"{merit(first) / merit(order[1]):.2f} times {order[1].name} (predicted, fibres "
@@ -69,13 +76,13 @@ def cases_remarks(
         Whether the part has alternative supports.
     """
     said = ", ".join(f"{n} {w:.2g}" for n, w in zip(cases.names, cases.weights, strict=True))
-    found = [
+    texts = [
         f"planned for {len(cases)} load cases, by weight: {said}; stiffness, first failure and "
         f"indices of stress in the first table are those of '{cases.heaviest.case}'"
     ]
     if others:
-        found.append("alternative supports are not tested with several load cases")
-    found += [
+        texts.append("alternative supports are not tested with several load cases")
+    texts += [
         f"{run.name}: planned for the case that gains least over the part without fibre, not for "
         "the shares of bounds"
         for run in runs
@@ -85,7 +92,7 @@ def cases_remarks(
         run for run in ranking(runs, wanted) if is_tested(run) and not off_length(run, wanted)
     ]
     if bound is None or not tested or tested[0].tested is None or tested[0].tested.cases is None:
-        return found
+        return texts
     ratios = tested[0].tested.cases.tension.ratios
     gap = bound.duality_gap
     loose = f"; the bound may be loose by {gap:.1%}" if gap > LOOSE else ""
@@ -93,7 +100,7 @@ def cases_remarks(
     where = f"{away:.1%} from" if away >= 0.0 else f"{-away:.1%} above"
     why = "" if away >= 0.0 else f": {why_above(tested[0], -away)}"
     return [
-        *found,
+        *texts,
         f"no paths of this length bring the worst case above {1.0 / bound.least:.0%} of what is "
         f"possible for it alone: {tested[0].name} reaches {bound.shares(ratios).min():.0%}, "
         f"{where} that bound (fibres carrying tension only{loose}){why}",
@@ -120,16 +127,16 @@ def cases_rows(runs: Sequence[Run]) -> tuple[list[str], list[tuple[str, list[str
     heads = [f"stiffness × (of its bound), {name}" for name in names]
     heads += ["worst of its bound", "above the bound of all", "first failure × load"]
     rows = []
-    for name, found in tested:
-        values = found.values()
+    for name, test in tested:
+        values = test.values()
         cells = []
         for case in names:
             share = values.get(f"share_of_bound[{case}]", np.nan)
-            own = f" ({share:.0%})" if np.isfinite(share) else ""
-            cells.append(f"{values[f'stiffness_ratio_tension[{case}]']:.2f}{own}")
+            share_text = f" ({share:.0%})" if np.isfinite(share) else ""
+            cells.append(f"{values[f'stiffness_ratio_tension[{case}]']:.2f}{share_text}")
         cells.append(_percent(values.get("worst_share_of_bound", np.nan), 0))
         cells.append(_percent(values.get("above_bound", np.nan), 1))
-        failure = found.failure
+        failure = test.failure
         cells.append("–" if failure is None else f"{failure.factor:.2f} ({failure.case})")
         rows.append((name, cells))
     return heads, rows

@@ -11,16 +11,16 @@ from ccfem.slicing.layers.layer import Layer
 
 def drawn_layers(comparison: Comparison) -> list[Layer]:
     """Layers that are drawn: all flat ones, and of curved ones those that have fibre."""
-    laid = {int(k) for run in comparison.succeeded for k in np.unique(run.toolpaths.layer)}
-    chosen = [k for k in comparison.layers if k.flat is not None or k.index in laid]
+    indices = {int(k) for run in comparison.succeeded for k in np.unique(run.toolpaths.layer)}
+    chosen = [k for k in comparison.layers if k.flat is not None or k.index in indices]
     return chosen or list(comparison.layers)
 
 
 def middle_layer(comparison: Comparison) -> Layer:
     """Middle one of the layers on which most runs lay fibre, to represent all."""
-    laid = [set(np.unique(run.toolpaths.layer).tolist()) for run in comparison.succeeded]
+    indices = [set(np.unique(run.toolpaths.layer).tolist()) for run in comparison.succeeded]
     drawn = drawn_layers(comparison)
-    runs = [sum(layer.index in those for those in laid) for layer in drawn]
+    runs = [sum(layer.index in those for those in indices) for layer in drawn]
     best = [layer for layer, count in zip(drawn, runs, strict=True) if count == max(runs)]
     return best[len(best) // 2]
 
@@ -33,9 +33,9 @@ def caption(run: Run, layer: Layer) -> str:
     count = int(values["paths"])
     if not count:
         return "no fibre"
-    laid = f"{values['fibre_length']:.0f} mm in {count} path{'s' if count > 1 else ''}"
+    amount = f"{values['fibre_length']:.0f} mm in {count} path{'s' if count > 1 else ''}"
     efficiency = values["efficiency"]
-    return laid if np.isnan(efficiency) else f"{laid}, efficiency {efficiency:.2f}"
+    return amount if np.isnan(efficiency) else f"{amount}, efficiency {efficiency:.2f}"
 
 
 def file_stem(*names: str) -> str:

@@ -109,8 +109,8 @@ def planned(
         layers, stress, machine = part.layers, part.stress, part.machine
         if isinstance(run.strategy, GivenPaths):
             paths = run.strategy.toolpaths
-            laid = length_per_layer(paths, layers)
-            found = Planned(run.strategy, paths, laid, _as_given(laid, wanted))
+            length = length_per_layer(paths, layers)
+            found = Planned(run.strategy, paths, length, _as_given(length, wanted))
         elif part.several_cases:
             found = plan_cases(run.strategy, layers, part.cases, machine, wanted, part.strand)
         elif wanted is None:
@@ -190,11 +190,11 @@ def planned_to_lengths(
     ]
 
 
-def _as_given(laid: float, wanted: float | None) -> str:
+def _as_given(length: float, wanted: float | None) -> str:
     """Note on given paths, which are not changed, if they miss the wanted length, mm per layer."""
-    if wanted is None or abs(laid / wanted - 1.0) <= TOLERANCE:
+    if wanted is None or abs(length / wanted - 1.0) <= TOLERANCE:
         return ""
-    return f"given paths stay as they are: lays {laid:.0f} of {wanted:.0f} mm per layer"
+    return f"given paths stay as they are: lays {length:.0f} of {wanted:.0f} mm per layer"
 
 
 def natural(runs: Sequence[Run], part: Part, tell: Tell) -> tuple[dict[str, Run], str | None]:
@@ -203,17 +203,17 @@ def natural(runs: Sequence[Run], part: Part, tell: Tell) -> tuple[dict[str, Run]
     Strategies that take the length itself, and those that lay much more than others on a few
     layers, are planned only if they lay least. The name is None if no run lays fibre.
     """
-    own: dict[str, Run] = {}
+    natural_runs: dict[str, Run] = {}
     for run in runs:
-        some = any(len(one.toolpaths) for one in own.values())
-        own[run.name] = _sampled(run, part, tell) if some else _by_itself(run, part, tell)
-    return own, _setter(own, part, tell)
+        some = any(len(one.toolpaths) for one in natural_runs.values())
+        natural_runs[run.name] = _sampled(run, part, tell) if some else _by_itself(run, part, tell)
+    return natural_runs, _setter(natural_runs, part, tell)
 
 
 def _by_itself(run: Run, part: Part, tell: Tell) -> Run:
     """Run planned to its natural amount, unless its strategy takes the length itself."""
-    told = isinstance(run.strategy, LengthStrategy)
-    return run if told else planned(run, part, None, tell)
+    by_length = isinstance(run.strategy, LengthStrategy)
+    return run if by_length else planned(run, part, None, tell)
 
 
 def _sampled(run: Run, part: Part, tell: Tell) -> Run:
@@ -226,9 +226,9 @@ def _sampled(run: Run, part: Part, tell: Tell) -> Run:
         length = sampled_length(run.strategy, part.layers, part.stress, part.machine)
         return replace(run, sampled=length)
 
-    found = _stage(run, "plan", work)
+    sampled = _stage(run, "plan", work)
     # Layers that stay empty tell nothing about others.
-    return found if found.failure or found.sampled else _by_itself(found, part, tell)
+    return sampled if sampled.failure or sampled.sampled else _by_itself(sampled, part, tell)
 
 
 def to_length(
@@ -258,11 +258,11 @@ def to_length(
     return list(own.values()) if length is None else [level(run) for run in own.values()]
 
 
-def _setter(own: dict[str, Run], part: Part, tell: Tell) -> str | None:
+def _setter(natural_runs: dict[str, Run], part: Part, tell: Tell) -> str | None:
     """Name of the run whose natural length applies to all; it is planned afterwards."""
     while True:
         natural, least = {}, {}  # least: the length that the run may turn out to lay
-        for name, run in own.items():
+        for name, run in natural_runs.items():
             if len(run.toolpaths):
                 natural[name] = least[name] = run.length_per_layer
             elif isinstance(run.strategy, LengthStrategy) and not run.failure:
@@ -270,14 +270,14 @@ def _setter(own: dict[str, Run], part: Part, tell: Tell) -> str | None:
                 least[name] = natural[name]
             elif run.sampled and not run.failure:
                 natural[name], least[name] = run.sampled, run.sampled / _UNLIKE
-        given = [name for name in natural if isinstance(own[name].strategy, GivenPaths)]
+        given = [name for name in natural if isinstance(natural_runs[name].strategy, GivenPaths)]
         setter = min(given or natural, key=least.__getitem__, default=None)
-        if setter is None or len(own[setter].toolpaths):
+        if setter is None or len(natural_runs[setter].toolpaths):
             return setter
-        told = isinstance(own[setter].strategy, LengthStrategy)
-        run = planned(own[setter], part, natural[setter] if told else None, tell)
+        by_length = isinstance(natural_runs[setter].strategy, LengthStrategy)
+        run = planned(natural_runs[setter], part, natural[setter] if by_length else None, tell)
         nothing = not run.failure and not len(run.toolpaths)
-        own[setter] = replace(run, failure=_no_fibre(part.machine)) if nothing else run
+        natural_runs[setter] = replace(run, failure=_no_fibre(part.machine)) if nothing else run
 
 
 def _no_fibre(machine: Machine) -> str:
@@ -360,7 +360,7 @@ class Tests:
         """Make the specimens of a solution, and of that under alternative supports."""
         fields = [stress] if alternative is None else [stress, alternative]
         try:
-            return cls(strand, [(Specimen.of(each, backend), _peak(each)) for each in fields])
+            return cls(strand, [(Specimen.of(field, backend), _peak(field)) for field in fields])
         except InputError as error:
             return cls(strand, refused=str(error))
 
@@ -394,8 +394,8 @@ def _tested(run: Run, tests: Tests, part: Part, tell: Tell, span: Sequence[float
     def work() -> Run:
         mesh = tests.models[0][0].unreinforced.mesh
         strands = carrying_strands(run.toolpaths, run.strategy, part.layers, mesh, part.machine)
-        found = [_test(strands, *model, tests.strand, part, span) for model in tests.models]
-        tested = replace(found[0], alternative=[*found[1:], None][0])
+        tests_done = [_test(strands, *model, tests.strand, part, span) for model in tests.models]
+        tested = replace(tests_done[0], alternative=[*tests_done[1:], None][0])
         if part.several_cases:
             every = in_all_cases(strands, part.cases, tests.strand, part.layers)
             tested = replace(tested, cases=every)

@@ -32,7 +32,7 @@ def frame(ranking: Sequence[Run]) -> "pd.DataFrame":
     import pandas as pd
 
     values = [headline_values(run) for run in ranking]
-    names = list(dict.fromkeys(name for found in values for name in found))
+    names = list(dict.fromkeys(name for row in values for name in row))
     columns = {
         "rank": np.arange(1, len(ranking) + 1),
         "strategy": [run.name for run in ranking],
@@ -42,5 +42,5 @@ def frame(ranking: Sequence[Run]) -> "pd.DataFrame":
         "fails_in": [run.fails_in for run in ranking],
         "empty_layers": [run.empty_layers for run in ranking],
     }
-    numbers = {name: [found.get(name, np.nan) for found in values] for name in names}
+    numbers = {name: [row.get(name, np.nan) for row in values] for name in names}
     return pd.DataFrame(numbers | columns)[[*columns, *(n for n in names if n not in columns)]]

@@ -60,21 +60,21 @@ class TestedCases:
 
     def values(self) -> dict[str, float]:
         """Every value by its column; those of a case have its name in brackets."""
-        found: dict[str, float] = {}
+        values: dict[str, float] = {}
         for k, name in enumerate(self.names):
-            found[f"stiffness_ratio_tension[{name}]"] = float(self.tension.ratios[k])
-            found[f"stiffness_ratio_bonded[{name}]"] = float(self.bonded.ratios[k])
+            values[f"stiffness_ratio_tension[{name}]"] = float(self.tension.ratios[k])
+            values[f"stiffness_ratio_bonded[{name}]"] = float(self.bonded.ratios[k])
             if self.bound is not None:
-                found[f"share_of_bound[{name}]"] = float(self.shares()[k])
+                values[f"share_of_bound[{name}]"] = float(self.shares()[k])
             if self.failure is not None:
-                found[f"first_failure_load[{name}]"] = self.failure.each[k].load
-                found[f"first_failure_factor[{name}]"] = self.failure.factors[k]
+                values[f"first_failure_load[{name}]"] = self.failure.each[k].load
+                values[f"first_failure_factor[{name}]"] = self.failure.factors[k]
         if self.bound is not None:
-            found["worst_share_of_bound"] = self.merit()
-            found["above_bound"] = self.bound.gap(self.tension.ratios)
+            values["worst_share_of_bound"] = self.merit()
+            values["above_bound"] = self.bound.gap(self.tension.ratios)
         if self.failure is not None:
-            found["first_failure_factor"] = self.failure.factor
-        return found
+            values["first_failure_factor"] = self.failure.factor
+        return values
 
 
 def in_all_cases(
@@ -86,7 +86,7 @@ def in_all_cases(
     """Test strands under all cases, in tension only and bonded."""
     parts = specimens(cases)
     tension = virtual_tests(strands, parts, strand, tolerance=_TOLERANCE)
-    near = [one.solution.displacement for one in tension.tests]
+    near = [test.solution.displacement for test in tension.tests]
     bonded = virtual_tests(strands, parts, strand, BONDED, known=near, tolerance=_TOLERANCE)
     try:
         failure = cases_failure(tension, strand, layers=layers)

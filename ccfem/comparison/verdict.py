@@ -85,17 +85,17 @@ def _stiffer(run: Run, best: Run | None) -> bool:
     """Whether a run that does not count is stiffer than the best, in tension only."""
     if best is None or run.tested is None or best.tested is None:
         return False
-    cases = [each.tested.cases for each in (run, best) if each.tested is not None]
-    if len({each is None or each.bound is None for each in cases}) > 1:
+    cases = [case.tested.cases for case in (run, best) if case.tested is not None]
+    if len({case is None or case.bound is None for case in cases}) > 1:
         return False  # a share of the bound, which another length has none of, against a ratio
     return merit(run) > merit(best)
 
 
 def _by_stiffness(order: Sequence[Run], wanted: Wanted) -> str:
     first, second = order[0], order[1]
-    found = [order_of(first, run) for run in order[1:]]
+    orders = [order_of(first, run) for run in order[1:]]
     both = all_have(order, ALTERNATIVES[0])
-    if all(each == FIRST for each in found):
+    if all(order_of_run == FIRST for order_of_run in orders):
         gain = stiffness_ratio(first) / stiffness_ratio(second)
         return (
             f"{first.name} makes the stiffest part, {_amount(wanted)}: "
@@ -103,7 +103,14 @@ def _by_stiffness(order: Sequence[Run], wanted: Wanted) -> str:
             f"{second.name} (predicted, fibres carrying tension only; no other is stiffer with "
             f"bonded fibres{', or under the alternative supports' if both else ''})."
         )
-    group = [first, *(run for run, each in zip(order[1:], found, strict=True) if each != FIRST)]
+    group = [
+        first,
+        *(
+            run
+            for run, order_of_run in zip(order[1:], orders, strict=True)
+            if order_of_run != FIRST
+        ),
+    ]
     if all_same(group):
         return (
             f"No difference between {_names(group)}, {_amount(wanted)}: "

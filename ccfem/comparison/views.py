@@ -30,9 +30,9 @@ FRONTS: Mapping[str, tuple[str, str]] = {
 
 def shown_layer(runs: Sequence[Run], layers: Sequence[Layer]) -> int:
     """Index of the layer that shows most: the middle one of those with fibre of any run."""
-    laid = sorted({int(k) for run in runs for k in np.unique(run.toolpaths.layer)})
-    if laid:
-        return laid[len(laid) // 2]
+    indices = sorted({int(k) for run in runs for k in np.unique(run.toolpaths.layer)})
+    if indices:
+        return indices[len(indices) // 2]
     if not layers:
         raise InputError("there is no layer to draw: slice the part into at least one")
     return layers[len(layers) // 2].index
@@ -85,18 +85,18 @@ def front_picture(runs: Sequence[Run], over: str) -> "Figure":
         raise InputError(f"fronts are drawn over {', '.join(FRONTS)}; got {over!r}: choose one")
     values = [headline_values(run) for run in runs]
     known = [
-        (run, found)
-        for run, found in zip(runs, values, strict=True)
-        if "stiffness" in found and over in found
+        (run, row)
+        for run, row in zip(runs, values, strict=True)
+        if "stiffness" in row and over in row
     ]
     if not known:
         raise InputError(f"no run has stiffness and {over}: compare with the virtual test")
     title, better = FRONTS[over]
-    across = np.array([found[over] if run.printable else np.nan for run, found in known])
-    best = on_front(across, np.array([found["stiffness"] for _, found in known]), better)
+    across = np.array([row[over] if run.printable else np.nan for run, row in known])
+    best = on_front(across, np.array([row["stiffness"] for _, row in known]), better)
     points = [
-        FrontPoint(run.name, found[over], found["stiffness"], bool(chosen), run.printable, run.name)
-        for (run, found), chosen in zip(known, best, strict=True)
+        FrontPoint(run.name, row[over], row["stiffness"], bool(chosen), run.printable, run.name)
+        for (run, row), chosen in zip(known, best, strict=True)
     ]
     return front_figure({"": points}, title, "stiffness, N/mm")
 

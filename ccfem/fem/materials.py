@@ -97,8 +97,12 @@ class Material:
         """
         moduli = 1.0 / np.diag(np.linalg.inv(self.stiffness))[:3]
         expansion = np.unique(self.expansion or ())
-        found = [("modulus", float(x), MODULUS) for x in np.unique([moduli.min(), moduli.max()])]
-        found += [("expansion", float(x), EXPANSION) for x in expansion[[0, -1][: len(expansion)]]]
+        constants = [
+            ("modulus", float(x), MODULUS) for x in np.unique([moduli.min(), moduli.max()])
+        ]
+        constants += [
+            ("expansion", float(x), EXPANSION) for x in expansion[[0, -1][: len(expansion)]]
+        ]
         optional = (
             ("tensile strength", self.tensile_strength, STRENGTH),
             ("compressive strength", self.compressive_strength, STRENGTH),
@@ -106,8 +110,8 @@ class Material:
             ("shear strength between layers", self.interlayer_shear, STRENGTH),
             ("mass density", self.mass_density, MASS_DENSITY),
         )
-        found += [(what, x, sizes) for what, x, sizes in optional if x is not None]
-        return tuple(found)
+        constants += [(what, x, sizes) for what, x, sizes in optional if x is not None]
+        return tuple(constants)
 
 
 def isotropic(

@@ -106,8 +106,8 @@ def beads(
     length = (lengths(points, offsets) / count)[line]
     middle = 0.5 * (nodes[start] + nodes[start + 1])
     normal = _normals(points, normals, offsets, middle, line)
-    own = nodes[start + 1] - nodes[start]
-    direction, straight, often = _chords(own, length, line, first, closed)
+    chord = nodes[start + 1] - nodes[start]
+    direction, straight, often = _chords(chord, length, line, first, closed)
     direction = direction - np.einsum("ij,ij->i", direction, normal)[:, None] * normal
     direction /= np.maximum(np.linalg.norm(direction, axis=1), 1e-300)[:, None]
     shares = share_room(
@@ -151,7 +151,7 @@ def _normals(
 
 
 @njit(cache=True, nogil=True)
-def _chords(own, length, line, first, closed):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _chords(chord, length, line, first, closed):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Direction (s, 3), share of the length that goes ahead (s,), and passes of the chord (s,)."""
     direction = np.empty((len(line), 3))
     straight, often = np.empty(len(line)), np.empty(len(line))
@@ -162,20 +162,20 @@ def _chords(own, length, line, first, closed):  # type: ignore[no-untyped-def]  
         for near in range(k - _AHEAD, k + _AHEAD + 1):
             at = low + (near - low) % (high - low) if ring else near
             if low <= at < high:
-                x, y, z = x + own[at, 0], y + own[at, 1], z + own[at, 2]
+                x, y, z = x + chord[at, 0], y + chord[at, 1], z + chord[at, 2]
                 whole += length[at]
         size = np.sqrt(x * x + y * y + z * z)
         # A strand that turns back within a width takes the direction of its own piece.
         lost = size < 1e-3 * whole
         if lost:
-            x, y, z = own[k, 0], own[k, 1], own[k, 2]
+            x, y, z = chord[k, 0], chord[k, 1], chord[k, 2]
         unit = max(np.sqrt(x * x + y * y + z * z), 1e-300)
         x, y, z = x / unit, y / unit, z / unit
         passed = 0.0
         for near in range(k - _AHEAD, k + _AHEAD + 1):
             at = low + (near - low) % (high - low) if ring else near
             if low <= at < high:
-                a, b, c = own[at, 0], own[at, 1], own[at, 2]
+                a, b, c = chord[at, 0], chord[at, 1], chord[at, 2]
                 piece = max(np.sqrt(a * a + b * b + c * c), 1e-300)
                 passed += abs(a * x + b * y + c * z) / piece * length[at]
         direction[k, 0], direction[k, 1], direction[k, 2] = x, y, z

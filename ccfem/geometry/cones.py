@@ -80,7 +80,7 @@ def _in_cones(
         radius = np.maximum.reduceat(off, first)
     half = np.radians(half_angle)
     tips_inside = _point_in_cones(
-        *(seen_only(np.asarray(each, dtype=np.float64)) for each in (tips, axes, points)),
+        *(seen_only(np.asarray(values, dtype=np.float64)) for values in (tips, axes, points)),
         seen_only(np.asarray(when, dtype=np.int64)),
         ends.astype(np.int64),
         seen_only(np.asarray(group[first], dtype=np.int64)),

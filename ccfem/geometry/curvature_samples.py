@@ -21,8 +21,8 @@ def curvature_samples(
         Wanted distance h of the samples; a polyline of length L gets ``max(1, round(L / h))`` equal
         steps. The curvature is the angle between the chords before and behind a point, over h.
     """
-    found, ends = resample(points, offsets, step)
+    samples, ends = resample(points, offsets, step)
     count = np.diff(ends)
-    angle = turning_angles(found, ends, closed)
+    angle = turning_angles(samples, ends, closed)
     size = np.repeat(lengths(points, offsets), count) / np.repeat(np.maximum(count - 1, 1), count)
     return np.asarray((angle / size)[inner_points(ends, closed)])

@@ -139,10 +139,10 @@ def word_sizes(start, end, radius, sizes):  # type: ignore[no-untyped-def]
                 continue
             # Headings where the circle between the two touches the first and the last one.
             lean = np.arccos(min(0.25 * apart, 1.0))
-            one = way + first * (lean + 0.5 * np.pi)
+            heading = way + first * (lean + 0.5 * np.pi)
             other = way + np.pi - first * (lean - 0.5 * np.pi)
-            sizes[word, 0] = _round(first * (one - start[2]))
-            sizes[word, 1] = _round(middle * (other - one))
+            sizes[word, 0] = _round(first * (heading - start[2]))
+            sizes[word, 1] = _round(middle * (other - heading))
             sizes[word, 2] = _round(last * (end[2] - other))
         for piece in range(3):
             sizes[word, piece] *= radius

@@ -57,13 +57,13 @@ def even_steps(
     merged[ends[1:][long] - 1] = points[offsets[1:][long] - 1]
     keep = _needed(np.ascontiguousarray(merged), ends, held, tolerance)
     chosen, kept = merged[keep], np.concatenate([[0], np.cumsum(keep)])[ends]
-    found, parts, segment = subdivide(chosen, kept, step)
+    stepped, parts, segment = subdivide(chosen, kept, step)
     source = last[keep]
     following = np.minimum(segment + 1, len(source) - 1)
     size = np.linalg.norm(chosen[following] - chosen[segment], axis=1)
-    way = np.linalg.norm(found - chosen[segment], axis=1)
+    way = np.linalg.norm(stepped - chosen[segment], axis=1)
     share = np.divide(way, size, out=np.zeros(len(way)), where=way > 0.0)
-    return found, parts, np.stack([source[segment], source[following]], axis=1), share
+    return stepped, parts, np.stack([source[segment], source[following]], axis=1), share
 
 
 @njit(cache=True, nogil=True)

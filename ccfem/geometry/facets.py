@@ -63,8 +63,8 @@ def positions(facets: IntArray, among: IntArray) -> IntArray:
     wanted, known = facet_keys(facets, among)
     known, row = np.unique(known, return_index=True)
     at = np.searchsorted(known, wanted)
-    found = np.append(known, -1)[at] == wanted
-    return np.where(found, np.append(row, -1)[at], -1)
+    present = np.append(known, -1)[at] == wanted
+    return np.where(present, np.append(row, -1)[at], -1)
 
 
 def are_among(facets: IntArray, others: IntArray) -> BoolArray:

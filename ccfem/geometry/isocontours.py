@@ -134,7 +134,7 @@ def _chain(of_triangle, low, high, start):  # type: ignore[no-untyped-def]
     line = np.empty(2 * count, np.int64)
     offsets = np.zeros(count + 1, np.int64)
     used = np.zeros(count, np.bool_)
-    found = 0
+    chains = 0
     size = 0
     for closed in range(2):
         for seed in range(count):
@@ -152,9 +152,9 @@ def _chain(of_triangle, low, high, start):  # type: ignore[no-untyped-def]
             if closed == 1:
                 line[size] = seed
                 size += 1
-            found += 1
-            offsets[found] = size
-    return line[:size], offsets[: found + 1]
+            chains += 1
+            offsets[chains] = size
+    return line[:size], offsets[: chains + 1]
 
 
 def least_distance(curves: Isocontours, reach: float, enough: float) -> float:

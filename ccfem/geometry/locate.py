@@ -33,17 +33,17 @@ def locate(
         close to it; 0 where `simplex` is -1.
     """
     queries = np.ascontiguousarray(queries, dtype=np.float64)
-    found = np.full(len(queries), -1, dtype=np.int64)
+    triangle = np.full(len(queries), -1, dtype=np.int64)
     weights = np.zeros((len(queries), simplices.shape[1]))
     if not len(queries) or not len(simplices):
-        return found, weights
+        return triangle, weights
     corners = points[simplices]
     origins, gradients, heights = _barycentric_maps(corners)
-    each = np.moveaxis(corners, 1, 0)
-    low, high = reduce(np.minimum, each), reduce(np.maximum, each)
+    by_corner = np.moveaxis(corners, 1, 0)
+    low, high = reduce(np.minimum, by_corner), reduce(np.maximum, by_corner)
     # First without reach, which needs the fewest candidates; then only what was not found.
     for margin in (0.0, reach) if reach > 0.0 else (0.0,):
-        left = np.flatnonzero(found < 0)
+        left = np.flatnonzero(triangle < 0)
         if not len(left):
             break
         slack = margin + 1e-9 * float(np.abs(corners).max())
@@ -51,8 +51,8 @@ def locate(
         index, weight = _search(*grid, origins, gradients, heights, queries[left], slack)
         weight = np.maximum(weight, 0.0)
         total = weight.sum(axis=1, keepdims=True)
-        found[left], weights[left] = index, weight / np.where(total > 0.0, total, 1.0)
-    return found, weights
+        triangle[left], weights[left] = index, weight / np.where(total > 0.0, total, 1.0)
+    return triangle, weights
 
 
 def _barycentric_maps(corners: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -88,7 +88,7 @@ def _search(
 ) -> tuple[IntArray, FloatArray]:
     """Simplex of each query: the first that holds it, else the least overstepped within slack."""
     count, dimension = queries.shape
-    found = np.full(count, -1, np.int64)
+    triangle = np.full(count, -1, np.int64)
     weights = np.zeros((count, dimension + 1))
     weight = np.empty(dimension + 1)
     for q in range(count):
@@ -120,9 +120,9 @@ def _search(
             depth = min(depth, rest * heights[k, 0])
             if depth >= best:
                 best = depth
-                found[q] = k
+                triangle[q] = k
                 for corner in range(dimension + 1):
                     weights[q, corner] = weight[corner]
                 if depth >= 0.0:
                     break
-    return found, weights
+    return triangle, weights

@@ -262,8 +262,8 @@ def _equidistant(
     """
     on_axis = np.zeros(len(vertices), dtype=bool)
     least, _ = cKDTree(sites).query(vertices[wanted])
-    own = np.linalg.norm(vertices[wanted] - sites[nearest[wanted]], axis=1)
-    on_axis[wanted] = own <= (1.0 + _NEARER) * least
+    distance = np.linalg.norm(vertices[wanted] - sites[nearest[wanted]], axis=1)
+    on_axis[wanted] = distance <= (1.0 + _NEARER) * least
     return on_axis
 
 

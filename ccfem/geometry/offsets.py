@@ -48,13 +48,13 @@ def inset(section: Region, distance: float, width: float = 0.0) -> Region:
 
 def rings(section: Region) -> list[FloatArray]:
     """Border rings of a (Multi)Polygon as closed (k, 2) polylines, material on the left, mm."""
-    found = []
+    boundaries = []
     for part in shapely.get_parts(section):
         if part.is_empty:
             continue
         part = orient(part)
-        found += [shapely.get_coordinates(ring) for ring in (part.exterior, *part.interiors)]
-    return found
+        boundaries += [shapely.get_coordinates(ring) for ring in (part.exterior, *part.interiors)]
+    return boundaries
 
 
 def offset_rings(

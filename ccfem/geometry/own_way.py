@@ -31,8 +31,8 @@ def until_itself(line: FloatArray, start: FloatArray, width: float) -> FloatArra
 
 
 @njit(cache=True, nogil=True)
-def _own_way(line, seed, closed, width, own):  # type: ignore[no-untyped-def]
-    """First and last point that keep a distance from all others more than `own` mm of arc away."""
+def _own_way(line, seed, closed, width, free):  # type: ignore[no-untyped-def]
+    """First and last point that keep a distance from all others more than `free` mm of arc away."""
     count = len(line)
     along = np.zeros(count)
     for p in range(1, count):
@@ -45,7 +45,7 @@ def _own_way(line, seed, closed, width, own):  # type: ignore[no-untyped-def]
                 arc = abs(along[p] - along[q])
                 if closed:
                     arc = min(arc, along[-1] - arc)
-                if arc > own and _squared(line, p, q) < width * width:
+                if arc > free and _squared(line, p, q) < width * width:
                     break
             else:
                 first, last = min(first, p), max(last, p)

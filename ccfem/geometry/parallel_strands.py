@@ -117,8 +117,8 @@ def _without_crossings(lines: list[FloatArray], gap: float) -> list[FloatArray]:
     for k, j in zip(one.tolist(), other.tolist(), strict=True):
         if (curves[k].length, k) < (curves[j].length, j):
             curves[k] = shapely.difference(curves[k], shapely.buffer(curves[j], gap))
-    found = open_lines(curves)
-    return [line for line in found if line_length(line) >= gap]
+    opened = open_lines(curves)
+    return [line for line in opened if line_length(line) >= gap]
 
 
 def _parallels(
@@ -398,11 +398,11 @@ class _Obstacles:
         tree = shapely.STRtree(shapely.linestrings(pairs))
         return cls(tree, along, np.repeat(owner, sizes), 0.5 * pitch)
 
-    def angle(self, point: FloatArray, way: FloatArray, own: int) -> float:
+    def angle(self, point: FloatArray, way: FloatArray, strand: int) -> float:
         """Acute angle, radians, between a way and the nearest piece ahead; 0 where none is near."""
         here = shapely.Point(point)
         near = self.tree.query(here, predicate="dwithin", distance=1.2 * self.half)
-        near = near[self.owner[near] != own]
+        near = near[self.owner[near] != strand]
         if not len(near):
             return 0.0
         gap = shapely.distance(self.tree.geometries[near], here)

@@ -24,12 +24,12 @@ def strings(lines: Sequence[FloatArray]) -> Shapes:
 
 def open_lines(shapes: shapely.Geometry | Shapes) -> list[FloatArray]:
     """Lines of geometries as (k, 2) arrays; pieces that touch end to end are joined."""
-    found = []
+    lines = []
     for shape in np.atleast_1d(shapes):
         merged = shape if shape.geom_type == "LineString" else shapely.line_merge(shape)
-        found += [
+        lines += [
             shapely.get_coordinates(part)
             for part in shapely.get_parts(merged)
             if part.geom_type == "LineString" and part.length > 0.0
         ]
-    return found
+    return lines

@@ -90,10 +90,10 @@ def concentric(
     lines: list[FloatArray] = []
     level = 0
     while count is None or level < count:
-        found = rings(_opened(section, first + level * pitch, closest * pitch))
-        if not found:
+        level_rings = rings(_opened(section, first + level * pitch, closest * pitch))
+        if not level_rings:
             break
-        lines += found
+        lines += level_rings
         level += 1
     if count is not None and not _narrow(section, first, pitch, closest, count):
         return lines
@@ -128,7 +128,7 @@ def _narrow(section: Region, first: float, pitch: float, closest: float, count: 
 
 def _middle_lines(
     axis: MedialAxis,
-    laid: list[FloatArray],
+    shells: list[FloatArray],
     pitch: float,
     closest: float,
     first: float,
@@ -154,7 +154,7 @@ def _middle_lines(
         pieces += _runs(points, wanted)
     if not pieces:
         return []
-    tree = shapely.STRtree(shapely.linestrings(straight_pieces(laid)))
+    tree = shapely.STRtree(shapely.linestrings(straight_pieces(shells)))
     lines = []
     for piece in pieces:
         near, _ = tree.query(

@@ -72,7 +72,7 @@ def mirror_lines(region: Region) -> tuple[Mirror, ...]:
         if len(mirrors) == 2:
             break
         image = shapely.transform(region, lambda points, m=mirror: reflected(points, m))
-        across = all(abs(each.direction @ mirror.direction) < 1e-6 for each in mirrors)
+        across = all(abs(other.direction @ mirror.direction) < 1e-6 for other in mirrors)
         if across and shapely.symmetric_difference(region, image).area <= _ALIKE * region.area:
             mirrors.append(mirror)
     return tuple(mirrors)

@@ -190,4 +190,4 @@ class GcodeProfile:
     @staticmethod
     def fill(lines: tuple[str, ...], values: Mapping[str, float]) -> list[str]:
         """Lines with every name in braces replaced by its number."""
-        return [_FIELD.sub(lambda found: f"{values[found[1]]:.10g}", line) for line in lines]
+        return [_FIELD.sub(lambda match: f"{values[match[1]]:.10g}", line) for line in lines]

@@ -103,8 +103,8 @@ def _curvatures(points: FloatArray, offsets: IntArray, shortest: float) -> Float
     # |u - v| of the unit vectors along both chords is 2 sin(half the angle between them).
     with np.errstate(divide="ignore", invalid="ignore"):
         bend = np.linalg.norm(into / reach[:, None] - out / on[:, None], axis=1)
-        found = 2.0 * bend / (reach + on)
+        estimate = 2.0 * bend / (reach + on)
     # A loop that closes within `shortest` has no chord: its curvature is infinite.
     curvature = np.zeros(len(points))
-    curvature[k] = np.where(np.isnan(found), np.inf, found)
+    curvature[k] = np.where(np.isnan(estimate), np.inf, estimate)
     return curvature.round(_DIGITS)

@@ -154,12 +154,12 @@ class Toolpaths(Shown):
     @classmethod
     def concatenate(cls, parts: Iterable["Toolpaths"]) -> "Toolpaths":
         """All paths of `parts`, in their order."""
-        found = [part for part in parts if len(part)]
-        if not found:
+        filled = [part for part in parts if len(part)]
+        if not filled:
             return cls.empty()
-        sizes = np.concatenate([np.diff(part.offsets) for part in found])
+        sizes = np.concatenate([np.diff(part.offsets) for part in filled])
         joined = {
-            name: np.concatenate([getattr(part, name) for part in found])
+            name: np.concatenate([getattr(part, name) for part in filled])
             for name in ("points", "normals", "layer", "kind", "closed", "link")
         }
         return cls(offsets=np.concatenate([[0], np.cumsum(sizes)]), **joined)

@@ -116,19 +116,19 @@ def _skirt(plan: PrintPlan, others: tuple[FloatArray, ...], machine: Machine) ->
     process, width = machine.process, machine.matrix_width
     first = plan.paths.on_layer(int(plan.paths.layer.min()))
     lines = [line[:, :2] for line in first]
-    found: list[FloatArray] = []
+    skirt: list[FloatArray] = []
     if process.skirt_loops:
         points = np.concatenate([*lines, *others])
         hull = shapely.convex_hull(shapely.MultiPoint(points))
         for k in range(process.skirt_loops)[::-1]:
             far = process.skirt_gap + process.brim_loops * width + (k + 0.5) * width
-            found += _ring(shapely.buffer(hull, far + 0.5 * width))
+            skirt += _ring(shapely.buffer(hull, far + 0.5 * width))
     closed = [line for line in lines if len(line) > 3 and (line[0] == line[-1]).all()]
     if process.brim_loops and closed:
         section = shapely.union_all([shapely.Polygon(line) for line in closed])
         for k in range(process.brim_loops)[::-1]:
-            found += _ring(shapely.buffer(section, (k + 1) * width))
-    return found
+            skirt += _ring(shapely.buffer(section, (k + 1) * width))
+    return skirt
 
 
 def _ring(region: Region) -> list[FloatArray]:

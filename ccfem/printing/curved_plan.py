@@ -74,27 +74,27 @@ def filled_layers(
         A layer of support stands just before the layer of the part at its level.
     """
     props = None if support is None else support_paths(support, machine)
-    found = []
+    filled = []
     for number, layer in enumerate(layers):
         if support is not None and props is not None:
             for k in np.flatnonzero(support.before == number).tolist():
                 own = props.on_layer(k)
                 own = replace(own, kind=np.full(len(own), SUPPORT))
-                found.append(_on_top(support.layers[k], own))
+                filled.append(_on_top(support.layers[k], own))
         strands = fibre.on_layer(layer.index)
         whole = _on_top(layer, Toolpaths.concatenate([layer_matrix([layer], machine), strands]))
-        found.append(_full(whole, machine))
-    return found
+        filled.append(_full(whole, machine))
+    return filled
 
 
 def _on_top(layer: Layer, paths: Toolpaths) -> FilledLayer:
     """Paths on the middle of a layer, raised to its top."""
     if not len(paths):
         return FilledLayer(layer, paths, np.zeros(0), np.zeros(0, dtype=np.int64))
-    found = nearest_on_triangles(layer.points, layer.triangles, paths.points)
-    corners = layer.local_thickness[layer.triangles[found.triangle]]
-    height = np.einsum("qk,qk->q", found.weights, corners)
-    piece = layer.component[found.triangle[paths.offsets[:-1]]]
+    nearest = nearest_on_triangles(layer.points, layer.triangles, paths.points)
+    corners = layer.local_thickness[layer.triangles[nearest.triangle]]
+    height = np.einsum("qk,qk->q", nearest.weights, corners)
+    piece = layer.component[nearest.triangle[paths.offsets[:-1]]]
     raised = paths.points + 0.5 * height[:, None] * paths.normals
     return FilledLayer(layer, replace(paths, points=raised), height, piece)
 
@@ -128,7 +128,7 @@ def in_order(paths: Toolpaths) -> tuple[Toolpaths, IntArray]:
         for k, back in zip(order.tolist(), backward.tolist(), strict=True)
     ]
     at = np.concatenate(index)
-    points, offsets = pack([paths.points[own] for own in index])
+    points, offsets = pack([paths.points[rows] for rows in index])
     return Toolpaths(
         points=points,
         normals=paths.normals[at],
@@ -193,7 +193,7 @@ def curved_plan(
     else:
         frame = plane_frame(support.columns.up.tolist())
     filled = filled_layers(fibre, layers, support, machine)
-    islands = islands_of([each.layer for each in filled])
+    islands = islands_of([layer.layer for layer in filled])
     clash = clashes(islands, frame[2], machine)
     steps = [
         (step, *_of_step(filled, islands, step))
@@ -203,7 +203,8 @@ def curved_plan(
     if not steps:
         raise InputError("there is nothing to print: the part is thinner than a line of matrix")
     paths = Toolpaths.concatenate(
-        replace(own, layer=np.full(len(own), number)) for number, (_, own, _) in enumerate(steps)
+        replace(step_paths, layer=np.full(len(step_paths), number))
+        for number, (_, step_paths, _) in enumerate(steps)
     )
     shift = _shift(mesh, support, frame, machine)
     points = (paths.points @ frame.T - shift).round(COORDINATE_DIGITS) + 0.0
@@ -217,21 +218,21 @@ def curved_plan(
     when = np.full(len(islands), -1)
     for number, (step, _, _) in enumerate(steps):
         when[step] = number
-    found = cleared(paths, axes, Matter.of(tops, when[islands.owner]), machine)
+    leaned = cleared(paths, axes, Matter.of(tops, when[islands.owner]), machine)
     upright = machine.kinematics.kind == "three_axes"
     owner = np.repeat(paths.layer, np.diff(paths.offsets))
     return PrintPlan(
-        replace(paths, normals=normals if upright else found.axes),
+        replace(paths, normals=normals if upright else leaned.axes),
         np.array([points[owner <= k, 2].max() for k in range(len(steps))]),
         np.array([filled[k].layer.thickness for k in source.tolist()]),
-        np.concatenate([laid for _, _, laid in steps]),
+        np.concatenate([shares for _, _, shares in steps]),
         dropped=strands.dropped,
-        touched=(before, found.before, found.after),
+        touched=(before, leaned.before, leaned.after),
         warnings=(
             *strands.warnings,
             *_stands(frame[2], wanted, support),
             *_not_full(filled, mesh),
-            *_said(before, found.before, found.after, found.place),
+            *_said(before, leaned.before, leaned.after, leaned.place),
         ),
     )
 
@@ -240,16 +241,16 @@ def _of_step(
     filled: Sequence[FilledLayer], islands: Islands, step: IntArray
 ) -> tuple[Toolpaths, FloatArray]:
     """Paths of some islands of a layer in the order of printing, and the height that they lay."""
-    own = filled[int(islands.layer[step[0]])]
-    here = np.isin(own.piece, islands.piece[step])
-    parts, laid = [], []
-    for wanted in (own.paths.kind != FIBRE, own.paths.kind == FIBRE):
+    layer = filled[int(islands.layer[step[0]])]
+    here = np.isin(layer.piece, islands.piece[step])
+    parts, shares = [], []
+    for wanted in (layer.paths.kind != FIBRE, layer.paths.kind == FIBRE):
         chosen = here & wanted
-        heights = own.laid[np.repeat(chosen, np.diff(own.paths.offsets))]
-        paths, at = in_order(own.paths.select(chosen))
+        heights = layer.laid[np.repeat(chosen, np.diff(layer.paths.offsets))]
+        paths, at = in_order(layer.paths.select(chosen))
         parts.append(paths)
-        laid.append(heights[at])
-    return Toolpaths.concatenate(parts), np.concatenate(laid)
+        shares.append(heights[at])
+    return Toolpaths.concatenate(parts), np.concatenate(shares)
 
 
 def _shift(
@@ -280,7 +281,7 @@ def _stands(up: FloatArray, wanted: FloatArray, support: SupportLayers | None) -
 
 def _not_full(filled: Sequence[FilledLayer], mesh: TetMesh) -> list[str]:
     """Say how much of the part's volume rings cannot fill."""
-    missing, whole = sum(each.missing for each in filled), float(mesh.volumes.sum())
+    missing, whole = sum(layer.missing for layer in filled), float(mesh.volumes.sum())
     if missing < _MISSING * whole:
         return []
     return [
@@ -449,7 +450,7 @@ def _turned(
     """Axes that clear by the least lean; axes without any are not changed."""
     across = np.cross(axes, off)
     left = np.ones(len(tips), dtype=bool)
-    found = axes.copy()
+    turned = axes.copy()
     limit = np.cos(np.radians(machine.kinematics.tilt_limit)) - 1e-9
     room = 90.0 - machine.head_angle
     for lean in np.radians([lean for lean in _LEANS if lean < room]):
@@ -459,11 +460,11 @@ def _turned(
             hits, _ = _touched(tips[left], tried, step[left], matter, machine)
             clear = (tried[:, 2] >= limit) & ~hits
             done = np.flatnonzero(left)[clear]
-            found[done] = tried[clear]
+            turned[done] = tried[clear]
             left[done] = False
             if not left.any():
-                return found
-    return found
+                return turned
+    return turned
 
 
 def _way_off(tips: FloatArray, axes: FloatArray, at: IntArray, points: FloatArray) -> FloatArray:
@@ -477,18 +478,18 @@ def _way_off(tips: FloatArray, axes: FloatArray, at: IntArray, points: FloatArra
 
 def _spread(paths: Toolpaths, axes: FloatArray, at: IntArray, turned: FloatArray) -> FloatArray:
     """Axes at all points, which turn to those at some points and back along the paths."""
-    found = axes.copy()
+    spread = axes.copy()
     path = np.searchsorted(paths.offsets, at, side="right") - 1
     lean = turned - axes[at]
     for number in np.unique(path).tolist():
         start, end = int(paths.offsets[number]), int(paths.offsets[number + 1])
-        along, own = along_line(paths.points[start:end]), path == number
-        away = np.abs(along[:, None] - along[at[own] - start])
+        along, on_path = along_line(paths.points[start:end]), path == number
+        away = np.abs(along[:, None] - along[at[on_path] - start])
         if paths.closed[number]:
             away = np.minimum(away, along[-1] - away)
         # Full over the stretch that a sample stands for, then decreasing.
         share = np.clip(1.0 - np.maximum(away - _EVERY, 0.0) / _RAMP, 0.0, 1.0)
         total = np.maximum(share.max(axis=1), 1e-300)
         weight = share**4 / np.maximum((share**4).sum(axis=1), 1e-300)[:, None]
-        found[start:end] += total[:, None] * (weight @ lean[own])
-    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
+        spread[start:end] += total[:, None] * (weight @ lean[on_path])
+    return np.asarray(spread / np.linalg.norm(spread, axis=1, keepdims=True))

@@ -42,9 +42,9 @@ def durations(moves: Moves, machine: Machine, heating: bool = True) -> FloatArra
 
 def waits(seconds: FloatArray, moves: Moves, machine: Machine) -> FloatArray:
     """Seconds that each row waits for its tool, where all rows take some seconds without."""
-    found = np.array(seconds)
-    _add_heating(found, moves, machine)
-    return found - seconds
+    pauses = np.array(seconds)
+    _add_heating(pauses, moves, machine)
+    return pauses - seconds
 
 
 def _motion(moves: Moves, moving: IntArray, stops: IntArray, machine: Machine) -> FloatArray:

@@ -106,7 +106,7 @@ def islands_of(layers: Sequence[Layer]) -> Islands:
 
 def rests_on(islands: Islands) -> BoolArray:
     """Mask (k, k): islands that the one of a row rests on, earlier ones near its lower side."""
-    owner, found = islands.owner, np.zeros((len(islands),) * 2, dtype=bool)
+    owner, rests = islands.owner, np.zeros((len(islands),) * 2, dtype=bool)
     tree = cKDTree(islands.points)
     pairs = tree.query_pairs(float(islands.reach.max()), output_type="ndarray")
     upper, lower = pairs.max(axis=1), pairs.min(axis=1)
@@ -115,8 +115,8 @@ def rests_on(islands: Islands) -> BoolArray:
     above = np.einsum("kd,kd->k", off, islands.normals[upper]) > 0.0
     later = islands.layer[owner[upper]] > islands.layer[owner[lower]]
     rest = near & above & later
-    found[owner[upper[rest]], owner[lower[rest]]] = True
-    return found
+    rests[owner[upper[rest]], owner[lower[rest]]] = True
+    return rests
 
 
 def clashes(islands: Islands, build: FloatArray, machine: Machine) -> FloatArray:

@@ -76,18 +76,18 @@ def matrix_layer(
     height, thickness : float, mm
         Top of the layer over the bed, and its own height.
     """
-    found, which = _printed(fill.lines, height, number, MATRIX)
+    matrix, which = _printed(fill.lines, height, number, MATRIX)
     heights, warning = np.zeros(0), ""
     strands = (below.strands, below.height, machine, below.sections)
-    if len(found):
+    if len(matrix):
         shares = np.array(fill.widths)[which] / machine.matrix_width
-        found, heights, warning = with_flow(found, fill.section, thickness, *strands, shares)
+        matrix, heights, warning = with_flow(matrix, fill.section, thickness, *strands, shares)
     pad, _ = _printed(pads, height, number, SUPPORT)
     if len(pad):
         pad, high = pad_flow(pad, thickness, *strands)
-        found, heights = Toolpaths.concatenate([found, pad]), np.append(heights, high)
+        matrix, heights = Toolpaths.concatenate([matrix, pad]), np.append(heights, high)
     warning = f"at {height:.4g} mm {warning}" if warning else ""
-    return LaidLayer(found, heights, np.zeros(len(found), dtype=bool), warning)
+    return LaidLayer(matrix, heights, np.zeros(len(matrix), dtype=bool), warning)
 
 
 def fibre_layer(
@@ -106,15 +106,15 @@ def fibre_layer(
     """
     outside = float(shapely.length(shapely.difference(strings(lines), border)).sum())
     few, _ = _printed(by_matrix, height, number, MATRIX)
-    found = Toolpaths.concatenate([few, _printed(lines, height, number, FIBRE)[0]])
-    heights = np.full(len(found.points), thickness)
-    short = found.kind == MATRIX
+    fibre = Toolpaths.concatenate([few, _printed(lines, height, number, FIBRE)[0]])
+    heights = np.full(len(fibre.points), thickness)
+    short = fibre.kind == MATRIX
     sections = [machine.matrix_width * thickness] * len(by_matrix)
     sections += [machine.strand_area] * len(lines)
     after = Below(
         [*below.strands, *by_matrix, *lines], below.sections + sections, below.height + thickness
     )
-    return LaidLayer(found, heights, short, "", outside), after
+    return LaidLayer(fibre, heights, short, "", outside), after
 
 
 def _printed(

@@ -69,7 +69,7 @@ def with_flow(
     -------
     paths : Toolpaths
         With a point wherever the height changes by a twentieth.
-    laid : (P,) array, mm
+    share : (P,) array, mm
         Height of matrix, a line wide, on the step from each point; 0 at the end of a line.
     warning : str
         Where strands stand higher on more than a hundredth; else empty.
@@ -97,17 +97,17 @@ def with_flow(
     kept = np.flatnonzero(keep)
     run = (np.cumsum(keep) - 1)[start]
     long = np.bincount(run, length, len(kept))
-    laid = np.bincount(run, wanted * length, len(kept)) / np.maximum(long, 1e-300)
+    share = np.bincount(run, wanted * length, len(kept)) / np.maximum(long, 1e-300)
     if shares is not None:
         line = np.searchsorted(np.searchsorted(kept, offsets), np.arange(len(kept)), "right") - 1
-        laid *= shares[line]
+        share *= shares[line]
     inside = shapely.length(shapely.intersection(strings(strands), section))
     room = section.area * (height + below) - float(inside @ np.asarray(sections))
-    scale = room / (machine.matrix_width * (laid * long).sum())
-    laid *= np.clip(scale, 1.0 / _SCALE, _SCALE)
+    scale = room / (machine.matrix_width * (share * long).sum())
+    share *= np.clip(scale, 1.0 / _SCALE, _SCALE)
     # No line thinner than the machine prints; those in gaps are narrower instead.
-    floor = np.full(len(laid), least) if shares is None else least * shares[line]
-    laid = np.where(long > 0.0, np.maximum(laid, floor), 0.0)
+    floor = np.full(len(share), least) if shares is None else least * shares[line]
+    share = np.where(long > 0.0, np.maximum(share, floor), 0.0)
     fewer = replace(
         paths,
         points=points[kept],
@@ -115,7 +115,7 @@ def with_flow(
         offsets=np.searchsorted(kept, offsets),
         link=np.zeros(len(kept), dtype=bool),
     )
-    return fewer, laid, warning
+    return fewer, share, warning
 
 
 def pad_flow(

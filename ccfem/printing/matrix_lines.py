@@ -62,9 +62,9 @@ def matrix_fills(
     """
     width, profile = machine.matrix_width, machine.gcode
     of_matrix = [k for k, slab in enumerate(slabs) if slab.fibre is None]
-    found: list[MatrixFill | None] = [None] * len(slabs)
+    fills: list[MatrixFill | None] = [None] * len(slabs)
     for k in of_matrix:
-        found[k] = MatrixFill()
+        fills[k] = MatrixFill()
     middles = tuple(0.5 * (slabs[k].lower + slabs[k].upper) for k in of_matrix)
 
     def filled(layer: Layer) -> MatrixFill:
@@ -86,8 +86,8 @@ def matrix_fills(
 
     layers = Planar(heights=middles).cut(mesh, frame[2]) if middles else ()
     for layer, fill in zip(layers, in_threads(filled, layers), strict=True):
-        found[of_matrix[layer.index]] = fill
-    return found
+        fills[of_matrix[layer.index]] = fill
+    return fills
 
 
 # Lines of matrix that a contour and a zigzag leave out: in narrow walls and beside holes.

@@ -90,6 +90,6 @@ class Moves:
     @property
     def in_part(self) -> BoolArray:
         """Rows that lay something of the part itself, (n,): no block, skirt or pad."""
-        own = [role(name) for name in ("contour", "infill", "fibre", "tail", "short")]
+        roles = [role(name) for name in ("contour", "infill", "fibre", "tail", "short")]
         beside = np.isin(self.role, [role("fibre"), role("tail")]) & (self.strand < 0)
-        return (self.event == LAY) & np.isin(self.role, own) & ~beside
+        return (self.event == LAY) & np.isin(self.role, roles) & ~beside

@@ -136,13 +136,13 @@ class _Site:
             heights = np.full(len(line) - 1, high)
             lay_matrix(recorder, points, normals, heights, what, machine, speed)
 
-        laid = 0.0
+        volume = 0.0
         for k, line in enumerate(self.around.block):
-            if k >= 2 and (laid >= process.prime_volume or not changed):
+            if k >= 2 and (volume >= process.prime_volume or not changed):
                 break
             lay(line, "block", height)
             length = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
-            laid += length * machine.matrix_width * height
+            volume += length * machine.matrix_width * height
         if first:
             for line in self.around.skirt:
                 lay(line, "skirt", height)
@@ -223,21 +223,21 @@ def _with_rows(moves: Moves, places: list[int], values: list[float], tools: list
     """Insert rows PREHEAT before the rows at the given places."""
     if not places:
         return moves
-    found = {}
-    for one in fields(moves):
-        old = getattr(moves, one.name)
+    by_row = {}
+    for field in fields(moves):
+        old = getattr(moves, field.name)
         new = np.zeros((len(places), *old.shape[1:]), dtype=old.dtype)
         at = np.array(places)
-        if one.name in ("place", "normal", "layer", "strand"):
+        if field.name in ("place", "normal", "layer", "strand"):
             new = old[np.maximum(at - 1, 0)]
-        elif one.name == "event":
+        elif field.name == "event":
             new[:] = PREHEAT
-        elif one.name == "amount":
+        elif field.name == "amount":
             new[:] = values
-        elif one.name == "tool":
+        elif field.name == "tool":
             new[:] = tools
-        found[one.name] = np.insert(old, at, new, axis=0)
-    return Moves(**found)
+        by_row[field.name] = np.insert(old, at, new, axis=0)
+    return Moves(**by_row)
 
 
 # What each tool needs before and after it lays something: heat, fan, its first filament, a cut.
@@ -491,7 +491,7 @@ def _bend_at(line: FloatArray, along: FloatArray, at: FloatArray, reach: float) 
         points_along(line, along, np.clip(at + off, 0.0, along[-1])) for off in (-reach, 0.0, reach)
     )
     u, v = b - a, c - b
-    sizes = [np.linalg.norm(one, axis=1) for one in (u, v, c - a)]
+    sizes = [np.linalg.norm(side, axis=1) for side in (u, v, c - a)]
     dot = np.einsum("ij,ij->i", u, v)
     across = np.sqrt(np.maximum((sizes[0] * sizes[1]) ** 2 - dot**2, 0.0))
     return np.asarray(2.0 * across / np.maximum(sizes[0] * sizes[1] * sizes[2], 1e-12))

@@ -95,9 +95,9 @@ class PrintPlan:
         points, start = self.paths.points, np.flatnonzero(starts_segment(self.paths.offsets))
         steps = np.linalg.norm(points[start + 1] - points[start], axis=1)
         matrix = np.repeat(self.paths.kind == MATRIX, np.diff(self.paths.offsets))[start]
-        laid = float((steps * self.laid[start])[matrix].sum())
+        volume = float((steps * self.laid[start])[matrix].sum())
         fibre = float(self.paths.of_kind(FIBRE).lengths.sum())
-        return machine.matrix_width * laid + machine.strand_area * (fibre - self.outside)
+        return machine.matrix_width * volume + machine.strand_area * (fibre - self.outside)
 
 
 def check_machine(machine: Machine) -> None:
@@ -299,7 +299,7 @@ def pad_regions(
     wide: Region = _NONE
     along: Region = _NONE
     recent: list[Region] = []
-    found: list[tuple[Region, Region]] = []
+    pads: list[tuple[Region, Region]] = []
     for k in range(len(sections))[::-1]:
         section = sections[k]
         if section is None:
@@ -308,19 +308,19 @@ def pad_regions(
                 free = shapely.difference(strings(strands[k]), below)
                 along = free_area(_along_border(free, below), reach)
                 recent = [shapely.union(free_area(free, reach), _union(recent[:1])), *recent[1:]]
-            found.append((_NONE, _NONE))
+            pads.append((_NONE, _NONE))
             continue
         wide = _union([wide, *recent[:1]])
         if wide.is_empty:
-            found.append((_NONE, _NONE))
+            pads.append((_NONE, _NONE))
         else:
             # Clear of the part, except below strands that run along its border.
             room = shapely.buffer(section, _CLEAR, quad_segs=_ARC)
             room = shapely.union(shapely.difference(room, along), section)
             solid = _union(recent[:_SOLID])
-            found.append((shapely.difference(wide, room), shapely.difference(solid, room)))
+            pads.append((shapely.difference(wide, room), shapely.difference(solid, room)))
         recent, along = [_NONE, *recent[: _SOLID - 1]], _NONE
-    return found[::-1]
+    return pads[::-1]
 
 
 def _opened(section: Region, half: float) -> Region:

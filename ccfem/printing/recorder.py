@@ -38,8 +38,8 @@ class Recorder:
     def feed(self, length: float, speed: float, beside: float = 0.0) -> None:
         """Feed filament without moving, in steps that the firmware takes."""
         count = int(np.ceil(abs(length) / self.machine.gcode.longest_feed - 1e-9))
-        each = np.diff(np.linspace(0.0, length, count + 1).round(_FEED_DIGITS))
-        for part in each.tolist():
+        steps = np.diff(np.linspace(0.0, length, count + 1).round(_FEED_DIGITS))
+        for part in steps.tolist():
             self._row(FEED, feed=part, beside=beside * part / length, speed=speed)
 
     def draw_back_beside(self, length: float, speed: float) -> None:
@@ -134,12 +134,12 @@ class Recorder:
         if len(moved):
             ends, at = moved + 1, index[moved]
             same = np.broadcast_to([self.layer, self.strand], (len(moved), 2))
-            one = np.ones(len(moved))
-            values = (self.tool * one, fed[moved], with_it[moved], speeds[at], width * one)
-            rest = (heights[at], 0.0 * one, number * one)
+            full = np.ones(len(moved))
+            values = (self.tool * full, fed[moved], with_it[moved], speeds[at], width * full)
+            rest = (heights[at], 0.0 * full, number * full)
             self._flush()
             self.blocks.append(
-                np.column_stack([LAY * one, line[ends], normals[ends], *values, *rest, same])
+                np.column_stack([LAY * full, line[ends], normals[ends], *values, *rest, same])
             )
             self.place, self.normal = line[ends[-1]], normals[ends[-1]]
         self.top = max(self.top, float(line[:, 2].max()))

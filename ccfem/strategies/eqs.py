@@ -129,11 +129,11 @@ def _seed_line(
         pieces = open_lines(shapely.intersection(shapely.LineString(whole), region))
         if not pieces:
             continue
-        own = min(
+        seed = min(
             pieces, key=lambda piece: shapely.LineString(piece).distance(shapely.Point(start))
         )
-        if line_length(own) > (line_length(longest) if len(longest) else 0.0) + _OFF * width:
-            longest = own
+        if line_length(seed) > (line_length(longest) if len(longest) else 0.0) + _OFF * width:
+            longest = seed
     return longest
 
 
@@ -143,7 +143,7 @@ def _family(
     """Lines (k, 2), mm, at whole multiples of a pitch from a seed line, along its member."""
     off = _OFF * width
     curve = shapely.simplify(shapely.LineString(seed), 0.5 * off)
-    found, before = [seed], [seed]
+    family, before = [seed], [seed]
     # The iso-lines also go round the ends of the seed line: there they cross the stress.
     for level in range(1, int(shapely.hausdorff_distance(region, curve) / pitch) + 1):
         distance = level * pitch
@@ -157,8 +157,8 @@ def _family(
         before = _along_stress(beside, stress, width)
         if not before:
             break
-        found += before
-    return found
+        family += before
+    return family
 
 
 def _along_stress(lines: list[FloatArray], stress: LayerStress, width: float) -> list[FloatArray]:
@@ -168,12 +168,14 @@ def _along_stress(lines: list[FloatArray], stress: LayerStress, width: float) ->
     counts = [max(1, round(line_length(line) / (_PIECE * width))) for line in lines]
     at = [np.linspace(0.0, line_length(line), n + 1) for line, n in zip(lines, counts, strict=True)]
     points = [points_along(line, along_line(line), a) for line, a in zip(lines, at, strict=True)]
-    middles = np.concatenate([0.5 * (each[1:] + each[:-1]) for each in points])
+    middles = np.concatenate([0.5 * (line_points[1:] + line_points[:-1]) for line_points in points])
     along = stress_lines(plane_stress_at(stress, middles, width))
-    angle = misalignment(np.concatenate([np.diff(each, axis=0) for each in points]), along, 0.0)
+    angle = misalignment(
+        np.concatenate([np.diff(line_points, axis=0) for line_points in points]), along, 0.0
+    )
     found = []
-    for line, a, own in zip(lines, at, np.split(angle, np.cumsum(counts)[:-1]), strict=True):
-        kept = np.concatenate([[False], own <= _ALONG, [False]])
+    for line, a, angles in zip(lines, at, np.split(angle, np.cumsum(counts)[:-1]), strict=True):
+        kept = np.concatenate([[False], angles <= _ALONG, [False]])
         edges = np.flatnonzero(kept[1:] != kept[:-1]).reshape(-1, 2)
         found += [between(line, float(a[i]), float(a[j])) for i, j in edges]
     return found

@@ -145,10 +145,10 @@ def _sampled(ring: FloatArray, spacing: float) -> FloatArray:
 
 
 def _grown(
-    found: Sequence[FloatArray], level: IntArray, spacing: float, reach: float
+    rings: Sequence[FloatArray], level: IntArray, spacing: float, reach: float
 ) -> list[ContourTree]:
     """Trees of contours: minimum spanning trees over those that lie side by side."""
-    lines = np.array([shapely.linearrings(ring) for ring in found])
+    lines = np.array([shapely.linearrings(ring) for ring in rings])
     one, other = shapely.STRtree(lines).query(lines, "dwithin", reach * spacing)
     kept = (one < other) & (np.abs(level[one] - level[other]) <= 1)
     one, other = one[kept], other[kept]
@@ -162,7 +162,7 @@ def _grown(
     one, other, apart, ridge = one[kept], other[kept], apart[kept], ridge[kept]
     size = shapely.length(lines) / shapely.length(lines).max()
     weight = np.round(apart, 3) + _RIDGE_COST * ridge + _LONGER * (2.0 - size[one] - size[other])
-    count = len(found)
+    count = len(rings)
     forest = minimum_spanning_tree(coo_array((weight, (one, other)), shape=(count, count)).tocsr())
     trees = []
     left = np.ones(count, dtype=bool)
@@ -176,7 +176,7 @@ def _grown(
         parent = np.append(-1, number[before[order[1:]]])
         trees.append(
             ContourTree(
-                tuple(read_only(found[k], float) for k in order.tolist()),
+                tuple(read_only(rings[k], float) for k in order.tolist()),
                 read_only(level[order], int),
                 read_only(parent, int),
             )
@@ -400,12 +400,12 @@ def _openings(
     For a wide opening the distance of the contour from its chord is added to the cost.
     """
     middles = [_middles(ring) for ring in rings]
-    own = [_NEAR / spacing * np.linalg.norm(line - start, axis=1) for line in middles]
+    distances = [_NEAR / spacing * np.linalg.norm(line - start, axis=1) for line in middles]
     if gap > 2 * SAMPLES:
-        for line, cost in zip(middles, own, strict=True):
+        for line, cost in zip(middles, distances, strict=True):
             chord = 0.5 * (np.roll(line, gap // 2, axis=0) + np.roll(line, -(gap // 2), axis=0))
             cost += _BEND * np.linalg.norm(line - chord, axis=1) / spacing
-    cost = own[-1]
+    cost = distances[-1]
     following: list[IntArray] = []
     for k in range(len(rings) - 2, -1, -1):
         outer, inner = middles[k], middles[k + 1]
@@ -414,7 +414,7 @@ def _openings(
         total = (off / spacing) ** _CUBE + cost[near]
         best = total.argmin(axis=1)
         rows = np.arange(len(outer))
-        cost = total[rows, best] + own[k]
+        cost = total[rows, best] + distances[k]
         following.append(near[rows, best])
     index = [int(cost.argmin())]
     for step in reversed(following):
@@ -460,7 +460,7 @@ def _merged(
 
 def _joined(line: _Loop, other: _Loop, spacing: float, start: FloatArray) -> _Loop | None:
     """Two closed lines joined to one where both links are shortest; None if there is no place."""
-    mine, theirs = (np.flatnonzero(~_touched(each.kept)) for each in (line, other))
+    mine, theirs = (np.flatnonzero(~_touched(loop.kept)) for loop in (line, other))
     if min(len(line.points), len(other.points)) < SAMPLES + 2 or not (len(mine) and len(theirs)):
         return None
     middles = _middles(line.points)[mine]
@@ -550,7 +550,7 @@ def _ramp(before: FloatArray, beyond: FloatArray) -> FloatArray:
     """Points between two lines on the cubic that continues both of them smoothly."""
     (a, b), way = (before[-1], beyond[0]), float(np.linalg.norm(beyond[0] - before[-1]))
     ahead = [line[1] - line[0] for line in (before[-2:], beyond[:2])]
-    u, v = (way * each / np.linalg.norm(each) for each in ahead)
+    u, v = (way * tangent / np.linalg.norm(tangent) for tangent in ahead)
     count = max(round(way / float(np.linalg.norm(ahead[1]))), 2)
     t = np.arange(1, count)[:, None] / count
     ends = (1.0 - t) ** 2 * (1.0 + 2.0 * t) * a + t**2 * (3.0 - 2.0 * t) * b

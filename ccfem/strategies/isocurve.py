@@ -386,11 +386,11 @@ class _Planner:
         paths = self.connected(lines, layer, found.tension, stress.held_or_loaded, machine)
         return Toolpaths.from_plane(paths.lines, layer, link=paths.link)
 
-    def isocurves(self, found: Directed, width: float) -> list[FloatArray]:
+    def isocurves(self, directed: Directed, width: float) -> list[FloatArray]:
         """Isocurves of the field, at least a width apart."""
-        s, surface, direction = self.strategy, found.surface, found.direction
-        confidence = found.confidence
-        share = np.clip(found.size / found.cap, 1e-9, None)
+        s, surface, direction = self.strategy, directed.surface, directed.direction
+        confidence = directed.confidence
+        share = np.clip(directed.size / directed.cap, 1e-9, None)
         density = np.clip(s.density * share**s.power, None, 1.0)
         weight = np.maximum(confidence, _LEAST_WEIGHT)
         if s.spacing != "search":

@@ -209,7 +209,7 @@ def _middles(interior: Region, pitch: float) -> FloatArray:
     the length apart from there.
     """
     axis = medial_axis(interior, 0.5 * pitch)
-    found: list[tuple[float, FloatArray]] = []
+    middles: list[tuple[float, FloatArray]] = []
     for segment in axis.segments:
         along = along_line(segment.points)
         places = np.array([0.5 * along[-1]])
@@ -217,13 +217,13 @@ def _middles(interior: Region, pitch: float) -> FloatArray:
             widest = along[np.argmax(segment.radius)]
             places = (widest + np.array([0.0, 0.25, 0.5, 0.75]) * along[-1]) % along[-1]
         points = points_along(segment.points, along, places)
-        found += zip(np.interp(places, along, segment.radius), points, strict=True)
+        middles += zip(np.interp(places, along, segment.radius), points, strict=True)
     ends = {end for segment in axis.segments for end in segment.ends}
     lone = [k for k in range(len(axis.nodes)) if k not in ends]  # discs and squares
-    found += zip(axis.radius[lone], axis.nodes[lone], strict=True)
+    middles += zip(axis.radius[lone], axis.nodes[lone], strict=True)
     # Places of equal clearance in a symmetric part keep the order of the axis, longest first.
-    found.sort(key=lambda item: -round(item[0] / (0.01 * pitch)))
-    return np.reshape([point for _, point in found], (-1, 2))
+    middles.sort(key=lambda item: -round(item[0] / (0.01 * pitch)))
+    return np.reshape([point for _, point in middles], (-1, 2))
 
 
 def _patch_middles(layer: Layer, patches: tuple[str, ...]) -> FloatArray:
@@ -231,15 +231,15 @@ def _patch_middles(layer: Layer, patches: tuple[str, ...]) -> FloatArray:
 
     Where several are equally near, as on the border of a hole, the first one is taken.
     """
-    found: list[FloatArray] = []
+    middles: list[FloatArray] = []
     for name in patches:
         edges = layer.patches.get(name, np.zeros((0, 2), dtype=np.int64))
         if len(edges):
             nodes = layer.plane.points[np.unique(edges)]
             places = np.concatenate([nodes, layer.plane.points[edges].mean(axis=1)])
             gap = np.linalg.norm(places - nodes.mean(axis=0), axis=1)
-            found.append(places[np.argmin(np.round(gap, 6))])
-    return np.array(found, dtype=np.float64).reshape(-1, 2)
+            middles.append(places[np.argmin(np.round(gap, 6))])
+    return np.array(middles, dtype=np.float64).reshape(-1, 2)
 
 
 # Ends of strands that abut the side of another strand, cut back to a width from its middle.
@@ -356,15 +356,15 @@ def segment_seeds(inside: BoolArray) -> IntArray:
         Its outermost rows and columns are empty.
     """
     far = depth(inside)
-    found, forks = segments(thin(np.where(skeleton(inside), 0, -1)))
+    branches, forks = segments(thin(np.where(skeleton(inside), 0, -1)))
     seeds: list[IntArray] = []
-    for one in found:
-        count = len(one.pixels)
+    for segment in branches:
+        count = len(segment.pixels)
         at = [count // 2]
-        if one.closed:
-            deepest = int(far[tuple(one.pixels.T)].argmax())
+        if segment.closed:
+            deepest = int(far[tuple(segment.pixels.T)].argmax())
             at = [(deepest + k * count // 4) % count for k in range(4)]
-        seeds += [one.pixels[k] for k in at]
+        seeds += [segment.pixels[k] for k in at]
     pieces, count = ndimage.label(inside, np.ones((3, 3)))
     held = {int(pieces[tuple(pixel)]) for pixel in seeds}
     for piece in range(1, count + 1):

@@ -69,9 +69,9 @@ class Offset:
 
 def _level_sets(section: Region, first: float, spacing: float) -> list[FloatArray]:
     """Find the closed curves (k, 2), mm, at `first`, `first + spacing`, ... inside a section."""
-    found: list[FloatArray] = []
+    curves: list[FloatArray] = []
     distance = first
     while level := rings(shapely.buffer(section, -distance, quad_segs=_QUARTER)):
-        found += level
+        curves += level
         distance += spacing
-    return found
+    return curves

@@ -183,11 +183,11 @@ class Pruned:
         tried = [paths]
         if self.of == "isocurve" and not self.base:
             tried += plain_plans(cases, layers, machine, curves=False)
-        found: list[tuple[Pruned, LayerPlanner]] = []
+        planners: list[tuple[Pruned, LayerPlanner]] = []
         for length in lengths:
             wanted = length * len(layers)
             kept = prune_and_move(tried, layers, goal, wanted, machine, strand, *cut_by)
             coverage = length / full
             overfill = max(planned / full / coverage, 1.0)
-            found.append((replace(self, coverage=coverage, overfill=overfill), WholePart(kept)))
-        return found
+            planners.append((replace(self, coverage=coverage, overfill=overfill), WholePart(kept)))
+        return planners

@@ -237,7 +237,7 @@ class StreamFunction:
             layers,
             machine,
             lengths,
-            lambda one, some: one._cut(cases, layers, machine, some),
+            lambda strategy, some: strategy._cut(cases, layers, machine, some),
             again=self.turns == "tight",
         )
 
@@ -252,7 +252,7 @@ class StreamFunction:
         _check_tension(cases.fields, layers)
         in_all, strand = [length * len(layers) for length in lengths], Strand(self.rho)
         bounds = measures(self.objective, cases, layers, max(in_all), machine, strand)
-        problem, group, found = self.designed(cases, layers, machine, bounds)
+        problem, group, designed = self.designed(cases, layers, machine, bounds)
         specimens = tuple(part.specimen for part in problem.parts)
         goal = Goal(specimens, cases.weights, bounds, self.objective)
         fields_of = layers_by_case(cases.weights, layers) * problem.model.groups + group
@@ -266,9 +266,9 @@ class StreamFunction:
             drawn = self.extraction(problem.model, tuple(design.fields), strained, machine)
             return drawn.candidates(layers, fields_of, in_all)
 
-        tried = candidates(found)
+        tried = candidates(designed)
         if self.strength:
-            fields, solutions = found.fields.ravel(), found.objective.solution
+            fields, solutions = designed.fields.ravel(), designed.objective.solution
             how = (self.strength, self.evaluations)
             strong = design_for_strength(problem, fields, solutions, *how)
             tried = _with_first(candidates(strong), tried)
@@ -318,8 +318,8 @@ class StreamFunction:
         def start(posed: StreamProblem) -> FloatArray:
             return start_fields(posed, cases.fields, chosen, self.cap, self.tilt)
 
-        found = designed_in_steps(problem, start, self.evaluations, self.coverage)
-        return problem, group, found
+        design = designed_in_steps(problem, start, self.evaluations, self.coverage)
+        return problem, group, design
 
     def _model(
         self, parts: Sequence[SmearedPart], layers: Sequence[Layer], machine: Machine
@@ -328,17 +328,20 @@ class StreamFunction:
         part, mesh = parts[0], parts[0].mesh
         centres = part.centroids @ part.frame[:2].T
         size = max(self.grid * machine.fibre_width, float(np.cbrt(6.0 * mesh.volumes.mean())))
-        stresses = [each.specimen.unreinforced.stress for each in parts]
+        stresses = [specimen_part.specimen.unreinforced.stress for specimen_part in parts]
         groups = self.groups
         if not groups:
-            alike = min(alike_share(part, each, size) for each in stresses)
+            alike = min(alike_share(part, specimen_part, size) for specimen_part in stresses)
             groups = 1 if alike > _ALIKE else _MOST_GROUPS
         group = group_layers(layers, groups)
         corners = mesh.points[np.unique(mesh.corners)] @ part.frame[:2].T
         points = [corners, centres]
         for layer in layers:
             points += [refined(layer)[0], layer.plane.points[layer.triangles].mean(axis=1)]
-        energies = [mesh.volumes * np.einsum("cij,cij->c", each, each) for each in stresses]
+        energies = [
+            mesh.volumes * np.einsum("cij,cij->c", specimen_part, specimen_part)
+            for specimen_part in stresses
+        ]
         grid = SplineGrid.over(np.concatenate(points), *plane_axes(part, energies), size)
         capacity = fibre_capacity(part, layers, machine)
         model = StreamModel(
@@ -443,19 +446,19 @@ def designed_to_lengths(
         rest = iter(designed_to_lengths(strategy, layers, machine, near, cut, again))
         of = dict(zip(short, anew, strict=True))
         return [of[k] if k in of else next(rest) for k in range(len(lengths))]
-    told = replace(strategy, coverage=longest / full)
-    found = cut(told, lengths)
-    laid = max(float(paths.lengths.sum()) for paths in found) / len(layers)
-    short_of = 0.0 < laid < _ENOUGH * longest
-    if again and short_of and strategy.overfill * told.coverage < DENSEST:
-        more = replace(told, overfill=min(_MORE * longest / laid, 2.0) * strategy.overfill)
+    asked = replace(strategy, coverage=longest / full)
+    plans = cut(asked, lengths)
+    longest_plan = max(float(paths.lengths.sum()) for paths in plans) / len(layers)
+    short_of = 0.0 < longest_plan < _ENOUGH * longest
+    if again and short_of and strategy.overfill * asked.coverage < DENSEST:
+        more = replace(asked, overfill=min(_MORE * longest / longest_plan, 2.0) * strategy.overfill)
         longer = cut(more, lengths)
-        if max(float(paths.lengths.sum()) for paths in longer) > laid * len(layers):
-            told, found = more, longer
-    designed = told.overfill * told.coverage
+        if max(float(paths.lengths.sum()) for paths in longer) > longest_plan * len(layers):
+            asked, plans = more, longer
+    designed = asked.overfill * asked.coverage
     return [
-        (_designed_for(told, length / full, designed), WholePart(paths))
-        for length, paths in zip(lengths, found, strict=True)
+        (_designed_for(asked, length / full, designed), WholePart(paths))
+        for length, paths in zip(lengths, plans, strict=True)
     ]
 
 
@@ -534,15 +537,18 @@ def start_fields(
         Coefficients, field after field; zero for a group without tension.
     """
     count = len(stresses)
-    tensions = [[layer_tension(stress_on(layer, one)) for one in stresses] for layer in layers]
+    tensions = [
+        [layer_tension(stress_on(layer, stress_field)) for stress_field in stresses]
+        for layer in layers
+    ]
     size = np.sqrt([part.unreinforced.work for part in problem.parts])
-    found = []
+    fields = []
     for k in range(count):
         factors = np.full(count, (1.0 - tilt) / max(count - 1, 1))
         factors[k] = tilt
         mixed = [mixed_tension(of_layer, factors / size) for of_layer in tensions]
-        found.append(field_along(problem.model, layers, mixed, cap))
-    return np.concatenate(found)
+        fields.append(field_along(problem.model, layers, mixed, cap))
+    return np.concatenate(fields)
 
 
 def field_along(

@@ -203,7 +203,7 @@ def _empty(grid: SectionGrid, cell: float, room: int) -> _Laid:
 
 
 @njit(cache=True, nogil=True)
-def _lay(field, grid, laid, seeds, homes, centre, apart, test, step, least):  # type: ignore[no-untyped-def]
+def _lay(field, grid, placed, seeds, homes, centre, apart, test, step, least):  # type: ignore[no-untyped-def]
     """Points of all lines, their (start, turn, end) among these, and whether each is closed.
 
     From start to turn the points run ahead of the seed, from turn to end back from it. Ahead is the
@@ -211,7 +211,7 @@ def _lay(field, grid, laid, seeds, homes, centre, apart, test, step, least):  # 
     order of lines does not depend on the orientation of the part.
     """
     way = np.zeros(2)
-    spans = np.empty((len(laid.line) // 4, 3), np.int64)
+    spans = np.empty((len(placed.line) // 4, 3), np.int64)
     closed = np.zeros(len(spans), np.bool_)
     # Literals as arguments would have signatures of their own, compiled besides those of numbers.
     lines, count, no_line = np.int64(0), np.int64(0), np.int64(-1)
@@ -220,10 +220,10 @@ def _lay(field, grid, laid, seeds, homes, centre, apart, test, step, least):  # 
         if looked < 2 * count:
             # On both sides of the points of lines.
             p, side = looked // 2, 1.0 - 2.0 * (looked % 2)
-            x = laid.spot[p, 0] - side * apart * laid.way[p, 1]
-            y = laid.spot[p, 1] + side * apart * laid.way[p, 0]
-            home = laid.home[p]
-            way[0], way[1] = laid.way[p, 0], laid.way[p, 1]
+            x = placed.spot[p, 0] - side * apart * placed.way[p, 1]
+            y = placed.spot[p, 1] + side * apart * placed.way[p, 0]
+            home = placed.home[p]
+            way[0], way[1] = placed.way[p, 0], placed.way[p, 1]
             looked += 1
         else:
             x, y = seeds[tried, 0], seeds[tried, 1]
@@ -231,22 +231,22 @@ def _lay(field, grid, laid, seeds, homes, centre, apart, test, step, least):  # 
             way[0], way[1] = x - centre[0], y - centre[1]
             tried += 1
         homing = lines < 0  # never
-        taken = _crowded(laid, x, y, no_line, 0.0, apart * (1.0 - _SLACK), homing)
+        taken = _crowded(placed, x, y, no_line, 0.0, apart * (1.0 - _SLACK), homing)
         if taken or not contains(grid, x, y):
             continue
-        turn, end, ring = _trace(field, grid, laid, count, lines, x, y, way, home, test, step)
+        turn, end, ring = _trace(field, grid, placed, count, lines, x, y, way, home, test, step)
         if (end - count) * step < least:
-            _take_back(laid, count, end)
+            _take_back(placed, count, end)
             continue
         spans[lines, 0], spans[lines, 1], spans[lines, 2] = count, turn, end
         closed[lines] = ring
         lines += 1
         count = end
-    return laid.spot[:count], spans[:lines], closed[:lines]
+    return placed.spot[:count], spans[:lines], closed[:lines]
 
 
 @njit(cache=True, nogil=True)
-def _trace(field, grid, laid, first, number, x0, y0, way, home, test, step):  # type: ignore[no-untyped-def]
+def _trace(field, grid, placed, first, number, x0, y0, way, home, test, step):  # type: ignore[no-untyped-def]
     """Add points of a line from its seed ahead and back; return both ends, and if it is closed.
 
     The numbers of the points start at `first`; ahead is roughly along `way`.
@@ -255,13 +255,13 @@ def _trace(field, grid, laid, first, number, x0, y0, way, home, test, step):  # 
     count = first
     if not fine:
         return count, count, False
-    _add(laid, count, x0, y0, dx, dy, home, 0.0, number)
+    _add(placed, count, x0, y0, dx, dy, home, 0.0, number)
     count += 1
     turn = count
     for sense in (1.0, -1.0):
         x, y, cell, along = x0, y0, home, 0.0
         way[0], way[1] = sense * dx, sense * dy
-        while count < len(laid.line):
+        while count < len(placed.line):
             x, y, cell, fine = streamline_step(field, cell, x, y, step, way)
             along += sense * step
             if not fine or not contains(grid, x, y):
@@ -273,9 +273,9 @@ def _trace(field, grid, laid, first, number, x0, y0, way, home, test, step):  # 
             homing = homing and -step < ahead < 2.0 * test
             if homing and ahead <= 0.5 * step and sense > 0.0:
                 return count, count, True
-            if _crowded(laid, x, y, number, along, test, homing):
+            if _crowded(placed, x, y, number, along, test, homing):
                 break
-            _add(laid, count, x, y, way[0], way[1], cell, along, number)
+            _add(placed, count, x, y, way[0], way[1], cell, along, number)
             count += 1
         if sense > 0.0:
             turn = count
@@ -283,47 +283,47 @@ def _trace(field, grid, laid, first, number, x0, y0, way, home, test, step):  # 
 
 
 @njit(cache=True, nogil=True)
-def _cell(laid, x, y):  # type: ignore[no-untyped-def]
-    return int((x - laid.origin[0]) / laid.cell), int((y - laid.origin[1]) / laid.cell)
+def _cell(placed, x, y):  # type: ignore[no-untyped-def]
+    return int((x - placed.origin[0]) / placed.cell), int((y - placed.origin[1]) / placed.cell)
 
 
 @njit(cache=True, nogil=True)
-def _add(laid, p, x, y, dx, dy, home, along, number):  # type: ignore[no-untyped-def]
-    laid.spot[p, 0], laid.spot[p, 1] = x, y
-    laid.way[p, 0], laid.way[p, 1] = dx, dy
-    laid.home[p], laid.along[p], laid.line[p] = home, along, number
-    i, j = _cell(laid, x, y)
-    laid.following[p] = laid.head[i, j]
-    laid.head[i, j] = p
+def _add(placed, p, x, y, dx, dy, home, along, number):  # type: ignore[no-untyped-def]
+    placed.spot[p, 0], placed.spot[p, 1] = x, y
+    placed.way[p, 0], placed.way[p, 1] = dx, dy
+    placed.home[p], placed.along[p], placed.line[p] = home, along, number
+    i, j = _cell(placed, x, y)
+    placed.following[p] = placed.head[i, j]
+    placed.head[i, j] = p
 
 
 @njit(cache=True, nogil=True)
-def _take_back(laid, first, end):  # type: ignore[no-untyped-def]
+def _take_back(placed, first, end):  # type: ignore[no-untyped-def]
     """Remove the points that were added last."""
     for p in range(end - 1, first - 1, -1):
-        i, j = _cell(laid, laid.spot[p, 0], laid.spot[p, 1])
-        laid.head[i, j] = laid.following[p]
+        i, j = _cell(placed, placed.spot[p, 0], placed.spot[p, 1])
+        placed.head[i, j] = placed.following[p]
 
 
 @njit(cache=True, nogil=True)
-def _crowded(laid, x, y, number, along, limit, homing):  # type: ignore[no-untyped-def]
+def _crowded(placed, x, y, number, along, limit, homing):  # type: ignore[no-untyped-def]
     """Whether a point of another line, or of another stretch of this one, is nearer than a limit.
 
     The stretch round the seed does not count for a line that returns to it. Line -1 has no points
     yet.
     """
-    i, j = _cell(laid, x, y)
-    nx, ny = laid.head.shape
+    i, j = _cell(placed, x, y)
+    nx, ny = placed.head.shape
     for a in range(max(i - 1, 0), min(i + 2, nx)):
         for b in range(max(j - 1, 0), min(j + 2, ny)):
-            q = laid.head[a, b]
+            q = placed.head[a, b]
             while q >= 0:
-                own = laid.line[q] == number
-                beside = own and abs(laid.along[q] - along) < 2.0 * limit
-                begun = own and homing and abs(laid.along[q]) < 4.0 * limit
+                same = placed.line[q] == number
+                beside = same and abs(placed.along[q] - along) < 2.0 * limit
+                begun = same and homing and abs(placed.along[q]) < 4.0 * limit
                 if not beside and not begun:
-                    dx, dy = laid.spot[q, 0] - x, laid.spot[q, 1] - y
+                    dx, dy = placed.spot[q, 0] - x, placed.spot[q, 1] - y
                     if dx * dx + dy * dy < limit * limit:
                         return True
-                q = laid.following[q]
+                q = placed.following[q]
     return False

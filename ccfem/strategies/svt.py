@@ -148,7 +148,7 @@ class Svt:
 
     def _on(self, layer: Layer, lines: list[_Marked], machine: Machine) -> Toolpaths:
         """Paths on a layer, without the short ones."""
-        points, marks = [each for each, _ in lines], [mask for _, mask in lines]
+        points, marks = [line for line, _ in lines], [mask for _, mask in lines]
         cut = with_turns(self, points, machine, marks)
         paths = Toolpaths.from_plane(cut.lines, layer, link=cut.link)
         return long_enough(paths, self.minimum_length, machine)
@@ -156,7 +156,7 @@ class Svt:
     def _lines(self, layer: Layer, stress: LayerStress, machine: Machine) -> list[_Marked]:
         """Paths in the plane of a layer, with the masks of their links."""
         pieces = shapely.get_parts(layer.plane.polygon)
-        return [each for piece in pieces for each in self._piece(piece, stress, machine)]
+        return [marked for piece in pieces for marked in self._piece(piece, stress, machine)]
 
     def groups(
         self, piece: Region, stress: LayerStress, machine: Machine
@@ -164,7 +164,7 @@ class Svt:
         """Strands (n_i, 2), mm, of each main path of one piece of the section, not yet joined."""
         members = frame(piece, _SAMPLING * machine.fibre_width)
         criterion = Criterion(turn=self.turn)
-        found = []
+        groups = []
         pitch = self.spacing * machine.fibre_width
         paths = main_paths(members, stress, criterion, self.width_ratio)
         if self.crossings:
@@ -175,16 +175,16 @@ class Svt:
         for path, turn in zip(paths, turns, strict=True):
             strip = band(path, members, self.crossings, turn)
             follow = stress if self.aligned else None
-            found.append(tracks(strip, pitch, piece, machine.minimum_radius, follow))
-        found = made_symmetric(found, piece, machine.fibre_width)
-        laid = [line for group in found for line in group]
-        if laid and self.filled:
+            groups.append(tracks(strip, pitch, piece, machine.minimum_radius, follow))
+        groups = made_symmetric(groups, piece, machine.fibre_width)
+        lines_so_far = [line for group in groups for line in group]
+        if lines_so_far and self.filled:
             width, least = (
                 machine.fibre_width,
                 max(self._least(machine), _LEAST * machine.fibre_width),
             )
-            found += blobs(piece, laid, width, pitch, least)
-        return found
+            groups += blobs(piece, lines_so_far, width, pitch, least)
+        return groups
 
     def _least(self, machine: Machine) -> float:
         """Length of the shortest path that is laid, mm."""
@@ -228,8 +228,8 @@ class _Alike:
         key = (twin.index, machine)
         with self._locks.setdefault(twin.index, Lock()):
             if key not in self._known:
-                own = stress if twin is layer else stress_on(twin, self._stress)
-                self._known[key] = self._svt._lines(twin, own, machine)
+                layer_stress = stress if twin is layer else stress_on(twin, self._stress)
+                self._known[key] = self._svt._lines(twin, layer_stress, machine)
         return self._svt._on(layer, self._known[key], machine)
 
 
@@ -256,8 +256,8 @@ def rest_of(section: Region, lines: Sequence[FloatArray], width: float, reach: f
     reach : float, mm
         Radius of the disc.
     """
-    laid = [shapely.LineString(line) for line in lines if len(line) > 1]
-    covered = shapely.union_all(shapely.buffer(laid, 0.5 * width, cap_style="flat"))
+    strings = [shapely.LineString(line) for line in lines if len(line) > 1]
+    covered = shapely.union_all(shapely.buffer(strings, 0.5 * width, cap_style="flat"))
     rest = shapely.buffer(shapely.difference(section, covered), -reach)
     return shapely.buffer(rest, reach)
 
@@ -290,7 +290,7 @@ def blobs(
     rest = rest_of(section, lines, width, 0.5 * width)
     places = [part for part in shapely.get_parts(rest) if part.area >= least * spacing]
     border = shapely.boundary(section)
-    found = []
+    spirals_of = []
     for place in sorted(places, key=lambda part: -part.area):
         levels = offset_rings(place, 0.5 * width, spacing, width)
         if not levels:
@@ -300,8 +300,8 @@ def blobs(
         spirals = [_even(line) for line in join_rings(levels, start, spacing, width)]
         spirals = [line for line in spirals if line_length(line) >= least]
         if spirals:
-            found.append(spirals)
-    return found
+            spirals_of.append(spirals)
+    return spirals_of
 
 
 def _even(line: FloatArray) -> FloatArray:
@@ -336,23 +336,25 @@ def made_symmetric(
     near : float, mm
         Largest distance of a track from the mirror image of its partner.
     """
-    found = [list(group) for group in groups]
+    symmetric = [list(group) for group in groups]
     for mirror in mirror_lines(section):
-        images = [[reflected(line, mirror) for line in group] for group in found]
+        images = [[reflected(line, mirror) for line in group] for group in symmetric]
         done: set[int] = set()
         for k, group in enumerate(images):
-            for other in range(k, len(found)):
-                partners = _partners(group, found[other], near)
+            for other in range(k, len(symmetric)):
+                partners = _partners(group, symmetric[other], near)
                 if other in done or k in done or partners is None:
                     continue
                 done |= {k, other}
                 for image, partner in enumerate(partners):
-                    line = found[other][partner]
+                    line = symmetric[other][partner]
                     if k == other and partner == image:
-                        found[k][image] = _within(_between(line, group[image]), line, section)
+                        symmetric[k][image] = _within(_between(line, group[image]), line, section)
                     elif k != other or partner > image:
-                        found[other][partner] = _within(_along(group[image], line), line, section)
-    return found
+                        symmetric[other][partner] = _within(
+                            _along(group[image], line), line, section
+                        )
+    return symmetric
 
 
 def _partners(
@@ -362,18 +364,21 @@ def _partners(
     if len(images) != len(lines) or not lines:
         return None
     curves = [shapely.LineString(line) for line in lines]
-    found: list[int] = []
+    partners: list[int] = []
     for image in images:
         along = along_line(image)
         middle = points_along(image, along, 0.5 * along[-1:])[0]
         apart = shapely.distance(curves, shapely.points(middle))
         for k in np.argsort(apart, kind="stable")[:2].tolist():
-            if k not in found and curves[k].hausdorff_distance(shapely.LineString(image)) <= near:
-                found.append(k)
+            if (
+                k not in partners
+                and curves[k].hausdorff_distance(shapely.LineString(image)) <= near
+            ):
+                partners.append(k)
                 break
         else:
             return None
-    return found
+    return partners
 
 
 def _within(image: FloatArray, line: FloatArray, section: Region) -> FloatArray:
@@ -438,12 +443,12 @@ def alike(layers: Sequence[Layer], stress: PartStress) -> dict[int, Layer]:
     Among layers of the same section it is the first with the largest mean stress. The same is then
     repeated for layers whose stress has other directions.
     """
-    found: dict[int, Layer] = {}
+    representatives: dict[int, Layer] = {}
     for group in _same_sections(layers):
         left = [stress_on(layer, stress) for layer in group] if len(group) > 1 else []
         sizes = [_mean_size(each) for each in left]
         if len(group) == 1:
-            found[group[0].index] = group[0]
+            representatives[group[0].index] = group[0]
         while left:
             largest = max(sizes)
             guide = next(
@@ -452,11 +457,11 @@ def alike(layers: Sequence[Layer], stress: PartStress) -> dict[int, Layer]:
             rest = []
             for each, size in zip(left, sizes, strict=True):
                 if size <= _WEAK * largest or apart(guide, each) <= _TURNED:
-                    found[each.layer.index] = guide.layer
+                    representatives[each.layer.index] = guide.layer
                 else:
                     rest.append((each, size))
             left, sizes = [each for each, _ in rest], [size for _, size in rest]
-    return found
+    return representatives
 
 
 def apart(one: LayerStress, other: LayerStress) -> float:
@@ -471,7 +476,9 @@ def apart(one: LayerStress, other: LayerStress) -> float:
     """
     layer = one.layer
     middles = layer.plane.points[layer.triangles].mean(axis=1)
-    first, second = (stress_lines(plane_stress_at(each, middles, _REACH)) for each in (one, other))
+    first, second = (
+        stress_lines(plane_stress_at(stress, middles, _REACH)) for stress in (one, other)
+    )
     both = first.defined & second.defined
     weight = np.where(both, layer.areas * np.sqrt(np.abs(first.value * second.value)), 0.0)
     cosine = np.einsum("ki,ki->k", first.direction, second.direction)
@@ -489,20 +496,20 @@ def _mean_size(stress: LayerStress) -> float:
 
 def _same_sections(layers: Sequence[Layer]) -> list[list[Layer]]:
     """Flat layers in groups of the same section."""
-    found: list[list[Layer]] = []
+    sections: list[list[Layer]] = []
     for layer in layers:
         if layer.flat is None:
             continue
         section = layer.plane.polygon
-        for group in found:
+        for group in sections:
             other = group[0].plane.polygon
             difference = shapely.symmetric_difference(section, other).area
             if difference <= _SAME * max(section.area, 1e-300):
                 group.append(layer)
                 break
         else:
-            found.append([layer])
-    return found
+            sections.append([layer])
+    return sections
 
 
 # Main load paths as traced in the paper: a greedy walk over the points of the medial axis.

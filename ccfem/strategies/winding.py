@@ -328,17 +328,17 @@ class _Planner:
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         lines: list[FloatArray] = []
-        for one in self.fields(layer):
-            lines += self.strands(one, machine)
+        for piece in self.fields(layer):
+            lines += self.strands(piece, machine)
         lines = with_turns(self.strategy, lines, machine).lines
         normals = []
         for k, line in enumerate(lines):
-            found = nearest_on_triangles(layer.points, layer.triangles, line)
-            corners = layer.point_normals[layer.triangles[found.triangle]]
-            normal = np.einsum("qk,qkd->qd", found.weights, corners)
+            nearest = nearest_on_triangles(layer.points, layer.triangles, line)
+            corners = layer.point_normals[layer.triangles[nearest.triangle]]
+            normal = np.einsum("qk,qkd->qd", nearest.weights, corners)
             size = np.linalg.norm(normal, axis=1, keepdims=True)
             normals.append(normal / np.maximum(size, 1e-300))
-            lines[k] = found.points
+            lines[k] = nearest.points
         paths = Toolpaths.in_space(lines, normals, layer)
         return long_enough(paths, self.strategy.minimum_length, machine)
 
@@ -347,14 +347,14 @@ class _Planner:
         same = replace(self.strategy, spacing=1.0, even=False, minimum_length=None, turns="tight")
         known: tuple[_Planner, list[_Wound]] | None = vars(layer).get(_KNOWN)
         if known is not None:
-            last, found = known
+            last, wound = known
             given = (last.strategy, last.names, last.least) == (same, self.names, self.least)
             if given and last.direction is self.direction and last.weight is self.weight:
-                return found
+                return wound
         pieces = pieces_with_joints(layer, self.names)
-        found = [self.field(piece) for piece in pieces if len(piece.loops) >= self.least]
-        vars(layer)[_KNOWN] = (replace(self, strategy=same), found)
-        return found
+        wound = [self.field(piece) for piece in pieces if len(piece.loops) >= self.least]
+        vars(layer)[_KNOWN] = (replace(self, strategy=same), wound)
+        return wound
 
     def field(self, piece: Piece) -> "_Wound":
         """Field of a piece of a layer, cut or not, with its level lines evenly spaced."""
@@ -375,32 +375,32 @@ class _Planner:
         field = evened(surface, field)
         return _Wound(piece, field, steep(surface, field, _KEPT))
 
-    def strands(self, one: "_Wound", machine: Machine) -> list[FloatArray]:
+    def strands(self, piece: "_Wound", machine: Machine) -> list[FloatArray]:
         """Level lines of the field on a piece of a layer, near its surface."""
         s, spacing = self.strategy, self.strategy.spacing * machine.fibre_width
-        step = spacing * one.steep
+        step = spacing * piece.steep
         if s.energy == "annulus":
             step = 1.0 / max(1, round(1.0 / step))
-        lines = self.lines(one, 0.5 * step, step, 0.0)
+        lines = self.lines(piece, 0.5 * step, step, 0.0)
         if not s.even:
             return lines
         between = [
-            line for shift in _BETWEEN for line in self.lines(one, shift * step, step, -np.inf)
+            line for shift in _BETWEEN for line in self.lines(piece, shift * step, step, -np.inf)
         ]
-        border = border_tree(one.piece.mesh.points, [*one.piece.outer, *one.piece.loops])
+        border = border_tree(piece.piece.mesh.points, [*piece.piece.outer, *piece.piece.loops])
         least = machine.minimum_length if s.minimum_length is None else s.minimum_length
         apart = CLOSEST * spacing
         lines = kept_apart(lines, apart, least)
         return lines + kept_apart(between, apart, least, lines, border)
 
-    def lines(self, one: "_Wound", first: float, step: float, least: float) -> list[FloatArray]:
+    def lines(self, piece: "_Wound", first: float, step: float, least: float) -> list[FloatArray]:
         """Level lines at or above `least`: closed ones, smoothed; open ones only with "paper"."""
-        s, mesh = self.strategy, one.piece.mesh
-        found = isocontours(mesh.points, mesh.triangles, one.field, first, step)
+        s, mesh = self.strategy, piece.piece.mesh
+        contours = isocontours(mesh.points, mesh.triangles, piece.field, first, step)
         open_too = s.energy == "paper"
         most = np.inf if open_too else 1.0 - 1e-9
         lines = []
-        for line, level in zip(found.lines(), found.level.tolist(), strict=True):
+        for line, level in zip(contours.lines(), contours.level.tolist(), strict=True):
             closed = np.array_equal(line[0], line[-1])
             if least <= first + level * step <= most and (closed or open_too):
                 lines.append(limit_bends(line, s.sharpest) if closed else line)
@@ -567,11 +567,11 @@ def _straightened(  # type: ignore[no-untyped-def]
         for k in range(n):
             before, after, dot = 0.0, 0.0, 0.0
             for i in range(3):
-                one = points[k, i] - points[k - 2, i]
+                chord = points[k, i] - points[k - 2, i]
                 two = points[(k + 2) % n, i] - points[k, i]
-                before += one * one
+                before += chord * chord
                 after += two * two
-                dot += one * two
+                dot += chord * two
             before, after = np.sqrt(before), np.sqrt(after)
             square = max((before * after) ** 2 - dot * dot, 0.0)
             bend = np.sqrt(square) / max(before * after, 1e-9) / (0.5 * (before + after))
@@ -598,8 +598,8 @@ def _straightened(  # type: ignore[no-untyped-def]
             last, first = step[n - 1, i], step[0, i]
             before = last
             for k in range(n):
-                own = step[k, i]
+                length = step[k, i]
                 after = first if k == n - 1 else step[k + 1, i]
-                points[k, i] += over[k] * (own - 0.5 * (before + after))
-                before = own
+                points[k, i] += over[k] * (length - 0.5 * (before + after))
+                before = length
     return points

@@ -27,15 +27,15 @@ def tetrahedra(blocks: Iterable[tuple[str, IntArray]], path: str | PathLike[str]
         When there are no tetrahedra, when linear and quadratic ones are mixed, or when some of
         the volume is meshed with other cells (dropping them would leave holes).
     """
-    found: dict[str, list[IntArray]] = {}
+    nodes_by_kind: dict[str, list[IntArray]] = {}
     for kind, nodes in blocks:
         if len(nodes):
-            found.setdefault(kind, []).append(np.asarray(nodes, dtype=np.int64))
-    counts = {kind: sum(map(len, parts)) for kind, parts in found.items()}
+            nodes_by_kind.setdefault(kind, []).append(np.asarray(nodes, dtype=np.int64))
+    counts = {kind: sum(map(len, parts)) for kind, parts in nodes_by_kind.items()}
     held = ", ".join(f"{count} {kind}" for kind, count in sorted(counts.items())) or "no cells"
-    solids = sorted(kind for kind in found if kind.startswith(_SOLIDS))
+    solids = sorted(kind for kind in nodes_by_kind if kind.startswith(_SOLIDS))
     if solids == ["tetra"] or solids == ["tetra10"]:
-        return np.concatenate(found[solids[0]])
+        return np.concatenate(nodes_by_kind[solids[0]])
     if set(solids) & {"tetra", "tetra10"}:
         raise InputError(
             f"{path} must be meshed with linear or with quadratic tetrahedra throughout; it has "

@@ -97,15 +97,15 @@ def read_surface(path: str | os.PathLike[str], scale: float = 1.0) -> Surface:
         )
     check_number("surface scale", scale, above=0.0)
     try:
-        found = read_isolated("vtk_files:read_surface", path)
+        arrays = read_isolated("vtk_files:read_surface", path)
     except ChildError as error:
         raise InputError(
             f"{path} is not a surface that can be read: {error}: export it again as binary STL"
         ) from None
     with np.errstate(over="ignore"):  # what overflows is refused as infinite
-        points = found["points"] * scale
+        points = arrays["points"] * scale
     try:
-        return Surface(*_merged(points, found["triangles"]))
+        return Surface(*_merged(points, arrays["triangles"]))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 

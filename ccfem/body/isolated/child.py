@@ -28,17 +28,17 @@ def main() -> None:
             resource.setrlimit(resource.RLIMIT_CPU, (int(work) + 1, int(work) + 2))
     arguments = {name: value[()] if value.ndim == 0 else value for name, value in given.items()}
     try:
-        found = getattr(importlib.import_module(f"ccfem.body.isolated.{module}"), function)(
+        arrays = getattr(importlib.import_module(f"ccfem.body.isolated.{module}"), function)(
             **arguments
         )
     except InputError as error:
-        found = {"refused": str(error)}
+        arrays = {"refused": str(error)}
     except MemoryError:
-        found = {"failed": "it takes too much memory"}
+        arrays = {"failed": "it takes too much memory"}
     except Exception as error:
-        found = {"failed": " ".join(f"{error}".split())[:200] or type(error).__name__}
+        arrays = {"failed": " ".join(f"{error}".split())[:200] or type(error).__name__}
     try:
-        np.savez(folder / "new.npz", **found)
+        np.savez(folder / "new.npz", **arrays)
         (folder / "new.npz").rename(folder / "out.npz")
     except OSError:
         sys.exit(NOT_WRITTEN)

@@ -170,14 +170,14 @@ def _mesh(gmsh: Any, scale: float) -> dict[str, Any]:
 def _faces(gmsh: Any, tags: list[int], names: dict[int, str]) -> dict[str, Any]:
     """Triangles of the faces, the number of the face of each, and the names of the faces."""
     nodes = np.sort(gmsh.model.mesh.getNodes()[0])
-    found, number = [], []
+    facets, number = [], []
     for k, tag in enumerate(tags, 1):
         _, corners = gmsh.model.mesh.getElementsByType(2, tag)
         rows = np.searchsorted(nodes, corners.astype(np.int64)).reshape(-1, 3)
-        found.append(rows)
+        facets.append(rows)
         number.append(np.full(len(rows), k))
     return {
-        "triangles": np.concatenate(found),
+        "triangles": np.concatenate(facets),
         "face": np.concatenate(number),
         "names": np.array([names[tag] for tag in tags]),
     }

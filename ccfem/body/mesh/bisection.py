@@ -64,8 +64,8 @@ def _cut(
         ends = np.sort(rest[:, sides], axis=2)
         wanted = np.where(ends[..., 1] < n, ends[..., 0] * n + ends[..., 1], -1)
         at = np.minimum(np.searchsorted(key, wanted), max(len(key) - 1, 0))
-        found = key[at] == wanted if len(key) else np.zeros(wanted.shape, dtype=bool)
-        place = np.where(found, rank[at] if len(key) else 0, -1)
+        known = key[at] == wanted if len(key) else np.zeros(wanted.shape, dtype=bool)
+        place = np.where(known, rank[at] if len(key) else 0, -1)
         side, rows = place.argmax(axis=1), np.arange(len(rest))
         whole = place[rows, side] < 0
         done.append(rest[whole])

@@ -326,8 +326,8 @@ def hanging_nodes(mesh: TetMesh) -> IntArray:
     reach = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
     tree = cKDTree(mesh.points[nodes])
     near = tree.query_ball_point(centre, (1.0 + _TOUCH) * reach, return_sorted=False)
-    facet = np.repeat(np.arange(len(facets)), [len(each) for each in near])
-    node = nodes[np.concatenate([np.asarray(each, dtype=np.int64) for each in near])]
+    facet = np.repeat(np.arange(len(facets)), [len(near_nodes) for near_nodes in near])
+    node = nodes[np.concatenate([np.asarray(near_nodes, dtype=np.int64) for near_nodes in near])]
     other = (facets[facet] != node[:, None]).all(axis=1)
     facet, node = facet[other], node[other]
     return np.unique(node[_lies_on(mesh.points[node], *np.moveaxis(corners[facet], 1, 0))])

@@ -14,8 +14,8 @@ def face_name(number: int) -> str:
 
 def number_of_face(name: str) -> int | None:
     """Return the number of the face whose group has this name; None for another name."""
-    found = _NAME.fullmatch(name)
-    return None if found is None else int(found[1])
+    match = _NAME.fullmatch(name)
+    return None if match is None else int(match[1])
 
 
 def check_free(name: str) -> None:

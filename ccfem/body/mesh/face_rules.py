@@ -211,7 +211,7 @@ def numbered_faces(mesh: Bounded, angle: float = FEATURE_ANGLE) -> BodyFaces:
         number: np.flatnonzero(are_among(mesh.boundary, groups[number]))
         for number in sorted(number for number in groups if number is not None)
     }
-    rows = {number: each for number, each in rows.items() if len(each)}
+    rows = {number: members for number, members in rows.items() if len(members)}
     if len(rows) < _GROUPS:
         return BodyFaces(
             mesh.points, mesh.boundary, smooth_faces(mesh.points, mesh.boundary, angle)

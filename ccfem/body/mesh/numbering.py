@@ -28,8 +28,8 @@ def reverse_cuthill_mckee(start: IntArray, neighbour: IntArray) -> IntArray:
     """
     degree = np.diff(start)
     first = np.argsort(degree, kind="stable")
-    found: IntArray = _numbered(start, neighbour, degree, first)
-    return found[::-1]
+    order: IntArray = _numbered(start, neighbour, degree, first)
+    return order[::-1]
 
 
 @njit(cache=True, nogil=True)

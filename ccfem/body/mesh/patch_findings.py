@@ -60,12 +60,12 @@ def _parts(
 ) -> list[tuple[Face, float, float]]:
     """Each face that a patch touches, with its share of the patch, and how much of it is taken."""
     total = float(area[chosen].sum())
-    found = []
+    parts = []
     for face in faces:
         size = float(area[face.facets][chosen[face.facets]].sum())
         if size > _SOME * min(total, face.area):
-            found.append((face, size / total, size / face.area))
-    return found
+            parts.append((face, size / total, size / face.area))
+    return parts
 
 
 def _about_cylinder(name: str, rule: Cylinder, parts: list[tuple[Face, float, float]]) -> list[str]:
@@ -118,7 +118,7 @@ def _forgotten(
 def _about_box(name: str, rule: Box, parts: list[tuple[Face, float, float]]) -> list[str]:
     """Say where a box takes facets that face in several directions."""
     directions = [face.direction for face, *_ in parts if face.kind == "plane"]
-    several = any(one @ other < _ASIDE for one in directions for other in directions)
+    several = any(direction @ other < _ASIDE for direction in directions for other in directions)
     if rule.normal is not None or not several:
         return []
     named = ", ".join(dict.fromkeys(face.along for face, *_ in parts if face.kind == "plane"))

@@ -309,8 +309,8 @@ def with_groups(mesh: BoundedT, groups: Mapping[str, IntArray]) -> BoundedT:
 
     Groups without a boundary facet give no patch.
     """
-    found = {name: match_boundary(mesh, facets) for name, facets in groups.items()}
-    return mesh.with_patches({name: facets for name, facets in found.items() if len(facets)})
+    patches = {name: match_boundary(mesh, facets) for name, facets in groups.items()}
+    return mesh.with_patches({name: facets for name, facets in patches.items() if len(facets)})
 
 
 def unit_vector(value: str | ArrayLike, what: str) -> FloatArray:

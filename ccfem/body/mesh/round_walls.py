@@ -118,7 +118,6 @@ def moved_onto(
 
     Parameters
     ----------
-    walls : sequence of RoundWall
     first : (k,) int array
         The wall of each place.
     places : (k, 3) array, mm

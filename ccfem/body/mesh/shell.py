@@ -87,8 +87,8 @@ def _cut(triangles: IntArray, middle: IntArray) -> tuple[IntArray, IntArray]:
     pieces, parents = [triangles[count == 0]], [np.flatnonzero(count == 0)]
 
     def add(rows: IntArray, *corners: tuple[IntArray, IntArray, IntArray]) -> None:
-        for each in corners:
-            pieces.append(np.stack(each, axis=1))
+        for corner in corners:
+            pieces.append(np.stack(corner, axis=1))
             parents.append(rows)
 
     for k in range(3):

@@ -116,11 +116,11 @@ def _across(mesh: TetMesh, facets: IntArray, normal: FloatArray) -> tuple[IntArr
         ray, depth, cell, entry = ray[on], depth[on], behind[on] // 4, behind[on] % 4
         if not len(ray):
             break
-    found, thick = np.concatenate(ended), np.concatenate(thickness)
+    across, thick = np.concatenate(ended), np.concatenate(thickness)
     _, opposite = mesh.facet_areas(mesh.facets[np.concatenate(last)])
-    facing = np.einsum("ki,ki->k", normal[found], opposite) < -_FACING
+    facing = np.einsum("ki,ki->k", normal[across], opposite) < -_FACING
     span = np.full(len(facets), np.nan)
-    span[found[facing]] = thick[facing]
+    span[across[facing]] = thick[facing]
     for rays, level in levels:
         with np.errstate(invalid="ignore"):
             share = level / span[rays][:, None]

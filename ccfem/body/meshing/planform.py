@@ -189,7 +189,7 @@ def _along(ring: FloatArray, corners: IntArray, size: Size) -> FloatArray:
     ring = np.roll(ring, -corners[0], axis=0)
     stops = np.append(corners - corners[0], len(ring))
     ring = np.concatenate([ring, ring[:1]])
-    found = []
+    points = []
     for start, stop in pairwise(stops):
         line = shapely.LineString(ring[start : stop + 1])
         fine = np.linspace(0.0, line.length, max(64, 8 * (stop - start)) + 1)
@@ -198,8 +198,8 @@ def _along(ring: FloatArray, corners: IntArray, size: Size) -> FloatArray:
         passed = np.concatenate([[0.0], np.cumsum(steps)])
         count = max(least, round(passed[-1]))
         at = np.interp(np.linspace(0.0, passed[-1], count + 1)[:-1], passed, fine)
-        found.append(shapely.get_coordinates(shapely.line_interpolate_point(line, at)))
-    return np.concatenate(found)
+        points.append(shapely.get_coordinates(shapely.line_interpolate_point(line, at)))
+    return np.concatenate(points)
 
 
 def _grid(

@@ -59,7 +59,7 @@ def front_figure(
         left=0.62 / width, right=1.0 - 0.12 / width, bottom=0.95 / height, top=1.0 - 0.3 / height,
         wspace=0.7 / 3.6, hspace=0.8 / 2.6,
     )  # fmt: skip
-    names = list(dict.fromkeys(each.name for points in panels.values() for each in points))
+    names = list(dict.fromkeys(point.name for points in panels.values() for point in points))
     colours = palette(names)
     for number, (heading, points) in enumerate(panels.items()):
         axes = figure.add_subplot(tall, wide, number + 1)

@@ -72,10 +72,10 @@ def coloured(checked: Check) -> tuple[list[str], list[Label]]:
 
 def load_arrows(checked: Check, case: str | None = None) -> list[Arrow]:
     """Resultants of the loads; of one load case alone where that has loads of its own."""
-    own = [row for row in checked.loads if row.case == case]
+    rows = [row for row in checked.loads if row.case == case]
     return [
         Arrow(row.point, row.resultant, _LOAD, f"{row.case}: {row.size:.4g} N")
-        for row in own or checked.loads
+        for row in rows or checked.loads
         if row.size > 0.0
     ]
 
@@ -84,14 +84,14 @@ def support_marks(checked: Check, case: str | None = None) -> FloatArray:
     """Places on what is held, in one load case or in any, spread evenly over its facets."""
     problem = checked.case.problem
     supports = problem.supports_of(case) if case in problem.cases else problem.all_supports
-    found: list[FloatArray] = []
+    marks: list[FloatArray] = []
     for support in supports:
-        found += [np.asarray(point, dtype=float)[None] for point in points_of(support)]
+        marks += [np.asarray(point, dtype=float)[None] for point in points_of(support)]
         for name in patches_of(support):
             facets = problem.mesh.patches.get(name, np.zeros((0, 3), dtype=np.int64))
             middles = problem.mesh.points[facets].mean(axis=1)
-            found.append(_spread(middles[np.lexsort(np.round(middles, 6).T)], _MARKS))
-    return np.concatenate([np.zeros((0, 3)), *found])
+            marks.append(_spread(middles[np.lexsort(np.round(middles, 6).T)], _MARKS))
+    return np.concatenate([np.zeros((0, 3)), *marks])
 
 
 def _spread(points: FloatArray, count: int) -> FloatArray:

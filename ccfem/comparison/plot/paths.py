@@ -162,7 +162,7 @@ def _draw_paths(axes: "Axes", layer: Layer, paths: Toolpaths, width: float) -> l
 
 def _strands_and_links(paths: Toolpaths, layer: Layer) -> tuple[list[FloatArray], list[FloatArray]]:
     """Paths cut where links begin and end: the strands, and the links, as (n, 2) arrays, mm."""
-    found: tuple[list[FloatArray], list[FloatArray]] = ([], [])
+    lines: tuple[list[FloatArray], list[FloatArray]] = ([], [])
     plane = layer.plane.project(paths.points)
     for start, end in pairwise(paths.offsets.tolist()):
         link = paths.link[start : end - 1]
@@ -170,8 +170,8 @@ def _strands_and_links(paths: Toolpaths, layer: Layer) -> tuple[list[FloatArray]
             continue
         turns = [0, *(np.flatnonzero(np.diff(link)) + 1).tolist(), len(link)]
         for first, last in pairwise(turns):
-            found[int(link[first])].append(plane[start + first : start + last + 1])
-    return found
+            lines[int(link[first])].append(plane[start + first : start + last + 1])
+    return lines
 
 
 def _draw_segments(axes: "Axes", coloured: Coloured, width: float) -> Any:

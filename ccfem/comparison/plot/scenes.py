@@ -75,8 +75,8 @@ def show(value: Any, picture: str | Path | None = None, **options: Any) -> View 
     window = pyvista.OFF_SCREEN is False and _has_screen()
     alone = picture is not None or not (notebook or window)
     plotter = pyvista.Plotter(off_screen=alone, window_size=(900, 650))
-    for each in value if isinstance(value, tuple | list) else (value,):
-        add(each, plotter, **options)
+    for item in value if isinstance(value, tuple | list) else (value,):
+        add(item, plotter, **options)
     plotter.add_axes()
     if not alone:
         plotter.show()

@@ -92,7 +92,7 @@ def _shades(share: FloatArray) -> Sequence[str]:
     """Colours "#rrggbb" of shares of the largest value."""
     from matplotlib.colors import to_hex
 
-    return [to_hex(each) for each in scale("stress")(np.clip(share, 0.0, 1.0))]
+    return [to_hex(colour) for colour in scale("stress")(np.clip(share, 0.0, 1.0))]
 
 
 @figure.register
@@ -135,11 +135,11 @@ def _paths_figure(paths: Toolpaths, layer: int) -> "Figure":
     axis = int(np.argmax(np.abs(normal)))
     across = [k for k in range(3) if k != axis]
     lines = [path[:, across] for path in paths]
-    found, (axes,) = new_figure(extents_of(np.concatenate(lines)))
+    figure, (axes,) = new_figure(extents_of(np.concatenate(lines)))
     axes.add_collection(LineCollection(lines, colors=INK, linewidths=0.8))
     scale_bar(axes)
     title(axes, f"layer {layer}", f"{len(paths)} paths, {paths.lengths.sum():.0f} mm of fibre")
-    return found
+    return figure
 
 
 @figure.register
@@ -189,8 +189,8 @@ def _wrong(value: Any) -> Sequence[str]:
     if isinstance(value, Problem):
         value = Case("problem", "", value)
     if isinstance(value, Case):
-        found = check(value)
-        return (*found.mistakes, *found.warnings)
+        checked = check(value)
+        return (*checked.mistakes, *checked.warnings)
     if isinstance(value, StressField):
         return value.findings
     if isinstance(value, VirtualTest):

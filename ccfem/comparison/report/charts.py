@@ -37,7 +37,7 @@ def fronts(runs: Sequence[Run], colours: Mapping[str, str]) -> list[dict[str, An
     The front joins the runs that can be printed and that no other such run equals or beats in both;
     it is not drawn where they differ by less than the resolution of the test.
     """
-    found = []
+    charts = []
     values = {run.name: headline_values(run) for run in runs}
     for column, factor, title, better in _COSTS:
         points = [
@@ -66,7 +66,7 @@ def fronts(runs: Sequence[Run], colours: Mapping[str, str]) -> list[dict[str, An
             ends = {"x": [x for x, _ in line], "y": [y for _, y in line]}
             series.insert(0, {**joined, "legend": False, **ends})
         name = title.split(",")[0]
-        found.append(
+        charts.append(
             {
                 "title": f"Stiffness over {name}",
                 "x": title,
@@ -76,7 +76,7 @@ def fronts(runs: Sequence[Run], colours: Mapping[str, str]) -> list[dict[str, An
                 "series": series,
             }
         )
-    return found
+    return charts
 
 
 def wide_enough(values: Sequence[float]) -> list[float]:
@@ -110,11 +110,11 @@ def front(points: Sequence[tuple[float, float]], better: str) -> list[tuple[floa
         Which first numbers are better; of the second ones, high ones are.
     """
     sign = 1.0 if better == "low" else -1.0
-    found: list[tuple[float, float]] = []
+    corners: list[tuple[float, float]] = []
     for x, y in sorted(set(points), key=lambda p: (sign * p[0], -p[1])):
-        if not found or y > found[-1][1]:
-            found.append((x, y))
-    return sorted(found)
+        if not corners or y > corners[-1][1]:
+            corners.append((x, y))
+    return sorted(corners)
 
 
 def spreads(
@@ -188,12 +188,12 @@ def _line(run: Run, colours: Mapping[str, str], x: FloatArray, y: FloatArray) ->
 def _matching(run: Run) -> FloatArray:
     """Join the samples of all layers: shares of the fibre within each of `THRESHOLDS`."""
     samples = run.evaluation.samples if run.evaluation is not None else ()
-    return matching_curve(along_fibre(pool([each.alignment for each in samples])))
+    return matching_curve(along_fibre(pool([sample.alignment for sample in samples])))
 
 
 def _curvatures(run: Run) -> FloatArray:
     samples = run.evaluation.samples if run.evaluation is not None else ()
-    return np.concatenate([np.zeros(0), *(each.curvature.curvature for each in samples)])
+    return np.concatenate([np.zeros(0), *(sample.curvature.curvature for sample in samples)])
 
 
 def _forces(run: Run) -> FloatArray:

@@ -284,7 +284,7 @@ def part_view(checked: Check, stress: StressField) -> dict[str, Any]:
     same = np.array_equal(stress.mesh.points[: len(mesh.points)], mesh.points)
     moved = stress.displacement[used] if same else None
     kept, triangles, drawn = _coarser(points, triangles.reshape(-1, 3), shade, size)
-    found = {
+    view = {
         "points": Rounded(points[kept], 1e-4 * size),
         "triangles": triangles,
         "colours": known,
@@ -300,13 +300,13 @@ def part_view(checked: Check, stress: StressField) -> dict[str, Any]:
     }
     if moved is not None:
         most = float(np.linalg.norm(stress.displacement, axis=1).max(initial=0.0))
-        found |= {
+        view |= {
             "moved": Rounded(moved[kept], max(most, 1e-300) / 2000.0),
             "moved_size": as_bytes(np.linalg.norm(moved[kept], axis=1), most),
             "most": most,
             "scale": _round_scale(_SHOWN * size / most) if most > 0.0 else 1.0,
         }
-    return found
+    return view
 
 
 def _unit(direction: FloatArray) -> list[float]:
@@ -398,7 +398,7 @@ def headline_table(
     """Table of the indices that matter first, the best run first."""
     best, runs = best_values(comparison.runs, wanted), comparison.ranking
     values = {run.name: headline_values(run) for run in runs}
-    heads = [h for h in columns if any(h.column in found for found in values.values())]
+    heads = [h for h in columns if any(h.column in row for row in values.values())]
     rows: list[tuple[str, tuple[Cell, ...], str]] = []
     for run in runs:
         cells = tuple(_headline_cell(run, head, values[run.name], best) for head in heads)
@@ -457,7 +457,7 @@ def all_indices(comparison: Comparison) -> Table:
     values = [headline_values(run) for run in runs]
     rows = []
     for column in (*TEST_COLUMNS, *COLUMNS):
-        cells = tuple(_numbered(found.get(column.name, np.nan)) for found in values)
+        cells = tuple(_numbered(row.get(column.name, np.nan)) for row in values)
         unit = "" if column.unit == "1" else f" ({column.unit})"
         rows.append((f"{column.name}{unit}", cells, ""))
     return Table(tuple(Head(run.name) for run in runs), tuple(rows))

@@ -96,12 +96,12 @@ def _thinned(paths: Toolpaths, step: float) -> tuple[FloatArray, IntArray, Float
     kept[offsets[:-1]] = kept[offsets[1:] - 1] = True
     before = np.concatenate([[0], np.cumsum(kept)])
     points, arcs, link = points[kept], arcs[kept], link[kept]
-    found, offsets, start = subdivide(points, before[offsets], 2.0 * step)
+    thinned, offsets, start = subdivide(points, before[offsets], 2.0 * step)
     end = np.minimum(start + 1, len(points) - 1)
     whole = np.linalg.norm(points[end] - points[start], axis=1)
-    share = np.linalg.norm(found - points[start], axis=1) / np.maximum(whole, 1e-300)
+    share = np.linalg.norm(thinned - points[start], axis=1) / np.maximum(whole, 1e-300)
     return (
-        found,
+        thinned,
         offsets,
         arcs[start] + np.minimum(share, 1.0) * (arcs[end] - arcs[start]),
         link[start],
@@ -112,9 +112,9 @@ def _nearest(
     line: IntArray, arc: FloatArray, values: FloatArray, wanted: IntArray, at: FloatArray
 ) -> FloatArray:
     """Value at the arc length nearest to each wanted one on the same line; NaN where none is."""
-    found = np.full(len(at), np.nan)
+    nearest = np.full(len(at), np.nan)
     if not len(line):
-        return found
+        return nearest
     reach = 1.0 + max(float(arc.max()), float(at.max(initial=0.0)))
     order = np.argsort(line * reach + arc, kind="stable")
     keys, sought = (line * reach + arc)[order], wanted * reach + at
@@ -125,8 +125,8 @@ def _nearest(
         away = np.abs(keys[inside] - sought)
         nearer = (line[order[inside]] == wanted) & (away < best)
         best = np.where(nearer, away, best)
-        found = np.where(nearer, values[order[inside]], found)
-    return found
+        nearest = np.where(nearer, values[order[inside]], nearest)
+    return nearest
 
 
 def _curvature(paths: Toolpaths, width: float, line: IntArray, at: FloatArray) -> FloatArray:
@@ -161,9 +161,9 @@ def angle_on_layer(plane: FloatArray, stress: LayerStress) -> FloatArray:
     (n,) array in [0, 90]
         NaN at the last point, and where a piece lies outside the layer.
     """
-    found = np.full(len(plane), np.nan)
+    angle = np.full(len(plane), np.nan)
     if len(plane) < 2:
-        return found
+        return angle
     layer = stress.layer
     middle, along = 0.5 * (plane[1:] + plane[:-1]), np.diff(plane, axis=0)
     triangle, weights = locate(layer.plane.points, layer.triangles, middle, _REACH)
@@ -171,8 +171,8 @@ def angle_on_layer(plane: FloatArray, stress: LayerStress) -> FloatArray:
     corners = in_plane(stress.nodal, layer.plane.frame)[layer.triangles[triangle[inside]]]
     _, _, direction = largest_in_plane(np.einsum("qk,qkc->qc", weights[inside], corners))
     off = np.abs(np.arctan2(along[inside, 1], along[inside, 0]) - direction) % np.pi
-    found[inside] = np.degrees(np.minimum(off, np.pi - off))
-    return found
+    angle[inside] = np.degrees(np.minimum(off, np.pi - off))
+    return angle
 
 
 _POINTS = 150_000
@@ -205,13 +205,13 @@ def layer_views(stacks: Mapping[str, Comparison], colours: Mapping[str, str]) ->
     lines, step = _lines(stacks)
     shown = _shown(stacks, lines)
     stresses = {
-        name: [stress_on(flat_view(k), one.planned_on) for k in shown[name]]
-        for name, one in stacks.items()
+        name: [stress_on(flat_view(k), stack.planned_on) for k in shown[name]]
+        for name, stack in stacks.items()
     }
     tension = max((tension_limit(s) for those in stresses.values() for s in those), default=1e-12)
     machine = next(iter(stacks.values())).case.machine
     most = 1.0 if machine.minimum_radius <= 0.0 else 2.0 / machine.minimum_radius
-    forces = [_most_force(each) for each in lines.values()]
+    forces = [_most_force(drawn) for drawn in lines.values()]
     scales = {
         "tension": tension,
         "force": max(forces, default=0.0) or 1e-12,
@@ -219,22 +219,22 @@ def layer_views(stacks: Mapping[str, Comparison], colours: Mapping[str, str]) ->
         "curvature": most,
     }
     found = []
-    for name, one in stacks.items():
-        runs = {run.name: lines[name, run.name] for run in one.succeeded}
+    for name, stack in stacks.items():
+        runs = {run.name: lines[name, run.name] for run in stack.succeeded}
         views = [
-            _layer(layer, stress, one, scales, len(shown[name]))
+            _layer(layer, stress, stack, scales, len(shown[name]))
             for layer, stress in zip(shown[name], stresses[name], strict=True)
         ]
         paths = [
             _run(run, runs[run.name], shown[name], stresses[name], scales, colours)
-            for run in one.ranking
+            for run in stack.ranking
             if run.name in runs
         ]
         found.append(
             {
                 "name": name,
-                "count": len(one.layers),
-                "first": [k.index for k in shown[name]].index(middle_layer(one).index),
+                "count": len(stack.layers),
+                "first": [k.index for k in shown[name]].index(middle_layer(stack).index),
                 "layers": views,
                 "runs": paths,
             }
@@ -244,31 +244,31 @@ def layer_views(stacks: Mapping[str, Comparison], colours: Mapping[str, str]) ->
 
 def _lines(stacks: Mapping[str, Comparison]) -> tuple[dict[tuple[str, str], DrawnPaths], float]:
     """Paths of every run with points as far apart as their number asks for; that distance, mm."""
-    found: dict[tuple[str, str], DrawnPaths] = {}
+    drawn: dict[tuple[str, str], DrawnPaths] = {}
     step = 0.0
     for times in _STEPS:
-        for name, one in stacks.items():
-            width = one.case.machine.fibre_width
+        for name, stack in stacks.items():
+            width = stack.case.machine.fibre_width
             step = times * width
-            for run in one.succeeded:
-                found[name, run.name] = drawn_paths(run, step, width)
-        if sum(len(each.points) for each in found.values()) <= _POINTS:
+            for run in stack.succeeded:
+                drawn[name, run.name] = drawn_paths(run, step, width)
+        if sum(len(paths.points) for paths in drawn.values()) <= _POINTS:
             break
-    return found, step
+    return drawn, step
 
 
 def _shown(
     stacks: Mapping[str, Comparison], lines: Mapping[tuple[str, str], DrawnPaths]
 ) -> dict[str, list[Layer]]:
     """Layers of each stack that are drawn: all, or every second, third ... where they are many."""
-    total = sum(len(each.points) for each in lines.values())
+    total = sum(len(paths.points) for paths in lines.values())
     every = max(1, int(np.ceil(total / _POINTS)))
-    found = {}
-    for name, one in stacks.items():
-        drawn = drawn_layers(one)
-        always = [k.index for k in drawn].index(middle_layer(one).index)
-        found[name] = drawn[always % every :: every]
-    return found
+    shown = {}
+    for name, stack in stacks.items():
+        drawn = drawn_layers(stack)
+        always = [k.index for k in drawn].index(middle_layer(stack).index)
+        shown[name] = drawn[always % every :: every]
+    return shown
 
 
 def _most_force(paths: DrawnPaths) -> float:
@@ -405,12 +405,12 @@ def _failure(run: Run, layers: Sequence[Layer]) -> dict[str, Any] | None:
     if failure is None:
         return None
     where = np.asarray(failure.where, dtype=np.float64)
-    found = {"what": failure.what, "load": failure.load, "where": where.tolist()}
+    place = {"what": failure.what, "load": failure.load, "where": where.tolist()}
     away = [
         np.inf if k.flat is None else abs(float(where @ k.flat.frame[2]) - k.flat.height)
         for k in layers
     ]
     if not np.isfinite(min(away, default=np.inf)):
-        return found
+        return place
     nearest = int(np.argmin(away))
-    return {**found, "layer": nearest, "at": layers[nearest].plane.project(where).tolist()}
+    return {**place, "layer": nearest, "at": layers[nearest].plane.project(where).tolist()}

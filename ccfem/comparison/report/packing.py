@@ -65,9 +65,9 @@ def pack(tree: Any) -> str:
 def _taken(value: Any, parts: list[bytes]) -> Any:
     """Return a tree for JSON whose arrays are places among the `parts`."""
     if isinstance(value, Mapping):
-        return {str(key): _taken(each, parts) for key, each in value.items()}
+        return {str(key): _taken(item, parts) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_taken(each, parts) for each in value]
+        return [_taken(item, parts) for item in value]
     if isinstance(value, np.generic):
         return _taken(value.item(), parts)
     if isinstance(value, float) and not np.isfinite(value):
@@ -100,8 +100,8 @@ def _rounded(given: Rounded, parts: list[bytes]) -> dict[str, Any]:
     step = max(given.step, reach / _STEPS)
     whole = np.round((values - low) / step).astype(np.int64).T
     steps = np.diff(whole, axis=1, prepend=0) % (_STEPS + 1)
-    found = _placed(steps.astype(np.uint16), "u2", parts)
-    return {**found, "low": low.tolist(), "step": step}
+    placed = _placed(steps.astype(np.uint16), "u2", parts)
+    return {**placed, "low": low.tolist(), "step": step}
 
 
 def unpack(text: str) -> Any:
@@ -113,11 +113,11 @@ def unpack(text: str) -> Any:
 
 def _given_back(value: Any, data: bytes) -> Any:
     if isinstance(value, list):
-        return [_given_back(each, data) for each in value]
+        return [_given_back(item, data) for item in value]
     if not isinstance(value, dict):
         return value
     if "$" not in value:
-        return {key: _given_back(each, data) for key, each in value.items()}
+        return {key: _given_back(item, data) for key, item in value.items()}
     kind = np.dtype(f"<{value['$']}")
     raw = np.frombuffer(data, np.uint8, value["n"] * kind.itemsize, value["at"])
     flat = np.ascontiguousarray(raw.reshape(kind.itemsize, -1).T).view(kind).reshape(-1)

@@ -79,8 +79,8 @@ def _pieces(value: Any, inside: tuple[int, ...]) -> Iterable[bytes]:
             yield from _pieces(value[key], inside)
     elif isinstance(value, tuple | list):
         yield f"sequence {len(value)}".encode()
-        for one in value:
-            yield from _pieces(one, inside)
+        for part in value:
+            yield from _pieces(part, inside)
     elif isinstance(value, frozenset | set):
         yield from _pieces(sorted(value, key=repr), inside)
     elif hasattr(value, "__dict__"):
@@ -130,8 +130,8 @@ def _function_pieces(function: FunctionType, inside: tuple[int, ...]) -> Iterabl
 
 def _names(code: CodeType) -> list[str]:
     """Names of globals that code may use, that of inner functions included."""
-    found = set(code.co_names)
+    names = set(code.co_names)
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
-            found.update(_names(constant))
-    return sorted(found)
+            names.update(_names(constant))
+    return sorted(names)

@@ -69,26 +69,26 @@ def variants(entry: str | Mapping[str, Any], where: str) -> list[Variant]:
     where = f"{where} '{entry['name']}'"
     if "sweep" not in entry:
         return [Variant(entry["name"], fixed)]
-    found = []
+    variants_of_entry = []
     for values in _swept(entry["sweep"], where):
         twice = sorted(set(values) & set(fixed))
         if twice:
             raise InputError(
                 f"{where} has a value and a sweep of '{twice[0]}': drop one of the two"
             )
-        found.append(Variant(entry["name"], {**fixed, **_nested(values)}))
-    return found
+        variants_of_entry.append(Variant(entry["name"], {**fixed, **_nested(values)}))
+    return variants_of_entry
 
 
 def _swept(sweep: object, where: str) -> Iterator[dict[str, Any]]:
     """Values of each variant of a sweep, by their parameters."""
     if isinstance(sweep, list | tuple):
-        if not sweep or not all(isinstance(each, Mapping) and each for each in sweep):
+        if not sweep or not all(isinstance(table, Mapping) and table for table in sweep):
             raise InputError(
                 f"sweep of {where} must be a table of lists or a list of tables; got "
                 f"{shown(sweep)}: write sweep.NAME = [..] or sweep = [{{NAME = ..}}, ..]"
             )
-        yield from (dict(each) for each in sweep)
+        yield from (dict(table) for table in sweep)
         return
     axes = dict(_axes(sweep, where, ""))
     for values in itertools.product(*axes.values()):
@@ -116,14 +116,14 @@ def _axes(sweep: object, where: str, outer: str) -> Iterator[tuple[str, list[Any
 
 def _nested(values: Mapping[str, Any]) -> dict[str, Any]:
     """Tables of names with dots."""
-    found: dict[str, Any] = {}
+    nested: dict[str, Any] = {}
     for name, value in values.items():
         *outer, last = name.split(".")
-        table = found
+        table = nested
         for key in outer:
             table = table.setdefault(key, {})
         table[last] = value
-    return found
+    return nested
 
 
 @dataclass(frozen=True)
@@ -167,9 +167,9 @@ class Job:
     @property
     def name(self) -> str:
         """What it is called in one line."""
-        told = [f"{k.partition('.')[2]} {v}" for k, v in self.labels.items() if "." in k]
+        settings = [f"{k.partition('.')[2]} {v}" for k, v in self.labels.items() if "." in k]
         part, strategy = self.labels["part"], self.labels["strategy"]
-        return f"{strategy} on {part}" + (f" ({', '.join(told)})" if told else "")
+        return f"{strategy} on {part}" + (f" ({', '.join(settings)})" if settings else "")
 
 
 @dataclass(frozen=True)
@@ -242,7 +242,7 @@ def _entries(entries: tuple[Any, ...], where: str, kind: Any) -> list[tuple[str,
             name = entry.name if isinstance(entry, Case) else member_name(entry)
             found.append((name, Variant(name, {}), entry))
         else:
-            found += [(each.name, each, None) for each in variants(entry, where)]
+            found += [(variant.name, variant, None) for variant in variants(entry, where)]
     return found
 
 
@@ -265,14 +265,14 @@ def _case(study: Study, variant: Variant) -> Case:
 
 def _slicings(study: Study) -> list[tuple[dict[str, Any], Slicer | None]]:
     """Labels and slicers; no slicer for a part's own."""
-    found: list[tuple[dict[str, Any], Slicer | None]] = []
+    slicings: list[tuple[dict[str, Any], Slicer | None]] = []
     for label, variant, given in _entries(study.slicings, "slicings", Slicer):
         if given is None and not variant.parameters:
             given = slicing.from_text(variant.name)
         elif given is None:
             given = slicing.create(variant.name, variant.parameters)
-        found.append(({"slicing": label, **_dotted("slicing", variant)}, given))
-    return found or [({"slicing": "own"}, None)]
+        slicings.append(({"slicing": label, **_dotted("slicing", variant)}, given))
+    return slicings or [({"slicing": "own"}, None)]
 
 
 def _strategies(study: Study, case: Case) -> list[tuple[dict[str, Any], Strategy]]:
@@ -282,8 +282,8 @@ def _strategies(study: Study, case: Case) -> list[tuple[dict[str, Any], Strategy
     for label, variant, given in _entries(study.strategies, "strategies", strategies):
         labels = {"strategy": label}
         if given is None:
-            own = case.parameters.get(variant.name, {})
-            given = create(variant.name, {**own, **variant.parameters})
+            parameters = case.parameters.get(variant.name, {})
+            given = create(variant.name, {**parameters, **variant.parameters})
             labels |= _dotted("strategy", variant)
         else:
             labels |= {f"strategy.{k}": _plain(v) for k, v in vars(given).items()}

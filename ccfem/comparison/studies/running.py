@@ -178,8 +178,8 @@ class _Teller:
     def __call__(self, job: Job, outcome: dict[str, Any]) -> None:
         self._done += 1
         self._failed += bool(outcome["failure"])
-        each = (time.monotonic() - self._start) / (self._done - self._first)
-        left = _duration(each * (self._total - self._done))
+        seconds = (time.monotonic() - self._start) / (self._done - self._first)
+        left = _duration(seconds * (self._total - self._done))
         failed = f", {self._failed} failed" if self._failed else ""
         said = f"{self._done} of {self._total} runs{failed}, about {left} left: {job.name}"
         self._progress(said, self._done / self._total)
@@ -308,11 +308,11 @@ def _check_workers(client: Any, address: str) -> None:
         raise InputError(
             f"the Dask scheduler at {address} has no workers: start some with dask worker {address}"
         ) from None
-    own = version("ccfem")
+    here = version("ccfem")
     for name, there in client.run(_version).items():
-        if there != own:
+        if there != here:
             raise InputError(
-                f"worker {name} has ccfem {there}, this is {own}: install the same on both"
+                f"worker {name} has ccfem {there}, this is {here}: install the same on both"
             )
 
 

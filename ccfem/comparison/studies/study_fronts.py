@@ -17,17 +17,17 @@ def with_fronts(table: "pd.DataFrame") -> "pd.DataFrame":
 
     Fronts are those of the printable runs of one part under one load case.
     """
-    found = table.copy()
+    marked = table.copy()
     for cost, better in COST.items():
         name = f"front_{cost}"
-        found[name] = False
-        if GAIN not in found or cost not in found:
+        marked[name] = False
+        if GAIN not in marked or cost not in marked:
             continue
-        printable = found[found["printable"].astype(bool)]
-        for _, group in printable.groupby(["part", "load_case", *_geometry(found)], dropna=False):
+        printable = marked[marked["printable"].astype(bool)]
+        for _, group in printable.groupby(["part", "load_case", *_geometry(marked)], dropna=False):
             chosen = on_front(group[cost].to_numpy(), group[GAIN].to_numpy(), better)
-            found.loc[group.index[chosen], name] = True
-    return found
+            marked.loc[group.index[chosen], name] = True
+    return marked
 
 
 def _geometry(table: "pd.DataFrame") -> list[str]:

@@ -92,13 +92,13 @@ class StudyResult:
                 reasons.setdefault(f"not tested: {outcome['untested']}", []).append(job.name)
             for line in outcome.get("findings", ()):
                 reasons.setdefault(f"warning: {line}", []).append(job.name)
-        found = [
+        texts = [
             f"{names[0]}{f' and {len(names) - 1} more' if names[1:] else ''} {reason}"
             for reason, names in reasons.items()
         ]
         if self.repeated:
-            found.append(f"{self.repeated} runs were listed more than once: each is computed once")
-        return tuple(found)
+            texts.append(f"{self.repeated} runs were listed more than once: each is computed once")
+        return tuple(texts)
 
     @cached_property
     def frame(self) -> "pd.DataFrame":
@@ -156,8 +156,10 @@ class StudyResult:
         geometry = [name for name in frame.columns if name.startswith("part.")]
         if GAIN in frame and over in frame:
             for row in frame[frame[GAIN].notna() & frame[over].notna()].to_dict("records"):
-                told = [f"{k.partition('.')[2]} {row[k]}" for k in geometry if row[k] is not None]
-                heading = ", ".join([str(row["part"]), *told, str(row["load_case"])])
+                settings = [
+                    f"{k.partition('.')[2]} {row[k]}" for k in geometry if row[k] is not None
+                ]
+                heading = ", ".join([str(row["part"]), *settings, str(row["load_case"])])
                 panels.setdefault(heading, []).append(
                     FrontPoint(
                         str(row["strategy"]),

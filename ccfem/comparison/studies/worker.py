@@ -32,13 +32,13 @@ def receive(stream: BinaryIO) -> bytes | None:
     return data if len(data) == length else None
 
 
-def _tasks(stream: BinaryIO, found: "queue.SimpleQueue[bytes]") -> None:
+def _tasks(stream: BinaryIO, queued: "queue.SimpleQueue[bytes]") -> None:
     """Read tasks until there is nobody left to give any."""
     while True:
         task = receive(stream)
         if task is None:
             os._exit(0)
-        found.put(task)
+        queued.put(task)
 
 
 def main() -> None:
@@ -46,19 +46,19 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started it stops it
     given, out = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print does not get among the messages
-    found: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    queued: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     first = receive(given)
     if first is None:
         return
     sys.path += [path for path in json.loads(first) if path not in sys.path]
-    threading.Thread(target=_tasks, args=(given, found), daemon=True).start()
+    threading.Thread(target=_tasks, args=(given, queued), daemon=True).start()
     import numpy as np
 
     from ccfem.comparison.studies.transport import packed, unpacked
     from ccfem.comparison.studies.work import run_job, solve_part
 
     while True:
-        what, name, file, task, rest = unpacked(found.get())
+        what, name, file, task, rest = unpacked(queued.get())
         if what == "solve":
             rest, arrays = solve_part(task)
             np.savez(file, **arrays)

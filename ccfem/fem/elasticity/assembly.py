@@ -328,8 +328,8 @@ def assemble(
     if density is not None:
         scale *= density[where.order]
     data = np.zeros((len(where.indices), 3, 3))
-    pattern = (where.indptr, where.indices, where.start, where.touching)
-    arguments = (pattern, cells, seen_only(which), gradients, scale, stiffness)
+    sparse_rows = (where.indptr, where.indices, where.start, where.touching)
+    arguments = (sparse_rows, cells, seen_only(which), gradients, scale, stiffness)
     if mesh.order == 1:
         _gather_linear(*arguments, data)
     else:

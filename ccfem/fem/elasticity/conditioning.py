@@ -39,21 +39,21 @@ def stiffness_contrast(stiffness: FloatArray, density: FloatArray | None) -> flo
 
 def about_conditioning(problem: Problem) -> str:
     """Say what makes the equations of a problem ill-conditioned, each with its cure."""
-    found, stiffness = [about_slivers(problem.mesh)], problem.cell_stiffness
+    warnings, stiffness = [about_slivers(problem.mesh)], problem.cell_stiffness
     bulk = incompressibility(stiffness)
     if bulk > _NEARLY_INCOMPRESSIBLE:
-        found.append(
+        warnings.append(
             f"the material is nearly incompressible, {bulk:.2g} times as stiff in volume as in "
             "shape: take a Poisson's ratio of 0.49 or less, or a direct backend"
         )
     contrast = stiffness_contrast(stiffness, problem.density)
     if contrast > _CONTRAST:
-        found.append(
+        warnings.append(
             f"the stiffest cell is {contrast:.2g} times as stiff as the softest: raise the least "
             "density or stiffness"
         )
-    found = [text for text in found if text]
-    return "; ".join(found) or (
+    warnings = [text for text in warnings if text]
+    return "; ".join(warnings) or (
         "no single cell is to blame: the part is slender, or held at very little; hold it wider, "
         "or take a direct backend"
     )

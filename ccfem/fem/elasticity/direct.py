@@ -102,13 +102,13 @@ class Pardiso:
         """Factorise a matrix of the pattern; an earlier factor is invalidated."""
         with self._lock:
             self._latest += 1
-            own = self._latest
+            current = self._latest
             self._upper.data = matrix.data.reshape(-1)[self._entries]
             self._call(22, np.zeros(matrix.shape[0]))
 
         def apply(rhs: FloatArray) -> FloatArray:
             with self._lock:
-                if own != self._latest:
+                if current != self._latest:
                     raise SolveError(
                         "pypardiso: a later matrix took the place of this factor: solve with what "
                         "`refactorise` returned"

@@ -347,24 +347,24 @@ def _terms(x, y, z, p):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _gather(group, corners, of_corner, start, cells, least, stamp, found):  # type: ignore[no-untyped-def]
+def _gather(group, corners, of_corner, start, cells, least, stamp, gathered):  # type: ignore[no-untyped-def]
     """Store the cells of a patch and return their number: those at the node, more if too few."""
     count = 0
     for k in range(start[group], start[group + 1]):
-        found[count] = cells[k]
+        gathered[count] = cells[k]
         stamp[cells[k]] = group
         count += 1
     if count >= least:
         return count
-    own = count
-    for k in range(own):
+    begin = count
+    for k in range(begin):
         for a in range(4):
-            other = of_corner[found[k], a]
+            other = of_corner[gathered[k], a]
             for j in range(start[other], start[other + 1]):
                 cell = cells[j]
-                if stamp[cell] != group and count < len(found):
+                if stamp[cell] != group and count < len(gathered):
                     stamp[cell] = group
-                    found[count] = cell
+                    gathered[count] = cell
                     count += 1
     return count
 
@@ -404,20 +404,20 @@ def _fit(  # type: ignore[no-untyped-def]
     most = 0
     for group in range(len(nodes)):
         most = max(most, start[group + 1] - start[group])
-    found = np.empty(most + 4096, np.int64)
-    place = np.empty((len(found) * len(at), 3))
+    gathered = np.empty(most + 4096, np.int64)
+    place = np.empty((len(gathered) * len(at), 3))
     for group in range(len(nodes)):
         if start[group] == start[group + 1]:
             size[group] = 1.0
             continue
-        count = _gather(group, corners, of_corner, start, cells, least, stamp, found)
+        count = _gather(group, corners, of_corner, start, cells, least, stamp, gathered)
         extent, s = 0.0, 0
         for k in range(count):
             for q in range(len(at)):
                 for d in range(3):
                     x = -points[nodes[group], d]
                     for a in range(4):
-                        x += at[q, a] * points[corners[found[k], a], d]
+                        x += at[q, a] * points[corners[gathered[k], a], d]
                     place[s, d] = x
                     extent = max(extent, abs(x))
                 s += 1
@@ -428,7 +428,7 @@ def _fit(  # type: ignore[no-untyped-def]
                 right[i, j] = 0.0
         for s in range(count * len(at)):
             _terms(place[s, 0] / extent, place[s, 1] / extent, place[s, 2] / extent, p)
-            cell, q = found[s // len(at)], s % len(at)
+            cell, q = gathered[s // len(at)], s % len(at)
             for i in range(terms):
                 for j in range(i + 1):
                     gram[i, j] += p[i] * p[j]

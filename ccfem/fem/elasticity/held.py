@@ -165,8 +165,8 @@ class Held:
         """Sum forces (3k,), N, on the free components, of nodal forces (n, 3)."""
         if self.ties is not None:
             forces = self.ties.gather(forces)
-        own = forces[self.nodes]
-        return (own if self._whole else own * self.free[self.nodes]).reshape(-1)
+        carried = forces[self.nodes]
+        return (carried if self._whole else carried * self.free[self.nodes]).reshape(-1)
 
     @cached_property
     def _whole(self) -> bool:

@@ -214,10 +214,10 @@ class Problem(Shown):
     @property
     def all_supports(self) -> tuple[AnySupport, ...]:
         """Supports of all load cases, each once."""
-        found = list(self.supports)
-        for own in self.case_supports.values():
-            found += [support for support in own if support not in found]
-        return tuple(found)
+        supports = list(self.supports)
+        for of_case in self.case_supports.values():
+            supports += [support for support in of_case if support not in supports]
+        return tuple(supports)
 
     def supports_of(self, case: str) -> tuple[AnySupport, ...]:
         """Return the supports that hold in a load case, or in a combination of them."""
@@ -242,8 +242,8 @@ class Problem(Shown):
         rest = np.ones(len(self.mesh.cells), dtype=bool)
         for region in self.regions:
             rest[region.cells] = False
-        found = [(self.material, np.flatnonzero(rest))] if rest.any() else []
-        return (*found, *((region.material, region.cells) for region in self.regions))
+        materials = [(self.material, np.flatnonzero(rest))] if rest.any() else []
+        return (*materials, *((region.material, region.cells) for region in self.regions))
 
     @property
     def cell_stiffness(self) -> FloatArray:
@@ -251,12 +251,12 @@ class Problem(Shown):
         if self.stiffness is not None:
             return self.stiffness
         if not self.regions:
-            own = self.material.stiffness
+            stiffness = self.material.stiffness
         else:
-            own = np.empty((len(self.mesh.cells), 6, 6))
+            stiffness = np.empty((len(self.mesh.cells), 6, 6))
             for material, cells in self.materials:
-                own[cells] = material.stiffness
-        return own if self.axes is None else rotate_stiffness(own, self.axes)
+                stiffness[cells] = material.stiffness
+        return stiffness if self.axes is None else rotate_stiffness(stiffness, self.axes)
 
 
 def _check_stiffness(stiffness: FloatArray) -> None:

@@ -63,7 +63,7 @@ def aggregates(matrix: sp.bsr_array, near_kernel: FloatArray, strength: float) -
 def _strong(indptr, indices, data, strength):  # type: ignore[no-untyped-def]
     """Strong connections of each node with others."""
     n, d = indptr.size - 1, data.shape[1]
-    size, own = np.empty(indices.size), np.zeros(n)
+    size, diagonal = np.empty(indices.size), np.zeros(n)
     for i in range(n):
         for s in range(indptr[i], indptr[i + 1]):
             total = 0.0
@@ -72,13 +72,17 @@ def _strong(indptr, indices, data, strength):  # type: ignore[no-untyped-def]
                     total += data[s, p, q] * data[s, p, q]
             size[s] = total
             if indices[s] == i:
-                own[i] = total
+                diagonal[i] = total
     start, column = np.zeros(n + 1, np.int32), np.empty(indices.size, np.int32)
     place = 0
     for i in range(n):
         for s in range(indptr[i], indptr[i + 1]):
             j = indices[s]
-            if j != i and size[s] * size[s] >= strength**4 * own[i] * own[j] and size[s] > 0.0:
+            if (
+                j != i
+                and size[s] * size[s] >= strength**4 * diagonal[i] * diagonal[j]
+                and size[s] > 0.0
+            ):
                 column[place] = j
                 place += 1
         start[i + 1] = place
@@ -237,10 +241,10 @@ def galerkin(matrix: sp.bsr_array, prolong: Prolongation) -> sp.bsr_array:
     ----------
     matrix : bsr_array (d n, d n) with d x d blocks
     """
-    own, count = (matrix.indptr, matrix.indices), prolong.groups
-    indptr, indices = _met(*own, prolong.indptr, prolong.indices, count)
+    pattern, count = (matrix.indptr, matrix.indices), prolong.groups
+    indptr, indices = _met(*pattern, prolong.indptr, prolong.indices, count)
     data = np.zeros((len(indices), 6, 6))
-    _project(*own, matrix.data, *prolong, indptr, indices, data)
+    _project(*pattern, matrix.data, *prolong, indptr, indices, data)
     _reflect(indptr, indices, data)
     return sp.bsr_array((data, indices, indptr), shape=(6 * count, 6 * count))
 
@@ -389,12 +393,12 @@ def _met(indptr, indices, start, column, count):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, fastmath=_CONTRACT)
 def _project(  # type: ignore[no-untyped-def]
-    indptr, indices, data, start, column, blocks, count, own, other, result
+    indptr, indices, data, start, column, blocks, count, first, other, result
 ):
     """Store the blocks of ``P^T A P`` up to the diagonal."""
     most = 0
     for k in range(count):
-        most = max(most, own[k + 1] - own[k])
+        most = max(most, first[k + 1] - first[k])
     # All groups met by the neighbours of a node are among those met by its own groups.
     images, groups = np.empty((most, data.shape[1], 6)), np.empty(most, np.int32)
     place = np.full(count, -1, np.int32)
@@ -417,7 +421,7 @@ def _project(  # type: ignore[no-untyped-def]
                 k = groups[e]
                 if k > row:
                     continue
-                low, high = own[row], own[row + 1] - 1
+                low, high = first[row], first[row + 1] - 1
                 while low < high:
                     middle = (low + high) // 2
                     if other[middle] < k:
@@ -430,11 +434,11 @@ def _project(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _reflect(own, other, result):  # type: ignore[no-untyped-def]
+def _reflect(first, other, result):  # type: ignore[no-untyped-def]
     """Copy what is below the diagonal to above it."""
-    place = np.empty(own.size - 1, np.int32)
-    for i in range(own.size - 1):
-        for s in range(own[i], own[i + 1]):
+    place = np.empty(first.size - 1, np.int32)
+    for i in range(first.size - 1):
+        for s in range(first[i], first[i + 1]):
             j = other[s]
             if j == i:
                 place[i] = s + 1
@@ -476,12 +480,12 @@ def quick_aggregation(matrix: sp.bsr_array, near_kernel: FloatArray) -> Apply:
         Rigid motions.
     """
     # Compiled once, for indices of one kind.
-    own = (
+    level = (
         matrix.data,
         matrix.indices.astype(np.int32, copy=False),
         matrix.indptr.astype(np.int32, copy=False),
     )
-    matrix = sp.bsr_array(own, shape=matrix.shape)
+    matrix = sp.bsr_array(level, shape=matrix.shape)
     motions = near_kernel.reshape(-1, 3, 6)
     levels: list[tuple[GaussSeidel, Prolongation]] = []
     while (nodes := len(motions)) > _COARSEST:

@@ -193,14 +193,14 @@ def _constraints(
     shift = np.einsum("hk,hkj->hj", holds.along[moved], centre_modes)
     twist = np.pad(holds.about[turned], ((0, 0), (3, 0)))
     i, j = members.pairs()
-    one = rows(np.repeat(members.owner[i], 3), modes[i].reshape(-1, 6))
+    first = rows(np.repeat(members.owner[i], 3), modes[i].reshape(-1, 6))
     other = rows(np.repeat(members.owner[j], 3), modes[j].reshape(-1, 6))
     return sp.vstack(
         [
             rows(members.owner[entry], held),
             rows(holds.moved[moved], shift),
             rows(holds.turned[turned], twist),
-            one - other,
+            first - other,
         ],
         format="csr",
     )

@@ -71,19 +71,19 @@ def solve(
     """
     fields: dict[str, StressField] = {}
     sets = support_sets(problem)
-    for one in sets:
+    for subproblem in sets:
         try:
-            fields |= _solved(one, backend, tolerance)
+            fields |= _solved(subproblem, backend, tolerance)
         except InputError as error:
             if len(sets) == 1:
                 raise
-            case = next(iter(one.loads))
+            case = next(iter(subproblem.loads))
             raise InputError(*(f"load case '{case}': {line}" for line in error.mistakes)) from None
     if len({len(field.mesh.points) for field in fields.values()}) > 1:
-        for one in sets:
-            if fields[next(iter(one.loads))].mesh.order == 1:
+        for subproblem in sets:
+            if fields[next(iter(subproblem.loads))].mesh.order == 1:
                 why = "load cases with other supports need them"
-                fields |= _solved_as_it_is(on_quadratic(one), backend, tolerance, why)
+                fields |= _solved_as_it_is(on_quadratic(subproblem), backend, tolerance, why)
     return KnownNames("load case", {case: fields[case] for case in problem.cases})
 
 
@@ -165,8 +165,8 @@ def solve_system(
     linear = system.held.presses is None
     sums = system.combinations if linear else {}
     alone = (*system.forces, *(name for name in system.combinations if name not in sums))
-    each = 1 if linear else EXPECTED
-    solver = system.factorise(matrix, backend, each * len(alone))
+    solves = 1 if linear else EXPECTED
+    solver = system.factorise(matrix, backend, solves * len(alone))
     record = SolveRecord(solver.backend, 0, 0.0, assembled - started, 0.0, system.held.unknowns)
     because = solver.because
     fields, displacement = {}, {}

@@ -99,16 +99,16 @@ class Solver:
         SolveError
             When the factorisation fails.
         """
-        own = self.matrix
+        known = self.matrix
         if not (
-            matrix.shape == own.shape
-            and matrix.data.shape == own.data.shape
-            and np.array_equal(matrix.indptr, own.indptr)
-            and np.array_equal(matrix.indices, own.indices)
+            matrix.shape == known.shape
+            and matrix.data.shape == known.data.shape
+            and np.array_equal(matrix.indptr, known.indptr)
+            and np.array_equal(matrix.indices, known.indices)
         ):
             raise InputError(
-                f"refactorise takes a matrix with the pattern of the one before ({own.shape[0]} "
-                f"unknowns, {len(own.indices)} blocks); got another ({matrix.shape[0]}, "
+                f"refactorise takes a matrix with the pattern of the one before ({known.shape[0]} "
+                f"unknowns, {len(known.indices)} blocks); got another ({matrix.shape[0]}, "
                 f"{len(matrix.indices)}): use factorise"
             )
         return replace(self, matrix=matrix, apply=self.make(matrix))

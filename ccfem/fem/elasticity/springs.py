@@ -66,8 +66,8 @@ def spring_forces(
     result = np.zeros_like(displacement)
     for support in supports:
         nodes, blocks = _elements(mesh, support)
-        own = displacement[nodes].reshape(len(nodes), -1)
-        forces = np.einsum("kij,kj->ki", blocks, own).reshape(*nodes.shape, 3)
+        move = displacement[nodes].reshape(len(nodes), -1)
+        forces = np.einsum("kij,kj->ki", blocks, move).reshape(*nodes.shape, 3)
         np.subtract.at(result, nodes, forces)
     return result
 

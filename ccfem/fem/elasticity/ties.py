@@ -80,8 +80,8 @@ class Ties:
     def matrix(self) -> sp.bsr_array:
         """T, (3 n, 3 n') with 3x3 blocks."""
         n = len(self.points)
-        own = np.flatnonzero(~self.slaves)
-        rows, columns, blocks = [own], [own], [self.axes[own]]
+        masters = np.flatnonzero(~self.slaves)
+        rows, columns, blocks = [masters], [masters], [self.axes[masters]]
         for k, body in enumerate(self.bodies):
             arm = (self.points[body.nodes] - body.centre) / body.size
             count = len(body.nodes)
@@ -111,13 +111,13 @@ class Ties:
 
         A rigid body takes the motion nearest to that of its nodes.
         """
-        own = np.einsum("nji,nj->ni", self.axes, displacement)
-        own[self.slaves] = 0.0
+        local = np.einsum("nji,nj->ni", self.axes, displacement)
+        local[self.slaves] = 0.0
         result = np.zeros((self.count, 3))
-        result[: len(own)] = own
+        result[: len(local)] = local
         dense = self.matrix.tocsr()
         for k, body in enumerate(self.bodies):
-            first = len(own) + 2 * k
+            first = len(local) + 2 * k
             rows = (3 * body.nodes[:, None] + np.arange(3)).reshape(-1)
             part = dense[rows][:, 3 * first : 3 * first + 6].toarray()
             motion = np.linalg.lstsq(part, displacement[body.nodes].reshape(-1), rcond=None)[0]
@@ -146,11 +146,11 @@ class Ties:
         halves = np.tile(0.5 * np.eye(3), (2 * n, 1, 1))
         middles = _blocks(np.repeat(node, 2), ends.reshape(-1), halves, (n, n))
         corner = (ends[:, 0] == node) & (ends[:, 1] == node)
-        own = np.flatnonzero(~self.slaves)
+        masters = np.flatnonzero(~self.slaves)
         bodies = n + np.arange(2 * len(self.bodies))
         kept = np.concatenate([np.flatnonzero(corner & ~self.slaves), bodies])
         pick = _blocks(kept, kept, np.tile(np.eye(3), (len(kept), 1, 1)), 2 * (self.count,))
-        back = _blocks(own, own, np.swapaxes(self.axes[own], 1, 2), (self.count, n))
+        back = _blocks(masters, masters, np.swapaxes(self.axes[masters], 1, 2), (self.count, n))
         rigid = _blocks(bodies, bodies, np.tile(np.eye(3), (len(bodies), 1, 1)), 2 * (self.count,))
         return (back @ (middles @ (self.matrix @ pick)) + rigid).tobsr((3, 3))
 

@@ -65,12 +65,12 @@ def distance_from_patches(
 def _held_and_loaded(problem: Problem, case: str) -> FloatArray:
     """Points (k, 3) that cover the patches of the supports and of the load case."""
     mesh = problem.mesh
-    edges = [each.patches for each in problem.supports if isinstance(each, EdgeSupport)]
+    edges = [support.patches for support in problem.supports if isinstance(support, EdgeSupport)]
     kinds: list[Any] = [*problem.loads_of(case)]
     kinds += [
-        each
-        for each in problem.supports
-        if not isinstance(each, EdgeSupport) and not _slides(mesh, each)
+        support
+        for support in problem.supports
+        if not isinstance(support, EdgeSupport) and not _slides(mesh, support)
     ]
     points = [np.zeros((0, 3))]
     points += [np.array([point]) for kind in kinds for point in points_of(kind)]

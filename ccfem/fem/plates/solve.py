@@ -115,8 +115,8 @@ class PlaneElements:
         if self.mesh.congruent:
             rows, columns = np.array(_PAIRS).T
             # Without the threads of a BLAS, which cost more than they save here.
-            own = np.einsum("ck,kl->cl", stiffness[:, rows, columns], self._constant)
-            return own.reshape(-1, size, size)
+            constant = np.einsum("ck,kl->cl", stiffness[:, rows, columns], self._constant)
+            return constant.reshape(-1, size, size)
         result = np.zeros((len(stiffness), size, size))
         for matrix, weight in self.gauss:
             result += np.swapaxes(matrix, 1, 2) @ ((weight[:, None, None] * stiffness) @ matrix)
@@ -213,7 +213,7 @@ class PlaneSystem:
     ) -> PlaneField:
         """Strain, stress, energies and reactions of a displacement (n, 2), mm."""
         strain = self.elements.centre_strain(displacement)
-        own = self.elements.cell_displacement(displacement)
+        by_cell = self.elements.cell_displacement(displacement)
         internal = (matrix @ displacement.reshape(-1)).reshape(-1, 2)
         return PlaneField(
             problem=self.problem,
@@ -221,7 +221,7 @@ class PlaneSystem:
             displacement=displacement,
             strain=strain,
             stress=np.einsum("mij,mj->mi", self.problem.stiffness, strain),
-            cell_energy=0.5 * np.einsum("mi,mij,mj->m", own, self.matrices, own),
+            cell_energy=0.5 * np.einsum("mi,mij,mj->m", by_cell, self.matrices, by_cell),
             reactions=np.where(self.held.free, 0.0, internal - self.forces[case]),
             record=record,
         )

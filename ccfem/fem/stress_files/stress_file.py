@@ -288,9 +288,9 @@ def table_stress(path: Path) -> StressData:
 
 def _name_and_unit(cell: str) -> tuple[str, str]:
     """Name of a column, and the unit in brackets behind it."""
-    found = re.fullmatch(r"\s*(.*?)\s*(?:\[\s*(.*?)\s*\])?\s*", cell)
-    assert found is not None
-    return found[1], found[2] or ""
+    match = re.fullmatch(r"\s*(.*?)\s*(?:\[\s*(.*?)\s*\])?\s*", cell)
+    assert match is not None
+    return match[1], match[2] or ""
 
 
 # Stress at the nodes from result files of CalculiX (``.frd``, ASCII).

@@ -181,10 +181,10 @@ class PlateEquations:
 
     def energy(self, displacement: FloatArray, elements: FloatArray) -> FloatArray:
         """Energy ``u^T k u`` (m,), N mm, of each element."""
-        own = self.system.elements.cell_displacement(displacement)
-        one = len(elements) == 1
-        image = own @ elements[0] if one else np.einsum("mij,mj->mi", elements, own)
-        return np.einsum("mi,mi->m", own, image)
+        by_cell = self.system.elements.cell_displacement(displacement)
+        single = len(elements) == 1
+        image = by_cell @ elements[0] if single else np.einsum("mij,mj->mi", elements, by_cell)
+        return np.einsum("mi,mi->m", by_cell, image)
 
     def stress(self, displacement: FloatArray, stiffness: FloatArray) -> FloatArray:
         """Stress (m, 3), MPa, [s11, s22, s12] at the centre of each cell."""

@@ -43,7 +43,7 @@ class ConeFilter:
         m = len(centres)
         tree = cKDTree(centres)
         sample = centres[:: max(1, m // 100)]
-        around = np.mean([len(found) for found in tree.query_ball_point(sample, radius)])
+        around = np.mean([len(neighbours) for neighbours in tree.query_ball_point(sample, radius)])
         if around * m > 1e8:
             raise InputError(
                 f"filter radius {radius} mm reaches {around:.0f} cells round each of {m}: give a "
@@ -51,8 +51,8 @@ class ConeFilter:
             )
         first, second = tree.query_pairs(radius, output_type="ndarray").T
         near = radius - np.linalg.norm(centres[first] - centres[second], axis=1)
-        own = np.arange(m)
-        row, column = np.concatenate([first, second, own]), np.concatenate([second, first, own])
+        cells = np.arange(m)
+        row, column = np.concatenate([first, second, cells]), np.concatenate([second, first, cells])
         weight = np.concatenate([near, near, np.full(m, radius)])
         matrix = sp.csr_array((weight * volumes[column], (row, column)), shape=(m, m))
         return cls(matrix, volumes)

@@ -61,11 +61,11 @@ class FlatPart:
 
     def ends(self) -> FloatArray:
         """Points (k, 2) at which patches on the walls end, mm."""
-        walls = [shapely.line_merge(each.wall) for each in self.traces.values()]
+        walls = [shapely.line_merge(trace.wall) for trace in self.traces.values()]
         lines = shapely.get_parts(walls) if walls else []
         open_ = [line for line in lines if not line.is_empty and not line.is_closed]
-        found = [shapely.get_coordinates(line)[[0, -1]] for line in open_]
-        return np.concatenate([np.zeros((0, 2)), *found])
+        ends = [shapely.get_coordinates(line)[[0, -1]] for line in open_]
+        return np.concatenate([np.zeros((0, 2)), *ends])
 
     def patches(self, mesh: TetMesh) -> dict[str, IntArray]:
         """Patches of another mesh of this planform, or of a piece of it, as high as this part.
@@ -77,7 +77,7 @@ class FlatPart:
         _, normal = mesh.facet_areas(facets)
         upright = np.abs(normal[:, 2]) < 0.5
         plane = mesh.points[facets][..., :2]
-        found = {}
+        patches = {}
         for name, trace in self.traces.items():
             chosen = upright & _all_on(plane, trace.wall, self.tolerance)
             for area, way in zip(trace.faces, (-1.0, 1.0), strict=True):
@@ -85,8 +85,8 @@ class FlatPart:
                     x, y = plane.mean(axis=1).T
                     chosen |= (way * normal[:, 2] > 0.5) & shapely.contains_xy(area, x, y)
             if chosen.any():
-                found[name] = facets[chosen]
-        return found
+                patches[name] = facets[chosen]
+        return patches
 
 
 def _all_on(plane: FloatArray, line: Any, off: float) -> BoolArray:

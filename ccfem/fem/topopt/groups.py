@@ -54,9 +54,9 @@ class CellGroups:
             raise InputError(
                 f"{name} must have shape {self.member.shape}, one entry a cell; got {values.shape}"
             )
-        found = values[self.first]
-        if (found[self.member] != values).any():
+        reduced = values[self.first]
+        if (reduced[self.member] != values).any():
             raise InputError(
                 f"{name} must be the same in all cells of a group: give each group one value"
             )
-        return found
+        return reduced

@@ -128,9 +128,9 @@ def optimality_criteria(
     least, most = np.log(largest) - 18.5, np.log(largest) + 18.5
     for _ in range(60):
         middle = 0.5 * (least + most)
-        found = np.minimum(high, np.maximum(low, root * np.exp(-middle)))
-        excess = float(volume @ found) - target
+        density_at = np.minimum(high, np.maximum(low, root * np.exp(-middle)))
+        excess = float(volume @ density_at) - target
         if abs(excess) <= 1e-9 * target:
             break
         least, most = (middle, most) if excess > 0.0 else (least, middle)
-    return found
+    return density_at

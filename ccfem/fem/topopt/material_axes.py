@@ -57,12 +57,12 @@ def harmonics(material: FloatArray) -> FloatArray:
     def turned(angle: FloatArray) -> FloatArray:
         return rotate_stiffness(material, axes_about_z(angle))
 
-    found = fitted_harmonics(turned)
+    fitted = fitted_harmonics(turned)
     other = np.array([0.3, 1.9])
-    missed = turned(other) - np.tensordot(turned_by(other), found, axes=1)
+    missed = turned(other) - np.tensordot(turned_by(other), fitted, axes=1)
     if np.abs(missed).max() > 1e-9 * np.abs(material).max():
         raise InputError(
             "a material whose axis turns about z must be symmetric about the x-y plane: "
             "give one with an axis of symmetry along z"
         )
-    return found
+    return fitted

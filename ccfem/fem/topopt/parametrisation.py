@@ -116,8 +116,8 @@ class Parametrisation:
 
     def _by_variables(self, by_density: FloatArray) -> FloatArray:
         """Gradient (g,) by the variables from that by the densities: the chain rule."""
-        own = np.where(self.free, by_density, 0.0)
-        return self.cone.transposed(own) if self.parameters.filter == "density" else own
+        by_free = np.where(self.free, by_density, 0.0)
+        return self.cone.transposed(by_free) if self.parameters.filter == "density" else by_free
 
     def sensitivities(
         self, variables: FloatArray, density: FloatArray, energy: FloatArray

@@ -143,7 +143,7 @@ def plate_outline(
     raster = raster_image(plate.mesh, design.density)
     if domain is not None:
         domain = shapely.transform(domain, lambda points: points - raster.origin)
-    found = outline(
+    shape = outline(
         raster.image,
         raster.size,
         volume_fraction,
@@ -153,7 +153,7 @@ def plate_outline(
         _anchors(plate, design.density) - raster.origin,
         apart=design.apart,
     )
-    return shapely.transform(found, lambda points: points + raster.origin)
+    return shapely.transform(shape, lambda points: points + raster.origin)
 
 
 def _anchors(plate: PlaneProblem, density: FloatArray) -> FloatArray:
@@ -162,7 +162,7 @@ def _anchors(plate: PlaneProblem, density: FloatArray) -> FloatArray:
     dense = np.zeros(len(mesh.points))
     np.maximum.at(dense, mesh.cells, density[:, None])
     patches = [np.unique(mesh.patch(name)) for name in plate.held_or_loaded]
-    nodes = [own[dense[own].argmax()] for own in patches]
+    nodes = [nodes_of_patch[dense[nodes_of_patch].argmax()] for nodes_of_patch in patches]
     for load in (load for case in plate.loads.values() for load in case):
         if isinstance(load, PointForce):
             nodes.append(mesh.nearest_nodes(load.point[:2])[0])
@@ -302,14 +302,14 @@ class Walls:
     def _along(self, plate: PlaneMesh, edges: IntArray) -> BoolArray:
         """Walls (w,) that are nearest to edges (k, 2) of all edges of the plate, and face them."""
         boundary, reach = plate.boundary, _REACH * self.pixel
-        own = are_among(boundary, edges)
+        held = are_among(boundary, edges)
         tree = shapely.STRtree(shapely.linestrings(plate.points[boundary]))
         middles = shapely.points(self.middle)
         (wall, edge), distance = tree.query_nearest(middles, return_distance=True)
         nearest = np.zeros(len(middles), dtype=bool)
-        nearest[wall[own[edge] & (distance <= reach)]] = True
+        nearest[wall[held[edge] & (distance <= reach)]] = True
         wall, edge = tree.query(middles, predicate="dwithin", distance=reach)
-        wall, edge = wall[own[edge]], edge[own[edge]]
+        wall, edge = wall[held[edge]], edge[held[edge]]
         along = plate.points[boundary[edge, 1]] - plate.points[boundary[edge, 0]]
         outward = np.zeros((len(middles), 2))
         np.add.at(outward, wall, along @ np.array([[0.0, -1.0], [1.0, 0.0]]))

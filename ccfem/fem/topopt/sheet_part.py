@@ -80,7 +80,7 @@ def sheet_problem(
         for name, side in zip(_FACES, ("min", "max"), strict=True)
     }
     broad = np.broadcast_to(sheet(stiffness), (len(mesh.cells), 6, 6))
-    supports = tuple(each for each in problem.supports if not _only_across(each, flat))
+    supports = tuple(support for support in problem.supports if not _only_across(support, flat))
     return (
         replace(
             problem,
@@ -146,7 +146,7 @@ def sheet_outline(design: Design, flat: FlatPart, edge_length: float, solid: Any
             image = 0.5 * (image + other)
     domain = shapely.difference(flat.planform, void)
     shift = shapely.transform(domain, lambda points: points - origin)
-    keep = [node for own in _anchors(problem) for node in own[[dense[own].argmax()]]]
+    keep = [node for anchor in _anchors(problem) for node in anchor[[dense[anchor].argmax()]]]
     region = outline(
         np.where(inside, image, 0.0),
         edge_length,

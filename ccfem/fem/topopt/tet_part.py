@@ -72,12 +72,12 @@ def volume_above(mesh: TetMesh, values: FloatArray, level: float) -> float:
     share = (count == 4).astype(np.float64)
     a, b, c, d = off.T
     with np.errstate(divide="ignore", invalid="ignore"):
-        one = a**3 / ((a - b) * (a - c) * (a - d))
+        corner = a**3 / ((a - b) * (a - c) * (a - d))
         three = 1.0 + d**3 / ((a - d) * (b - d) * (c - d))
         # Two of three corners, by the prism that is left of the tetrahedron.
         x, y, z, w = a / (a - c), a / (a - d), b / (b - c), b / (b - d)
         two = x * y + z * w * (1.0 - x) + (1.0 - y) * x * w
-    for chosen, part in ((1, one), (2, two), (3, three)):
+    for chosen, part in ((1, corner), (2, two), (3, three)):
         share[count == chosen] = part[count == chosen]
     return float(mesh.volumes @ share)
 
@@ -110,8 +110,8 @@ def cut_mesh(mesh: TetMesh, values: FloatArray, level: float) -> CutMesh:
     cells[turned] = cells[turned][:, [0, 2, 1, 3]]
     used, number = np.unique(cells, return_inverse=True)
     kept = TetMesh(points[used], number.reshape(-1, 4))
-    own = np.repeat(np.arange(n)[:, None], 2, axis=1)
-    facet = _facets(mesh, np.concatenate([own, ends])[used][kept.boundary])
+    ends_of_node = np.repeat(np.arange(n)[:, None], 2, axis=1)
+    facet = _facets(mesh, np.concatenate([ends_of_node, ends])[used][kept.boundary])
     patches = {}
     for name, facets in mesh.patches.items():
         chosen = are_among(mesh.boundary, facets)
@@ -334,8 +334,8 @@ def _surface_pairs(cut: CutMesh) -> IntArray:
     Nodes of the cut follow neighbours on the cut only, so that its rim stays sharp.
     """
     sides = cut.mesh.boundary[:, [[0, 1], [1, 2], [2, 0]]]
-    own, rest = _both_ways(sides[cut.facet < 0]), _both_ways(sides[cut.facet >= 0])
-    return np.concatenate([own, rest[~np.isin(rest[:, 0], own[:, 0])]])
+    cut_sides, rest = _both_ways(sides[cut.facet < 0]), _both_ways(sides[cut.facet >= 0])
+    return np.concatenate([cut_sides, rest[~np.isin(rest[:, 0], cut_sides[:, 0])]])
 
 
 def _mean(pairs: IntArray, n: int) -> sp.csr_array:
@@ -366,9 +366,9 @@ def _patch_ends(mesh: TetMesh, border: IntArray) -> BoolArray:
     """Nodes (n,) where facets (b, 3) inside and outside a patch meet."""
     ends = np.zeros(len(mesh.points), dtype=bool)
     for facets in mesh.patches.values():
-        own = are_among(border, facets)
+        in_patch = are_among(border, facets)
         inside, outside = np.zeros((2, len(mesh.points)), dtype=bool)
-        inside[border[own]], outside[border[~own]] = True, True
+        inside[border[in_patch]], outside[border[~in_patch]] = True, True
         ends |= inside & outside
     return ends
 

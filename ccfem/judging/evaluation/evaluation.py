@@ -163,11 +163,11 @@ def evaluate(
 
     samples = in_threads(sampled, layers)
     basis = Basis(machine, _material(layers, stress, machine, strand or Strand()))
-    rows = [_indices(each, basis) for each in (*samples, _pooled(samples))]
+    rows = [_indices(sample, basis) for sample in (*samples, _pooled(samples))]
     return Evaluation(
         np.array([layer.index for layer in layers]),
         {column.name: np.array([row[column.name] for row in rows]) for column in COLUMNS},
-        tuple(FibreSamples(each["curvature"], each["alignment"]) for each in samples),
+        tuple(FibreSamples(sample["curvature"], sample["alignment"]) for sample in samples),
     )
 
 
@@ -239,7 +239,7 @@ def _in_space(paths: PlanePaths) -> Toolpaths:
 
 def _pooled(samples: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Join the samples of all layers."""
-    return {name: pool([each[name] for each in samples]) for name in samples[0]}
+    return {name: pool([sample[name] for sample in samples]) for name in samples[0]}
 
 
 def _material(

@@ -45,10 +45,10 @@ def open_places(paths: PlanePaths, width: float) -> OpenPlaces:
     width : float, mm
         Fibre width W. Strands cover half of it to both sides, and nothing beyond their ends.
     """
-    section, laid = paths.layer.plane.polygon, paths.in_part
+    section, in_part = paths.layer.plane.polygon, paths.in_part
     lines = [
-        shapely.LineString(laid.points[a:b])
-        for a, b in zip(laid.offsets[:-1], laid.offsets[1:], strict=True)
+        shapely.LineString(in_part.points[a:b])
+        for a, b in zip(in_part.offsets[:-1], in_part.offsets[1:], strict=True)
         if b - a > 1
     ]
     lines = [shapely.simplify(line, _FINE * width) for line in lines]
@@ -59,13 +59,13 @@ def open_places(paths: PlanePaths, width: float) -> OpenPlaces:
     wide = shapely.intersection(shapely.buffer(shapely.buffer(rest, -disc), disc), rest)
     parts = [part for part in shapely.get_parts(wide) if part.area > 0.0]
     inside = [shapely.get_coordinates(shapely.point_on_surface(part))[0] for part in parts]
-    found = [
+    places = [
         OpenPlace(float(x), float(y), float(part.area))
         for (x, y), part in zip(inside, parts, strict=True)
     ]
-    share = float(sum(place.area for place in found)) / float(section.area)
+    share = float(sum(place.area for place in places)) / float(section.area)
     return OpenPlaces(
         float(np.maximum(rest.area / section.area - share, 0.0)),
         share,
-        tuple(sorted(found, key=lambda place: -place.area)),
+        tuple(sorted(places, key=lambda place: -place.area)),
     )

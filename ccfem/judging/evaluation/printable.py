@@ -48,16 +48,16 @@ def why_not(total: Mapping[str, float], machine: Machine) -> tuple[str, ...]:
         Each names what was found and what the machine tolerates. An index that is NaN, as without
         fibre, breaks no limit.
     """
-    found = _bounded_values(total)
+    reasons = _bounded_values(total)
     broken = []
     for rule in _RULES:
-        value, limit = found[rule.limit], getattr(machine.limits, rule.limit)
+        value, limit = reasons[rule.limit], getattr(machine.limits, rule.limit)
         if value > limit:
             said = rule.words.format(found=rule.pattern.format(value), machine=machine)
             excess = value / limit if limit > 0.0 else float("inf")
             broken.append((-excess, f"{said} (limit {rule.pattern.format(limit)})"))
-    if found["order"] > 0.0:
-        said = f"{found['order']:.0f} paths come after one of a higher layer"
+    if reasons["order"] > 0.0:
+        said = f"{reasons['order']:.0f} paths come after one of a higher layer"
         broken.append((-float("inf"), said))
     # Flat layers may be thick: matrix fills them in several lines.
     thick = total["thickness_95"]

@@ -42,7 +42,9 @@ def printed(layers: Sequence[Layer], build: Sequence[float] | None = None) -> Pr
         return None
     stack = sorted(layers, key=lambda layer: layer.index)
     points = [np.concatenate([k.points, k.points[k.triangles].mean(axis=1)]) for k in stack]
-    index = np.repeat([layer.index for layer in stack], [len(each) for each in points])
+    index = np.repeat(
+        [layer.index for layer in stack], [len(layer_points) for layer_points in points]
+    )
     every = np.concatenate(points)
     # Keep the point of each cube that is printed first.
     _, first = np.unique(np.floor(every / COARSE).astype(np.int64), axis=0, return_index=True)

@@ -161,7 +161,7 @@ def _reduced(specimen: Specimen, held: Held) -> sp.bsr_array:
 def _mixed(matrix: Reinforced, forces: FloatArray, known: Sequence[FloatArray]) -> FloatArray:
     """Mixture of displacements (n, 3), by shares that add to 1, of least energy for a matrix."""
     last = known[-1]
-    moves = np.array([(each - last).reshape(-1) for each in known[:-1]])
+    moves = np.array([(state - last).reshape(-1) for state in known[:-1]])
     images = np.array([matrix @ move for move in moves])
     rest = forces.reshape(-1) - matrix @ last.reshape(-1)
     shares = np.linalg.lstsq(moves @ images.T, moves @ rest, rcond=1e-12)[0]

@@ -118,8 +118,8 @@ class Curve:
 
 def _line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
     """Slope and start of a line that up to a quarter of the points may miss (Theil and Sen)."""
-    found = theilslopes(y, x) if np.ptp(x) > 0.0 else (0.0, float(np.median(y)))
-    return float(found[0]), float(found[1])
+    fitted = theilslopes(y, x) if np.ptp(x) > 0.0 else (0.0, float(np.median(y)))
+    return float(fitted[0]), float(fitted[1])
 
 
 def read_curve(path: str | Path) -> Curve:
@@ -162,14 +162,14 @@ def read_curve(path: str | Path) -> Curve:
 
 def _column(names: list[str], kind: str, path: Path) -> tuple[int, float]:
     """Index of the column of a kind, and the factor from its unit to mm or N."""
-    found = [k for k, name in enumerate(names) if name.strip().lower().startswith(kind)]
-    if len(found) != 1:
+    columns = [k for k, name in enumerate(names) if name.strip().lower().startswith(kind)]
+    if len(columns) != 1:
         raise InputError(
             f"{path}: expected one column named {kind}; got {', '.join(names)}: name the columns "
             "displacement and force, with a unit if not mm and N"
         )
-    unit = names[found[0]].strip().lower()[len(kind) :].strip(" _[]()/")
+    unit = names[columns[0]].strip().lower()[len(kind) :].strip(" _[]()/")
     if unit not in _UNITS[kind]:
         known = ", ".join(u for u in _UNITS[kind] if u)
         raise InputError(f"{path}: {kind} has unit '{unit}'; known are {known}: convert it")
-    return found[0], _UNITS[kind][unit]
+    return columns[0], _UNITS[kind][unit]

@@ -144,8 +144,8 @@ def layer_normals(layers: Sequence[Layer], places: FloatArray) -> FloatArray:
     normal = np.concatenate([layer.normals for layer in layers])[area]
     middle = np.concatenate([layer.points[layer.triangles].mean(axis=1) for layer in layers])[area]
     _, near = cKDTree(middle).query(places, k=min(_NEAREST, len(middle)))
-    found = normal[near.reshape(len(places), -1)]
-    return np.asarray(np.linalg.eigh(np.einsum("kni,knj->kij", found, found))[1][:, :, -1])
+    normals = normal[near.reshape(len(places), -1)]
+    return np.asarray(np.linalg.eigh(np.einsum("kni,knj->kij", normals, normals))[1][:, :, -1])
 
 
 def _about_ball(mesh: TetMesh, radius: float) -> str:

@@ -76,7 +76,7 @@ def nearness(
     factors : mapping of key to float
         Index over norm when last computed. Peaks without a factor, or with 0, do not count.
     """
-    known = {key: factors.get(key, 0.0) * one.norm for key, one in peaks.items()}
+    known = {key: factors.get(key, 0.0) * peak.norm for key, peak in peaks.items()}
     logs = {key: float(np.log(index)) for key, index in known.items() if index > 0.0}
     largest = max(logs.values())
     terms = {key: float(np.exp(_BETWEEN * (log - largest))) for key, log in logs.items()}
@@ -239,12 +239,12 @@ class MatrixPeaks:
         normal : (3,) array, optional
             Of all layers.
         """
-        found = {} if fibre is None else {"fibre": fibre}
-        found["matrix"] = self.matrix(displacement, limits.matrix)
+        peaks = {} if fibre is None else {"fibre": fibre}
+        peaks["matrix"] = self.matrix(displacement, limits.matrix)
         if limits.bond is not None and normal is not None:
             bond = self.bond(displacement, normal, limits.bond)
-            found |= {} if bond is None else {"interlayer": bond}
-        return found
+            peaks |= {} if bond is None else {"interlayer": bond}
+        return peaks
 
     def _stress(self, displacement: FloatArray) -> FloatArray:
         strain = cell_strain(self.part.mesh, displacement)

@@ -78,13 +78,13 @@ def specimens(cases: WeightedCases, backend: str = "auto") -> tuple[Specimen, ..
         As `Specimen.of`.
     """
     leaders: dict[int, Specimen] = {}
-    found = []
+    parts = []
     for field in cases.fields:
         leader = leaders.get(id(field.problem))
-        own = Specimen.of(field, backend) if leader is None else leader.under(field)
-        leaders.setdefault(id(field.problem), own)
-        found.append(own)
-    return tuple(found)
+        specimen = Specimen.of(field, backend) if leader is None else leader.under(field)
+        leaders.setdefault(id(field.problem), specimen)
+        parts.append(specimen)
+    return tuple(parts)
 
 
 def virtual_tests(
@@ -117,14 +117,14 @@ def virtual_tests(
     SolveError
         When a solve misses its tolerance.
     """
-    each = specimens(parts) if isinstance(parts, WeightedCases) else tuple(parts)
+    specimens_of_cases = specimens(parts) if isinstance(parts, WeightedCases) else tuple(parts)
     if isinstance(fibres, Toolpaths):
-        fibres = cut_strands(fibres, each[0].unreinforced.mesh, machine=machine)
-    near = [()] * len(each) if known is None else [(one,) for one in known]
+        fibres = cut_strands(fibres, specimens_of_cases[0].unreinforced.mesh, machine=machine)
+    near = [()] * len(specimens_of_cases) if known is None else [(one,) for one in known]
     return CasesTest(
         tuple(
             virtual_test(fibres, one, strand, mode, (), known=start, tolerance=tolerance)
-            for one, start in zip(each, near, strict=True)
+            for one, start in zip(specimens_of_cases, near, strict=True)
         )
     )
 
@@ -139,6 +139,10 @@ def cases_failure(
 
     Parameters and errors as in `first_failure`.
     """
-    each = tuple(first_failure(one, strand, matrix_strength, layers) for one in tested.tests)
-    factors = tuple(one.load / test.force for one, test in zip(each, tested.tests, strict=True))
-    return CasesFailure(each, factors, tested.names[int(np.argmin(factors))])
+    failures = tuple(
+        first_failure(failure, strand, matrix_strength, layers) for failure in tested.tests
+    )
+    factors = tuple(
+        failure.load / test.force for failure, test in zip(failures, tested.tests, strict=True)
+    )
+    return CasesFailure(failures, factors, tested.names[int(np.argmin(factors))])

@@ -58,8 +58,8 @@ class Specimen:
             backend = unreinforced.record.backend
         if backend not in known:
             known[backend] = cls._made(unreinforced, backend)
-        found: Specimen = known[backend]
-        return found
+        specimen: Specimen = known[backend]
+        return specimen
 
     @classmethod
     def _made(cls, unreinforced: StressField, backend: str) -> "Specimen":
@@ -89,8 +89,8 @@ class Specimen:
             if np.array_equal(made.held.free, self.held.free):
                 made.__dict__["solver"] = self.solver
             known[self.backend] = made
-        found: Specimen = known[self.backend]
-        return found
+        specimen: Specimen = known[self.backend]
+        return specimen
 
     @cached_property
     def solver(self) -> Solver:

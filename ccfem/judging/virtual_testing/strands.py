@@ -241,8 +241,8 @@ def _tables(mesh: TetMesh) -> tuple[Any, ...]:
     if "cut_tables" not in known:
         across = np.ascontiguousarray(mesh.across)
         known["cut_tables"] = (*_barycentric(mesh), across, *_grid(mesh))
-    found: tuple[Any, ...] = known["cut_tables"]
-    return found
+    tables: tuple[Any, ...] = known["cut_tables"]
+    return tables
 
 
 def _barycentric(mesh: TetMesh) -> tuple[FloatArray, FloatArray]:
@@ -276,7 +276,7 @@ def _cut(  # type: ignore[no-untyped-def]
     tested.
     """
     count, last = 0, -1
-    found = np.empty(len(origin), dtype=np.int64)
+    cells_met = np.empty(len(origin), dtype=np.int64)
     ends = np.empty(2 * len(origin) + 1)
     point, leap, middle = np.empty(3), np.empty(3), np.empty(3)
     for s in range(len(start)):
@@ -288,17 +288,17 @@ def _cut(  # type: ignore[no-untyped-def]
                 leap[i] = (t1 - t0) * step[s, i]
             passed = 0
             if last >= 0:
-                passed = _walk(point, leap, last, origin, gradient, across, found, ends)
+                passed = _walk(point, leap, last, origin, gradient, across, cells_met, ends)
             u0 = 0.0
             for e in range(passed):
                 begin, end = t0 + u0 * (t1 - t0), t0 + ends[e] * (t1 - t0)
-                u0, last = ends[e], found[e]
+                u0, last = ends[e], cells_met[e]
                 count = _write(whole, real, count, s, last, begin, end)
             if passed:
                 continue
             number, size = _touching(
-                point, leap, origin, gradient, first, spacing, shape, offsets, candidates, found,
-                ends,
+                point, leap, origin, gradient, first, spacing, shape, offsets, candidates,
+                cells_met, ends,
             )  # fmt: skip
             u0 = 0.0
             for e in range(size):
@@ -308,23 +308,23 @@ def _cut(  # type: ignore[no-untyped-def]
                 for i in range(3):
                     middle[i] = point[i] + 0.5 * (u0 + u1) * leap[i]
                 number = _complete(
-                    middle, origin, gradient, first, spacing, shape, offsets, candidates, found,
+                    middle, origin, gradient, first, spacing, shape, offsets, candidates, cells_met,
                     number,
                 )  # fmt: skip
                 sharing = 0
                 for f in range(number):
-                    if _least(middle, origin, gradient, found[f]) >= -_TOUCH:
-                        found[sharing], found[f] = found[f], found[sharing]
+                    if _least(middle, origin, gradient, cells_met[f]) >= -_TOUCH:
+                        cells_met[sharing], cells_met[f] = cells_met[f], cells_met[sharing]
                         sharing += 1
                 begin, end = t0 + u0 * (t1 - t0), t0 + u1 * (t1 - t0)
                 u0 = u1
                 if sharing == 1:
-                    last = found[0]
+                    last = cells_met[0]
                     count = _write(whole, real, count, s, last, begin, end)
                     continue
                 for f in range(sharing):
                     if count < len(whole):
-                        whole[count, 0], whole[count, 1] = s, found[f]
+                        whole[count, 0], whole[count, 1] = s, cells_met[f]
                         real[count, 0], real[count, 1] = begin, end
                         real[count, 2] = 1.0 / sharing
                     count += 1
@@ -348,14 +348,14 @@ def _write(whole, real, count, segment, cell, begin, end):  # type: ignore[no-un
 
 
 @njit(cache=True)
-def _walk(point, step, cell, origin, gradient, across, found, ends):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _walk(point, step, cell, origin, gradient, across, cells_met, ends):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Write the cells that a step passes, and where it leaves each; return the number of cells.
 
     The number is 0 where the step comes near an edge, runs along a face, or leaves the mesh.
     """
     value, slope = np.empty(4), np.empty(4)  # of the barycentric coordinates, the first one last
     number, here = 0, 0.0
-    for _ in range(len(found)):
+    for _ in range(len(cells_met)):
         value[3], slope[3] = 1.0, 0.0
         for i in range(3):
             a, b = 0.0, 0.0
@@ -387,7 +387,7 @@ def _walk(point, step, cell, origin, gradient, across, found, ends):  # type: ig
         if counts:
             if number:
                 ends[number - 1] = min(here, begin)
-            found[number], ends[number] = cell, end
+            cells_met[number], ends[number] = cell, end
             number += 1
             here = end
         if leaves < 0 or 1.0 - end < _SLIVER:
@@ -413,11 +413,11 @@ def _least(point, origin, gradient, cell):  # type: ignore[no-untyped-def]  # pr
 
 @njit(cache=True)
 def _complete(  # type: ignore[no-untyped-def]
-    point, origin, gradient, first, spacing, shape, offsets, candidates, found, number
+    point, origin, gradient, first, spacing, shape, offsets, candidates, cells_met, number
 ):  # pragma: no cover
     """Add the cells that hold a point where rounding hid all of them; return the new number."""
     for f in range(number):
-        if _least(point, origin, gradient, found[f]) >= -_TOUCH:
+        if _least(point, origin, gradient, cells_met[f]) >= -_TOUCH:
             return number
     box = 0
     for i in range(3):
@@ -427,14 +427,14 @@ def _complete(  # type: ignore[no-untyped-def]
         box = box * shape[i] + at
     for c in range(offsets[box + 1] - 1, offsets[box] - 1, -1):
         if _least(point, origin, gradient, candidates[c]) >= -_TOUCH:
-            found[number] = candidates[c]
+            cells_met[number] = candidates[c]
             number += 1
     return number
 
 
 @njit(cache=True)
 def _touching(  # type: ignore[no-untyped-def]
-    point, step, origin, gradient, first, spacing, shape, offsets, candidates, found, ends
+    point, step, origin, gradient, first, spacing, shape, offsets, candidates, cells_met, ends
 ):  # pragma: no cover
     """Cells that a step touches, and the sorted parameters of entry and exit, with 1."""
     low = np.empty(3, dtype=np.int64)
@@ -455,10 +455,10 @@ def _touching(  # type: ignore[no-untyped-def]
                     u0, u1 = _inside(point, step, origin, gradient, cell)
                     known = u1 - u0 < _SLIVER
                     for f in range(number):
-                        known = known or found[f] == cell
+                        known = known or cells_met[f] == cell
                     if known:
                         continue
-                    found[number] = cell
+                    cells_met[number] = cell
                     number += 1
                     for u in (u0, u1):
                         at = size

@@ -109,25 +109,25 @@ def first_failure(
     fibre_index, fibre_at = fibre_peak(test)
     matrix_load = test.force * limits.matrix / matrix_index
     fibre_load = test.force * limits.fibre / fibre_index if fibre_index > 0.0 else np.inf
-    found = _between(test.solution, layers)
+    bond = _between(test.solution, layers)
     zones: tuple[float, ...] = ()
-    if isinstance(found, Interlayer):
-        zones = tuple(test.force / f if f > 0.0 else np.inf for f in found.zone_indices)
+    if isinstance(bond, Interlayer):
+        zones = tuple(test.force / f if f > 0.0 else np.inf for f in bond.zone_indices)
     failures = [("matrix", matrix_load, matrix_at), ("fibre", fibre_load, fibre_at)]
-    failures += [("interlayer", zones[0], found.where)] if isinstance(found, Interlayer) else []
+    failures += [("interlayer", zones[0], bond.where)] if isinstance(bond, Interlayer) else []
     what, load, where = min(failures, key=lambda failure: failure[1])
     first = FirstFailure(load, what, where, matrix_load, fibre_load, matrix_index, fibre_index)
-    if not isinstance(found, Interlayer):
-        return replace(first, note=found)
+    if not isinstance(bond, Interlayer):
+        return replace(first, note=bond)
     return replace(
         first,
         interlayer_load=zones[0],
-        interlayer_index=found.index,
-        interlayer_where=found.where,
-        opening=found.opening,
-        sliding=found.sliding,
+        interlayer_index=bond.index,
+        interlayer_where=bond.where,
+        opening=bond.opening,
+        sliding=bond.sliding,
         interlayer_zones=zones,
-        note=found.note,
+        note=bond.note,
     )
 
 

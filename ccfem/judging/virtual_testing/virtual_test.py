@@ -143,16 +143,16 @@ def virtual_test(
     before = specimen.unreinforced
     axial = (Strand() if strand is None else strand).stiffness(specimen.modulus)
     started = perf_counter()
-    found = equilibrium(specimen, strands, axial, mode, known, tolerance)
+    balanced = equilibrium(specimen, strands, axial, mode, known, tolerance)
     record = SolveRecord(
         backend=specimen.solver.backend,
-        iterations=found.iterations,
-        residual=found.residual,
+        iterations=balanced.iterations,
+        residual=balanced.residual,
         assembly_seconds=0.0,
         solve_seconds=perf_counter() - started,
         unknowns=before.record.unknowns,
     )
-    after = specimen.system.field(before.case, found.displacement, found.matrix, record)
+    after = specimen.system.field(before.case, balanced.displacement, balanced.matrix, record)
     unreinforced = specimen.stiffness(before.displacement, before.strain_energy)
     ratios, known = [], [before.displacement]
     for rho in span:
@@ -161,13 +161,13 @@ def virtual_test(
             strands,
             rho * specimen.modulus,
             mode,
-            known=[*known, found.displacement],
+            known=[*known, balanced.displacement],
             tolerance=_SPAN_TOLERANCE,
         )
         known.append(other.displacement)
         stiffness = specimen.stiffness(other.displacement, 0.5 * other.work)
         ratios.append((float(rho), stiffness / unreinforced))
-    force = np.where(found.carries, axial * found.strain, 0.0)
+    force = np.where(balanced.carries, axial * balanced.strain, 0.0)
     return VirtualTest(
         mode=mode,
         rho=axial / specimen.modulus,
@@ -175,12 +175,12 @@ def virtual_test(
         solution=after,
         strands=strands,
         axial_force=force,
-        fibre_energy=0.5 * float(np.vdot(force * strands.length * strands.share, found.strain)),
+        fibre_energy=0.5 * float(np.vdot(force * strands.length * strands.share, balanced.strain)),
         force=specimen.force(after.reactions),
         stiffness=specimen.stiffness(after.displacement, after.strain_energy),
         unreinforced_stiffness=unreinforced,
         span=tuple(ratios),
-        updates=found.updates,
+        updates=balanced.updates,
     )
 
 

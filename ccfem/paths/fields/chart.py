@@ -63,9 +63,9 @@ class Chart:
         """Images (n, 3) in the chart of points (n, 3) on the layer, mm."""
         if not len(points):
             return np.zeros((0, 3))
-        found = nearest_on_triangles(self.layer.points, self.layer.triangles, points)
-        corners = self.flat.points[self.layer.triangles[found.triangle]]
-        return np.asarray(np.einsum("qk,qkd->qd", found.weights, corners))
+        nearest = nearest_on_triangles(self.layer.points, self.layer.triangles, points)
+        corners = self.flat.points[self.layer.triangles[nearest.triangle]]
+        return np.asarray(np.einsum("qk,qkd->qd", nearest.weights, corners))
 
     def flattened(self, paths: Toolpaths) -> Toolpaths:
         """Images in the chart of paths on the layer."""
@@ -90,11 +90,11 @@ class Chart:
         near : (s,) bool array
             Mask of these pieces.
         """
-        found = nearest_on_triangles(self.layer.points, self.layer.triangles, middle)
-        near = found.distance < _ON
-        triangle = found.triangle[near]
+        nearest = nearest_on_triangles(self.layer.points, self.layer.triangles, middle)
+        near = nearest.distance < _ON
+        triangle = nearest.triangle[near]
         corners = self.flat.points[self.layer.triangles[triangle]]
-        points = np.einsum("qk,qkd->qd", found.weights[near], corners)
+        points = np.einsum("qk,qkd->qd", nearest.weights[near], corners)
         assert self.flat.turns is not None
         return points, np.einsum("qij,qj->qi", self.flat.turns[triangle], tangent[near]), near
 
@@ -106,8 +106,8 @@ class Chart:
         triangle, weights = locate(self.flat.points[:, :2], self.layer.triangles, flat[:, :2])
         left = np.flatnonzero(triangle < 0)
         if len(left):
-            found = nearest_on_triangles(self.flat.points, self.layer.triangles, flat[left])
-            triangle[left], weights[left] = found.triangle, found.weights
+            nearest = nearest_on_triangles(self.flat.points, self.layer.triangles, flat[left])
+            triangle[left], weights[left] = nearest.triangle, nearest.weights
         corners = self.layer.triangles[triangle]
         points = np.einsum("qk,qkd->qd", weights, self.layer.points[corners])
         normals = np.einsum("qk,qkd->qd", weights, self.layer.point_normals[corners])
@@ -133,8 +133,8 @@ def chart_of(layer: Layer) -> Chart:
     known = vars(layer)
     if _CHART not in known:
         known[_CHART] = _flattened(layer)
-    found: Chart = known[_CHART]
-    return found
+    chart: Chart = known[_CHART]
+    return chart
 
 
 def flat_view(layer: Layer) -> Layer:
@@ -229,13 +229,13 @@ def _rigid(surface: Surface, image: FloatArray) -> tuple[FloatArray, FloatArray]
 
 def _rotations(surface: Surface, image: FloatArray) -> FloatArray:
     """Rotation (t, 2, 2) nearest to the map of each triangle."""
-    found: FloatArray = _nearest_rotations(surface.gradients, surface.triangles, image)
-    return found
+    rotations: FloatArray = _nearest_rotations(surface.gradients, surface.triangles, image)
+    return rotations
 
 
 @njit(cache=True, nogil=True)
 def _nearest_rotations(gradients, triangles, image):  # type: ignore[no-untyped-def]
-    found = np.empty((len(triangles), 2, 2))
+    rotations = np.empty((len(triangles), 2, 2))
     for t in range(len(triangles)):
         cosine, sine = 0.0, 0.0
         for i in range(3):
@@ -247,9 +247,9 @@ def _nearest_rotations(gradients, triangles, image):  # type: ignore[no-untyped-
             cosine, sine = cosine / size, sine / size
         else:
             cosine, sine = 1.0, 0.0
-        found[t, 0, 0], found[t, 0, 1] = cosine, -sine
-        found[t, 1, 0], found[t, 1, 1] = sine, cosine
-    return found
+        rotations[t, 0, 0], rotations[t, 0, 1] = cosine, -sine
+        rotations[t, 1, 0], rotations[t, 1, 1] = sine, cosine
+    return rotations
 
 
 def _along_axes(surface: Surface, image: FloatArray) -> FloatArray:

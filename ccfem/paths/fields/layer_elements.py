@@ -77,8 +77,8 @@ class Surface:
     @cached_property
     def areas(self) -> FloatArray:
         """Area of each triangle, (t,), mm^2; 0 where a chart inverts the triangle."""
-        own = np.arange(3 * len(self.triangles)).reshape(-1, 3)
-        return read_only(np.maximum(signed_areas(self._corners.reshape(-1, 2), own), 0.0))
+        corners = np.arange(3 * len(self.triangles)).reshape(-1, 3)
+        return read_only(np.maximum(signed_areas(self._corners.reshape(-1, 2), corners), 0.0))
 
     @cached_property
     def gradients(self) -> FloatArray:

@@ -86,8 +86,8 @@ def _lay(points, offsets, clearance, least_length, low, shape, head, keep):  # t
                     apart = along[p] - along[q]
                     if closed:
                         apart = min(apart, whole - apart)
-                    own = line[q] == k
-                    if not (own and apart < 3.0 * clearance):
+                    same = line[q] == k
+                    if not (same and apart < 3.0 * clearance):
                         dx, dy = points[p, 0] - points[q, 0], points[p, 1] - points[q, 1]
                         if dx * dx + dy * dy < clearance * clearance:
                             keep[p] = False

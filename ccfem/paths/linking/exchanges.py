@@ -88,10 +88,10 @@ def greedy_order(clusters: Clusters) -> IntArray:
     while free.any():
         chosen = int(cluster[np.flatnonzero(free)[np.argmin(value[free])]])
         order.append(chosen)
-        own = cluster == chosen
-        free[own] = False
-        leave = (value[own][:, None] + visit[np.ix_(own, own)]).min(axis=0)
-        value = (leave[:, None] + links[own]).min(axis=0)
+        members = cluster == chosen
+        free[members] = False
+        leave = (value[members][:, None] + visit[np.ix_(members, members)]).min(axis=0)
+        value = (leave[:, None] + links[members]).min(axis=0)
     return np.array([*order, final] if last >= 0 else order, dtype=np.int64)
 
 
@@ -245,13 +245,13 @@ def _along(order: IntArray, clusters: Clusters) -> IntArray:
     way: list[tuple[int, int]] = []
     value = np.where(np.arange(len(links)) == first, 0.0, np.inf if first >= 0 else 0.0)
     for k, c in enumerate(order):
-        own = slice(offsets[c], offsets[c + 1])
-        entered = int(offsets[c] + np.argmin(value[own] + behind[own]))
+        span = slice(offsets[c], offsets[c + 1])
+        entered = int(offsets[c] + np.argmin(value[span] + behind[span]))
         rest = np.where(np.arange(len(links)) == last, 0.0, np.inf if last >= 0 else 0.0)
         if k + 1 < len(order):
             following = slice(offsets[order[k + 1]], offsets[order[k + 1] + 1])
             rest = (links[:, following] + behind[following]).min(axis=1)
-        left = int(offsets[c] + np.argmin(visit[entered, own] + rest[own]))
+        left = int(offsets[c] + np.argmin(visit[entered, span] + rest[span]))
         way.append((entered, left))
         value = links[left]
     return np.array(way)

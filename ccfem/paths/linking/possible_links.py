@@ -82,8 +82,8 @@ def possible_links(
             lines, points, outward, ends, section, 0.5 * width, limit, turn_cost
         )
     if radius > 0.0:
-        found = smooth_links(lines, ends, limit, width, radius)
-        links += [Link(*link, smooth=True) for link in found]
+        smooth = smooth_links(lines, ends, limit, width, radius)
+        links += [Link(*link, smooth=True) for link in smooth]
         links = _without_folds(lines, links, radius)
     return links
 
@@ -304,9 +304,9 @@ def smooth_links(
     poses = np.array([_poses(lines[end // 2], int(end % 2), cuts, width) for end in ends])
     pairs = cKDTree(poses[:, 0, :2]).query_pairs(limit, output_type="ndarray")
     room = np.array([along_line(lines[end // 2])[-1] for end in ends])
-    found = _best(poses, pairs, cuts, room, radius, limit + cuts[-1])
+    cheapest = _best(poses, pairs, cuts, room, radius, limit + cuts[-1])
     links = []
-    for (a, b), (cost, turn, one, other) in zip(pairs, found, strict=True):
+    for (a, b), (cost, turn, one, other) in zip(pairs, cheapest, strict=True):
         if not np.isfinite(cost):
             continue
         start, end = poses[a, int(one)].copy(), poses[b, int(other)].copy()

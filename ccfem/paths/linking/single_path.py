@@ -136,11 +136,11 @@ def _leads(starts, goal, radius, grid, weights):  # type: ignore[no-untyped-def]
             for v in range(variants):
                 word_sizes(starts[a], goal[a, side, v], radius, sizes)
                 for k in range(6):
-                    found = curve_cost(
+                    total = curve_cost(
                         starts[a], WORDS[k], sizes[k], radius, grid, weights, cost[a, side, v]
                     )
-                    if found < cost[a, side, v]:
-                        cost[a, side, v] = found
+                    if total < cost[a, side, v]:
+                        cost[a, side, v] = total
                         word[a, side, v] = k
     return cost, word
 
@@ -168,9 +168,9 @@ def ring_cost(routes: RingRoutes) -> tuple[FloatArray, IntArray]:
                     for w in range(variants):
                         along = sense * (position[b, 1 - side, w] - position[a, side, v])
                         along -= length * np.floor(along / length)
-                        found = lead[a, side, v] + along + lead[b, 1 - side, w]
-                        if found < cost[a, b] - 1e-9:
-                            cost[a, b] = found
+                        total = lead[a, side, v] + along + lead[b, 1 - side, w]
+                        if total < cost[a, b] - 1e-9:
+                            cost[a, b] = total
                             way[a, b] = (side * variants + v) * variants + w
     return cost, way
 
@@ -248,12 +248,12 @@ class LinkedPath:
         stretches, left_out = runs(self.link), self.long_links(section, inside, over_void)
         starts = [0, *stretches[left_out, 1]]
         ends = [*stretches[left_out, 0], len(self.points) - 1]
-        found = []
+        parts = []
         for a, b in zip(starts, ends, strict=True):
             link = self.link[a : b + 1].copy()
             link[-1:] = False
-            found.append(LinkedPath(self.points[a : b + 1], link))
-        return found
+            parts.append(LinkedPath(self.points[a : b + 1], link))
+        return parts
 
     def long_links(self, section: Region, inside: float, over_void: float) -> BoolArray:
         """Whether each link has more than the given length, mm, in a section or over its voids."""
@@ -331,19 +331,19 @@ def link_tracks(
     tracks = [track for group in opened for track in group]
     network = _Network.between(tracks, np.array(closed), section, radius)
     offsets = np.concatenate([[0], np.cumsum([2 * len(group) for group in opened])])
-    cost, found = network.cost, []
+    cost, candidates = network.cost, []
     for _ in range(_TRIES):
         visits = _order(cost, offsets)
         path = _assembled(tracks, visits, network)
         long = np.flatnonzero(path.long_links(section, inside, over_void))
-        found.append((len(long), path))
+        candidates.append((len(long), path))
         if not len(long):
             break
         cost = cost.copy()
         left, entered = visits[long, 1], visits[long + 1, 0]
         cost[left, entered] += _AVOIDED
         cost[entered, left] += _AVOIDED
-    return min(found, key=lambda each: each[0])[1]
+    return min(candidates, key=lambda candidate: candidate[0])[1]
 
 
 def _clean(track: FloatArray) -> FloatArray:
@@ -363,19 +363,19 @@ def _opened(
     """
     aside = min(width, 2.0 * radius)
     gap = max(width, 1.1 * float(np.sqrt(aside * (4.0 * radius - aside))))
-    found: list[list[FloatArray]] = []
+    opened: list[list[FloatArray]] = []
     for group in groups:
         fixed = [track for track in group if not is_closed(track)]
         others = [*(track for other in groups if other is not group for track in other), *fixed]
         seam = np.concatenate([track[[0, -1]] for track in others]).mean(axis=0) if others else None
-        found.append([])
+        opened.append([])
         for track in group:
             if is_closed(track):
                 ring = ring_from(track, track[0] if seam is None else seam)
                 seam, length = ring[0], line_length(ring)
                 track = between(ring, 0.0, max(length - gap, 0.5 * length))
-            found[-1].append(track)
-    return found
+            opened[-1].append(track)
+    return opened
 
 
 class _Network(NamedTuple):
@@ -572,12 +572,12 @@ def _traced(best: FloatArray, clusters: Clusters) -> IntArray:
         raise InputError("there is no way through all clusters: some visit must be possible")
     way: list[tuple[int, int]] = []
     while True:
-        own = np.arange(offsets[cluster[left]], offsets[cluster[left] + 1])
+        nodes = np.arange(offsets[cluster[left]], offsets[cluster[left] + 1])
         done &= ~(1 << int(cluster[left]))
         if not done:
-            way.append((first if first >= 0 else int(own[np.argmin(visit[own, left])]), left))
+            way.append((first if first >= 0 else int(nodes[np.argmin(visit[nodes, left])]), left))
             return np.array(way[::-1])
-        through = best[done][:, None] + links[:, own] + visit[own, left]
+        through = best[done][:, None] + links[:, nodes] + visit[nodes, left]
         t, a = np.unravel_index(int(np.argmin(through)), through.shape)
-        way.append((int(own[a]), left))
+        way.append((int(nodes[a]), left))
         left = int(t)

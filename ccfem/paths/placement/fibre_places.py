@@ -131,7 +131,7 @@ class FibrePlaces:
         if self.between:
             said.append(f"{self.between} matrix layers between")
         for mode in ("only", "exclude"):
-            count = sum(one.mode == mode for one in self.regions)
+            count = sum(area.mode == mode for area in self.regions)
             if count:
                 said.append(f"{count} regions {mode}" if count > 1 else f"1 region {mode}")
         if self.covered:
@@ -198,15 +198,15 @@ class FibrePlaces:
         plane = layer.plane
         section = plane.polygon
         reach = float(np.abs(plane.points).max()) + 1.0
-        only = any(one.mode == "only" for one in self.regions)
-        found: Region = shapely.Polygon() if only else section
-        for one in sorted(self.regions, key=lambda one: (-one.priority, one.mode == "exclude")):
-            shape = one.shape.section(plane, mesh, reach)
-            if one.mode == "only":
-                found = shapely.union(found, shapely.intersection(shape, section))
+        only = any(area.mode == "only" for area in self.regions)
+        region: Region = shapely.Polygon() if only else section
+        for area in sorted(self.regions, key=lambda area: (-area.priority, area.mode == "exclude")):
+            shape = area.shape.section(plane, mesh, reach)
+            if area.mode == "only":
+                region = shapely.union(region, shapely.intersection(shape, section))
             else:
-                found = shapely.difference(found, shape)
-        return found
+                region = shapely.difference(region, shape)
+        return region
 
 
 def _slice(text: str) -> slice:
@@ -214,15 +214,15 @@ def _slice(text: str) -> slice:
     parts = [part.strip() for part in text.split(":")]
     try:
         numbers = [int(part) if part else None for part in parts]
-        found = slice(*numbers)
-        if len(parts) == 1 or found.step == 0:
+        chosen = slice(*numbers)
+        if len(parts) == 1 or chosen.step == 0:
             raise ValueError
     except (ValueError, TypeError):
         raise InputError(
             f"fibre.layers must be a range FIRST:END:STEP as '3:20:2', or a list; got '{text}': "
             'write "2:-2" or [0, 1, 2]'
         ) from None
-    return found
+    return chosen
 
 
 def _levels(layer: Layer, mesh: TetMesh) -> tuple[float, float, float]:
@@ -371,9 +371,9 @@ def _in_cells(points: FloatArray, cells: IntArray, mesh: TetMesh) -> tuple[IntAr
 def _patches(layer: Layer, points: FloatArray, border: IntArray) -> dict[str, IntArray]:
     """Edges of the new border that lie on each patch."""
     middle = shapely.points(layer.plane.project(points[border].mean(axis=1)))
-    found = {}
+    patches = {}
     for name, edges in layer.patches.items():
         lines = shapely.multilinestrings(shapely.linestrings(layer.plane.points[edges]))
         on_it = shapely.distance(middle, lines) < _CUT_SAME if len(edges) else np.zeros(len(border))
-        found[name] = border[np.asarray(on_it, dtype=bool)]
-    return found
+        patches[name] = border[np.asarray(on_it, dtype=bool)]
+    return patches

@@ -51,13 +51,13 @@ class InBox:
 
     def section(self, plane: Plane, mesh: TetMesh, reach: float) -> Region:
         """Section with a plane, in its coordinates."""
-        found: Region = shapely.box(-reach, -reach, reach, reach)
+        shape: Region = shapely.box(-reach, -reach, reach, reach)
         for axis in range(3):
             slope, offset = plane.frame[:2, axis], plane.height * float(plane.frame[2, axis])
             for sign, bound in ((1.0, self.lower[axis]), (-1.0, self.upper[axis])):
                 if np.isfinite(bound):
-                    found = _half(found, sign * slope, sign * (bound - offset), reach)
-        return found
+                    shape = _half(shape, sign * slope, sign * (bound - offset), reach)
+        return shape
 
 
 @dataclass(frozen=True)
@@ -91,8 +91,8 @@ class InCylinder:
         if abs(float(axis @ plane.frame[2])) > _ALONG:
             circle = shapely.Point(0.0, 0.0).buffer(self.radius, quad_segs=_ARC)
             inverse = np.linalg.inv(slope)
-            found: Region = shapely.transform(circle, lambda at: (at - start) @ inverse.T)
-            return found
+            shape: Region = shapely.transform(circle, lambda at: (at - start) @ inverse.T)
+            return shape
         # The axis lies along the plane, whose section is a strip: how high above it is fixed.
         over = plane.frame[2] @ (plane.height * plane.frame[2] - np.asarray(self.point))
         if abs(float(over)) >= self.radius:
@@ -126,20 +126,20 @@ class NearPatch:
         facets = mesh.points[mesh.patch(self.patch)[:, :3]]
         corners = plane.project(facets)
         level = facets @ plane.frame[2] - plane.height
-        found = []
+        shapes = []
         flat = np.ptp(level, axis=1) < 10.0**-_DIGITS
         low = flat & (np.abs(level[:, 0]) < self.within)
         for at in np.unique(level[low, 0].round(_DIGITS)).tolist():
             faces = shapely.polygons(corners[low & (np.abs(level[:, 0] - at) < 10.0**-_DIGITS)])
             far = float(np.sqrt(max(self.within**2 - at**2, 0.0)))
-            found.append(shapely.buffer(shapely.union_all(faces), far, quad_segs=_ARC))
+            shapes.append(shapely.buffer(shapely.union_all(faces), far, quad_segs=_ARC))
         for at in (self.within * np.sin(0.5 * np.pi * np.arange(-_CUTS, _CUTS + 1) / _CUTS))[1:-1]:
             ends = _cut(corners, level - float(at))
             if len(ends):
                 far = float(np.sqrt(self.within**2 - at**2))
                 lines = shapely.multilinestrings(shapely.linestrings(ends))
-                found.append(shapely.buffer(lines, far, quad_segs=_ARC))
-        return shapely.union_all(found)
+                shapes.append(shapely.buffer(lines, far, quad_segs=_ARC))
+        return shapely.union_all(shapes)
 
 
 @dataclass(frozen=True)

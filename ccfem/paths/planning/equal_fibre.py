@@ -104,8 +104,8 @@ class Dial:
         """Return the parameters in which a strategy on this dial differs, or else the first one."""
         amount = self.strategy.amount
         names = [amount.parameter, *(name for name, _ in amount.beyond)]
-        told = [n for n in names if getattr(strategy, n) != getattr(self.strategy, n)]
-        return ", ".join(f"{n} = {getattr(strategy, n):.6g}" for n in told or names[:1])
+        changed = [n for n in names if getattr(strategy, n) != getattr(self.strategy, n)]
+        return ", ".join(f"{n} = {getattr(strategy, n):.6g}" for n in changed or names[:1])
 
     def guess(self, lengths: Mapping[float, float], target: float, beyond: float = 0.0) -> float:
         """Turn at which the length may be the target.
@@ -149,9 +149,9 @@ class Dial:
         near = sorted(near, key=lambda t: abs(np.log(lengths[t] / target)))[:2]
         if len(near) < 2:
             return slope
-        found = np.log(lengths[near[1]] / lengths[near[0]]) / (near[1] - near[0])
+        secant = np.log(lengths[near[1]] / lengths[near[0]]) / (near[1] - near[0])
         # Where the length changes in steps two values say little about the next.
-        return float(np.clip(found, _POWERS[0] * slope, _POWERS[1] * slope))
+        return float(np.clip(secant, _POWERS[0] * slope, _POWERS[1] * slope))
 
 
 TOLERANCE = 0.01
@@ -266,16 +266,16 @@ def plan_to_lengths(
         check_wanted(wanted)
     if isinstance(strategy, LengthStrategy):
         check_layers(strategy, layers, machine)
-        found = strategy.to_lengths(stress, layers, machine, lengths)
+        planners = strategy.to_lengths(stress, layers, machine, lengths)
         return [
             _planned(
-                told,
-                plan_layers(planner, layers, layers, stress, machine, may_fold(told)),
+                asked,
+                plan_layers(planner, layers, layers, stress, machine, may_fold(asked)),
                 layers,
                 machine,
                 wanted,
             )
-            for (told, planner), wanted in zip(found, lengths, strict=True)
+            for (asked, planner), wanted in zip(planners, lengths, strict=True)
         ]
     search = _Search(Dial(strategy), layers, stress, machine, tolerance)
     search.learn(known)
@@ -337,9 +337,9 @@ class _Search:
     def learn(self, known: Sequence[Planned]) -> None:
         """Take over known plans."""
         for turn in (self.dial.own, 0.0, self.dial.end):
-            for one in known:
-                if one.strategy == self.dial.at(turn):
-                    self.tried.setdefault(turn, one)
+            for attempt in known:
+                if attempt.strategy == self.dial.at(turn):
+                    self.tried.setdefault(turn, attempt)
 
     @cached_property
     def few(self) -> Sequence[Layer]:
@@ -377,13 +377,13 @@ class _Search:
         return _meets(length, wanted, self.tolerance)
 
     def lengths(self) -> Mapping[float, float]:
-        return {turn: one.length_per_layer for turn, one in self.tried.items()}
+        return {turn: attempt.length_per_layer for turn, attempt in self.tried.items()}
 
-    def filled(self, one: Planned) -> bool:
+    def filled(self, attempt: Planned) -> bool:
         """Whether a plan lays fibre on every layer that any known one does."""
-        laid = layer_lengths(one.toolpaths, self.layers) > 0.0
+        filled = layer_lengths(attempt.toolpaths, self.layers) > 0.0
         return not any(
-            (~laid & (layer_lengths(other.toolpaths, self.layers) > 0.0)).any()
+            (~filled & (layer_lengths(other.toolpaths, self.layers) > 0.0)).any()
             for other in self.tried.values()
         )
 
@@ -396,15 +396,15 @@ class _Search:
             middle = 0.5 * (low + high)
             low, high = (low, middle) if self.filled(self.whole(middle)) else (middle, high)
         plans = list(self.tried.values())
-        return min([one for one in plans if self.filled(one)] or plans, key=_length)
+        return min([attempt for attempt in plans if self.filled(attempt)] or plans, key=_length)
 
     def to(self, wanted: float) -> Planned:
         """Plan to a length per layer, mm."""
         if self.tried:
             for _ in range(_GUESSES):
-                found = self.between(wanted, _CLOSE)
-                if found is not None:
-                    return found
+                planned = self.between(wanted, _CLOSE)
+                if planned is not None:
+                    return planned
                 turn = self.dial.guess(self.lengths(), (1.0 - 0.5 * self.tolerance) * wanted)
                 if turn in self.tried:
                     break
@@ -417,21 +417,21 @@ class _Search:
             for turn in self.bracket(wanted / self.ratio(wanted)):
                 if turn is not None:
                     self.whole(turn)
-                    found = self.between(wanted, _CLOSE)
-                    if found is not None:
-                        return found
-        if not any(one.length_per_layer <= wanted for one in self.tried.values()):
+                    planned = self.between(wanted, _CLOSE)
+                    if planned is not None:
+                        return planned
+        if not any(attempt.length_per_layer <= wanted for attempt in self.tried.values()):
             self.whole(0.0)
-        if not any(one.length_per_layer >= wanted for one in self.tried.values()):
+        if not any(attempt.length_per_layer >= wanted for attempt in self.tried.values()):
             self.whole(self.dial.end)
         return self.between(wanted, np.inf) or self.off(wanted)
 
     def ratio(self, wanted: float) -> float:
         """Length on the stack over that on the few layers, for the nearest known plan."""
         off = {
-            turn: abs(one.length_per_layer - wanted)
-            for turn, one in self.tried.items()
-            if self.sample(turn) > 0.0 and one.length_per_layer > 0.0
+            turn: abs(attempt.length_per_layer - wanted)
+            for turn, attempt in self.tried.items()
+            if self.sample(turn) > 0.0 and attempt.length_per_layer > 0.0
         }
         if not off:
             return 1.0
@@ -461,8 +461,16 @@ class _Search:
 
     def between(self, wanted: float, close: float) -> Planned | None:
         """Mix the known plans on either side of a length, if they are close enough."""
-        below = [one for one in self.tried.values() if one.length_per_layer <= wanted * (1 + 1e-9)]
-        above = [one for one in self.tried.values() if one.length_per_layer > wanted * (1 + 1e-9)]
+        below = [
+            attempt
+            for attempt in self.tried.values()
+            if attempt.length_per_layer <= wanted * (1 + 1e-9)
+        ]
+        above = [
+            attempt
+            for attempt in self.tried.values()
+            if attempt.length_per_layer > wanted * (1 + 1e-9)
+        ]
         less = max(below, key=_length, default=None)
         more = min(above, key=_length, default=None)
         if less is not None and self.meets(less.length_per_layer, wanted) and self.filled(less):
@@ -472,25 +480,25 @@ class _Search:
         if more.length_per_layer - less.length_per_layer > close * wanted:
             return None
         count = len(self.layers)
-        found = mixed(
+        planned = mixed(
             less.toolpaths,
             more.toolpaths,
             self.layers,
             wanted * count,
             self.machine.minimum_length,
         )
-        length = length_per_layer(found.toolpaths, self.layers)
+        length = length_per_layer(planned.toolpaths, self.layers)
         if not self.meets(length, wanted) and np.isfinite(close):
             return None
-        said = f"{self.dial.says(more.strategy)} on {found.more} of {count} layers"
-        if found.cut:
-            said += f", strands cut back on {found.cut}"
+        said = f"{self.dial.says(more.strategy)} on {planned.more} of {count} layers"
+        if planned.cut:
+            said += f", strands cut back on {planned.cut}"
         if not self.meets(length, wanted):
             said += (
                 f"; lays {length:.0f} of {wanted:.0f} mm per layer: the nearest that strands of "
             )
             said += f"{self.machine.minimum_length:g} mm allow"
-        return Planned(less.strategy, found.toolpaths, length, said, self.meets(length, wanted))
+        return Planned(less.strategy, planned.toolpaths, length, said, self.meets(length, wanted))
 
     def off(self, wanted: float) -> Planned:
         """Return the extreme plan nearest to a length that the strategy does not reach."""

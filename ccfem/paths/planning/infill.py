@@ -159,12 +159,12 @@ class _Prepared:
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         infill = self.infill
         if infill.mode == "raster":
-            found = with_turns(infill, infill.raster(layer, stress, machine).lines(), machine)
+            joined = with_turns(infill, infill.raster(layer, stress, machine).lines(), machine)
         else:
             prepared = self.known[layer.index]
             lines = infill.strands(layer, stress, machine, prepared)
-            found = infill.linked(lines, prepared, machine)
-        paths = Toolpaths.from_plane(found.lines, layer, link=found.link)
+            joined = infill.linked(lines, prepared, machine)
+        paths = Toolpaths.from_plane(joined.lines, layer, link=joined.link)
         return long_enough(paths, infill.minimum_length, machine)
 
 
@@ -283,8 +283,8 @@ def _unbent(
     if not len(a):
         changes = np.append(False, link[1:] != link[:-1])
         ends = np.array([0, len(line)])
-        laid, _, _, _ = even_steps(line, ends, changes, width, OFF * width)
-        a = b = tight_samples(laid, closed, radius, width)
+        stepped, _, _, _ = even_steps(line, ends, changes, width, OFF * width)
+        a = b = tight_samples(stepped, closed, radius, width)
     if not len(a):
         return [(line, link)]
     pieces = _between_bends(line, along, link, a, b, width, least)
@@ -351,7 +351,7 @@ def _pieces(
     # A ring is cut at one turn first: of a few the one from which the others keep the least bent.
     firsts = np.argsort(-np.round(turns.cost, 3), kind="stable")[:_FIRSTS]
     tried = [_ring_pieces(turns, int(first), size, least) for first in firsts]
-    return min(tried, key=lambda one: round(one[0], 3))[1]
+    return min(tried, key=lambda trial: round(trial[0], 3))[1]
 
 
 def _ring_pieces(turns: _Turns, first: int, size: float, least: float) -> tuple[float, _Pieces]:

@@ -36,8 +36,8 @@ def layer_lengths(toolpaths: Toolpaths, layers: Sequence[Layer]) -> FloatArray:
     """Length of fibre on each layer, (n,), mm."""
     index = [layer.index for layer in layers]
     fibre = toolpaths.of_kind(FIBRE)
-    each = np.bincount(fibre.layer, fibre.lengths, minlength=max(index, default=0) + 1)
-    return np.asarray(each[index], dtype=np.float64)
+    by_index = np.bincount(fibre.layer, fibre.lengths, minlength=max(index, default=0) + 1)
+    return np.asarray(by_index[index], dtype=np.float64)
 
 
 def mixed(

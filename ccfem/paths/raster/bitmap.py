@@ -55,8 +55,8 @@ class Bitmap:
     def pixels(self, points: FloatArray) -> IntArray:
         """Pixels (k, 2), by row and column, that hold points (k, 2), mm; clipped to the bitmap."""
         place = (np.asarray(points).reshape(-1, 2) - self.origin) / self.pixel
-        found = np.stack([len(self.mask) - 1 - np.floor(place[:, 1]), np.floor(place[:, 0])], 1)
-        return np.clip(found, 0, np.array(self.mask.shape) - 1).astype(np.int64)
+        pixel = np.stack([len(self.mask) - 1 - np.floor(place[:, 1]), np.floor(place[:, 0])], 1)
+        return np.clip(pixel, 0, np.array(self.mask.shape) - 1).astype(np.int64)
 
     @cached_property
     def linked(self) -> BoolArray:

@@ -191,7 +191,7 @@ def _ladders(number: IntArray, counts: BoolArray) -> BoolArray:
 
 def _pieces(number: IntArray, counts: BoolArray) -> IntArray:
     """Give each piece (H, W) of a region that counts a number from 1; 0 where none counts."""
-    found = np.zeros(number.shape, dtype=np.int64)
+    components = np.zeros(number.shape, dtype=np.int64)
     total = 0
     boxes = ndimage.find_objects(np.where(counts, number + 1, 0))
     for region, box in enumerate(boxes):
@@ -199,6 +199,6 @@ def _pieces(number: IntArray, counts: BoolArray) -> IntArray:
             continue
         inside = counts[box] & (number[box] == region)
         labels, count = ndimage.label(inside, np.ones((3, 3)))
-        found[box][inside] = labels[inside] + total
+        components[box][inside] = labels[inside] + total
         total += count
-    return found
+    return components

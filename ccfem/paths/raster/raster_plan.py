@@ -93,8 +93,8 @@ def trace(regions: IntArray, linked: BoolArray, seed: int = 0) -> PixelPaths:
     pixels, offsets, closed = chains(regions, used, following, before)
     random = np.random.default_rng(seed)
     for k in np.flatnonzero(closed):
-        own = slice(offsets[k], offsets[k + 1])
-        pixels[own] = np.roll(pixels[own], random.integers(offsets[k + 1] - offsets[k]), axis=0)
+        span = slice(offsets[k], offsets[k + 1])
+        pixels[span] = np.roll(pixels[span], random.integers(offsets[k + 1] - offsets[k]), axis=0)
     label = np.full(regions.shape, -1, dtype=np.int64)
     label[tuple(pixels.T)] = np.repeat(np.arange(len(closed)), np.diff(offsets))
     isolated = (regions >= 0) & ~used
@@ -215,7 +215,7 @@ def walk(line, regions, linked, used, following, before, stub):  # type: ignore[
     chain = np.empty(regions.size, dtype=np.int64)
     width = regions.shape[1]
     already = used.copy()
-    found = 0
+    count = 0
     for from_ends in (True, False):
         for start in range(regions.size):
             i, j = start // width, start % width
@@ -230,11 +230,11 @@ def walk(line, regions, linked, used, following, before, stub):  # type: ignore[
                     line[chain[k] // width, chain[k] % width] = False
                     used[chain[k] // width, chain[k] % width] = False
                 continue
-            found += 1
+            count += 1
             for k in range(size - 1):
                 following[chain[k]] = chain[k + 1]
                 before[chain[k + 1]] = chain[k]
-    return found
+    return count
 
 
 @njit(cache=True)
@@ -451,13 +451,13 @@ class RasterPlan:
             return []
         points, offsets = pack(chains)
         pixels = self.raster.pixels(points)
-        found = self._kept(chains, corners(pixels, offsets))
+        lines = self._kept(chains, corners(pixels, offsets))
         shapely.prepare(self.raster.section)
-        inside = shapely.covers(self.raster.section, [shapely.LineString(x) for x in found])
+        inside = shapely.covers(self.raster.section, [shapely.LineString(x) for x in lines])
         if not inside.all():
             plain = self._kept(chains, corners(pixels, offsets, stairs=False))
-            found = [a if k else b for a, b, k in zip(found, plain, inside, strict=True)]
-        return found
+            lines = [a if k else b for a, b, k in zip(lines, plain, inside, strict=True)]
+        return lines
 
     def _kept(self, chains: list[FloatArray], keep: BoolArray) -> list[FloatArray]:
         ends = np.cumsum([len(chain) for chain in chains])[:-1]

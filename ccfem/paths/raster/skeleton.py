@@ -63,8 +63,8 @@ def skeleton(mask: BoolArray) -> BoolArray:
     line = thin(np.where(mask, 0, -1))
     far = depth(mask)
     while True:
-        found, forks = segments(line)
-        spurs = [one for one in found if _is_spur(one, forks, far)]
+        branches, forks = segments(line)
+        spurs = [segment for segment in branches if _is_spur(segment, forks, far)]
         if not spurs:
             break
         for spur in spurs:
@@ -76,11 +76,11 @@ def skeleton(mask: BoolArray) -> BoolArray:
     return line
 
 
-def _is_spur(one: Segment, forks: IntArray, far: FloatArray) -> bool:
-    if (one.forks[0] < 0) == (one.forks[1] < 0):
+def _is_spur(segment: Segment, forks: IntArray, far: FloatArray) -> bool:
+    if (segment.forks[0] < 0) == (segment.forks[1] < 0):
         return False
-    reach = far[forks == max(one.forks)].max()
-    return one.length < max(_LEAST_SPUR, _SPUR * reach + _MORE)
+    reach = far[forks == max(segment.forks)].max()
+    return segment.length < max(_LEAST_SPUR, _SPUR * reach + _MORE)
 
 
 def _mirrored(line: BoolArray, axis: int) -> BoolArray:
@@ -122,7 +122,7 @@ def segments(line: BoolArray) -> tuple[tuple[Segment, ...], IntArray]:
     around = ndimage.convolve(line.astype(np.int64), _ALL.astype(np.int64), mode="constant")
     forks = ndimage.label(line & (around > 3), _ALL)[0].astype(np.int64) - 1
     pieces, count = ndimage.label(line & (forks < 0), _ALL)
-    found = []
+    branches = []
     for number, box in zip(range(1, count + 1), ndimage.find_objects(pieces), strict=True):
         corner = np.array([part.start for part in box])
         chain = _ordered(np.argwhere(pieces[box] == number) + corner)
@@ -131,8 +131,8 @@ def segments(line: BoolArray) -> tuple[tuple[Segment, ...], IntArray]:
             ends = [ends[0][:1], ends[0][1:2]]
         closed = not any(ends) and len(chain) > 3 and np.abs(chain[0] - chain[-1]).max() == 1
         first, last = (end[0] if end else -1 for end in ends)
-        found.append(Segment(chain, (first, last), closed))
-    return tuple(found), forks
+        branches.append(Segment(chain, (first, last), closed))
+    return tuple(branches), forks
 
 
 def _forks_beside(forks: IntArray, pixel: IntArray) -> list[int]:
@@ -162,12 +162,12 @@ def nearest_segment(line: BoolArray) -> IntArray:
     A piece that is a single fork is a segment of its own. The axis is as `skeleton` returns it, in
     places two pixels wide.
     """
-    found, _ = segments(thin(np.where(line, 0, -1)))
+    branches, _ = segments(thin(np.where(line, 0, -1)))
     number = np.full(line.shape, -1, dtype=np.int64)
-    for k, one in enumerate(found):
-        number[tuple(one.pixels.T)] = k
+    for k, segment in enumerate(branches):
+        number[tuple(segment.pixels.T)] = k
     pieces, _ = ndimage.label(line, _ALL)
     alone = ~np.isin(pieces, np.unique(pieces[number >= 0])) & line
-    number[alone] = len(found) + pieces[alone]
+    number[alone] = len(branches) + pieces[alone]
     _, nearest = ndimage.distance_transform_edt(number < 0, return_indices=True)
     return np.where(line, number[nearest[0], nearest[1]], -1)

@@ -43,15 +43,15 @@ def read_paths(path: str | Path, frame: FloatArray, named: str | None = None) ->
     tool = (named or ("mesh" if table else "tool")) == "tool"
     axes = frame if tool else np.eye(3)
     if table:
-        found = read_path_table(path, axes, frame[2])
-        _check_lengths(found, str(path))
-        return found
-    found = read_waypoints(path, axes)
-    _check_lengths(found, str(path))
+        paths = read_path_table(path, axes, frame[2])
+        _check_lengths(paths, str(path))
+        return paths
+    paths = read_waypoints(path, axes)
+    _check_lengths(paths, str(path))
     # The normals are those of the layers, whatever the points are in.
     return Toolpaths(
-        found.points, np.broadcast_to(frame[2], found.points.shape), found.offsets, found.layer,
-        found.kind, found.closed,
+        paths.points, np.broadcast_to(frame[2], paths.points.shape), paths.offsets, paths.layer,
+        paths.kind, paths.closed,
     )  # fmt: skip
 
 

@@ -44,9 +44,9 @@ def write_robot_cell(path: str | Path, moves: Moves) -> None:
         When the file cannot be written.
     """
     length = moves.length
-    laid = (moves.event == LAY) & (length > 0.0)
+    laying = (moves.event == LAY) & (length > 0.0)
     share = [
-        np.divide(fed, length, out=np.zeros(len(moves)), where=laid)
+        np.divide(fed, length, out=np.zeros(len(moves)), where=laying)
         for fed in (moves.feed, moves.beside)
     ]
     table = np.column_stack(

@@ -75,9 +75,9 @@ def write_robot_waypoints(
 
 def _height(layer: Layer, points: FloatArray) -> FloatArray:
     """Thickness of a layer at points on it, mm."""
-    found = nearest_on_triangles(layer.points, layer.triangles, points)
-    corners = layer.local_thickness[layer.triangles[found.triangle]]
-    return np.asarray(np.einsum("qk,qk->q", found.weights, corners))
+    nearest = nearest_on_triangles(layer.points, layer.triangles, points)
+    corners = layer.local_thickness[layer.triangles[nearest.triangle]]
+    return np.asarray(np.einsum("qk,qk->q", nearest.weights, corners))
 
 
 def write_layer_waypoints(path: str | Path, toolpaths: Toolpaths, layer: int) -> None:
@@ -139,9 +139,9 @@ def read_layer_waypoints(path: str | Path, layer: Layer) -> Toolpaths:
         ) from None
     if not np.isfinite(points).all():
         raise InputError(f"{path} has a place that is no number: mend or leave out that row")
-    found = nearest_on_triangles(layer.points, layer.triangles, points)
-    corners = layer.point_normals[layer.triangles[found.triangle]]
-    normals = np.einsum("qk,qkd->qd", found.weights, corners)
+    nearest = nearest_on_triangles(layer.points, layer.triangles, points)
+    corners = layer.point_normals[layer.triangles[nearest.triangle]]
+    normals = np.einsum("qk,qkd->qd", nearest.weights, corners)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     cut = np.flatnonzero(np.linalg.norm(np.diff(points, axis=0), axis=1) > _JUMP) + 1
     lines, across = np.split(points, cut), np.split(normals, cut)

@@ -133,13 +133,13 @@ def column_mesh(
     on_bed = low & ~rests[line]
     node = np.full(len(points), -1)
     node[: len(top)] = top
-    found = _with_patches(points @ frame, cells, facets, on_bed)
+    columns = _with_patches(points @ frame, cells, facets, on_bed)
     flat = points[facets][:, :, :2]
     u, v = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
     shadow = 0.5 * np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
     standing = float(shadow @ rests[facets].mean(axis=1))
     contact = float(area[hanging].sum())
-    return ColumnMesh(found, node, below, share, on_bed, contact, standing, frame[2])
+    return ColumnMesh(columns, node, below, share, on_bed, contact, standing, frame[2])
 
 
 def _feet(

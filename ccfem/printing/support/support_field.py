@@ -117,4 +117,4 @@ def support_field(
         return SupportField(values, gradient, bed, inverted)
 
     bounds = Bounds(_RANGE[0] * slope, _RANGE[1] * slope, columns.up)
-    return bounded(target, bounds, field_of, lambda each: each.inverted <= most_inverted)
+    return bounded(target, bounds, field_of, lambda field: field.inverted <= most_inverted)

@@ -138,18 +138,18 @@ def support_layers(
     for height in lifts if lift is None else [lift]:
         columns = column_mesh(mesh, build, angle, height, size)
         origin = float(levels[0]) - 0.5 * step
-        found = support_field(columns, field, step / nominal, step, origin, _INVERTED)
-        if found.inverted <= _INVERTED:
+        field_below = support_field(columns, field, step / nominal, step, origin, _INVERTED)
+        if field_below.inverted <= _INVERTED:
             break
     else:
         raise InputError(
-            f"support layers lie upside down in {100.0 * found.inverted:.2g} % of the support: "
-            f"raise lift, over which the lowest layers flatten, above {height:.3g} mm"
+            f"support layers lie upside down in {100.0 * field_below.inverted:.2g} % of the "
+            f"support: raise lift, over which the lowest layers flatten, above {height:.3g} mm"
         )
     thinnest, thickest = (share * nominal for share in _RANGE)
     cut = layers_within(
         columns.mesh,
-        found.values,
+        field_below.values,
         step,
         thinnest,
         thickest,
@@ -157,12 +157,12 @@ def support_layers(
         _LEAST_AREA,
         origin,
     )
-    own = [float(np.median(layer.interpolate(found.values))) for layer in cut.layers]
-    before = np.searchsorted(levels, np.array(own) - 1e-3 * step)
+    medians = [float(np.median(layer.interpolate(field_below.values))) for layer in cut.layers]
+    before = np.searchsorted(levels, np.array(medians) - 1e-3 * step)
     area = np.array([float(layer.areas.sum()) for layer in cut.layers])
     thick = np.array([layer.thickness for layer in cut.layers])
     mean = float(area @ thick / area.sum()) if len(area) else 0.0
-    return SupportLayers(cut.layers, before, columns, found, mean)
+    return SupportLayers(cut.layers, before, columns, field_below, mean)
 
 
 def slice_with_support(

@@ -89,13 +89,13 @@ def bounded(
     Field
         Within the bounds, or as near as it came in the last step.
     """
-    found = solve(target)
+    field = solve(target)
     lag, before = np.zeros_like(target), _WEIGHTS[0]
     for weight in np.repeat(_WEIGHTS, _STEPS).tolist():
-        if enough(found) if enough else not bounds.outside(found.gradient).any():
+        if enough(field) if enough else not bounds.outside(field.gradient).any():
             break
         lag, before = lag * (before / weight), weight
-        within = bounds.nearest(found.gradient + lag)
-        lag = lag + found.gradient - within
-        found = solve((target + weight * (within - lag)) / (1.0 + weight))
-    return found
+        within = bounds.nearest(field.gradient + lag)
+        lag = lag + field.gradient - within
+        field = solve((target + weight * (within - lag)) / (1.0 + weight))
+    return field

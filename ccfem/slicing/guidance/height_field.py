@@ -155,13 +155,13 @@ def _poisson(mesh: TetMesh) -> Callable[[FloatArray], HeightField]:
     pinned = used[np.unique(piece[used], return_index=True)[1]]
     free = np.setdiff1d(used, pinned)
     solve_free = superlu(matrix[free][:, free])
-    pieces = [used[piece[used] == each] for each in np.unique(piece[used]).tolist()]
+    pieces = [used[piece[used] == number] for number in np.unique(piece[used]).tolist()]
 
     def solve(direction: FloatArray) -> HeightField:
         values = np.zeros(n)
         values[free] = solve_free((fall @ direction.ravel())[free])
-        for own in pieces:
-            values[own] -= values[own].min()
+        for component in pieces:
+            values[component] -= values[component].min()
         gradient = (slope @ values).reshape(m, 3)
         mean = volume @ gradient
         up = mean / max(float(np.linalg.norm(mean)), 1e-300)

@@ -38,5 +38,5 @@ def joint_lines(stress: PartStress, joints: Sequence[Joint], keep: Keep) -> Join
         walls, pairs = [joint.wall for joint in joints], joining_pairs(joints, stress)
         region = critical_region(stress.mesh, strongest.direction, walls, pairs, keep)
         known[key] = JointLines(strongest, region)
-    found: JointLines = known[key]
-    return found
+    lines: JointLines = known[key]
+    return lines

@@ -147,9 +147,9 @@ def joining_pairs(joints: Sequence[Joint], stress: PartStress) -> list[tuple[int
     is_loaded = [any(len(nodes & set(j.wall.tolist())) for nodes in loaded) for j in joints]
     pairs = [
         (i, k)
-        for i, one in enumerate(is_loaded)
+        for i, flag in enumerate(is_loaded)
         for k, other in enumerate(is_loaded)
-        if one and not other
+        if flag and not other
     ]
     return pairs or None
 

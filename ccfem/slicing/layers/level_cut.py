@@ -74,7 +74,7 @@ def _cut_cells(
     where = np.empty((4, 3))
     lines = np.empty((2 * len(cells), 3), np.int64)
     source = np.empty(2 * len(cells), np.int64)
-    found = 0
+    count = 0
     key = np.empty(4, np.int64)
     for row in range(len(cells)):
         corners = 0
@@ -106,9 +106,9 @@ def _cut_cells(
                     corners += 1
         if corners == 3:
             for i in range(3):
-                lines[found, i] = key[i]
-            source[found] = row
-            found += 1
+                lines[count, i] = key[i]
+            source[count] = row
+            count += 1
         elif on == 0:
             # Four crossings in the order (i, j) of a 2-2 split: 0-1-3-2 is the cyclic order. The
             # quad is split along its shorter diagonal [Chen et al. 2021, section 5].
@@ -120,11 +120,11 @@ def _cut_cells(
                 a, b, c, d = key[0], key[1], key[3], key[2]
             else:
                 a, b, c, d = key[1], key[3], key[2], key[0]
-            lines[found, 0], lines[found, 1], lines[found, 2] = a, b, c
-            lines[found + 1, 0], lines[found + 1, 1], lines[found + 1, 2] = a, c, d
-            source[found] = source[found + 1] = row
-            found += 2
-    return lines[:found], source[:found]
+            lines[count, 0], lines[count, 1], lines[count, 2] = a, b, c
+            lines[count + 1, 0], lines[count + 1, 1], lines[count + 1, 2] = a, c, d
+            source[count] = source[count + 1] = row
+            count += 2
+    return lines[:count], source[:count]
 
 
 def _drop_repeated(triangles: IntArray, cell: IntArray) -> tuple[IntArray, IntArray]:

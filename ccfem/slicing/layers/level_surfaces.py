@@ -85,10 +85,10 @@ def level_surfaces(
         among = np.flatnonzero((low <= level) & (high >= level))
         return _surface(mesh, signed, among, gradient, thickness, on_patch, shortest, least_area)
 
-    found = in_threads(cut, levels.tolist(), most=None)
-    kept = [surface for surface, _, _ in found if surface is not None]
+    cuts = in_threads(cut, levels.tolist(), most=None)
+    kept = [surface for surface, _, _ in cuts if surface is not None]
     layers = tuple(Layer(index=k, **surface) for k, surface in enumerate(kept))
-    return LevelSurfaces(layers, sum(b for _, b, _ in found), sum(s for _, _, s in found))
+    return LevelSurfaces(layers, sum(b for _, b, _ in cuts), sum(s for _, _, s in cuts))
 
 
 def thickness_at_nodes(mesh: TetMesh, values: FloatArray, step: float) -> FloatArray:

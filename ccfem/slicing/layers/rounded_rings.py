@@ -30,7 +30,6 @@ def rounded_rings(
 
     Parameters
     ----------
-    plane : Plane
     points : (n, 2) array, mm
         Plane coordinates of the section's points.
     loops : sequence of (k,) int arrays

@@ -73,9 +73,9 @@ def layers_within(
             ended = np.searchsorted(np.sort(thick.max(axis=1)), between, side="left")
             within = (between > low + _OFF * step) & (between < high - _OFF * step)
             levels = np.asarray(between[(begun > ended) & within])
-        found = level_surfaces(mesh, values, levels, step, shortest, least_area)
-        bubbles, specks = bubbles + found.bubbles, specks + found.specks
-        for layer in found.layers:
+        surfaces = level_surfaces(mesh, values, levels, step, shortest, least_area)
+        bubbles, specks = bubbles + surfaces.bubbles, specks + surfaces.specks
+        for layer in surfaces.layers:
             level = float(np.median(layer.interpolate(values)))
             number = round((level - (low if origin is None else origin)) / step - 0.5)
             t = layer.local_thickness

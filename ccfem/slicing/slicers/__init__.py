@@ -46,28 +46,28 @@ def from_text(text: str) -> Slicer:
     """
     method, _, rest = (part.strip() for part in text.partition(":"))
     parameters = {}
-    for one in (word.strip() for word in rest.split(",") if word.strip()):
-        if "=" in one:
-            name, value = assignment(one)
+    for setting in (word.strip() for word in rest.split(",") if word.strip()):
+        if "=" in setting:
+            name, value = assignment(setting)
         else:
-            name, value = getattr(named().get(method), "shorthand", ""), one
+            name, value = getattr(named().get(method), "shorthand", ""), setting
         if not name:
-            raise InputError(f"slicer '{method}' expects NAME=VALUE; got '{one}': name it")
+            raise InputError(f"slicer '{method}' expects NAME=VALUE; got '{setting}': name it")
         parameters[name] = value
     return create(method, parameters)
 
 
 def split(text: str) -> tuple[str, ...]:
     """Split slicings separated by commas; ``name=value`` belongs to the slicing before it."""
-    found: list[str] = []
+    words: list[str] = []
     for word in (word.strip() for word in text.split(",")):
         if not word:
             continue
-        if found and "=" in word and ":" not in word.partition("=")[0]:
-            found[-1] += f"{',' if ':' in found[-1] else ':'}{word}"
+        if words and "=" in word and ":" not in word.partition("=")[0]:
+            words[-1] += f"{',' if ':' in words[-1] else ':'}{word}"
         else:
-            found.append(word)
-    return tuple(found)
+            words.append(word)
+    return tuple(words)
 
 
 def as_slicer(layers: "int | Sequence[float] | str | Slicer") -> Slicer:

@@ -84,7 +84,7 @@ def best_plane(stress: FloatArray, volume: FloatArray, critical: BoolArray) -> F
     weight = volume[critical] / np.linalg.eigvalsh(stress[critical])[:, 2]
     flat = stress[critical].reshape(-1, 9)
     products = np.einsum("ki,kj->kij", tried, tried).reshape(-1, 9)
-    total = [float(weight @ np.maximum(flat @ each, 0.0)) for each in products]
+    total = [float(weight @ np.maximum(flat @ product, 0.0)) for product in products]
     return np.asarray(tried[int(np.argmin(total))])
 
 

@@ -193,8 +193,8 @@ class Spatial:
         else:
             edge = self.shortest_edge or _SHORTEST * mean_edge(mesh)
             levels = low + (np.arange(count) + 0.5) * step
-            found = level_surfaces(mesh, guidance.values, levels, step, edge, self.least_area)
-            layers, bubbles, specks = found.layers, found.bubbles, found.specks
+            surfaces = level_surfaces(mesh, guidance.values, levels, step, edge, self.least_area)
+            layers, bubbles, specks = surfaces.layers, surfaces.bubbles, surfaces.specks
         return SpatialSlicing(layers, guidance, region, joints, quality, step, bubbles, specks)
 
     def remarks(self, stress: PartStress) -> tuple[str, ...]:

@@ -66,13 +66,13 @@ def _read(path: Path) -> tuple[FloatArray, IntArray]:
                 points.append([float(word) for word in words[1:4]])
             elif words[:1] == ["f"]:
                 triangles.append([int(word.split("/")[0]) for word in words[1:]])
-        found = np.array(points, dtype=np.float64).reshape(-1, 3)
+        vertices = np.array(points, dtype=np.float64).reshape(-1, 3)
         corners = np.array(triangles, dtype=np.int64).reshape(-1, 3) - 1
     except (ValueError, IndexError, OverflowError):
         raise InputError(f"{path} is no OBJ file of triangles: export it again") from None
-    if not len(corners) or corners.min() < 0 or corners.max() >= len(found):
+    if not len(corners) or corners.min() < 0 or corners.max() >= len(vertices):
         raise InputError(f"{path} has no triangles, or they name points that it has not")
-    return found, corners
+    return vertices, corners
 
 
 # A layer from a surface made by another program.

@@ -106,9 +106,9 @@ class BorderLevels:
     @classmethod
     def side_by_side(cls, levels: Sequence["BorderLevels"]) -> "BorderLevels":
         """Combine several fields, one after the other; their costs add up."""
-        values = sp.block_diag([one.values for one in levels], format="csr")
-        weight = np.concatenate([one.weight for one in levels])
-        return cls(values, weight, sp.block_diag([one.blocks for one in levels]).toarray())
+        values = sp.block_diag([level.values for level in levels], format="csr")
+        weight = np.concatenate([level.weight for level in levels])
+        return cls(values, weight, sp.block_diag([level.blocks for level in levels]).toarray())
 
     def cost(self, field: FloatArray) -> tuple[float, FloatArray]:
         """Cost, and its derivative (c,) by the coefficients."""
@@ -124,5 +124,5 @@ class BorderLevels:
         """Field (c,) plus the constant on each group that makes the cost least."""
         for block in self.blocks.T:
             tried = [field + k / _CONSTANTS * block for k in range(_CONSTANTS)]
-            field = tried[int(np.argmin([self.cost(one)[0] for one in tried]))]
+            field = tried[int(np.argmin([self.cost(trial)[0] for trial in tried]))]
         return field

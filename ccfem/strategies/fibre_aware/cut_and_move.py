@@ -87,12 +87,12 @@ def best_cut(
     rounds : int
         Tests of each cut.
     """
-    laid = [one for one in candidates if len(one)]
-    if not laid:
+    filled = [paths for paths in candidates if len(paths)]
+    if not filled:
         return candidates[0]
     cuts = [
-        cut(one, share * strength, rounds)
-        for k, one in enumerate(laid)
+        cut(paths, share * strength, rounds)
+        for k, paths in enumerate(filled)
         for share in (_SHARES if strength and k < _ALL_WAYS else _SHARES[:1])
     ]
     return stiffest(cuts, judge)

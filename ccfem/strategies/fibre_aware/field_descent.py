@@ -109,17 +109,17 @@ def improved(
         field = metric.field(x)
         # The last solution is near to this one; the best one is to be returned.
         last = tried[-1][1].solution if tried else solution
-        found = problem.evaluate(field, last, TOLERANCE)
-        ratios.append(found.ratio)
+        objective_at = problem.evaluate(field, last, TOLERANCE)
+        ratios.append(objective_at.ratio)
         if len(tried) == 2:
             tried.pop() if tried[0][1].value <= tried[1][1].value else tried.pop(0)
-        tried.append((field, found))
-        return found.value, metric.pulled(found.gradient)
+        tried.append((field, objective_at))
+        return objective_at.value, metric.pulled(objective_at.gradient)
 
     options = {"maxfun": evaluations, "maxiter": evaluations, "maxcor": _MEMORY, "ftol": 1e-9}
     minimize(objective, metric.unknowns(start), jac=True, method="L-BFGS-B", options=options)
-    field, found = min(tried, key=lambda one: one[1].value)
-    return field, found, tuple(ratios)
+    field, evaluated = min(tried, key=lambda trial: trial[1].value)
+    return field, evaluated, tuple(ratios)
 
 
 class _Posed(Protocol):
@@ -144,9 +144,9 @@ class _AtBorders:
         return self.problem.laplacian
 
     def evaluate(self, field: FloatArray, start: Any, tolerance: float) -> Any:
-        found = self.problem.evaluate(field, start, tolerance)
+        objective = self.problem.evaluate(field, start, tolerance)
         cost, slope = self.levels.cost(field)
-        return replace(found, value=found.value + cost, gradient=found.gradient + slope)
+        return replace(objective, value=objective.value + cost, gradient=objective.gradient + slope)
 
 
 def designed_fields(
@@ -172,10 +172,10 @@ def designed_fields(
     last = int(_AT_BORDERS * evaluations)
     before = problem.evaluate(start, tolerance=TOLERANCE)
     metric = FieldMetric.of(problem.curvature(start, before.solution))
-    found = improved(problem, start, evaluations - last, metric, before.solution)
+    designed = improved(problem, start, evaluations - last, metric, before.solution)
     if not last:
-        return found
-    field, objective, ratios = found
+        return designed
+    field, objective, ratios = designed
     field, objective, more = drawn_to_borders(problem, field, objective.solution, last)
     return field, objective, (*ratios, *more)
 

@@ -82,10 +82,10 @@ def layer_counts(weights: FloatArray, count: int) -> IntArray:
         Of layers.
     """
     wanted = weights / weights.sum() * count
-    found = np.floor(wanted + 1e-9).astype(np.int64)
-    rest = np.argsort(-np.round(wanted - found, 9), kind="stable")
-    found[rest[: count - int(found.sum())]] += 1
-    return found
+    counts = np.floor(wanted + 1e-9).astype(np.int64)
+    rest = np.argsort(-np.round(wanted - counts, 9), kind="stable")
+    counts[rest[: count - int(counts.sum())]] += 1
+    return counts
 
 
 def layers_by_case(weights: FloatArray, layers: Sequence[Layer]) -> IntArray:
@@ -98,10 +98,10 @@ def layers_by_case(weights: FloatArray, layers: Sequence[Layer]) -> IntArray:
     counts = layer_counts(weights, count)
     order = np.argsort([layer.plane.height for layer in layers], kind="stable")
     given = np.zeros(len(counts), dtype=np.int64)
-    found = np.empty(count, dtype=np.int64)
+    case_of = np.empty(count, dtype=np.int64)
     for place, number in enumerate(order):
         behind = np.round(counts * (place + 0.5) / count - given, 9)
         k = int(np.argmax(np.where(given < counts, behind, -np.inf)))
         given[k] += 1
-        found[number] = k
-    return found
+        case_of[number] = k
+    return case_of

@@ -114,7 +114,7 @@ class Equilibria:
     @property
     def displacements(self) -> tuple[FloatArray, ...]:
         """Displacement (n, 3), mm, under each case."""
-        return tuple(one.displacement for one in self.found)
+        return tuple(equilibrium.displacement for equilibrium in self.found)
 
 
 def equilibria(
@@ -136,7 +136,7 @@ def equilibria(
         Relative residual.
     """
     axial = (Strand() if strand is None else strand).stiffness(goal.parts[0].modulus)
-    found, ratios, works = [], [], []
+    with_strands, ratios, works = [], [], []
     for k, part in enumerate(goal.parts):
         near = () if known is None else (known[k],)
         with_fibre = equilibrium(part, strands, axial, known=near, tolerance=tolerance)
@@ -144,10 +144,10 @@ def equilibria(
         bare = part.unreinforced
         ratio = stiffness / part.stiffness(bare.displacement, bare.strain_energy)
         before = 2.0 * bare.strain_energy
-        found.append(with_fibre)
+        with_strands.append(with_fibre)
         ratios.append(ratio)
         works.append(before / ratio if part.forced else before * ratio)
-    return Equilibria(tuple(found), np.array(ratios), np.array(works))
+    return Equilibria(tuple(with_strands), np.array(ratios), np.array(works))
 
 
 @dataclass(frozen=True)
@@ -225,8 +225,8 @@ def strength_judge(
             if not for_both:
                 work = [2.0 * one.solution.strain_energy for one in tested.tests]
                 return _stiff_worths(counts / work, displaced)
-            found = equilibria(goal, strands, strand, displaced).found
-            return worth.strain_worths(strands, found, normal, counts)
+            equilibrium_of = equilibria(goal, strands, strand, displaced).found
+            return worth.strain_worths(strands, equilibrium_of, normal, counts)
 
         return Judged(float(value), strain_worths)
 
@@ -235,10 +235,10 @@ def strength_judge(
 
 def stiffest(candidates: Sequence[Toolpaths], judge: Judge) -> Toolpaths:
     """Return the toolpaths of highest value, the first of equal ones; one alone is not tested."""
-    laid = [one for one in candidates if len(one)]
-    if len(laid) < 2:
-        return laid[0] if laid else candidates[0]
-    return laid[int(np.argmax([judge(one).value for one in laid]))]
+    filled = [paths for paths in candidates if len(paths)]
+    if len(filled) < 2:
+        return filled[0] if filled else candidates[0]
+    return filled[int(np.argmax([judge(paths).value for paths in filled]))]
 
 
 def _stiff_worths(

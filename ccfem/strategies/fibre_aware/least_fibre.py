@@ -109,7 +109,7 @@ def least_fibre(
         strategy = for_every_case(strategy)
     parts, most = specimens(cases), _MOST * full_length(layers, machine)
     mesh = parts[0].unreinforced.mesh
-    found: dict[float, LeastFibre] = {}
+    by_length: dict[float, LeastFibre] = {}
     tried: list[tuple[float, float]] = []
     length = _FIRST * most
     for _ in range(_PLANS):
@@ -119,9 +119,9 @@ def least_fibre(
         ratios = virtual_tests(strands, parts, strand).ratios
         reached = float(ratios.min())
         laid = planned.length_per_layer
-        if laid in found:  # no other length lies between
+        if laid in by_length:  # no other length lies between
             break
-        found[laid] = LeastFibre(planned, length, reached, ratios, ())
+        by_length[laid] = LeastFibre(planned, length, reached, ratios, ())
         tried.append((laid, reached))
         if 0.0 <= reached - ratio <= _CLOSE * (ratio - 1.0):
             break
@@ -131,9 +131,9 @@ def least_fibre(
         if following is None:
             break
         length = min(following, most)
-    enough = [laid for laid, one in found.items() if one.ratio >= ratio]
+    enough = [laid for laid, plan in by_length.items() if plan.ratio >= ratio]
     if not enough:
-        best = max(found.values(), key=lambda one: one.ratio)
+        best = max(by_length.values(), key=lambda plan: plan.ratio)
         every, where = "", ""
         if len(cases) > 1:
             every = " in every load case"
@@ -144,7 +144,7 @@ def least_fibre(
             f"{best.planned.length_per_layer:.0f} mm per layer: ask for less, or give the part "
             "more layers"
         )
-    return replace(found[min(enough)], tried=tuple(tried))
+    return replace(by_length[min(enough)], tried=tuple(tried))
 
 
 def for_every_case(strategy: Strategy) -> Strategy:
@@ -153,8 +153,8 @@ def for_every_case(strategy: Strategy) -> Strategy:
     One that was told another objective than its default, "worst", keeps it.
     """
     changed: Any = strategy
-    told = getattr(strategy, "objective", None) == WORST
-    return replace(changed, objective=LEAST) if told else strategy
+    worst = getattr(strategy, "objective", None) == WORST
+    return replace(changed, objective=LEAST) if worst else strategy
 
 
 def _next(tried: list[tuple[float, float]], ratio: float) -> float | None:
@@ -164,8 +164,8 @@ def _next(tried: list[tuple[float, float]], ratio: float) -> float | None:
     """
     wanted = np.log((ratio - 1.0) * (1.0 + 0.5 * _CLOSE))
     known = sorted((float(np.log(x)), float(np.log(max(r - 1.0, 1e-9)))) for x, r in tried)
-    above = min((one for one in known if one[1] >= np.log(ratio - 1.0)), default=None)
-    below = max((one for one in known if above is None or one < above), default=None)
+    above = min((point for point in known if point[1] >= np.log(ratio - 1.0)), default=None)
+    below = max((point for point in known if above is None or point < above), default=None)
     if above is None or below is None:
         x, y = known[-1] if above is None else known[0]
         leap = float(np.clip(wanted - y, -np.log(_LEAP), np.log(_LEAP)))

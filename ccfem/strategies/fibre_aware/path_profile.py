@@ -96,18 +96,18 @@ def least_price(
     along: Sequence[Profile], length: float, minimum: float, cut_cost: float = 20.0
 ) -> float:
     """Smallest price of fibre at which no more than the given length, mm, is worth keeping."""
-    values = [one.value for one in along]
+    values = [profile.value for profile in along]
     pieces = np.array([len(value) for value in values], dtype=np.int64)
     value, ends = np.concatenate([np.zeros(0), *values]), np.cumsum(pieces)
-    step = np.array([one.step for one in along])
-    least = np.array([one.least(minimum) for one in along], dtype=np.int64)
+    step = np.array([profile.step for profile in along])
+    least = np.array([profile.least(minimum) for profile in along], dtype=np.int64)
 
     def left(price: float) -> float:
         return float(_kept_length(value, ends, step, least, price, cut_cost * price))
 
     if left(0.0) <= length:
         return 0.0
-    low, high = 0.0, 2.0 * max(float(one.value.max()) for one in along)
+    low, high = 0.0, 2.0 * max(float(profile.value.max()) for profile in along)
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if left(middle) > length else (low, middle)

@@ -118,7 +118,7 @@ def plan_cases_to_lengths(
     if isinstance(strategy, CasesStrategy):
         check_layers(strategy, layers, machine)
         return _by_itself(strategy, layers, cases, machine, lengths)
-    return [plan_cases(strategy, layers, cases, machine, each, strand) for each in lengths]
+    return [plan_cases(strategy, layers, cases, machine, length, strand) for length in lengths]
 
 
 def _is_of_one(strategy: Strategy, cases: WeightedCases) -> bool:
@@ -134,12 +134,12 @@ def _by_itself(
     lengths: Sequence[float],
 ) -> list[Planned]:
     """Plans of a strategy that plans for all cases, of several lengths per layer."""
-    found = []
+    plans = []
     planners = strategy.for_cases(cases, layers, machine, lengths)
-    for (told, planner), wanted in zip(planners, lengths, strict=True):
+    for (asked, planner), wanted in zip(planners, lengths, strict=True):
         paths = plan_layers(planner, layers, layers, cases.fields[0], machine)
-        found.append(_planned(told, paths, layers, machine, wanted))
-    return found
+        plans.append(_planned(asked, paths, layers, machine, wanted))
+    return plans
 
 
 def plan_by_layers(
@@ -157,16 +157,18 @@ def plan_by_layers(
         Per layer, met within 5 %; default the strategy's own.
     """
     case = layers_by_case(cases.weights, layers)
-    found = []
+    parts = []
     for k, field in enumerate(cases.fields):
-        own = [layer for layer, each in zip(layers, case, strict=True) if each == k]
-        if own and length is None:
-            found.append(plan(strategy, own, field, machine))
-        elif own and length is not None:
+        case_layers = [layer for layer, number in zip(layers, case, strict=True) if number == k]
+        if case_layers and length is None:
+            parts.append(plan(strategy, case_layers, field, machine))
+        elif case_layers and length is not None:
             wanted = (1.0 + _SLACK) * length
-            planned = plan_to_length(strategy, own, field, machine, wanted, tolerance=_SLACK)
-            found.append(planned.toolpaths)
-    whole = Toolpaths.concatenate(found)
+            planned = plan_to_length(
+                strategy, case_layers, field, machine, wanted, tolerance=_SLACK
+            )
+            parts.append(planned.toolpaths)
+    whole = Toolpaths.concatenate(parts)
     return Toolpaths.concatenate(whole.on_layer(layer.index) for layer in layers)
 
 

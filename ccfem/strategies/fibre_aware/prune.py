@@ -99,8 +99,8 @@ def prune(
     check_number("length of fibre", length, above=0.0, unit="mm")
     check_number("rounds", rounds, at_least=1)
     check_number("tight", tight, at_least=0.0, at_most=1.0)
-    laid = fibre_length(toolpaths)
-    if laid <= length and (tight >= 1.0 or tight_share(toolpaths, machine) <= tight):
+    length_now = fibre_length(toolpaths)
+    if length_now <= length and (tight >= 1.0 or tight_share(toolpaths, machine) <= tight):
         return toolpaths
     goal, known = Goal.of(part), None
     worth = Worth.of(goal.parts, strand, strength) if strength else None
@@ -112,13 +112,13 @@ def prune(
             value = worth(strands, tested.found, layer_normal(toolpaths), counts)
         else:
             value = np.zeros(len(strands.length))
-            for share, one in zip(counts / tested.work, tested.found, strict=True):
-                value += share * np.where(one.carries, one.strain, 0.0) ** 2
+            for share, equilibrium in zip(counts / tested.work, tested.found, strict=True):
+                value += share * np.where(equilibrium.carries, equilibrium.strain, 0.0) ** 2
         share = max(1.0 / (rounds - k), _FASTEST if len(goal.parts) == 1 else 0.0)
-        wanted = length + (1.0 - share) * max(laid - length, 0.0)
+        wanted = length + (1.0 - share) * max(length_now - length, 0.0)
         toolpaths = taken_off(toolpaths, strands, value, wanted, machine, tight)
-        laid = fibre_length(toolpaths)
-        if laid <= length:
+        length_now = fibre_length(toolpaths)
+        if length_now <= length:
             break
     return toolpaths
 
@@ -144,9 +144,9 @@ def taken_off(
     length, machine, tight
         As of `prune`.
     """
-    found = shorten_bent(toolpaths, profiles(toolpaths, strands, value), length, machine, tight)
-    if fibre_length(found) >= _ENOUGH * length or not value.min(initial=0.0) < 0.0:
-        return found
+    shortened = shorten_bent(toolpaths, profiles(toolpaths, strands, value), length, machine, tight)
+    if fibre_length(shortened) >= _ENOUGH * length or not value.min(initial=0.0) < 0.0:
+        return shortened
     along = profiles(toolpaths, strands, raised(value))
     return shorten_bent(toolpaths, along, length, machine, tight)
 
@@ -173,10 +173,10 @@ def profiles(toolpaths: Toolpaths, strands: Strands, value: FloatArray) -> list[
     for k in np.flatnonzero((toolpaths.kind == FIBRE) & (total > 0.0)).tolist():
         count = max(int(np.ceil(total[k] / _STATION)), 1)
         step = float(total[k]) / count
-        own = slice(bounds[k], bounds[k + 1])
-        done = np.cumsum(work[own])
-        along = np.concatenate([[0.0], np.stack([begin[own], end[own]], axis=1).ravel()])
-        below = np.concatenate([[0.0], np.stack([done - work[own], done], axis=1).ravel()])
+        span = slice(bounds[k], bounds[k + 1])
+        done = np.cumsum(work[span])
+        along = np.concatenate([[0.0], np.stack([begin[span], end[span]], axis=1).ravel()])
+        below = np.concatenate([[0.0], np.stack([done - work[span], done], axis=1).ravel()])
         mean = np.diff(np.interp(step * np.arange(count + 1), along, below)) / step
         turn = _least_valuable(mean) if toolpaths.closed[k] else 0
         result.append(Profile(k, np.roll(mean, -turn), step, turn * step))
@@ -185,9 +185,12 @@ def profiles(toolpaths: Toolpaths, strands: Strands, value: FloatArray) -> list[
 
 def _tilted(along: list[Profile]) -> list[Profile]:
     """Profiles with values raised by a trifle that falls from the first piece to the last."""
-    ends = np.cumsum([0, *(len(one.value) for one in along)])
+    ends = np.cumsum([0, *(len(profile.value) for profile in along)])
     shares = np.split(1.0 + _TILT * (1.0 - np.arange(ends[-1]) / max(ends[-1], 1)), ends[1:-1])
-    return [replace(one, value=one.value * share) for one, share in zip(along, shares, strict=True)]
+    return [
+        replace(profile, value=profile.value * share)
+        for profile, share in zip(along, shares, strict=True)
+    ]
 
 
 def _pieces(

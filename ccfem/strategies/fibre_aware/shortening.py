@@ -59,17 +59,17 @@ def shorten(
         part of that where all of it is too long.
     """
     price = least_price(along, length, minimum, cut_cost)
-    chosen = {one.path: one.kept(price, minimum, cut_cost)[0] for one in along}
-    room = length - sum(one.step * float(chosen[one.path].sum()) for one in along)
+    chosen = {profile.path: profile.kept(price, minimum, cut_cost)[0] for profile in along}
+    room = length - sum(profile.step * float(chosen[profile.path].sum()) for profile in along)
     for factor in _LOWER_PRICES if price > 0.0 else ():
-        for one in along:
-            before = chosen[one.path]
-            longer = one.kept(factor * price, minimum, cut_cost)[0]
-            if one.step * (longer.sum() - before.sum()) > room:
-                longer = _grown(before, longer, int(room / one.step))
-            more = one.step * float(longer.sum() - before.sum())
+        for profile in along:
+            before = chosen[profile.path]
+            longer = profile.kept(factor * price, minimum, cut_cost)[0]
+            if profile.step * (longer.sum() - before.sum()) > room:
+                longer = _grown(before, longer, int(room / profile.step))
+            more = profile.step * float(longer.sum() - before.sum())
             if 0.0 < more <= room:
-                chosen[one.path] = longer
+                chosen[profile.path] = longer
                 room -= more
     return _cut(toolpaths, along, chosen)
 
@@ -97,30 +97,33 @@ def shorten_bent(
     least = machine.minimum_length
     if tight >= 1.0:
         return shorten(toolpaths, along, length, least)
-    best = max((float(np.abs(one.value).max()) for one in along), default=0.0) or 1.0
+    best = max((float(np.abs(profile.value).max()) for profile in along), default=0.0) or 1.0
     along = [
-        replace(one, value=np.where(one.value < 0.0, one.value, one.value + _TRIFLE * best))
-        for one in along
+        replace(
+            profile,
+            value=np.where(profile.value < 0.0, profile.value, profile.value + _TRIFLE * best),
+        )
+        for profile in along
     ]
-    found = shorten(toolpaths, along, length, least)
-    if tight_share(found, machine) <= tight:
-        return found
+    shortened = shorten(toolpaths, along, length, least)
+    if tight_share(shortened, machine) <= tight:
+        return shortened
     shares = _tight_pieces(toolpaths, along, machine)
     low, high = (np.log(price * best) for price in _PRICES)
-    found = toolpaths.select(toolpaths.kind != FIBRE)
+    shortened = toolpaths.select(toolpaths.kind != FIBRE)
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
         price = float(np.exp(middle))
         priced = [
-            replace(one, value=one.value - price * share)
-            for one, share in zip(along, shares, strict=True)
+            replace(profile, value=profile.value - price * share)
+            for profile, share in zip(along, shares, strict=True)
         ]
         trial = shorten(toolpaths, priced, length, least)
         if tight_share(trial, machine) <= tight:
-            found, high = trial, middle
+            shortened, high = trial, middle
         else:
             low = middle
-    return found
+    return shortened
 
 
 def tight_share(toolpaths: Toolpaths, machine: Machine) -> float:
@@ -130,8 +133,8 @@ def tight_share(toolpaths: Toolpaths, machine: Machine) -> float:
     """
     fibre = toolpaths.of_kind(FIBRE)
     points, offsets, closed = fibre.points, fibre.offsets, fibre.closed
-    found = curvature_samples(points, offsets, closed, machine.fibre_width)
-    return float((found * machine.minimum_radius >= 1.0).mean()) if len(found) else 0.0
+    curvature = curvature_samples(points, offsets, closed, machine.fibre_width)
+    return float((curvature * machine.minimum_radius >= 1.0).mean()) if len(curvature) else 0.0
 
 
 def _bends(toolpaths: Toolpaths, k: int, machine: Machine) -> FloatArray:
@@ -145,18 +148,18 @@ def _tight_pieces(
     toolpaths: Toolpaths, along: Sequence[Profile], machine: Machine
 ) -> list[FloatArray]:
     """Share of each piece of the profiles that turns too tightly."""
-    found = []
-    for one in along:
-        edges = one.origin + one.step * np.arange(len(one.value) + 1)
-        size = one.step * len(one.value)
-        bent = np.zeros(len(one.value))
+    tightness = []
+    for profile in along:
+        edges = profile.origin + profile.step * np.arange(len(profile.value) + 1)
+        size = profile.step * len(profile.value)
+        bent = np.zeros(len(profile.value))
         # The pieces of a ring may start anywhere, and a bend may extend over its start.
-        for start, end in _bends(toolpaths, one.path, machine):
+        for start, end in _bends(toolpaths, profile.path, machine):
             for round_ in (-size, 0.0, size):
                 last = np.minimum(edges[1:], end + round_)
                 bent += np.maximum(last - np.maximum(edges[:-1], start + round_), 0.0)
-        found.append(np.minimum(bent / one.step, 1.0))
-    return found
+        tightness.append(np.minimum(bent / profile.step, 1.0))
+    return tightness
 
 
 def _grown(kept: BoolArray, longer: BoolArray, count: int) -> BoolArray:
@@ -178,14 +181,16 @@ def _cut(toolpaths: Toolpaths, along: Sequence[Profile], chosen: dict[int, BoolA
     parts: list[FloatArray] = []
     source, closed = [], []
     for k in range(len(toolpaths)):
-        own = slice(toolpaths.offsets[k], toolpaths.offsets[k + 1])
-        link = toolpaths.link[own, None]
-        line = np.hstack([toolpaths.points[own], toolpaths.normals[own], link])
+        span = slice(toolpaths.offsets[k], toolpaths.offsets[k + 1])
+        link = toolpaths.link[span, None]
+        line = np.hstack([toolpaths.points[span], toolpaths.normals[span], link])
         whole = k not in chosen or bool(chosen[k].all())
-        found = [line] if whole else _stretches(line, profile[k], chosen[k], toolpaths.closed[k])
-        parts += found
-        source += len(found) * [k]
-        closed += len(found) * [bool(toolpaths.closed[k]) and whole]
+        stretches = (
+            [line] if whole else _stretches(line, profile[k], chosen[k], toolpaths.closed[k])
+        )
+        parts += stretches
+        source += len(stretches) * [k]
+        closed += len(stretches) * [bool(toolpaths.closed[k]) and whole]
     if not parts:
         return Toolpaths.empty()
     columns = np.concatenate(parts)

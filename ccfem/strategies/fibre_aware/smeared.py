@@ -253,8 +253,8 @@ class SmearedPart:
         """
         operator = _Operator(self, self.pack(stiffness))
         held, solver = self.specimen.held, self.specimen.solver
-        found = preconditioned_cg(operator, held.project(forces), solver, tolerance=tolerance)
-        return self.strain(operator.expand(found.values))
+        solution = preconditioned_cg(operator, held.project(forces), solver, tolerance=tolerance)
+        return self.strain(operator.expand(solution.values))
 
     @cached_property
     def _load_size(self) -> float:

@@ -41,5 +41,5 @@ class StrainWorth:
     def value(self, strain: FloatArray, adjoint: FloatArray) -> FloatArray:
         """Value (s,) of pieces of fibre, per mm, at strains (s,) of both displacements."""
         stretch = np.maximum(strain, 0.0)
-        own = self.peak * (stretch / self.most) ** POWER
-        return np.asarray(self.squared * stretch**2 + self.mixed * stretch * adjoint - own)
+        at_peak = self.peak * (stretch / self.most) ** POWER
+        return np.asarray(self.squared * stretch**2 + self.mixed * stretch * adjoint - at_peak)

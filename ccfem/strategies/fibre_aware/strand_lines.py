@@ -112,8 +112,8 @@ class StrandLines:
         """
         first = self._differences((-1.0, 1.0))
         second = self._differences((1.0, -2.0, 1.0))
-        own = sp.diags_array(1.0 + _HELD * self.fixed)
-        return (own + _STRETCH * (first.T @ first) + _BEND * (second.T @ second)).tocsc()
+        diagonal = sp.diags_array(1.0 + _HELD * self.fixed)
+        return (diagonal + _STRETCH * (first.T @ first) + _BEND * (second.T @ second)).tocsc()
 
     def _differences(self, weights: tuple[float, ...]) -> sp.csr_array:
         """Matrix (n, P) of differences between neighbouring points of a path."""
@@ -209,13 +209,13 @@ def _in_even_steps(paths: Toolpaths, width: float) -> Toolpaths:
     line = np.concatenate([path[first][stretch], np.arange(len(paths))])
     order = np.argsort(line, kind="stable")
     place = np.concatenate([place, along[offsets[1:] - 1]])[order]
-    found, _ = sample_at(points, offsets, line[order], place)
+    resampled, _ = sample_at(points, offsets, line[order], place)
     counts = np.bincount(line, minlength=len(paths))
     bounds = np.concatenate([[0], np.cumsum(counts)])
-    found[bounds[1:] - 1] = points[offsets[1:] - 1]
+    resampled[bounds[1:] - 1] = points[offsets[1:] - 1]
     return replace(
         paths,
-        points=found,
+        points=resampled,
         normals=np.repeat(paths.normals[paths.offsets[:-1]], counts, axis=0),
         offsets=bounds,
         link=np.concatenate([link[first][stretch], np.zeros(len(paths), dtype=bool)])[order],

@@ -152,10 +152,10 @@ def _direction(
     step *= price / np.where(size > 0.0, size, 1.0)[:, None]
     slope[:-1] += step
     slope[1:] -= step
-    found = smooth.solve(np.einsum("pi,pi->p", slope, lines.normals))
-    size = np.abs(found[~lines.fixed])
+    direction = smooth.solve(np.einsum("pi,pi->p", slope, lines.normals))
+    size = np.abs(direction[~lines.fixed])
     usual = float(np.quantile(size, 0.95)) if len(size) else 0.0
-    return np.clip(found / usual, -2.0, 2.0) if usual > 0.0 else found
+    return np.clip(direction / usual, -2.0, 2.0) if usual > 0.0 else direction
 
 
 # Sensitivity of the worth of strands to their position: the direction in which to slide them.
@@ -223,13 +223,13 @@ def plane_strain(mesh: TetMesh, worths: Sequence[StrainWorth], frame: FloatArray
         sums = [np.bincount(corners.ravel(), weight * part, n) for part in strain.T]
         return np.stack(sums, axis=1) / np.where(total > 0.0, total, 1.0)[:, None]
 
-    values = [at_nodes(one.displacement, float(np.sqrt(one.squared))) for one in worths]
+    values = [at_nodes(worth.displacement, float(np.sqrt(worth.squared))) for worth in worths]
     pairs, terms = np.zeros((0, 2, n, 3)), np.zeros((0, 3))
-    for one in worths:
-        if one.adjoint is not None:
-            pair = np.stack([at_nodes(one.displacement), at_nodes(one.adjoint)])
+    for worth in worths:
+        if worth.adjoint is not None:
+            pair = np.stack([at_nodes(worth.displacement), at_nodes(worth.adjoint)])
             pairs = np.concatenate([pairs, pair[None]])
-            terms = np.concatenate([terms, [[one.mixed, one.peak, one.most]]])
+            terms = np.concatenate([terms, [[worth.mixed, worth.peak, worth.most]]])
     slopes = cell_gradients(mesh) @ frame[:2].T
     return PlaneStrain(mesh, frame, np.array(values), pairs, terms, slopes)
 

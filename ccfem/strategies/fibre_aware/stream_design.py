@@ -78,18 +78,18 @@ class FieldBends:
         by_x = by_size * x / size + by_bend * 2.0 * (x * yy - y * xy)
         by_y = by_size * y / size + by_bend * 2.0 * (y * xx - x * xy)
         parts = (by_x, by_y, by_bend * y * y, -2.0 * by_bend * x * y, by_bend * x * x)
-        found = sum(matrix @ part for matrix, part in zip(self._transposed, parts, strict=True))
-        return np.asarray(found)
+        slope = sum(matrix @ part for matrix, part in zip(self._transposed, parts, strict=True))
+        return np.asarray(slope)
 
     def _curvature(
         self, field: FloatArray
     ) -> tuple[tuple[FloatArray, ...], FloatArray, FloatArray, FloatArray]:
         """Find derivatives of the field, |g|, curvature of levels, and its excess: (m,) each."""
-        found = tuple(matrix @ field for matrix in (*self.slopes, *self.seconds))
-        x, y, xx, xy, yy = found
+        derivatives = tuple(matrix @ field for matrix in (*self.slopes, *self.seconds))
+        x, y, xx, xy, yy = derivatives
         size = np.sqrt(x * x + y * y + _FIELD_SMALLEST**2)
         curvature = (y * y * xx - 2.0 * x * y * xy + x * x * yy) / size**3
-        return found, size, curvature, np.maximum(self.radius * np.abs(curvature) - 1.0, 0.0)
+        return derivatives, size, curvature, np.maximum(self.radius * np.abs(curvature) - 1.0, 0.0)
 
 
 DESIGN_POWERS = {WORST: 4.0, SUM: 1.0, LEAST: 4.0}
@@ -234,8 +234,11 @@ class StreamModel:
         """Cost of bends, if there is one."""
         if not self.radius:
             return None
-        found = (self.of_group(one, self.group) for one in self.grid.derivatives(self.centres))
-        x, y, xx, xy, yy = (self.width * matrix for matrix in found)
+        derivatives = (
+            self.of_group(derivative, self.group)
+            for derivative in self.grid.derivatives(self.centres)
+        )
+        x, y, xx, xy, yy = (self.width * matrix for matrix in derivatives)
         return FieldBends((x, y), (xx, xy, yy), self.room / self.budget, self.radius)
 
     @cached_property
@@ -404,8 +407,8 @@ class StreamProblem:
     @classmethod
     def alone(cls, model: StreamModel) -> "StreamProblem":
         """Problem of one load case, of one field in all layers."""
-        one = np.ones(1)
-        return cls(model, (model.part,), one, one, one)
+        unit = np.ones(1)
+        return cls(model, (model.part,), unit, unit, unit)
 
     @cached_property
     def laplacian(self) -> Any:
@@ -430,20 +433,24 @@ class StreamProblem:
             Relative residual of the solves.
         """
         smeared = self.smeared(field)
-        found = self.solve(smeared, start, tolerance)
-        value, counts = self.worth(self.ratios(found))
-        return self.objective(field, smeared, found, value, self.pulls(smeared, found, counts))
+        solutions = self.solve(smeared, start, tolerance)
+        value, counts = self.worth(self.ratios(solutions))
+        return self.objective(
+            field, smeared, solutions, value, self.pulls(smeared, solutions, counts)
+        )
 
     def smeared(self, field: FloatArray) -> tuple[SmearedFibre, ...]:
         """Fibre that each field lays."""
-        return tuple(self.model.smeared(one) for one in field.reshape(len(self.shares), -1))
+        return tuple(
+            self.model.smeared(coefficients) for coefficients in field.reshape(len(self.shares), -1)
+        )
 
     def stiffness(self, smeared: Sequence[SmearedFibre], strain: FloatArray) -> FloatArray:
         """Stiffness (m, 3, 3), MPa, of the fibre of all fields at strains (m, 3)."""
-        found = self.shares[0] * smeared[0].stiffness(strain)
-        for share, one in zip(self.shares[1:], smeared[1:], strict=True):
-            found += share * one.stiffness(strain)
-        return found
+        stiffness = self.shares[0] * smeared[0].stiffness(strain)
+        for share, fibre in zip(self.shares[1:], smeared[1:], strict=True):
+            stiffness += share * fibre.stiffness(strain)
+        return stiffness
 
     def solve(
         self,
@@ -454,14 +461,16 @@ class StreamProblem:
         """Solve each case; parameters as in `evaluate`."""
         starts = start if start is not None else (None,) * len(self.parts)
         return tuple(
-            part.solve(lambda strain: self.stiffness(smeared, strain), one, tolerance)
-            for part, one in zip(self.parts, starts, strict=True)
+            part.solve(lambda strain: self.stiffness(smeared, strain), begin, tolerance)
+            for part, begin in zip(self.parts, starts, strict=True)
         )
 
     def ratios(self, solutions: Sequence[SmearedSolution]) -> FloatArray:
         """Stiffness (n,) of each case over that of the part without fibre."""
-        found = [part.ratio(one.work) for part, one in zip(self.parts, solutions, strict=True)]
-        return np.array(found)
+        ratios = [
+            part.ratio(solution.work) for part, solution in zip(self.parts, solutions, strict=True)
+        ]
+        return np.array(ratios)
 
     def worth(self, ratios: FloatArray) -> tuple[float, FloatArray]:
         """Objective at stiffness ratios (n,) without penalties, and the weight of each case."""
@@ -477,11 +486,11 @@ class StreamProblem:
         counts: FloatArray,
     ) -> list[Pull]:
         """Derive -log(stiffness), the cases weighted (n,), by each field if in all layers."""
-        found = []
-        for one in smeared:
-            x, y = zip(*(self.model.pull(one, each) for each in solutions), strict=True)
-            found.append((counts @ np.stack(x), counts @ np.stack(y)))
-        return found
+        pulls = []
+        for fibre in smeared:
+            x, y = zip(*(self.model.pull(fibre, solution) for solution in solutions), strict=True)
+            pulls.append((counts @ np.stack(x), counts @ np.stack(y)))
+        return pulls
 
     def objective(
         self,
@@ -502,13 +511,15 @@ class StreamProblem:
             Derivatives of the value by the gradient of each field, if it were in all layers.
         """
         model, fields, shares = self.model, field.reshape(len(self.shares), -1), self.shares
-        length = sum(share * model.length(one) for share, one in zip(shares, smeared, strict=True))
+        length = sum(
+            share * model.length(fibre) for share, fibre in zip(shares, smeared, strict=True)
+        )
         over = max(length / model.budget - 1.0, 0.0)
         value, gradient = value + OVER_BUDGET * over**2, []
-        for share, one, coefficients, pull in zip(shares, smeared, fields, pulls, strict=True):
-            for penalty in model.penalties(coefficients, one):
+        for share, fibre, coefficients, pull in zip(shares, smeared, fields, pulls, strict=True):
+            for penalty in model.penalties(coefficients, fibre):
                 value += share * penalty
-            gradient.append(share * model.gradient(coefficients, one, pull, over))
+            gradient.append(share * model.gradient(coefficients, fibre, pull, over))
         ratios = self.ratios(solutions)
         return Objective(float(value), np.concatenate(gradient), ratios, float(length), solutions)
 
@@ -520,19 +531,19 @@ class StreamProblem:
         """Matrix with a block for each field: mean over the cases of `StreamModel.curvature`."""
         counts, blocks = self._counts(solutions), []
         for share, own in zip(self.shares, field.reshape(len(self.shares), -1), strict=True):
-            each = [self.model.curvature(own, one) for one in solutions]
-            mean = sum(count * one for count, one in zip(counts, each, strict=True))
+            of_cases = [self.model.curvature(own, one) for one in solutions]
+            mean = sum(count * one for count, one in zip(counts, of_cases, strict=True))
             blocks.append((share or 1.0) * mean)  # a field without layers changes nothing
         return sp.block_diag(blocks, format="csc")
 
     def levels(self, field: FloatArray, solutions: tuple[SmearedSolution, ...]) -> BorderLevels:
         """Cost, over all cases, of levels that lie farther from the border than they need to."""
-        counts, found = self._counts(solutions), []
+        counts, levels = self._counts(solutions), []
         for share, own in zip(self.shares, field.reshape(len(self.shares), -1), strict=True):
-            each = [self.model.levels(own, one) for one in solutions]
-            weight = share * (counts @ np.stack([one.weight for one in each]))
-            found.append(replace(each[0], weight=weight))
-        return BorderLevels.side_by_side(found)
+            of_cases = [self.model.levels(own, one) for one in solutions]
+            weight = share * (counts @ np.stack([one.weight for one in of_cases]))
+            levels.append(replace(of_cases[0], weight=weight))
+        return BorderLevels.side_by_side(levels)
 
 
 @dataclass(frozen=True)
@@ -572,8 +583,8 @@ def design(problem: StreamProblem, start: FloatArray, evaluations: int = 50) -> 
     StreamDesign
         The best of all evaluations.
     """
-    field, found, ratios = designed_fields(problem, start, evaluations)
-    return StreamDesign(field.reshape(len(problem.shares), -1), found, ratios)
+    field, objective, ratios = designed_fields(problem, start, evaluations)
+    return StreamDesign(field.reshape(len(problem.shares), -1), objective, ratios)
 
 
 def designed_in_steps(
@@ -604,5 +615,5 @@ def designed_in_steps(
         return design(problem, start(problem), evaluations)
     less = replace(problem, model=replace(problem.model, budget=most))
     first = design(less, start(less), evaluations)
-    found = design(problem, first.fields.ravel(), int(np.ceil(_THEN * evaluations)))
-    return replace(found, ratios=first.ratios + found.ratios)
+    design_of = design(problem, first.fields.ravel(), int(np.ceil(_THEN * evaluations)))
+    return replace(design_of, ratios=first.ratios + design_of.ratios)

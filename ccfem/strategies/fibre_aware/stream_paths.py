@@ -134,8 +134,8 @@ class Extraction:
 
         def ways(length: float) -> list[tuple[tuple[int, ...], float]]:
             price = self._price(tried, counts, length)
-            found = [(phases, 0.0) for phases in self.best_phases(tried, counts, length)]
-            best = found[0][0]
+            shifts = [(phases, 0.0) for phases in self.best_phases(tried, counts, length)]
+            best = shifts[0][0]
 
             def gain(phases: tuple[int, ...], r: float) -> float:
                 return sum(
@@ -148,15 +148,15 @@ class Extraction:
             linked = [(phases, r) for phases in dict.fromkeys((best, whole)) for r in _REACHES]
             gains = [gain(*way) for way in linked]
             if max(gains) > (1.0 + _BETTER) * gain(best, 0.0):
-                found.append(linked[int(np.argmax(gains))])
-            return found
+                shifts.append(linked[int(np.argmax(gains))])
+            return shifts
 
         planned: dict[tuple[tuple[int, ...], float], Toolpaths] = {}
         chosen = [ways(length) for length in lengths]
         for phases, reach in {way for some in chosen for way in some}:
             of = {k: p for some, p in zip(alike, phases, strict=True) for k in some.tolist()}
-            laid = [paths(k, of[k], reach) for k in range(len(layers))]
-            planned[phases, reach] = Toolpaths.concatenate(laid)
+            paths_of_layers = [paths(k, of[k], reach) for k in range(len(layers))]
+            planned[phases, reach] = Toolpaths.concatenate(paths_of_layers)
         return [[planned[way] for way in some] for some in chosen]
 
     def best_phases(
@@ -175,17 +175,17 @@ class Extraction:
         """
         price = self._price(tried, counts, length)
         gains = np.array(
-            [[self._gain(along, price) for along in one] for one in tried], dtype=float
+            [[self._gain(along, price) for along in profiles] for profiles in tried], dtype=float
         )
         first, rows = gains.argmax(axis=1), np.arange(len(gains))
         others = gains.copy()
         others[rows, first] = -np.inf
         second = others.argmax(axis=1)
         near = others[rows, second] >= (1.0 - _NEAR) * gains[rows, first]
-        found = [first, np.zeros_like(first), np.where(near, second, first)]
+        candidates = [first, np.zeros_like(first), np.where(near, second, first)]
         if self.radius:  # only the test shows which bends can stay
-            found += [np.full_like(first, phase) for phase in range(self.phases)]
-        return list(dict.fromkeys(tuple(phases.tolist()) for phases in found))
+            candidates += [np.full_like(first, phase) for phase in range(self.phases)]
+        return list(dict.fromkeys(tuple(phases.tolist()) for phases in candidates))
 
     def _price(
         self, tried: list[list[list[Profile]]], counts: Sequence[int], length: float
@@ -198,7 +198,7 @@ class Extraction:
     def _gain(self, along: list[Profile], price: float) -> float:
         """Return the worth of fibre beyond its price."""
         minimum = self.machine.minimum_length
-        return sum(one.kept(price, minimum, _CUT_COST)[1] for one in along)
+        return sum(profile.kept(price, minimum, _CUT_COST)[1] for profile in along)
 
     def layer_paths(self, layer: Layer, field: FloatArray, shift: float) -> Toolpaths:
         """Paths of one layer along the levels `shift` above whole numbers."""
@@ -250,11 +250,11 @@ class Extraction:
         radius = self.machine.minimum_radius
         if reach:
             worth = partial(self._worth, layer)
-            found = link_by_worth(lines, section, reach * limit, width, radius, least, worth)
-            found = long_enough(found, least)
+            joined = link_by_worth(lines, section, reach * limit, width, radius, least, worth)
+            joined = long_enough(joined, least)
         else:
-            found = linked_paths(lines, section, width, limit, least, radius=radius)
-        paths = Toolpaths.from_plane(found.lines, layer, link=found.link)
+            joined = linked_paths(lines, section, width, limit, least, radius=radius)
+        paths = Toolpaths.from_plane(joined.lines, layer, link=joined.link)
         paths = slid_in(paths, layer, self.machine, self.inset, self.radius)
         return unfolded_paths(paths, layer, self.machine)
 

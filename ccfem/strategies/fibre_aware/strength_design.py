@@ -98,11 +98,11 @@ class StrengthProblem:
         """
         judges = tuple(MatrixPeaks(part.specimen.unreinforced) for part in problem.parts)
         bare = cls(problem, limits, strength, judges, {})
-        found = bare._peaks(problem.smeared(field), solutions)
-        check_stretched([one.stretch for one in found])
+        peaks = bare._peaks(problem.smeared(field), solutions)
+        check_stretched([one.stretch for one in peaks])
         factors = {
             (k, name): peak.index / peak.norm
-            for k, one in enumerate(found)
+            for k, one in enumerate(peaks)
             for name, peak in one.peaks.items()
         }
         return replace(bare, factors=factors)
@@ -182,21 +182,21 @@ class StrengthProblem:
     ) -> tuple[float, list[Pull]]:
         """Logarithm of the index that fails first, and its derivatives by each field's slope."""
         problem = self.problem
-        found = self._peaks(smeared, solutions)
-        peaks = {(k, name): p for k, one in enumerate(found) for name, p in one.peaks.items()}
+        case_peaks = self._peaks(smeared, solutions)
+        peaks = {(k, name): p for k, one in enumerate(case_peaks) for name, p in one.peaks.items()}
         near, counts = nearness(peaks, self.factors)
         pulls = [(np.zeros(len(one.size)), np.zeros(len(one.size))) for one in smeared]
-        cases = zip(problem.parts, found, solutions, strict=True)
+        cases = zip(problem.parts, case_peaks, solutions, strict=True)
         for k, (part, one, solution) in enumerate(cases):
             failing = {name: counts[k, name] for name in one.peaks}
             load = sum(count * one.peaks[name].by_displacement for name, count in failing.items())
             stiffness = problem.stiffness(smeared, solution.strain)
             adjoint = part.respond(stiffness, np.asarray(load), _TOLERANCE)
-            own = failing.get("fibre", 0.0) * one.counted
+            fibre_factor = failing.get("fibre", 0.0) * one.counted
             moved = 0.0 if part.forced else sum(failing.values())
             for f, fibre in enumerate(smeared):
                 share = max(float(problem.shares[f]), _NONE)
-                dx, dy = self._nearer(fibre, solution.strain, adjoint, own[f] / share)
+                dx, dy = self._nearer(fibre, solution.strain, adjoint, fibre_factor[f] / share)
                 if moved:
                     softer = problem.model.pull(fibre, solution)
                     dx, dy = dx + moved * softer[0], dy + moved * softer[1]
@@ -204,7 +204,7 @@ class StrengthProblem:
         return near, pulls
 
     def _nearer(
-        self, smeared: SmearedFibre, strain: FloatArray, adjoint: FloatArray, own: FloatArray
+        self, smeared: SmearedFibre, strain: FloatArray, adjoint: FloatArray, nearness: FloatArray
     ) -> Pull:
         """Derive the logarithm of the indices of one case by the slope of one field.
 
@@ -214,7 +214,7 @@ class StrengthProblem:
             Its fibre, in all layers.
         strain, adjoint : (m, 3) array
             Of the part with its fibre, and of the adjoint solution.
-        own : (m,) array
+        nearness : (m,) array
             Weight of the fibre of each cell in the index of the fibre itself.
         """
         alone = self.problem.model
@@ -225,8 +225,8 @@ class StrengthProblem:
         factor = -alone.axial_stiffness * alone.room * share / size**3
         fall = 3.0 * stretch * other / size**2
         # The fibre norm to its power is room * stretch^p / size^(2 p - 1) a cell.
-        power = own / np.where(stretch > 0.0, stretch, 1.0)
-        thin = (2.0 - 1.0 / POWER) * own / size**2
+        power = nearness / np.where(stretch > 0.0, stretch, 1.0)
+        thin = (2.0 - 1.0 / POWER) * nearness / size**2
         (ux, uy), (ax, ay) = _turned(smeared, strain), _turned(smeared, adjoint)
         dx = factor * (ux * other + ax * stretch - fall * gx) + power * ux - thin * gx
         dy = factor * (uy * other + ay * stretch - fall * gy) + power * uy - thin * gy
@@ -266,5 +266,5 @@ def design_for_strength(
     """
     limits = Limits.of(problem.parts[0].specimen.system.problem.material, Strand())
     whole = StrengthProblem.at(problem, limits, strength, field, solutions)
-    field, found, ratios = drawn_to_borders(whole, field, solutions, evaluations)
-    return StreamDesign(field.reshape(len(problem.shares), -1), found, tuple(ratios))
+    field, objective, ratios = drawn_to_borders(whole, field, solutions, evaluations)
+    return StreamDesign(field.reshape(len(problem.shares), -1), objective, tuple(ratios))

@@ -113,9 +113,9 @@ class Worth:
         """
         pieces = bars(strands, self.parts[0].system.problem.mesh)
         value = np.zeros(len(strands.length))
-        for one in self.strain_worths(strands, found, normal, counts):
-            assert one.adjoint is not None
-            value += one.value(pieces.strain(one.displacement), pieces.strain(one.adjoint))
+        for worth in self.strain_worths(strands, found, normal, counts):
+            assert worth.adjoint is not None
+            value += worth.value(pieces.strain(worth.displacement), pieces.strain(worth.adjoint))
         return value
 
     def strain_worths(
@@ -145,28 +145,38 @@ class Worth:
         axial, w = self.strand.stiffness(self.parts[0].modulus), self.strength
         pieces = bars(strands, self.parts[0].system.problem.mesh)
         length = strands.length * strands.share
-        strains = [pieces.strain(one.displacement) for one in found]
+        strains = [pieces.strain(equilibrium.displacement) for equilibrium in found]
         check_stretched(strains)
-        works = [one.work for one in found]
+        works = [equilibrium.work for equilibrium in found]
         peaks: dict[tuple[int, str], Peak] = {}
-        for k, (judge, one, strain) in enumerate(zip(self.judges, found, strains, strict=True)):
-            fibre = _fibre(pieces, length, strain, one.displacement, self.limits.fibre / axial)
-            of_case = judge.peaks(one.displacement, fibre, self.limits, normal)
+        for k, (judge, equilibrium, strain) in enumerate(
+            zip(self.judges, found, strains, strict=True)
+        ):
+            fibre = _fibre(
+                pieces, length, strain, equilibrium.displacement, self.limits.fibre / axial
+            )
+            of_case = judge.peaks(equilibrium.displacement, fibre, self.limits, normal)
             load = _load_share(self.parts[k], works[k])
             peaks |= {(k, name): peak.over(load) for name, peak in of_case.items()}
-        failing = nearness(peaks, {key: one.index / one.norm for key, one in peaks.items()})[1]
+        failing = nearness(
+            peaks, {key: equilibrium.index / equilibrium.norm for key, equilibrium in peaks.items()}
+        )[1]
         worths = []
-        for k, (part, one, strain) in enumerate(zip(self.parts, found, strains, strict=True)):
-            own = {name: failing[case, name] for case, name in failing if case == k}
-            loads = [count * peaks[k, name].by_displacement for name, count in own.items()]
-            adjoint = _respond(part, one, np.sum(loads, axis=0))
+        for k, (part, equilibrium, strain) in enumerate(
+            zip(self.parts, found, strains, strict=True)
+        ):
+            case_failing = {name: failing[case, name] for case, name in failing if case == k}
+            loads = [count * peaks[k, name].by_displacement for name, count in case_failing.items()]
+            adjoint = _respond(part, equilibrium, np.sum(loads, axis=0))
             # The load grows with the stiffness where supports move.
-            stiff = (1.0 - w) * share[k] + w * (0.0 if part.forced else sum(own.values()))
+            stiff = (1.0 - w) * share[k] + w * (0.0 if part.forced else sum(case_failing.values()))
             most = max(float(strain.max(initial=0.0)), _NONE)
             whole = float(length @ (np.maximum(strain, 0.0) / most) ** POWER)
-            peak = w * own.get("fibre", 0.0) / (POWER * max(whole, _NONE))
+            peak = w * case_failing.get("fibre", 0.0) / (POWER * max(whole, _NONE))
             squared = float(stiff) * axial / works[k]
-            worths.append(StrainWorth(squared, one.displacement, w * axial, adjoint, peak, most))
+            worths.append(
+                StrainWorth(squared, equilibrium.displacement, w * axial, adjoint, peak, most)
+            )
         return tuple(worths)
 
 
@@ -177,11 +187,11 @@ def _load_share(part: Specimen, work: float) -> float:
     return work / (2.0 * part.unreinforced.strain_energy)
 
 
-def _respond(part: Specimen, found: Equilibrium, load: FloatArray) -> FloatArray:
+def _respond(part: Specimen, equilibrium: Equilibrium, load: FloatArray) -> FloatArray:
     """Displacement (n, 3) under nodal forces (n, 3) of a part with its fibre, supports at rest."""
-    held = part.held.touching(found.displacement)
+    held = part.held.touching(equilibrium.displacement)
     matrix = part.solver.matrix if held.presses is None else held.reduce(part.matrix)
-    reduced = Reduced(matrix, found.matrix, held)
+    reduced = Reduced(matrix, equilibrium.matrix, held)
     solved = preconditioned_cg(reduced, held.project(load), part.solver, tolerance=_TOLERANCE)
     return np.asarray(held.motion(solved.values))
 

@@ -250,7 +250,7 @@ def upper_bound(
         solutions = [
             part.solve(fibre, start, 1e-3) for part, start in zip(parts, solutions, strict=True)
         ]
-        works = [one.work for one in solutions]
+        works = [solution.work for solution in solutions]
         ratios = np.array([part.ratio(work) for part, work in zip(parts, works, strict=True)])
         terms = singles / ratios
         value = _objective(terms, cases.weights, objective)
@@ -266,15 +266,15 @@ def upper_bound(
             factors = factors * (terms / terms.max()) ** min(1.0, _FULL_STEPS / (k + 1))
             factors = factors / factors.sum()
         squares = np.zeros_like(ascent.density)
-        for v, part, one in zip(factors * scale, parts, solutions, strict=True):
-            strain = one.strain @ along.T
+        for v, part, solution in zip(factors * scale, parts, solutions, strict=True):
+            strain = solution.strain @ along.T
             stretch = np.maximum(strain, 0.0) if mode == TENSION else strain
-            squares += v * (part.pull(one)[0] * stretch) ** 2
+            squares += v * (part.pull(solution)[0] * stretch) ** 2
         ascent = ascent.step(np.sqrt(squares), merit)
     if len(cases) == 1 and objective != LEAST:  # it is measured by this bound itself
         singles, least, attained = singles / least, 1.0, attained / least
-    found = (least, attained, sharpest, best, angles, k + 1)
-    return UpperBound(objective, singles, cases.weights, *found)
+    bound = (least, attained, sharpest, best, angles, k + 1)
+    return UpperBound(objective, singles, cases.weights, *bound)
 
 
 def affordable_iterations(cells: int) -> int:
@@ -348,15 +348,19 @@ def certificate(
     mode : str
         "tension" or "bonded".
     """
-    pulls = [part.pull(one) for part, one in zip(parts, solutions, strict=True)]
-    strains = np.stack([s * one.strain for (s, _), one in zip(pulls, solutions, strict=True)])
+    pulls = [part.pull(solution) for part, solution in zip(parts, solutions, strict=True)]
+    strains = np.stack(
+        [s * solution.strain for (s, _), solution in zip(pulls, solutions, strict=True)]
+    )
     square = largest_gathered(strains, np.asarray(factors, dtype=np.float64), mode)
     order = np.argsort(-square, kind="stable")
     room = (parts[0].mesh.volumes * most)[order]
     used = np.minimum(room, np.maximum(length - (np.cumsum(room) - room), 0.0))
     energy, work = axial_stiffness * float(used @ square[order]), 0.0
-    for factor, part, one, (s, load_work) in zip(factors, parts, solutions, pulls, strict=True):
-        u = s * one.displacement.reshape(-1)
+    for factor, part, solution, (s, load_work) in zip(
+        factors, parts, solutions, pulls, strict=True
+    ):
+        u = s * solution.displacement.reshape(-1)
         energy += factor * float(u @ (part.specimen.matrix @ u))
         work += factor * load_work
     return work**2 / energy
@@ -476,7 +480,7 @@ class DensityAscent:
         low, high = 1e-12, 1e12
         for _ in range(_BISECTIONS):
             middle = float(np.sqrt(low * high))
-            laid = float(self.volume @ np.minimum(self.most, total / middle))
-            low, high = (middle, high) if laid > self.length else (low, middle)
+            fitted = float(self.volume @ np.minimum(self.most, total / middle))
+            low, high = (middle, high) if fitted > self.length else (low, middle)
         scale = np.minimum(self.most, total / high) / np.maximum(total, 1e-300)
         return np.maximum(weight * scale[:, None], _TRACE * self.most[:, None])

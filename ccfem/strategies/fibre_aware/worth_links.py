@@ -77,8 +77,8 @@ def link_by_worth(
     cheapest : float in [0, 1], default 0.1
         Share of the lines, those worth least, that sets the price of length.
     """
-    found = possible_links(lines, section, limit, width, radius=radius)
-    order = sorted(found, key=lambda x: (not x.smooth, round(x.cost, 6), x.first, x.second))
+    possible = possible_links(lines, section, limit, width, radius=radius)
+    order = sorted(possible, key=lambda x: (not x.smooth, round(x.cost, 6), x.first, x.second))
     if not order:
         return join(lines, [])
     paths = strings([link.path for link in order])
@@ -88,13 +88,13 @@ def link_by_worth(
     if not links:
         return join(lines, [])
     along = worth([*lines, *(link.path for link in links)])
-    own, between = along[: len(lines)], along[len(lines) :]
-    price = _price(own, cheapest)
+    on_lines, between = along[: len(lines)], along[len(lines) :]
+    price = _price(on_lines, cheapest)
     shares = _beside_none(lines, links, between, width)
     choice = _Choice(
         lines,
         links,
-        [(one.value - price) * one.step for one in own],
+        [(profile.value - price) * profile.step for profile in on_lines],
         [(p.value * x - price) * p.step for p, x in zip(between, shares, strict=True)],
         enough,
         CLEARANCE * width,
@@ -113,8 +113,10 @@ def link_by_worth(
 
 def _price(along: Sequence[Profile], cheapest: float) -> float:
     """Largest worth per length in the cheapest part of lines; never quite zero."""
-    value = np.concatenate([one.value for one in along])
-    length = np.repeat([one.step for one in along], [len(one.value) for one in along])
+    value = np.concatenate([profile.value for profile in along])
+    length = np.repeat(
+        [profile.step for profile in along], [len(profile.value) for profile in along]
+    )
     order = np.argsort(value, kind="stable")
     total = np.cumsum(length[order])
     place = int(np.searchsorted(total, cheapest * total[-1]))
@@ -125,9 +127,11 @@ def _beside_none(
     lines: Sequence[FloatArray], links: Sequence[Link], along: Sequence[Profile], width: float
 ) -> list[FloatArray]:
     """For the pieces of each link 1, or 0 where they lie beside a strand that the link joins."""
-    counts = [len(one.value) for one in along]
+    counts = [len(profile.value) for profile in along]
     of = np.repeat(np.arange(len(links)), counts)
-    middle = np.concatenate([(np.arange(len(one.value)) + 0.5) * one.step for one in along])
+    middle = np.concatenate(
+        [(np.arange(len(profile.value)) + 0.5) * profile.step for profile in along]
+    )
     path = strings([link.path for link in links])[of]
     places, way = shapely.line_interpolate_point(path, middle), _direction(path, middle)
     clear = np.ones(len(of), dtype=bool)
@@ -262,9 +266,9 @@ class _Choice:
                 for j in before.taken
                 if j not in self.near[k] and not ends & {self.links[j].first, self.links[j].second}
             ]
-            found = self.greedy([k, *rest])
-            if found.gain > best.gain + self.equal:
-                best = better = found
+            choice = self.greedy([k, *rest])
+            if choice.gain > best.gain + self.equal:
+                best = better = choice
         return better
 
 

@@ -89,15 +89,15 @@ def band(
     turns : 2 floats, radians, default 0
         Turns to the left, at the start and at the end, with which the path leaves such joints.
     """
-    own = np.concatenate([_own(member, frame) for member in path.members])
-    left = np.concatenate([member.left for member in path.members])[own]
-    right = np.concatenate([member.right for member in path.members])[own]
+    nodes = np.concatenate([_own(member, frame) for member in path.members])
+    left = np.concatenate([member.left for member in path.members])[nodes]
+    right = np.concatenate([member.right for member in path.members])[nodes]
     strip = np.column_stack([0.5 * (left + right), 0.5 * (left - right), np.zeros(len(left))])
-    gap = np.diff(np.flatnonzero(own)) > 1
+    gap = np.diff(np.flatnonzero(nodes)) > 1
     if along_line(strip[:, :2])[-1] < STEP:
         strip, gap = _stub(strip), np.zeros(1, dtype=bool)
     if path.closed:
-        strip, gap = _as_ring(strip, np.append(gap, not own[0] or not own[-1]))
+        strip, gap = _as_ring(strip, np.append(gap, not nodes[0] or not nodes[-1]))
     strip = _even(_bridged(strip, gap), path.closed)
     width = 2.0 * np.linalg.norm(strip[:, 2:4], axis=1)
     if path.closed:

@@ -139,13 +139,13 @@ def _joined(members: list[Member], joint: int) -> list[Member]:
     if k == other:
         ring = replace(members[k], ends=(FREE, FREE), closed=True)
         return [*members[:k], ring, *members[k + 1 :]]
-    one = members[k] if side == 1 else members[k].reversed
+    member = members[k] if side == 1 else members[k].reversed
     two = members[other] if beside == 0 else members[other].reversed
     whole = Member(
-        np.concatenate([one.points, two.points]),
-        np.concatenate([one.left, two.left]),
-        np.concatenate([one.right, two.right]),
-        (one.ends[0], two.ends[1]),
+        np.concatenate([member.points, two.points]),
+        np.concatenate([member.left, two.left]),
+        np.concatenate([member.right, two.right]),
+        (member.ends[0], two.ends[1]),
     )
     return [*(m for n, m in enumerate(members) if n not in (k, other)), whole]
 

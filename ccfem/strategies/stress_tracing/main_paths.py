@@ -104,8 +104,8 @@ def _ends(frame: Frame, stress: LayerStress, limit: float) -> list[_End]:
     sizes = np.array([len(stretch) for stretch in stretches])
     lines = stress_lines(np.add.reduceat(plane, np.cumsum(sizes) - sizes) / sizes[:, None])
     beta = np.minimum(misalignment(np.array(outward), lines, 0.5 * limit), limit)
-    found = zip(places, outward, lines.value.tolist(), beta.tolist(), strict=True)
-    return [_End(*place, *rest) for place, *rest in found]
+    ends = zip(places, outward, lines.value.tolist(), beta.tolist(), strict=True)
+    return [_End(*place, *rest) for place, *rest in ends]
 
 
 def outward(member: Member, frame: Frame, joint: int) -> FloatArray:
@@ -130,7 +130,7 @@ def _candidates(
     ends: list[_End], rule: Criterion
 ) -> list[tuple[float, tuple[int, int], tuple[int, int]]]:
     """Smoothness of every pair of ends in a joint that turns by less than the limit."""
-    found = []
+    candidates = []
     joints = (list(group) for _, group in groupby(ends, key=lambda end: end.joint))
     for one, other in (pair for joint in joints for pair in combinations(joint, 2)):
         cosine = np.clip(-one.outward @ other.outward, -1.0, 1.0)
@@ -139,8 +139,8 @@ def _candidates(
             delta = float(rule(turn, 0.5 * (one.beta + other.beta), 0.0))
             if one.value * other.value < 0.0:
                 delta *= _OTHER_SIGN
-            found.append((delta, (one.member, one.side), (other.member, other.side)))
-    return found
+            candidates.append((delta, (one.member, one.side), (other.member, other.side)))
+    return candidates
 
 
 def _chained(

@@ -30,16 +30,16 @@ def with_shared_stems(paths: Sequence[MainPath], frame: Frame) -> list[MainPath]
         In the same order. A shared member is divided along its length in proportion to both widths.
         A member that is a path of its own and forks into two others is given to these.
     """
-    found = _forked(paths, frame)
-    for k in range(len(found)):
+    forked = _forked(paths, frame)
+    for k in range(len(forked)):
         for backward in (False, True):
-            own = _turned(found[k], backward)
+            own = _turned(forked[k], backward)
             joint = own.members[-1].ends[1]
             if own.closed or joint == FREE:
                 continue
             arrival = -outward(own.members[-1].reversed, frame, joint)
             best, of, turned = _ALONG, -1, False
-            for n, other in enumerate(found):
+            for n, other in enumerate(forked):
                 for way in (False, True):
                     stem = _stem(_turned(other, way), joint)
                     if n != k and stem is not None and _alike(own, _turned(other, way)):
@@ -47,19 +47,19 @@ def with_shared_stems(paths: Sequence[MainPath], frame: Frame) -> list[MainPath]
                         if along > best:
                             best, of, turned = along, n, way
             if of >= 0:
-                whole = _turned(found[of], turned)
+                whole = _turned(forked[of], turned)
                 mine, others = _divided(
                     own, whole, outward(whole.members[-1], frame, joint), arrival
                 )
-                found[k] = _turned(replace(own, members=(*own.members, mine)), backward)
+                forked[k] = _turned(replace(own, members=(*own.members, mine)), backward)
                 rest = replace(whole, members=(*whole.members[:-1], others))
-                found[of] = _turned(rest, turned)
-    return found
+                forked[of] = _turned(rest, turned)
+    return forked
 
 
 def _forked(paths: Sequence[MainPath], frame: Frame) -> list[MainPath]:
     """Divide stems that no path runs through between the paths that end there on both sides."""
-    found: list[MainPath | None] = list(paths)
+    forked: list[MainPath | None] = list(paths)
     for k, whole in enumerate(paths):
         stem = whole.members[0] if whole.members[0].ends[1] == FREE else whole.members[0].reversed
         joint = stem.ends[0]
@@ -67,31 +67,31 @@ def _forked(paths: Sequence[MainPath], frame: Frame) -> list[MainPath]:
             continue
         along = outward(stem, frame, joint)
         sides: dict[bool, tuple[float, int, bool]] = {}
-        for n, path in enumerate(found):
+        for n, path in enumerate(forked):
             for way in (False, True):
                 if n == k or path is None or path.closed:
                     continue
-                own = _turned(path, way)
-                if own.members[-1].ends[1] != joint:
+                turned = _turned(path, way)
+                if turned.members[-1].ends[1] != joint:
                     continue
-                arrival = -outward(own.members[-1].reversed, frame, joint)
+                arrival = -outward(turned.members[-1].reversed, frame, joint)
                 side = _on_left(along, arrival)
                 near = float(arrival @ along)
                 if near > max(_FORK, sides.get(side, (0.0,))[0]):
                     sides[side] = (near, n, way)
         if len(sides) < 2 or sides[True][1] == sides[False][1]:
             continue
-        left, right = (found[sides[side][1]] for side in (True, False))
+        left, right = (forked[sides[side][1]] for side in (True, False))
         assert left is not None
         assert right is not None
         ends = [_turned(left, sides[True][2]), _turned(right, sides[False][2])]
-        wide = [float(np.median(own.members[-1].width)) for own in ends]
+        wide = [float(np.median(turned.members[-1].width)) for turned in ends]
         parts = _cut(stem, wide[0] / sum(wide))
-        for side, own, part in zip((True, False), ends, parts, strict=True):
-            longer = replace(own, members=(*own.members, part))
-            found[sides[side][1]] = _turned(longer, sides[side][2])
-        found[k] = None
-    return [path for path in found if path is not None]
+        for side, turned, part in zip((True, False), ends, parts, strict=True):
+            longer = replace(turned, members=(*turned.members, part))
+            forked[sides[side][1]] = _turned(longer, sides[side][2])
+        forked[k] = None
+    return [path for path in forked if path is not None]
 
 
 def _turned(path: MainPath, backward: bool) -> MainPath:
@@ -108,24 +108,24 @@ def _stem(path: MainPath, joint: int) -> Member | None:
     return last if through else None
 
 
-def _widths(own: MainPath, whole: MainPath) -> tuple[float, float]:
+def _widths(branch: MainPath, whole: MainPath) -> tuple[float, float]:
     """Median widths, mm, of the members of both paths before a stem of the second one."""
-    wide, beside = (np.median(each.width) for each in (own.members[-1], whole.members[-2]))
+    wide, beside = (np.median(member.width) for member in (branch.members[-1], whole.members[-2]))
     return float(wide), float(beside)
 
 
-def _alike(own: MainPath, whole: MainPath) -> bool:
+def _alike(branch: MainPath, whole: MainPath) -> bool:
     """Whether neither path is much wider than the other."""
-    least, most = sorted(_widths(own, whole))
+    least, most = sorted(_widths(branch, whole))
     return most <= _ALIKE * least
 
 
 def _divided(
-    own: MainPath, whole: MainPath, along: FloatArray, arrival: FloatArray
+    branch: MainPath, whole: MainPath, along: FloatArray, arrival: FloatArray
 ) -> tuple[Member, Member]:
-    """Parts of the stem of `whole` for `own`, which arrives on one side of it, and for itself."""
+    """Parts of the stem of `whole` for `branch`, arriving on one side of it, and for itself."""
     stem = whole.members[-1]
-    wide, beside = _widths(own, whole)
+    wide, beside = _widths(branch, whole)
     share = wide / (wide + beside)
     if _on_left(along, arrival):
         return _cut(stem, share)

@@ -55,8 +55,8 @@ def tail_turns(
     shapely.prepare(section)
     bands = [band(path, frame) for path in paths]
     shares = [places(strip, pitch, section) for strip in bands]
-    fixed = [_fixed(*each) for each in zip(paths, bands, shares, strict=True)]
-    found = []
+    fixed = [_fixed(*arguments) for arguments in zip(paths, bands, shares, strict=True)]
+    turns_of_tails = []
     for k, (path, strip, share) in enumerate(zip(paths, bands, shares, strict=True)):
         turns = [0.0, 0.0]
         if not path.closed:
@@ -73,8 +73,8 @@ def tail_turns(
                         for t, lines in zip(_TURNS, tails, strict=True)
                     ]
                     turns[side] = _best(costs)
-        found.append((turns[0], turns[1]))
-    return found
+        turns_of_tails.append((turns[0], turns[1]))
+    return turns_of_tails
 
 
 def _best(costs: Sequence[float]) -> float:
@@ -102,13 +102,13 @@ def _fixed(path: MainPath, strip: Band, share: FloatArray) -> tuple[FloatArray, 
 def _tails(strip: Band, share: FloatArray, side: int) -> list[FloatArray]:
     """Lines (k, n, 2) behind the end of a band, for every turn."""
     core = np.column_stack([strip.middle, strip.half, strip.free])[strip.core]
-    own = share[:, strip.core]
+    shares = share[:, strip.core]
     if side == 0:
-        core, own = core[::-1] * [1.0, 1.0, -1.0, -1.0, 1.0], -own[:, ::-1]
+        core, shares = core[::-1] * [1.0, 1.0, -1.0, -1.0, 1.0], -shares[:, ::-1]
         reach = STEP * strip.core.start
     else:
         reach = STEP * (len(strip.middle) - strip.core.stop)
-    there = own[:, -1:]
+    there = shares[:, -1:]
     there = there[np.abs(there[:, 0]) <= 1.0]
     ahead = [extension(core, reach, turn) for turn in _TURNS]
     return [tail[:, :2] + there[..., None] * tail[:, 2:4] for tail in ahead]

@@ -81,7 +81,7 @@ def tracks(
                 clipped(line[run], section, *_parts_of(band, run))
                 for run in _stretches(place, band.core)
             ]
-        found += [_held(each, section, inner, whole) for each in pieces if len(each) > 1]
+        found += [_held(piece, section, inner, whole) for piece in pieces if len(piece) > 1]
     return found
 
 
@@ -89,13 +89,13 @@ def _stretches(place: FloatArray, core: slice) -> list[slice]:
     """Stretches of a track that lie within its band, or on beyond its ends."""
     within = np.abs(place) <= 1.0
     ends = np.flatnonzero(np.diff(np.concatenate([[False], within, [False]]).astype(np.int8)))
-    found = []
+    stretches = []
     for a, b in ends.reshape(-1, 2):
         # One point beyond the border at either side, so that the track is cut there.
         run = slice(max(int(a) - _BEYOND, 0), min(int(b) + _BEYOND, len(place)))
         if a < core.stop and b > core.start:
-            found.append(run)
-    return found
+            stretches.append(run)
+    return stretches
 
 
 def _parts_of(band: Band, run: slice) -> tuple[slice, slice]:
@@ -136,11 +136,11 @@ def clipped(line: FloatArray, section: Region, core: slice, within: slice) -> Fl
     the member behind a joint, the end of the points `within` is used.
     """
     inside = shapely.contains_xy(section, line)
-    own = np.flatnonzero(inside[core]) + core.start
-    if not len(own):
+    in_core = np.flatnonzero(inside[core]) + core.start
+    if not len(in_core):
         return line[:0]
     middle = (core.start + core.stop) // 2
-    start = int(own[np.argmin(np.abs(own - middle))])
+    start = int(in_core[np.argmin(np.abs(in_core - middle))])
     first = start - _last_inside(line[start::-1], inside[start::-1])
     last = start + _last_inside(line[start:], inside[start:])
     ahead = back = line[:0]

@@ -133,11 +133,11 @@ def _edge_graph(mesh: TriangleMesh, cost: _Cost, closed: BoolArray) -> sp.csr_ar
 
 def _ways(graph: sp.csr_array, sources: Sequence[IntArray]) -> tuple[FloatArray, IntArray]:
     """Distance of every point from each set of sources, and the point before it on the way."""
-    found = [
+    ways = [
         dijkstra(graph, directed=False, indices=s, min_only=True, return_predecessors=True)
         for s in sources
     ]
-    return np.stack([d for d, _, _ in found]), np.stack([p for _, p, _ in found]).astype(np.int64)
+    return np.stack([d for d, _, _ in ways]), np.stack([p for _, p, _ in ways]).astype(np.int64)
 
 
 def _follow(before: IntArray, end: int) -> list[int]:

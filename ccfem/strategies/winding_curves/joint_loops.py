@@ -26,7 +26,7 @@ def joint_loops(layer: Layer, names: Iterable[str]) -> dict[str, IntArray]:
         Points of each loop by the patch that it lies on. If two loops lie on one patch, as where a
         layer meets a hole twice, there is a second entry: the name with a prime.
     """
-    found: dict[str, IntArray] = {}
+    loops: dict[str, IntArray] = {}
     taken: set[int] = set()
     for name in names:
         edges = layer.patches.get(name)
@@ -41,7 +41,7 @@ def joint_loops(layer: Layer, names: Iterable[str]) -> dict[str, IntArray]:
             if k in taken or length[on].sum() < _SHARE * length.sum():
                 continue
             taken.add(k)
-            while name in found:
+            while name in loops:
                 name += "'"
-            found[name] = loop
-    return found
+            loops[name] = loop
+    return loops

@@ -26,7 +26,7 @@ def kept_apart(
     lines: Sequence[FloatArray],
     clearance: float,
     least: float,
-    laid: Sequence[FloatArray] = (),
+    placed: Sequence[FloatArray] = (),
     border: cKDTree | None = None,
 ) -> list[FloatArray]:
     """Choose the longest stretches of lines, one after the other, that keep a clearance.
@@ -39,7 +39,7 @@ def kept_apart(
     clearance : float, mm
     least : float, mm
         Shorter stretches are not laid.
-    laid : sequence of (n_i, 3) arrays, mm
+    placed : sequence of (n_i, 3) arrays, mm
         Lines that are there already.
     border : cKDTree, optional
         Of points that lines keep half the clearance from.
@@ -49,7 +49,7 @@ def kept_apart(
     list of (n, 3) arrays
         A closed line that nothing is cut from stays closed.
     """
-    free = [_free(line, laid, clearance, border) for line in lines]
+    free = [_free(line, placed, clearance, border) for line in lines]
     best = [_longest(line, mask) for line, mask in zip(lines, free, strict=True)]
     kept: list[FloatArray] = []
     while best:
@@ -76,15 +76,15 @@ def _reach(line: FloatArray, clearance: float) -> float:
 
 
 def _free(
-    line: FloatArray, laid: Sequence[FloatArray], clearance: float, border: cKDTree | None
+    line: FloatArray, placed: Sequence[FloatArray], clearance: float, border: cKDTree | None
 ) -> BoolArray:
     """Which points of a line keep the clearance, those of itself that come before them included."""
     free = np.ones(len(line), dtype=bool)
     if border is not None:
         free = border.query(line)[0] >= 0.5 * clearance
-    if len(laid):
-        every = np.concatenate(laid)
-        reach = max(_reach(one, clearance) for one in laid)
+    if len(placed):
+        every = np.concatenate(placed)
+        reach = max(_reach(strand, clearance) for strand in placed)
         free &= cKDTree(every).query(line, distance_upper_bound=reach)[0] >= reach
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
     pairs = cKDTree(line).query_pairs(clearance, output_type="ndarray")
@@ -103,7 +103,7 @@ def _longest(line: FloatArray, free: BoolArray) -> tuple[float, IntArray]:
     rows = [np.arange(a, b) for a, b in runs(free)]
     if is_closed(line) and len(rows) > 1 and free[0] and free[-1]:
         rows = [np.concatenate([rows[-1], rows[0][1:]]), *rows[1:-1]]
-    lengths = [line_length(line[each]) if len(each) > 1 else 0.0 for each in rows]
+    lengths = [line_length(line[run]) if len(run) > 1 else 0.0 for run in rows]
     if not lengths:
         return 0.0, np.zeros(0, dtype=np.int64)
     k = int(np.argmax(lengths))

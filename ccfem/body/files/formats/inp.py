@@ -198,11 +198,11 @@ def _members(lines: list[str], generate: bool) -> list[str | range]:
     items = [item.strip() for line in lines for item in line.split(",") if item.strip()]
     if not generate:
         return list(items)
-    found: list[str | range] = []
+    members: list[str | range] = []
     for line in lines:
         first, last, *step = (int(item) for item in line.split(",") if item.strip())
-        found.append(range(first, last + 1, step[0] if step else 1))
-    return found
+        members.append(range(first, last + 1, step[0] if step else 1))
+    return members
 
 
 def _key(deck: _Deck, name: str) -> str:

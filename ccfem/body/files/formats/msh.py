@@ -24,17 +24,17 @@ def read(path: Path) -> TetMesh:
     if b"$MeshFormat" not in start and not start.startswith(b"$Comments"):
         raise InputError(f"{path} is not a Gmsh mesh: it must begin with $MeshFormat")
     try:
-        found = read_isolated("gmsh_files:read", path)
+        arrays = read_isolated("gmsh_files:read", path)
     except ChildError as error:
         raise InputError(
             f"{path} is not a Gmsh mesh that can be read ({error}): save it again as version 4.1"
         ) from None
-    parts = {name: name.split(":", 2) for name in found}
-    blocks = {p[1]: (p[2], found[name]) for name, p in parts.items() if p[0] == "cells"}
-    mesh = TetMesh(found["points"][:, :3], tetrahedra(blocks.values(), path))
+    parts = {name: name.split(":", 2) for name in arrays}
+    blocks = {p[1]: (p[2], arrays[name]) for name, p in parts.items() if p[0] == "cells"}
+    mesh = TetMesh(arrays["points"][:, :3], tetrahedra(blocks.values(), path))
     groups: dict[str, list[IntArray]] = {}
     for name, (kind, *rest) in parts.items():
         if kind == "group":
             corners = blocks[rest[0]][1][:, :3]
-            groups.setdefault(rest[1], []).append(corners[found[name]])
+            groups.setdefault(rest[1], []).append(corners[arrays[name]])
     return with_groups(mesh, {name: np.concatenate(each) for name, each in groups.items()})

@@ -93,18 +93,18 @@ def read_grid(path: Path) -> Grid:
             f"{path} is not a VTK unstructured grid: it must hold <VTKFile type='UnstructuredGrid'>"
         )
     try:
-        found = read_isolated("vtk_files:read_grid", path)
+        arrays = read_isolated("vtk_files:read_grid", path)
     except ChildError as error:
         raise InputError(
             f"{path} is not a VTK unstructured grid that can be read: {error}: write it again"
         ) from None
     parts: dict[str, dict[str, Any]] = {
-        kind: {k.partition(":")[2]: v for k, v in found.items() if k.startswith(f"{kind}:")}
+        kind: {k.partition(":")[2]: v for k, v in arrays.items() if k.startswith(f"{kind}:")}
         for kind in ("cells", "point", "cell", "field", "components")
     }
     return Grid(
-        np.asarray(found["points"], dtype=np.float64),
-        found["types"].astype(np.int64),
+        np.asarray(arrays["points"], dtype=np.float64),
+        arrays["types"].astype(np.int64),
         {int(kind): nodes for kind, nodes in parts["cells"].items()},
         parts["point"],
         parts["cell"],

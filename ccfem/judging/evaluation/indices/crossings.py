@@ -43,8 +43,10 @@ def sample_crossings(paths: PlanePaths) -> CrossingSamples:
     """Count the crossings on a layer (see `ccfem.geometry.intersections.find_crossings`)."""
     pairs = find_crossings(paths.points, paths.offsets, paths.closed)
     line = np.searchsorted(paths.offsets, pairs, side="right")
-    own = int((line[:, 0] == line[:, 1]).sum())
-    return CrossingSamples(np.array([float(len(pairs) - own)]), np.array([float(own)]))
+    with_itself = int((line[:, 0] == line[:, 1]).sum())
+    return CrossingSamples(
+        np.array([float(len(pairs) - with_itself)]), np.array([float(with_itself)])
+    )
 
 
 def crossing_indices(samples: CrossingSamples) -> dict[str, float]:

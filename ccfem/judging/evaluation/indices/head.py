@@ -87,15 +87,15 @@ def sample_head(
         return HeadSamples(length, np.zeros(len(length)), np.zeros(len(length), dtype=bool))
     points, offsets, _ = merge_repeated(fibre.points, fibre.offsets, 1e-6)
     middle, _, length, _ = sample_midpoints(points, offsets, COARSE)
-    found = nearest_on_triangles(layer.points, layer.triangles, middle)
-    corners = layer.point_normals[layer.triangles[found.triangle]]
-    axis = np.einsum("sk,skd->sd", found.weights, corners)
+    nearest = nearest_on_triangles(layer.points, layer.triangles, middle)
+    corners = layer.point_normals[layer.triangles[nearest.triangle]]
+    axis = np.einsum("sk,skd->sd", nearest.weights, corners)
     axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-300)
     tilt = np.degrees(np.arccos(np.clip(axis @ stack.build, -1.0, 1.0)))
     when = np.full(len(axis), layer.index)
     size = (machine.head_angle, machine.head_length)
     index = stack.index.astype(np.int64)
-    hits = earlier_in_cones(found.points, axis, when, stack.points, index, *size) >= 0
+    hits = earlier_in_cones(nearest.points, axis, when, stack.points, index, *size) >= 0
     return HeadSamples(length, tilt, hits)
 
 

@@ -229,12 +229,12 @@ def matching_curve(
 
 def matching_indices(samples: AlignmentSamples) -> dict[str, float]:
     """Values of `COLUMNS`."""
-    found = along_fibre(samples)
+    rates = along_fibre(samples)
     limits = np.array(_ANGLES, dtype=np.float64)
     return {
         f"matching_{reading}_{angle}": float(value)
         for reading in ("path", "energy")
-        for angle, value in zip(_ANGLES, matching_curve(found, reading, limits), strict=True)
+        for angle, value in zip(_ANGLES, matching_curve(rates, reading, limits), strict=True)
     }
 
 

@@ -144,20 +144,20 @@ def sample_room(
     flat = np.column_stack([lines.points, np.zeros(len(lines.points))])
     up = np.broadcast_to([0.0, 0.0, 1.0], flat.shape)
     same = np.zeros(len(lines), dtype=np.int64)
-    found = beads(flat, up, lines.offsets, lines.closed, same, width, machine.strand_height)
-    inside = width_inside(found.middle[:, :2], found.direction[:, :2], width, layer.plane.polygon)
+    room = beads(flat, up, lines.offsets, lines.closed, same, width, machine.strand_height)
+    inside = width_inside(room.middle[:, :2], room.direction[:, :2], width, layer.plane.polygon)
     height = max(layer.thickness, 1e-300)
     return RoomSamples(
-        found.length,
-        found.alone,
-        found.every,
-        found.fill,
-        found.stack,
+        room.length,
+        room.alone,
+        room.every,
+        room.fill,
+        room.stack,
         inside,
-        found.fill * machine.filament_area / (width * height),
+        room.fill * machine.filament_area / (width * height),
         _free_runs(paths, 0.5 * width, None if below is None else below.plane.polygon),
-        np.array([width * float((found.length * (1.0 - found.every)).sum())]),
-        np.array([machine.filament_area * float((found.length * inside).sum())]),
+        np.array([width * float((room.length * (1.0 - room.every)).sum())]),
+        np.array([machine.filament_area * float((room.length * inside).sum())]),
         np.array([float(layer.areas.sum()) * layer.thickness]),
         np.array([float(late)]),
     )

@@ -86,11 +86,11 @@ def path_sinuosity(points: FloatArray, offsets: IntArray, width: float) -> Float
         return np.zeros(0)
     pieces, owner = _pieces(points, offsets)
     total = lengths(points, offsets)
-    found = np.zeros(count)
+    sinuosity = np.zeros(count)
     for tolerance in TOLERANCES:
         simple = shapely.simplify(pieces, tolerance * width, preserve_topology=False)
-        found += total / np.bincount(owner, shapely.length(simple), count)
-    return np.maximum(found / len(TOLERANCES), 1.0)
+        sinuosity += total / np.bincount(owner, shapely.length(simple), count)
+    return np.maximum(sinuosity / len(TOLERANCES), 1.0)
 
 
 def _pieces(points: FloatArray, offsets: IntArray) -> tuple[FloatArray, IntArray]:

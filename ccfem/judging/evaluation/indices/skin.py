@@ -85,13 +85,13 @@ def _over(layer: Layer, points: FloatArray) -> tuple[FloatArray, BoolArray]:
         plane = layer.plane
         beside = section_places(plane.project(points), plane.polygon) != INSIDE
         return np.broadcast_to(plane.frame[2], points.shape), beside
-    found = nearest_on_triangles(layer.points, layer.triangles, points)
-    corners = layer.point_normals[layer.triangles[found.triangle]]
-    normal = np.einsum("sk,skd->sd", found.weights, corners)
+    nearest = nearest_on_triangles(layer.points, layer.triangles, points)
+    corners = layer.point_normals[layer.triangles[nearest.triangle]]
+    normal = np.einsum("sk,skd->sd", nearest.weights, corners)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    along = points - found.points
+    along = points - nearest.points
     along = along - np.einsum("sd,sd->s", along, normal)[:, None] * normal
-    return normal, np.linalg.norm(along, axis=1) > 0.5 * found.distance + 1e-6
+    return normal, np.linalg.norm(along, axis=1) > 0.5 * nearest.distance + 1e-6
 
 
 def _in_part(mesh: TetMesh, points: FloatArray) -> BoolArray:

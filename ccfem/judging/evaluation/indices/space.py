@@ -169,8 +169,8 @@ def _on_layer(layer: Layer, points: FloatArray) -> tuple[IntArray, FloatArray]:
         triangle, weights = locate(plane.points, layer.triangles, plane.project(points))
     left = np.flatnonzero(triangle < 0)
     if len(left):
-        found = nearest_on_triangles(layer.points, layer.triangles, points[left])
-        triangle[left], weights[left] = found.triangle, found.weights
+        nearest = nearest_on_triangles(layer.points, layer.triangles, points[left])
+        triangle[left], weights[left] = nearest.triangle, nearest.weights
     return triangle, weights
 
 
@@ -189,16 +189,16 @@ def _curvature(points: FloatArray, offsets: IntArray, closed: BoolArray, step: f
 
 def _linked(fibre: Toolpaths, layer: Layer, patches: Sequence[str], reach: float) -> FloatArray:
     """Count the patches near each strand."""
-    found = np.zeros(len(fibre))
+    linked = np.zeros(len(fibre))
     if not len(fibre):
-        return found
+        return linked
     for name in patches:
         edges = layer.patches.get(name)
         if edges is None or not len(edges):
             continue
         away, _ = cKDTree(layer.points[np.unique(edges)]).query(fibre.points)
-        found += np.minimum.reduceat(away, fibre.offsets[:-1]) <= reach
-    return found
+        linked += np.minimum.reduceat(away, fibre.offsets[:-1]) <= reach
+    return linked
 
 
 def space_indices(samples: SpaceSamples) -> dict[str, float]:

@@ -131,7 +131,7 @@ def tension_indices(samples: TensionSamples) -> dict[str, float]:
     angles = (samples.angle, samples.angle_flat, _angle(samples.least @ best))
     gap = float(samples.gap.sum())
     gap = gap if gap > _EQUAL * total else float("nan")
-    ours, flat, least = (float(samples.gap @ each) / gap for each in angles)
+    ours, flat, least = (float(samples.gap @ angle) / gap for angle in angles)
     return {
         "across_flat": float(samples.flat.sum()) / total,
         "across_best": float(acting.min()) / total,
@@ -153,14 +153,14 @@ def _acting_along(directions: FloatArray, tensor: FloatArray) -> FloatArray:
 
 def _around(axes: FloatArray) -> FloatArray:
     """Directions (k, 3) evenly over half a sphere, symmetric about the planes of the axes."""
-    found = []
+    neighbours = []
     for height in np.linspace(0.0, 0.5 * np.pi, _STEPS + 1):
         count = max(round(_STEPS * np.cos(height)), 1)
         turn = np.linspace(0.0, 2.0 * np.pi, 4 * count, endpoint=False)
         out = np.cos(height)
         ring = [out * np.cos(turn), out * np.sin(turn), np.full(len(turn), np.sin(height))]
-        found.append(np.stack(ring, axis=1))
-    return np.concatenate(found) @ axes
+        neighbours.append(np.stack(ring, axis=1))
+    return np.concatenate(neighbours) @ axes
 
 
 def sample(paths: LayerPaths) -> TensionSamples:
