@@ -25,8 +25,6 @@ _FOLDED = {
     ),
     "cases.reading": "cases.named",
     "cases.shipped": "cases.bracket cases.t_bracket cases.two_load_plate",
-    "cases.stored": "cases.stored.stored_files",
-    "cases.storing": "cases.stored.build",
     "papers.contents": "papers.verdicts",
     "body.mesh.check": "body.mesh.hanging",
     "body.meshing.meshed_body": "body.meshing.cache",
@@ -130,6 +128,8 @@ _FOLDED = {
 """Modules that became sections of another one, by that one."""
 
 MOVED = {
+    "printing.slabs": "paths.splitting.slabs",
+    "printing.strand_density": "paths.splitting.strand_density",
     **{part: whole for whole, parts in _FOLDED.items() for part in parts.split()},
     "arrays": "base.arrays",
     "checks": "base.checks",

@@ -136,11 +136,14 @@ def folds(points: FloatArray, offsets: IntArray, closed: BoolArray, radius: floa
     closed : (K,) bool array
         Closed polylines repeat their first point at their end, and are measured across it.
     radius : float, mm
-        Least radius of the machine.
+        Least radius of the machine, at least 0, which allows every turn.
     """
     points, offsets, closed = np.asarray(points, float), np.asarray(offsets), np.asarray(closed)
     window = WINDOW * radius
     size = lengths(points, offsets)
+    if radius == 0.0:  # the machine turns on the spot
+        none = np.zeros(0)
+        return Folds(none.astype(np.int64), none, none, lengths=size, closed=closed)
     line, position, tangent, step = _tangents(points, offsets, closed, window)
     # From each sample the nearest one ahead to which the tangent turns by more than the angle.
     samples = np.bincount(line, minlength=len(size))

@@ -171,3 +171,8 @@ def test_folds_of_one_line_are_its_own_beside_a_longer_one():
     offsets = np.array([0, len(long), len(long) + len(short)])
     found = folds(np.concatenate([long, short]), offsets, np.zeros(2, dtype=bool), 3.85)
     assert found.counts.tolist() == [1, 5]
+
+
+def test_a_machine_that_turns_on_the_spot_folds_nothing():
+    hairpin = np.array([[0.0, 0.0], [50.0, 0.0], [50.0, 0.1], [0.0, 0.1]])
+    assert of(hairpin, radius=0.0).counts.tolist() == [0]

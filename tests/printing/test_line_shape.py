@@ -5,10 +5,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import shapely
-from ccfem.printing.slabs import LOW, slabs_of
 
 from ccfem.body.mesh.box import box_mesh
 from ccfem.machine import machine_from, machine_names
+from ccfem.paths.splitting.slabs import LOW, slabs_of
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.matrix_flow import with_flow
 from ccfem.slicing.slicers.planar import Planar
