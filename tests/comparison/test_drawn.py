@@ -30,7 +30,7 @@ ROOT = Path(ccfem.__file__).parent
 DRAWN = [
     *sorted((ROOT / "comparison" / "plot").glob("*.py")),
     *sorted((ROOT / "comparison" / "report").glob("*.py")),
-    *(ROOT / "comparison" / f"{name}.py" for name in ("pictures", "record", "files", "shown")),
+    *(ROOT / "comparison" / f"{name}.py" for name in ("pictures", "files", "shown")),
 ]
 COMPUTED = ("sample_", "evaluate", "plan_", "plan", "matching_rate", "virtual_test", "plane_paths")
 

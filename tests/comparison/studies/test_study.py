@@ -30,6 +30,7 @@ from ccfem.paths.planning import Amount
 @dataclass(frozen=True)
 class Rows:
     spacing: float = 5.0
+    folds: ClassVar[bool] = True
     amount: ClassVar[Amount] = Amount("spacing", 1.0, 20.0)
 
     def __call__(self, layer, stress, machine):
@@ -312,7 +313,7 @@ def test_the_lock_and_the_tables_are_not_written_through_links(beside):
 
 
 def test_stress_is_kept_as_plain_arrays_where_nobody_else_writes(tmp_path):
-    case = ccfem.read("bar", element_size=12.5)
+    case = ccfem.read("bar", element_size=10.0)
     task = part_bytes(Part(case, ("pull",)), None, "auto")
     rest, arrays = solve_part(task)
     assert len(rest) < 0.2 * sum(array.nbytes for array in arrays.values())
