@@ -37,8 +37,18 @@ def python_page() -> str:
 
 def _room(name: str, title: str) -> str:
     module = importlib.import_module(f"ccfem.{name}")
-    entries = [_entry(module, each, 3) for each in module.__all__ if _documented(module, each)]
+    public = getattr(module, "__all__", None) or _defined(module)
+    entries = [_entry(module, member, 3) for member in public if _documented(module, member)]
     return f"## {title}: `ccfem.{name}` {{ #{name.replace('.', '-')} }}\n\n" + "".join(entries)
+
+
+def _defined(module: object) -> list[str]:
+    """Public functions and classes that a module defines itself."""
+    return [
+        name
+        for name, value in vars(module).items()
+        if not name.startswith("_") and getattr(value, "__module__", "") == module.__name__  # type: ignore[attr-defined]
+    ]
 
 
 def _documented(module: object, name: str) -> bool:
