@@ -344,10 +344,10 @@ def test_a_strategy_that_fails_stays_with_its_reason():
 
 @dataclass(frozen=True)
 class Joined:
-    """Two strands, and a link of 23 mm of which 20 mm lie outside the part."""
+    """Two strands, and a link of 26 mm without folds, of which 23 mm lie outside the part."""
 
     def __call__(self, layer, stress, machine):
-        line = np.array([[1.0, 9.0], [58, 9], [68, 9], [68, 5], [59, 5], [1, 5]])
+        line = np.array([[1.0, 12.0], [58, 12], [68, 12], [68, 5], [59, 5], [1, 5]])
         return Toolpaths.from_plane([line], layer, link=[np.isin(np.arange(6), [1, 2, 3])])
 
 
@@ -356,11 +356,11 @@ def test_links_outside_the_part_are_reported_and_carry_nothing():
     (run,) = result.runs
     assert not run.untested
     total = run.evaluation.total
-    assert total["link_outside"] == pytest.approx(4 * 20.0, rel=1e-3)
+    assert total["link_outside"] == pytest.approx(4 * 23.0, rel=1e-3)
     assert total["outside_length"] == 0.0
     inside = run.tested.bracket.tension.strands.total
     assert inside == pytest.approx(total["fibre_length"] - total["link_outside"], rel=1e-4)
-    assert "joined: 80 mm of links lie outside the part and must be cut off" in result.remarks
+    assert "joined: 92 mm of links lie outside the part and must be cut off" in result.remarks
     assert not any("voids" in line for line in result.remarks)
 
 

@@ -6,6 +6,7 @@ fits, or where nothing holds them.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -138,9 +139,11 @@ CHEATS: dict[str, tuple[Callable[..., Lines], str]] = {
 
 @dataclass(frozen=True)
 class Cheat:
-    """A strategy that lays what a function draws."""
+    """A strategy that lays what a function draws, and whose folds planning leaves as they are."""
 
     name: str
+
+    folds: ClassVar[bool] = True
 
     def __call__(self, layer: Layer, stress, machine) -> Toolpaths:
         draw, _ = CHEATS[self.name]

@@ -250,7 +250,7 @@ def _true_wall(face: Face, corners: FloatArray) -> RoundWall | None:
     near = np.abs(distance) <= slack
     if not near.all() and ((distance > slack).any() or face.kind != "cylinder"):
         return None
-    if not near.all() and not _chords(face, nodes - wall.centre, distance, near):
+    if not near.all() and not _chords(face, nodes - wall.centre, near, slack):
         return None
     places = np.concatenate([corners, 0.5 * (corners + np.roll(corners, 1, axis=1))])
     height = (nodes - wall.centre) @ wall.direction
@@ -264,26 +264,37 @@ def _true_wall(face: Face, corners: FloatArray) -> RoundWall | None:
     )
 
 
-def _chords(face: Face, arm: FloatArray, distance: FloatArray, near: BoolArray) -> bool:
-    """Whether nodes inside a cylinder lie on chords between columns of nodes that are near it.
+def _chords(face: Face, arm: FloatArray, near: BoolArray, slack: float) -> bool:
+    """Whether nodes off a cylinder lie on chords between columns of nodes that are on it.
+
+    Where the corner between two chords has no node, they are half as long as their columns tell, at
+    most, and so are as near to the wall as such a chord.
 
     Parameters
     ----------
     arm : (k, 3) array, mm
         Of the nodes, from a point of the axis.
-    distance : (k,) array, mm
-        Of the nodes from the wall; negative inside.
     near : (k,) bool array
         Nodes on the wall.
+    slack : float, mm
+        Largest distance of a node from its chord.
     """
     axes = np.linalg.svd(face.direction[None])[2][1:]
-    turn = np.sort(np.arctan2(arm[near] @ axes[1], arm[near] @ axes[0]))
-    if 1 + (np.diff(turn) > 1e-3).sum() < _COLUMNS:
+    across, along = axes @ arm.T
+    turn, away = np.arctan2(along, across), np.hypot(along, across)
+    order = np.flatnonzero(near)[np.argsort(turn[near])]
+    column = turn[order]
+    if 1 + (np.diff(column) > 1e-3).sum() < _COLUMNS:
         return False
-    gaps = np.sort(np.diff(turn, append=turn[:1] + 2.0 * np.pi))
-    gaps = gaps[: len(gaps) - (face.turn < 359.0)]  # a wall that does not close has one more
-    chord = face.radius * (1.0 - np.cos(0.5 * gaps[-1]))
-    return bool(gaps[-1] < np.radians(COARSE_ANGLE)) and bool((distance > -1.1 * chord).all())
+    # Columns before and behind each node off the wall; the first follows the last.
+    place = np.searchsorted(column, turn[~near])
+    before, after = order[place - 1], order[place % len(order)]
+    half = 0.5 * ((turn[after] - turn[before]) % (2.0 * np.pi))
+    middle = turn[before] + half
+    radius = 0.5 * (away[before] + away[after])
+    on_chord = np.abs(radius * np.cos(half) - away[~near] * np.cos(turn[~near] - middle)) <= slack
+    on_half = (away[~near] <= radius) & (away[~near] >= radius * np.cos(0.5 * half))
+    return bool((half < np.radians(0.5 * COARSE_ANGLE)).all() and (on_chord | on_half).all())
 
 
 def guessed_walls(points: FloatArray, boundary: IntArray) -> tuple[tuple[RoundWall, ...], IntArray]:

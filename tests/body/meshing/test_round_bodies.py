@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
+import ccfem
 from ccfem.base.errors import InputError
 from ccfem.body.files.surface import Surface
 from ccfem.body.mesh import TetMesh
@@ -83,3 +84,11 @@ def test_a_part_that_slides_on_its_bore_is_free_to_turn(body, kind, order, share
     problem = Problem(mesh, isotropic(100.0, 0.3), supports, {}, order=order)
     with pytest.raises(InputError, match=r"the part is free to .*rotate about the axis through"):
         held(problem)
+
+
+def test_a_wavy_top_is_no_round_wall():
+    """The sections are those of the mesh: a cylinder through the crests adds 1.5 % to them."""
+    mesh = ccfem.read("m_shape", element_size=6.0).problem.mesh
+    assert not mesh.round_walls
+    (layer,) = Planar(count=1).cut(mesh)
+    assert layer.plane.polygon.area == pytest.approx(mesh.volumes.sum(), rel=1e-3)  # 1 mm
