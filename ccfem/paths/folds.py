@@ -15,7 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, repeated
-from ccfem.geometry.polylines import arc_lengths, lengths, merge_repeated
+from ccfem.geometry.polylines import (
+    arc_lengths,
+    farthest_point,
+    lengths,
+    line_length,
+    merge_repeated,
+)
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 
@@ -35,8 +41,6 @@ _SPREAD = 0.25
 """Largest length, in windows, over which a vertex of a polyline spreads its turn to each side."""
 _STRAIGHT = 1e-6
 """Turn, radians, up to which a point lies on a straight piece: it then decides nothing."""
-_DIGITS = 6
-"""Decimals of the distances, mm, by which the beginning of a ring is chosen."""
 
 
 @dataclass(frozen=True)
@@ -201,12 +205,9 @@ def _begun_alike(
     begin = np.zeros(len(offsets) - 1)
     for k in np.flatnonzero(closed & (np.diff(offsets) > 2)):
         ring = points[offsets[k] : offsets[k + 1]]
-        size = np.linalg.norm(np.diff(ring, axis=0), axis=1)
-        centre = size @ (0.5 * (ring[1:] + ring[:-1])) / max(float(size.sum()), 1e-300)
-        first = int(np.argmax(np.round(np.linalg.norm(ring[:-1] - centre, axis=1), _DIGITS)))
-        begin[k] = size[:first].sum()
-        ring[:-1] = np.roll(ring[:-1], -first, axis=0)
-        ring[-1] = ring[0]
+        first = farthest_point(ring)
+        begin[k] = line_length(ring[: first + 1])
+        ring[:] = np.concatenate([ring[first:-1], ring[: first + 1]])
     return points, begin
 
 
