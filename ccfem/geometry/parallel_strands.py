@@ -9,7 +9,7 @@ import shapely
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.geometry.offsets import rings
-from ccfem.geometry.polylines import is_closed, line_length, straight_pieces
+from ccfem.geometry.polylines import farthest_point, is_closed, line_length, straight_pieces
 from ccfem.geometry.shapes import Region, open_lines, strings
 from ccfem.geometry.shells import concentric
 
@@ -209,7 +209,8 @@ def _own_pieces(ring: FloatArray, owner: IntArray, least: float) -> list[FloatAr
     """
     change = np.flatnonzero(np.diff(owner)) + 1
     if not len(change):
-        return [ring] if owner[0] >= 0 else []
+        first = farthest_point(ring)
+        return [np.concatenate([ring[first:-1], ring[: first + 1]])] if owner[0] >= 0 else []
     # Start at a change, so that no piece is cut at the arbitrary start of the ring.
     ring = np.concatenate([ring[change[0] : -1], ring[: change[0] + 1]])
     owner = np.roll(owner, -change[0])

@@ -265,6 +265,16 @@ def runs(mask: BoolArray) -> IntArray:
     return np.flatnonzero(edges).reshape(-1, 2)
 
 
+def farthest_point(ring: FloatArray) -> int:
+    """Index of the point of a closed line (k, d) that is farthest from its middle.
+
+    What begins there turns with a ring, wherever its points begin.
+    """
+    step = np.linalg.norm(np.diff(ring, axis=0), axis=1)
+    middle = step @ (0.5 * (ring[1:] + ring[:-1])) / max(float(step.sum()), 1e-300)
+    return int(np.argmax(np.round(np.linalg.norm(ring[:-1] - middle, axis=1), 6)))
+
+
 def middle_of_longest_run(ring: BoolArray) -> int:
     """Index of the middle of the longest run of true values of a ring (n,) of values."""
     starts, ends = runs(np.concatenate([ring, ring])).T

@@ -15,7 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, repeated
-from ccfem.geometry.polylines import arc_lengths, lengths, merge_repeated
+from ccfem.geometry.polylines import (
+    arc_lengths,
+    farthest_point,
+    lengths,
+    line_length,
+    merge_repeated,
+)
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 
@@ -33,6 +39,8 @@ _SLACK = 2e-3
 """By how much a turn may exceed the angle, radians: a square corner in rounded coordinates."""
 _SPREAD = 0.25
 """Largest length, in windows, over which a vertex of a polyline spreads its turn to each side."""
+_STRAIGHT = 1e-6
+"""Turn, radians, up to which a point lies on a straight piece: it then decides nothing."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +146,8 @@ def folds(points: FloatArray, offsets: IntArray, closed: BoolArray, radius: floa
     radius : float, mm
         Least radius of the machine, at least 0, which allows every turn.
     """
-    points, offsets, closed = np.asarray(points, float), np.asarray(offsets), np.asarray(closed)
+    offsets, closed = np.asarray(offsets), np.asarray(closed)
+    points, begin = _begun_alike(np.array(points, dtype=float), offsets, closed)
     window = WINDOW * radius
     size = lengths(points, offsets)
     if radius == 0.0:  # the machine turns on the spot
@@ -162,12 +171,17 @@ def folds(points: FloatArray, offsets: IntArray, closed: BoolArray, radius: floa
         turned = np.einsum("ij,ij->i", tangent[pending], tangent[other]) < limit
         ahead[pending[turned]] = lag
         pending = pending[~turned]
+    reach = ahead * step[line]
     # Shortest stretches: those that hold no other, which would start at the next sample.
     following = ahead[first[line] + (number + 1) % np.maximum(samples[line], 1)]
     shortest = (following == 0) | (following >= ahead)
     at = np.flatnonzero((ahead > 0) & shortest)
+    line, start = line[at], (position + begin[line])[at]
+    start = np.where(start >= size[line], start - size[line], start)
+    order = np.lexsort((start, line))
+    line, start, reach = line[order], start[order], reach[at][order]
     return Folds(
-        *_merged(line[at], position[at], position[at] + (ahead * step[line])[at], size, closed),
+        *_merged(line, start, start + reach, size, closed),
         lengths=size,
         closed=closed,
     )
@@ -177,6 +191,39 @@ def folds_in(toolpaths: Toolpaths, machine: Machine) -> Folds:
     """Folds of toolpaths of any kind, in space, by the machine's least radius."""
     paths = toolpaths
     return folds(paths.points, paths.offsets, paths.closed, machine.minimum_radius)
+
+
+def _begun_alike(
+    points: FloatArray, offsets: IntArray, closed: BoolArray
+) -> tuple[FloatArray, FloatArray]:
+    """Begin closed polylines at their point farthest from their middle, wherever they began.
+
+    Returns
+    -------
+    points : (P, d) array
+        Changed in place.
+    begin : (K,) array, mm
+        Arc length of that point on the polyline as it was given.
+    """
+    begin = np.zeros(len(offsets) - 1)
+    for k in np.flatnonzero(closed & (np.diff(offsets) > 2)):
+        ring = points[offsets[k] : offsets[k + 1]]
+        first = farthest_point(ring)
+        begin[k] = line_length(ring[: first + 1])
+        ring[:] = np.concatenate([ring[first:-1], ring[: first + 1]])
+    return points, begin
+
+
+def _without_straight_points(points: FloatArray, offsets: IntArray) -> tuple[FloatArray, IntArray]:
+    """Polylines without repeated points and without those at which they do not turn."""
+    points, offsets, _ = merge_repeated(points, offsets)
+    step = np.diff(points, axis=0)
+    step /= np.maximum(np.linalg.norm(step, axis=1), 1e-300)[:, None]
+    keep = np.ones(len(points), dtype=bool)
+    keep[1:-1] = np.linalg.norm(np.diff(step, axis=0), axis=1) > _STRAIGHT
+    some = np.diff(offsets) > 0
+    keep[offsets[:-1][some]] = keep[offsets[1:][some] - 1] = True
+    return points[keep], np.concatenate([[0], np.cumsum(keep)])[offsets]
 
 
 def _tangents(
@@ -194,7 +241,7 @@ def _tangents(
     step : (K,) array, mm
         Length of the steps of each polyline.
     """
-    points, offsets, _ = merge_repeated(points, offsets)
+    points, offsets = _without_straight_points(points, offsets)
     size, along = lengths(points, offsets), arc_lengths(points, offsets)
     parts = np.maximum(1, np.round(size * (_SAMPLES / window))).astype(np.int64)
     parts[size == 0.0] = 0

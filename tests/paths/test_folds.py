@@ -115,6 +115,31 @@ def test_verdict_does_not_hang_on_the_points(step):
         assert of(stepped(line, step)).counts.tolist() == [fold]
 
 
+def test_points_on_straight_pieces_change_nothing():
+    bent = [(0.0, 0.0), (20.0, 0.0), (21.0, 1.6), (19.0, 1.6), (0.0, 1.0)]
+    more = [*bent[:2], (20.1, 0.16), *bent[2:3], (20.4, 1.6), *bent[3:]]
+    one, other = of(bent), of(more)
+    np.testing.assert_allclose([other.start, other.stop], [one.start, one.stop], atol=1e-9)
+
+
+@pytest.mark.parametrize("begin", [1, 57, 58, 131])
+def test_a_ring_folds_alike_wherever_it_begins(begin):
+    angle = np.linspace(0.0, 2.0 * np.pi, 181)[:-1]
+    out = 6.0 + 4.5 * np.cos(3.0 * angle) + 0.4 * np.cos(2.0 * angle + 0.3)
+    ring = out[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    one = of(np.concatenate([ring, ring[:1]]))
+    turned = np.roll(ring, -begin, axis=0)
+    other = of(np.concatenate([turned, turned[:1]]))
+    assert one.counts.tolist() == other.counts.tolist()
+    assert one.counts[0] >= 2
+    before = np.linalg.norm(np.diff(ring[: begin + 1], axis=0), axis=1).sum()
+    start = (other.start + before) % one.lengths[0]
+    order = np.argsort(start)
+    np.testing.assert_allclose(start[order], one.start, atol=1e-9)
+    sizes = (other.stop - other.start)[order]
+    np.testing.assert_allclose(sizes, one.stop - one.start, atol=1e-9)
+
+
 def test_short_strands_and_points():
     """Shorter than the window: it is the turn that counts. No length: nothing does."""
     assert of([(0.0, 0.0), (1.0, 0.0)]).longest_free.tolist() == [1.0]

@@ -206,7 +206,7 @@ def _in_space(line: FloatArray, layer: Layer, normal: FloatArray) -> FloatArray:
 
 
 def _cut(marked: _Marked, radius: float, least: float) -> list[_Marked]:
-    """Parts of a line (n, c) without folds that are long enough; the line itself where none is."""
+    """Parts of a line (n, c) without folds, or the line itself, as far as they are long enough."""
     pieces, again = [marked], _ROUNDS
     while again:
         found = _folds_of([line for line, _ in pieces], radius)
@@ -228,7 +228,8 @@ def _cut(marked: _Marked, radius: float, least: float) -> list[_Marked]:
         pieces = parts
         if not pieces:
             break
-    return pieces
+    # A line led round its folds is shorter than it was.
+    return [marked for marked in pieces if line_length(marked[0][:, :3]) >= least * (1.0 - 1e-9)]
 
 
 class _Rounding:

@@ -24,6 +24,7 @@ from ccfem.paths.planning.plan import check_layers, plan, plan_layers
 from ccfem.paths.planning.planned import Planned
 from ccfem.paths.planning.short_pieces import about_short_pieces
 from ccfem.paths.planning.strategy import CasesStrategy, LengthStrategy, Strategy
+from ccfem.paths.planning.unfolding import may_fold
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.heights import layers_by_case
@@ -137,7 +138,8 @@ def _by_itself(
     plans = []
     planners = strategy.for_cases(cases, layers, machine, lengths)
     for (asked, planner), wanted in zip(planners, lengths, strict=True):
-        paths = plan_layers(planner, layers, layers, cases.fields[0], machine)
+        fold = may_fold(asked)
+        paths = plan_layers(planner, layers, layers, cases.fields[0], machine, fold)
         plans.append(_planned(asked, paths, layers, machine, wanted))
     return plans
 

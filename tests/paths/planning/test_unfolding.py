@@ -76,6 +76,14 @@ def test_hairpin_between_strands_is_cut_and_short_pieces_go():
     assert line_length(lines[1]) == pytest.approx(60.0, abs=1.5)
 
 
+def test_a_ring_that_is_too_short_once_it_is_led_round_goes():
+    """A triangle of perimeter 60 whose corners are rounded by r loses 6 r tan(60) - 2 pi r."""
+    triangle = 20.0 * np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.75**0.5], [0.0, 0.0]])
+    (ring,) = freed(triangle, least=40.0).lines
+    assert 40.0 < line_length(ring) < 58.0
+    assert not freed(triangle, least=58.0).lines
+
+
 def test_strands_without_folds_are_left_alone():
     lines = [corner(90), corner(30)]
     result = freed(*lines)
