@@ -29,7 +29,7 @@ HONEST = ("isocurve", "concentric", "zigzag")
 Lines = list[np.ndarray]
 
 
-def rings(layer, stress, machine, spacing=3.0) -> Lines:
+def rings(layer, stress, machine, spacing=6.0) -> Lines:
     paths = create("concentric", {"spacing": spacing})(layer, stress, machine)
     return [layer.plane.project(path) for path in paths]
 
@@ -52,7 +52,7 @@ def waves(line, height, period):
 
 def back_and_forth(line):
     length = lengths(line, np.array([0, len(line)]))[0]
-    steps = np.cumsum(np.tile([1.0, -0.8], int(length / 0.2)))
+    steps = np.cumsum(np.tile([1.0, -0.6], int(length / 0.4)))
     return along(line, np.clip(np.append(0.0, steps), 0.0, length))
 
 
@@ -67,28 +67,28 @@ def copies(layer, stress, machine):
 
 
 def bundles(layer, stress, machine):
-    lines = rings(layer, stress, machine, 6.0)
+    lines = rings(layer, stress, machine)
     return [line + 0.15 * k for line in lines for k in range(-3, 4)]
 
 
 def short_pieces(layer, stress, machine):
-    return [piece for line in rings(layer, stress, machine, 6.0) for piece in pieces(line)]
+    return [piece for line in rings(layer, stress, machine) for piece in pieces(line)]
 
 
 def micro_waves(layer, stress, machine):
-    return [waves(line, 0.4, 1.2) for line in rings(layer, stress, machine, 6.0)]
+    return [waves(line, 0.4, 1.2) for line in rings(layer, stress, machine)]
 
 
 def meanders(layer, stress, machine):
-    return [waves(line, 1.2, 1.0) for line in rings(layer, stress, machine, 6.0)]
+    return [waves(line, 1.2, 1.0) for line in rings(layer, stress, machine)]
 
 
 def there_and_back(layer, stress, machine):
-    return [back_and_forth(line) for line in rings(layer, stress, machine, 6.0)]
+    return [back_and_forth(line) for line in rings(layer, stress, machine)]
 
 
 def one_layer(layer, stress, machine):
-    return rings(layer, stress, machine, 1.0) * 3 if layer.index == 1 else []
+    return rings(layer, stress, machine, 2.0) * 3 if layer.index == 1 else []
 
 
 def winding(layer, stress, machine):
@@ -106,7 +106,7 @@ def on_the_border(layer, stress, machine):
 
 def fan(layer, stress, machine):
     """Two dense families of strands that cross at 31 degrees."""
-    hatches = [{"angle": a, "turn": 0.0, "spacing": 1.0} for a in (15.5, -15.5)]
+    hatches = [{"angle": a, "turn": 0.0, "spacing": 2.0} for a in (15.5, -15.5)]
     paths = [create("zigzag", each)(layer, stress, machine) for each in hatches]
     return [layer.plane.project(path) for each in paths for path in each]
 
@@ -118,7 +118,7 @@ def outside(layer, stress, machine):
 
 
 def as_links(layer, stress, machine):
-    return rings(layer, stress, machine, 1.0)
+    return rings(layer, stress, machine)
 
 
 CHEATS: dict[str, tuple[Callable[..., Lines], str]] = {
@@ -184,7 +184,7 @@ def test_each_cheat_is_named_for_what_it_is(judged, name):
 def test_piling_up_gains_nothing(judged):
     """Without the verdict too: copies and turns of a winding are worth the ring that they hide."""
     case, stress = judged.case, judged.stress
-    plain = ccfem.plan(create("concentric", {"spacing": 3.0}), judged.layers, stress, case.machine)
+    plain = ccfem.plan(create("concentric", {"spacing": 6.0}), judged.layers, stress, case.machine)
     once = ccfem.virtual_test(plain, stress, machine=case.machine, span=()).ratio
     runs = {run.name: run for run in judged.runs}
     for name, rel in (("copies", 1e-3), ("winding", 0.01)):

@@ -282,7 +282,7 @@ def _chords(face: Face, arm: FloatArray, near: BoolArray, slack: float) -> bool:
     axes = np.linalg.svd(face.direction[None])[2][1:]
     across, along = axes @ arm.T
     turn, away = np.arctan2(along, across), np.hypot(along, across)
-    order = np.flatnonzero(near)[np.argsort(turn[near])]
+    order = np.flatnonzero(near)[np.argsort(turn[near], kind="stable")]
     column = turn[order]
     if 1 + (np.diff(column) > 1e-3).sum() < _COLUMNS:
         return False

@@ -247,6 +247,8 @@ class _Rounding:
     def led_round(self, k: int, line: FloatArray, link: BoolArray) -> _Marked:
         """Lead line number k (n, 2) round as many of its folds as there is room for."""
         found = _folds_of([line], _MARGIN * self.radius)
+        if found.longest_free[0] < self.window:
+            return line, link  # a wave or a meander of folds: no curve could leave and meet it
         if is_closed(line):
             # From the middle of the longest part without folds on, a ring is like an open line.
             _, start, stop = found.free()

@@ -165,3 +165,17 @@ def test_paths_in_space_are_cut_with_their_normals():
 def test_only_published_patterns_may_fold():
     turning_back = {"concentric", "contour_zigzag", "fiso", "grid", "offset", "zigzag"}
     assert {name for name in named() if may_fold(create(name))} == turning_back
+
+
+def test_no_curve_is_looked_for_in_a_meander(monkeypatch):
+    """Hairpins every 2 mm, 4000 to a layer, took minutes and left nothing."""
+
+    def looked_for(*_):
+        raise AssertionError("a curve was looked for")
+
+    monkeypatch.setattr("ccfem.paths.planning.unfolding.shortest_curve", looked_for)
+    x = np.repeat(np.arange(100.0), 2)
+    meander = np.stack([x, np.tile([0.0, 1.0, 1.0, 0.0], 50)], axis=1)
+    assert not freed(meander).lines
+    with pytest.raises(AssertionError, match="a curve was looked for"):
+        freed(corner(120))
