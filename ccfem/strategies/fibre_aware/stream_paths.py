@@ -114,21 +114,42 @@ class Extraction:
             For each length; the paths worth most first.
         """
         alike = _alike(layers, group, self.machine.fibre_width)
+        kind = {int(k): middle(numbers) for numbers in alike for k in numbers}
         cut: dict[tuple[int, int], list[FloatArray]] = {}
+        levels: dict[tuple[int, int], int] = {}
+        led: dict[tuple[int, int], list[FloatArray]] = {}
         drawn: dict[tuple[int, int, float], Toolpaths] = {}
 
-        def paths(number: int, phase: int, reach: float = 0.0) -> Toolpaths:
-            key = number, phase, reach
+        def strands(number: int, phase: int) -> list[FloatArray]:
             if (number, phase) not in cut:
                 field = self.fields[group[number]]
                 cut[number, phase] = self.strands(layers[number], field, phase / self.phases)
+            return cut[number, phase]
+
+        def round_holes(number: int, phase: int) -> list[FloatArray]:
+            if (number, phase) not in led:
+                tried, first = range(1, LEVELS + 1), kind[number]
+                if number != first:  # as many as in the layer that stands for all of its kind
+                    round_holes(first, phase)
+                    tried = range(levels[first, phase], levels[first, phase] + 1)
+                lines = strands(number, phase)
+                led[number, phase], count = self.round_holes(lines, layers[number], tried)
+                levels[number, phase] = count
+            return led[number, phase]
+
+        def paths(number: int, phase: int, reach: float = 0.0) -> Toolpaths:
+            key = number, phase, reach
             if key not in drawn:
-                drawn[key] = self.linked(layers[number], cut[number, phase], reach)
+                drawn[key] = self.linked(layers[number], round_holes(number, phase), reach)
             return drawn[key]
 
+        # Leading strands round holes takes most of the time, and does not tell positions apart.
         tried = [
-            [self.profiles(paths(middle(numbers), phase)) for phase in range(self.phases)]
-            for numbers in alike
+            [
+                self.profiles(self.linked(layers[k], strands(k, phase)))
+                for phase in range(self.phases)
+            ]
+            for k in map(middle, alike)
         ]
         counts = [len(numbers) for numbers in alike]
 
@@ -202,20 +223,28 @@ class Extraction:
 
     def layer_paths(self, layer: Layer, field: FloatArray, shift: float) -> Toolpaths:
         """Paths of one layer along the levels `shift` above whole numbers."""
-        return self.linked(layer, self.strands(layer, field, shift))
+        lines, _ = self.round_holes(self.strands(layer, field, shift), layer)
+        return self.linked(layer, lines)
 
     def strands(self, layer: Layer, field: FloatArray, shift: float) -> list[FloatArray]:
         """Trace the levels, and cut strands that can slide neither off the border nor apart."""
         width = self.machine.fibre_width
         lines = self.unfolded(self.levels(layer, field, shift), layer)
         lines = lines_to_slide_in(lines, layer.plane.polygon, self.inset * width)
-        lines = trim_to_clearance(lines, CLEARANCE * width, SHORTEST * width)
-        return self.round_holes(lines, layer)
+        return trim_to_clearance(lines, CLEARANCE * width, SHORTEST * width)
 
-    def round_holes(self, lines: list[FloatArray], layer: Layer) -> list[FloatArray]:
+    def round_holes(
+        self, lines: list[FloatArray], layer: Layer, tried: range = range(1, LEVELS + 1)
+    ) -> tuple[list[FloatArray], int]:
         """Lead strands that end at the wall of a hole round it, as many as there is room for.
 
-        Of no, one, two or three strands on each side, take what leaves most in printable strands.
+        Of none and the numbers tried on each side, take what leaves most in printable strands.
+
+        Returns
+        -------
+        lines : list of (n_i, 2) arrays, mm
+        number : int
+            Strands on each side of a hole.
         """
         machine, section = self.machine, layer.plane.polygon
         width = machine.fibre_width
@@ -224,8 +253,8 @@ class Extraction:
             sizes = [line_length(line) for line in strands]
             return sum(size for size in sizes if size >= machine.minimum_length)
 
-        best, count = lines, len(lines)
-        for levels in range(1, LEVELS + 1):
+        best, number, count = lines, 0, len(lines)
+        for levels in tried if tried.start else ():
             led = led_round_holes(lines, section, width, 0.75 * machine.minimum_radius, levels)
             if len(led) == count:
                 break  # no further strand to be led round
@@ -236,8 +265,8 @@ class Extraction:
             room = lines_to_slide_in(room, section, self.inset * width)
             room = trim_to_clearance(room, CLEARANCE * width, SHORTEST * width)
             if printable(room) > printable(best):
-                best = room
-        return best
+                best, number = room, levels
+        return best, number
 
     def linked(self, layer: Layer, lines: list[FloatArray], reach: float = 0.0) -> Toolpaths:
         """Link the strands of one layer, and slide the paths inwards.
