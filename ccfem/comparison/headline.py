@@ -281,10 +281,10 @@ def _test_values(run: Run) -> dict[str, float]:
         return {}
     values, other = _values_of(run.tested), run.tested.alternative
     if other is not None:
-        found = _values_of(other)
+        other_values = _values_of(other)
         ends = [column.name for column in TEST_COLUMNS if column.name.endswith("_alternative")]
         names = {name: name.removesuffix("_alternative") for name in ends}
-        values |= {name: found[own] for name, own in names.items() if own in found}
+        values |= {name: other_values[own] for name, own in names.items() if own in other_values}
     return values
 
 

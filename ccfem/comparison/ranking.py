@@ -78,25 +78,25 @@ def best_values(runs: Sequence[Run], wanted: Wanted) -> dict[str, float]:
         known = sorted(value for value in values if np.isfinite(value))
         if not head.better or len(known) < 2 or known[0] == known[-1]:
             continue
-        found = known[-1] if head.better == "high" else known[0]
+        winner = known[-1] if head.better == "high" else known[0]
         if head.column in _STIFFNESSES:
             if not stiffest:
                 continue
-            found = headline_values(order[0])[head.column]
-        if head.column == "first_failure_load" and not _strongest(equal, found):
+            winner = headline_values(order[0])[head.column]
+        if head.column == "first_failure_load" and not _strongest(equal, winner):
             continue
         texts = [
             cell_text(run, head)[0]
             for run in runs
-            if run.evaluation is not None and headline_values(run).get(head.column) != found
+            if run.evaluation is not None and headline_values(run).get(head.column) != winner
         ]
         measured = next(
             cell_text(run, head)[0]
             for run in equal
-            if headline_values(run).get(head.column) == found
+            if headline_values(run).get(head.column) == winner
         )
         if measured not in texts:
-            best[head.column] = found
+            best[head.column] = winner
     return best
 
 

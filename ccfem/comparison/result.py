@@ -373,8 +373,8 @@ def summary_html(
 
 def _rows(ranking: Sequence[Run], columns: Sequence[Headline]) -> list[list[str]]:
     """Titles, and the cells of each run."""
-    found = [headline_values(run) for run in ranking]
-    heads = [head for head in columns if any(head.column in values for values in found)]
+    row_values = [headline_values(run) for run in ranking]
+    heads = [head for head in columns if any(head.column in values for values in row_values)]
     rows = [["strategy", *(head.title for head in heads)]]
     for run in ranking:
         cells = [cell_text(run, head) for head in heads]

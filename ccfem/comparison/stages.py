@@ -110,17 +110,17 @@ def planned(
         if isinstance(run.strategy, GivenPaths):
             paths = run.strategy.toolpaths
             length = length_per_layer(paths, layers)
-            found = Planned(run.strategy, paths, length, _as_given(length, wanted))
+            outcome = Planned(run.strategy, paths, length, _as_given(length, wanted))
         elif part.several_cases:
-            found = plan_cases(run.strategy, layers, part.cases, machine, wanted, part.strand)
+            outcome = plan_cases(run.strategy, layers, part.cases, machine, wanted, part.strand)
         elif wanted is None:
             paths = plan(run.strategy, layers, stress, machine)
-            found = Planned(run.strategy, paths, length_per_layer(paths, layers))
+            outcome = Planned(run.strategy, paths, length_per_layer(paths, layers))
         else:
-            found = plan_to_length(
+            outcome = plan_to_length(
                 run.strategy, layers, stress, machine, wanted, start, sampled=run.sampled
             )
-        return with_plan(run, found, part)
+        return with_plan(run, outcome, part)
 
     bare = replace(run, toolpaths=Toolpaths.empty(), length_per_layer=0.0)
     return _stage(bare, "plan", work)

@@ -60,7 +60,7 @@ def tight_bends(
         return np.zeros((0, 2))
     first = int(np.argmin(tight)) if closed else 0  # no bend extends over the start
     over = np.roll(over, -first)
-    found = runs(over >= 0.0)
+    over_limit = runs(over >= 0.0)
 
     def crossing(outside: IntArray, inside: IntArray) -> FloatArray:
         """Places between two samples where the limit is met, independent of the sampling."""
@@ -72,8 +72,8 @@ def tight_bends(
 
     if closed:
         over = np.append(over, over[0])
-    a = crossing(found[:, 0] - 1, found[:, 0])
-    b = crossing(found[:, 1], found[:, 1] - 1)
+    a = crossing(over_limit[:, 0] - 1, over_limit[:, 0])
+    b = crossing(over_limit[:, 1], over_limit[:, 1] - 1)
     return np.column_stack([a, b]) * step + (first * step + at[0])
 
 

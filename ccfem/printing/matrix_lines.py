@@ -132,7 +132,7 @@ def gap_lines(
     reach = 0.5 * _NARROW * width
     wide = shapely.buffer(gaps, -reach, quad_segs=_ARC)
     opened = shapely.intersection(shapely.buffer(wide, 1.01 * reach, quad_segs=_ARC), gaps)
-    found: list[FloatArray] = []
+    filling: list[FloatArray] = []
     widths: list[float] = []
     for gap in shapely.get_parts(opened):
         if gap.geom_type != "Polygon" or gap.area < _SMALL * width**2:
@@ -144,9 +144,9 @@ def gap_lines(
             if drawn.length >= _SMALL * width:
                 points = shapely.get_coordinates(drawn)
                 middle = shapely.points(shapely.get_coordinates(shapely.segmentize(drawn, width)))
-                found.append(points)
+                filling.append(points)
                 widths.append(2.0 * float(shapely.distance(middle, border).mean()))
-    return found, widths
+    return filling, widths
 
 
 def _middle(gap: shapely.Polygon, step: float) -> list[FloatArray]:

@@ -173,9 +173,9 @@ def _along_stress(lines: list[FloatArray], stress: LayerStress, width: float) ->
     angle = misalignment(
         np.concatenate([np.diff(line_points, axis=0) for line_points in points]), along, 0.0
     )
-    found = []
+    curves = []
     for line, a, angles in zip(lines, at, np.split(angle, np.cumsum(counts)[:-1]), strict=True):
         kept = np.concatenate([[False], angles <= _ALONG, [False]])
         edges = np.flatnonzero(kept[1:] != kept[:-1]).reshape(-1, 2)
-        found += [between(line, float(a[i]), float(a[j])) for i, j in edges]
-    return found
+        curves += [between(line, float(a[i]), float(a[j])) for i, j in edges]
+    return curves

@@ -95,7 +95,7 @@ def contour_trees(
     narrow = 0.4995 * closest * spacing
     trees = []
     for piece in shapely.get_parts(_level(section, 0.5 * spacing, narrow, radius)):
-        found: list[FloatArray] = []
+        sampled: list[FloatArray] = []
         level: list[int] = []
         here = rings(piece)
         while here:
@@ -103,12 +103,12 @@ def contour_trees(
             depth = level[-1] + 1 if level else 0
             if not long:
                 break
-            found += [_sampled(ring_from(ring, start), spacing) for ring in long]
+            sampled += [_sampled(ring_from(ring, start), spacing) for ring in long]
             level += [depth] * len(long)
             deeper = shapely.get_parts(_level(section, (1.5 + depth) * spacing, narrow, radius))
             here = rings(shapely.multipolygons(deeper[shapely.intersects(deeper, piece)]))
-        if found:
-            trees += _grown(found, np.array(level), spacing, _RIDGE + closest)
+        if sampled:
+            trees += _grown(sampled, np.array(level), spacing, _RIDGE + closest)
     return trees
 
 

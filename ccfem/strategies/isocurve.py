@@ -381,9 +381,9 @@ class _Planner:
             if not tension.defined.any():
                 return Toolpaths.empty()
             self.known[key] = directed(layer, tension, s.cap, s.fill, s.fill_length)
-        found = self.known[key]
-        lines = self.isocurves(found, machine.fibre_width)
-        paths = self.connected(lines, layer, found.tension, stress.held_or_loaded, machine)
+        potential = self.known[key]
+        lines = self.isocurves(potential, machine.fibre_width)
+        paths = self.connected(lines, layer, potential.tension, stress.held_or_loaded, machine)
         return Toolpaths.from_plane(paths.lines, layer, link=paths.link)
 
     def isocurves(self, directed: Directed, width: float) -> list[FloatArray]:

@@ -531,11 +531,11 @@ def fitted_guides(guides: Sequence[FloatArray], region: Region, pitch: float) ->
             moved[k] = _shifted(guides[k], shifts[k] * pitch)
         if (shifts == before).all():
             break
-    found = []
+    shifted = []
     for guide, shift in zip(guides, shifts, strict=True):
         ways = (-0.5, 0.5) if shift == 0.5 else (shift,)
-        found += [_shifted(guide, way * pitch) for way in ways]
-    return found
+        shifted += [_shifted(guide, way * pitch) for way in ways]
+    return shifted
 
 
 def _best_shift(gap: FloatArray, weight: FloatArray) -> float:

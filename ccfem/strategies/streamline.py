@@ -149,7 +149,7 @@ def evenly_spaced_streamlines(
             "mm^2: choose a larger one"
         )
     grid = section_grid(region, 2.0 * separation)
-    found, spans, closed = _lay(
+    traced, spans, closed = _lay(
         line_field(points, triangles, plane_stress, _EVENLY_LEAST),
         grid,
         _empty(grid, separation, int(room)),
@@ -163,7 +163,7 @@ def evenly_spaced_streamlines(
     )
     lines = []
     for (start, turn, end), ring in zip(spans, closed, strict=True):
-        ahead, back = found[start:turn], found[turn:end]
+        ahead, back = traced[start:turn], traced[turn:end]
         lines.append(np.concatenate([ahead, ahead[:1]] if ring else [back[::-1], ahead]))
     return lines
 

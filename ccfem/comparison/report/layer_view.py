@@ -218,7 +218,7 @@ def layer_views(stacks: Mapping[str, Comparison], colours: Mapping[str, str]) ->
         "angle": 90.0,
         "curvature": most,
     }
-    found = []
+    layer_list = []
     for name, stack in stacks.items():
         runs = {run.name: lines[name, run.name] for run in stack.succeeded}
         views = [
@@ -230,7 +230,7 @@ def layer_views(stacks: Mapping[str, Comparison], colours: Mapping[str, str]) ->
             for run in stack.ranking
             if run.name in runs
         ]
-        found.append(
+        layer_list.append(
             {
                 "name": name,
                 "count": len(stack.layers),
@@ -239,7 +239,7 @@ def layer_views(stacks: Mapping[str, Comparison], colours: Mapping[str, str]) ->
                 "runs": paths,
             }
         )
-    return {"stacks": found, "scales": scales, "step": step, "width": machine.fibre_width}
+    return {"stacks": layer_list, "scales": scales, "step": step, "width": machine.fibre_width}
 
 
 def _lines(stacks: Mapping[str, Comparison]) -> tuple[dict[tuple[str, str], DrawnPaths], float]:

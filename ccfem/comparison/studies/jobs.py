@@ -236,14 +236,14 @@ def jobs_of(study: Study, progress: Progress = silent) -> Jobs:
 
 def _entries(entries: tuple[Any, ...], where: str, kind: Any) -> list[tuple[str, Variant, Any]]:
     """Label, variant and, where it was given itself, value of all entries."""
-    found: list[tuple[str, Variant, Any]] = []
+    given_entries: list[tuple[str, Variant, Any]] = []
     for entry in entries:
         if isinstance(entry, kind):
             name = entry.name if isinstance(entry, Case) else member_name(entry)
-            found.append((name, Variant(name, {}), entry))
+            given_entries.append((name, Variant(name, {}), entry))
         else:
-            found += [(variant.name, variant, None) for variant in variants(entry, where)]
-    return found
+            given_entries += [(variant.name, variant, None) for variant in variants(entry, where)]
+    return given_entries
 
 
 def _dotted(owner: str, variant: Variant) -> dict[str, Any]:
@@ -277,7 +277,7 @@ def _slicings(study: Study) -> list[tuple[dict[str, Any], Slicer | None]]:
 
 def _strategies(study: Study, case: Case) -> list[tuple[dict[str, Any], Strategy]]:
     """Labels and strategies on one part."""
-    found = []
+    labelled = []
     strategies = (LayerStrategy, PartStrategy)
     for label, variant, given in _entries(study.strategies, "strategies", strategies):
         labels = {"strategy": label}
@@ -287,5 +287,5 @@ def _strategies(study: Study, case: Case) -> list[tuple[dict[str, Any], Strategy
             labels |= _dotted("strategy", variant)
         else:
             labels |= {f"strategy.{k}": _plain(v) for k, v in vars(given).items()}
-        found.append((labels, given))
-    return found
+        labelled.append((labels, given))
+    return labelled

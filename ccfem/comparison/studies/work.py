@@ -64,8 +64,8 @@ def solve_part(task: bytes) -> Parted:
     failure = ""
     with _ALONE, timed(seconds, "solve"):
         try:
-            found = solve(part.case.problem, backend=backend)
-            fields = {name: found[name] for name in part.load_cases}
+            stress_fields = solve(part.case.problem, backend=backend)
+            fields = {name: stress_fields[name] for name in part.load_cases}
             if strand is not None and part.case.alternative_supports:
                 for name, stress in fields.items():
                     alternative[name] = otherwise_held(part.case, stress, backend)

@@ -160,11 +160,11 @@ def _link_curves(ends, reach, radius, grid, weights, bound):  # type: ignore[no-
                     length = abs(sizes[k, 0]) + abs(sizes[k, 1]) + abs(sizes[k, 2])
                     if stubs + length >= best:
                         continue
-                    found = stubs + curve_cost(
+                    total = stubs + curve_cost(
                         start, WORDS[k], sizes[k], radius, grid, weights, best - stubs
                     )
-                    if found < best - 1e-9:
-                        best = found
+                    if total < best - 1e-9:
+                        best = total
                         chosen[a, b], chosen[b, a] = reach[a, v], reach[b, w]
                         word[a, b] = k
             if best < limit:

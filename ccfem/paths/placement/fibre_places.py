@@ -288,8 +288,8 @@ def cut_layer(layer: Layer, region: Region, mesh: TetMesh) -> Layer | None:
     # Triangles beside those that are cut may get a point of theirs on an edge.
     touched = np.isin(layer.triangles, layer.triangles[crossed]).any(axis=1)
     beside = whole & touched
-    found, parent = _pieces(triangles, crossed, beside, region)
-    points, number = _numbered(shapely.get_coordinates(found), plane.points)
+    cut_triangles, parent = _pieces(triangles, crossed, beside, region)
+    points, number = _numbered(shapely.get_coordinates(cut_triangles), plane.points)
     number = number.reshape(-1, 4)[:, :3]
     kept = np.concatenate([layer.triangles[whole & ~touched], _counter_clockwise(points, number)])
     parent = np.concatenate([np.flatnonzero(whole & ~touched), parent])
@@ -339,13 +339,13 @@ def _pieces(
     return parts, parent[of_piece]
 
 
-def _numbered(found: FloatArray, known: FloatArray) -> tuple[FloatArray, IntArray]:
+def _numbered(vertices: FloatArray, known: FloatArray) -> tuple[FloatArray, IntArray]:
     """Points, those that are known first, and the number of each found place (k, 2)."""
     from scipy.spatial import KDTree
 
-    away, number = KDTree(known).query(found)
+    away, number = KDTree(known).query(vertices)
     new = away > _CUT_SAME
-    places, inverse = np.unique(found[new].round(6), axis=0, return_inverse=True)
+    places, inverse = np.unique(vertices[new].round(6), axis=0, return_inverse=True)
     number[new] = len(known) + inverse.reshape(-1)
     return np.concatenate([known, places]), number
 

@@ -250,7 +250,7 @@ def cut_turns(
         The pieces of each line in its order; uncut lines as they were.
     """
     pitch = width if spacing is None else spacing
-    found = Joined([], [])
+    result = Joined([], [])
     for line, mark in zip(*joined, strict=True):
         if every:
             parts = _unbent(line, mark, radius, width, least)
@@ -258,9 +258,9 @@ def cut_turns(
             along = along_line(line)
             pieces = _pieces(line, along, radius, width, least, pitch)
             parts = [piece(line, along, mark, *ends) for ends in pieces] or [(line, mark)]
-        found.lines.extend(part for part, _ in parts)
-        found.link.extend(marked for _, marked in parts)
-    return found
+        result.lines.extend(part for part, _ in parts)
+        result.link.extend(marked for _, marked in parts)
+    return result
 
 
 def _unbent(

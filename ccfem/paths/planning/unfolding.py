@@ -78,14 +78,14 @@ def unfolded(joined: Joined, section: Region, machine: Machine, least: float) ->
         Lines without folds as they were; the pieces of each line in its order.
     """
     lines, radius = joined.lines, _MARGIN * machine.minimum_radius
-    found = _folds_of(lines, radius)
-    if not len(found.line):
+    bends = _folds_of(lines, radius)
+    if not len(bends.line):
         return joined
     rounding = _Rounding(lines, section, machine)
     result = Joined([], [])
     for k, marked in enumerate(zip(*joined, strict=True)):
         pieces = [marked]
-        if found.counts[k]:
+        if bends.counts[k]:
             pieces = _cut(rounding.led_round(k, *marked), radius, least)
         result.lines.extend(line for line, _ in pieces)
         result.link.extend(link for _, link in pieces)
@@ -106,8 +106,8 @@ def unfolded_paths(
     """
     least, radius = machine.minimum_length if least is None else least, machine.minimum_radius
     radius *= _MARGIN if layer is not None else 1.0
-    found = folds(paths.points, paths.offsets, paths.closed, radius)
-    folded = (found.counts > 0) & (paths.kind == FIBRE)
+    bends = folds(paths.points, paths.offsets, paths.closed, radius)
+    folded = (bends.counts > 0) & (paths.kind == FIBRE)
     if not folded.any():
         return paths
     spans = [slice(a, b) for a, b in pairwise(paths.offsets)]
@@ -209,14 +209,14 @@ def _cut(marked: _Marked, radius: float, least: float) -> list[_Marked]:
     """Parts of a line (n, c) without folds, or the line itself, as far as they are long enough."""
     pieces, again = [marked], _ROUNDS
     while again:
-        found = _folds_of([line for line, _ in pieces], radius)
-        if not len(found.line):
+        bends = _folds_of([line for line, _ in pieces], radius)
+        if not len(bends.line):
             break
         again -= 1
-        number, start, stop = found.free()
+        number, start, stop = bends.free()
         parts: list[_Marked] = []
         for k, (line, link) in enumerate(pieces):
-            if not found.counts[k]:
+            if not bends.counts[k]:
                 parts.append((line, link))
                 continue
             along, own = along_line(line[:, :3]), number == k
@@ -246,20 +246,20 @@ class _Rounding:
 
     def led_round(self, k: int, line: FloatArray, link: BoolArray) -> _Marked:
         """Lead line number k (n, 2) round as many of its folds as there is room for."""
-        found = _folds_of([line], _MARGIN * self.radius)
-        if found.longest_free[0] < self.window:
+        bends = _folds_of([line], _MARGIN * self.radius)
+        if bends.longest_free[0] < self.window:
             return line, link  # a wave or a meander of folds: no curve could leave and meet it
         if is_closed(line):
             # From the middle of the longest part without folds on, a ring is like an open line.
-            _, start, stop = found.free()
+            _, start, stop = bends.free()
             if not len(start):
                 return line, link
             longest = int(np.argmax(stop - start))
             middle, along = 0.5 * float(start[longest] + stop[longest]), along_line(line)
             line, link = piece(line, along, link, middle, middle + float(along[-1]))
             line[-1] = line[0]
-            found = _folds_of([line], _MARGIN * self.radius)
-        for start, stop in zip(found.start[::-1], found.stop[::-1], strict=True):
+            bends = _folds_of([line], _MARGIN * self.radius)
+        for start, stop in zip(bends.start[::-1], bends.stop[::-1], strict=True):
             line, link = self._without(k, line, link, float(start), float(stop)) or (line, link)
         return line, link
 

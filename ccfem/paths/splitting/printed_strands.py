@@ -451,7 +451,7 @@ def _passes(
 ) -> list[tuple[float, int, int, float, float]]:
     """List passes through stacks that may be left out: excess, stack, strand and both ends."""
     shortest = max(machine.tail, machine.minimum_length)
-    found = []
+    passes = []
     for k, line in enumerate(lines):
         along = along_line(line)
         total = float(along[-1])
@@ -470,8 +470,8 @@ def _passes(
             if 0.0 < low < shortest or 0.0 < total - high < shortest:
                 continue
             gain = float(excess[first:last].clip(0.0).sum()) / (high - low)
-            found.append((gain, int(stack[first]), k, low, high))
-    return found
+            passes.append((gain, int(stack[first]), k, low, high))
+    return passes
 
 
 def _without(piece: tuple[int, Interval], gap: Interval | None) -> list[tuple[int, Interval]]:

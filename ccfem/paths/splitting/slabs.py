@@ -110,7 +110,7 @@ def check_cover(slabs: Sequence[Slab], machine: Machine) -> list[str]:
     fibre = [k for k, slab in enumerate(slabs) if slab.fibre is not None]
     if not fibre:
         return []
-    found, least = [], machine.process.cover
+    problems, least = [], machine.process.cover
     sides = {"below the first": slabs[: fibre[0]], "over the last": slabs[fibre[-1] + 1 :]}
     for side, those in sides.items():
         height = those[-1].upper - those[0].lower if those else 0.0
@@ -121,7 +121,7 @@ def check_cover(slabs: Sequence[Slab], machine: Machine) -> list[str]:
                 "--heights, or set process.cover"
             )
         if len(those) == 1:
-            found.append(
+            problems.append(
                 f"only one layer of matrix, {height:.3g} mm, {side} fibre layer: two hold it better"
             )
-    return found
+    return problems

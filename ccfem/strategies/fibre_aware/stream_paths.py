@@ -381,12 +381,12 @@ def lines_to_slide_in(
         Parts at least 0.8 times the distance off the border. Ends that run onto the border are cut
         at the full distance, since sideways slides do not move them inwards.
     """
-    found = []
+    slid_in = []
     for line in keep_off_border(lines, section, _DEPTH * inset):
         kept = keep_off_border([line], section, inset)
         cut = len(kept) == 1 and line_length(line) - line_length(kept[0]) < inset
-        found.append(kept[0] if cut else line)
-    return found
+        slid_in.append(kept[0] if cut else line)
+    return slid_in
 
 
 def slid_in(

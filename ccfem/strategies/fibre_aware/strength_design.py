@@ -147,7 +147,7 @@ class StrengthProblem:
         limit = self.limits.fibre / alone.axial_stiffness
         size = np.stack([one.size for one in smeared])
         length = (problem.shares[:, None] * alone.room * size).ravel()
-        found = []
+        case_peaks = []
         for part, judge, solution in zip(problem.parts, self.judges, solutions, strict=True):
             stretch = np.stack(
                 [np.einsum("ci,ci->c", one.along, solution.strain) for one in smeared]
@@ -166,8 +166,8 @@ class StrengthProblem:
             # For the same load, which falls with the stiffness where supports move.
             load = 1.0 if part.forced else part.ratio(solution.work)
             scaled = {name: peak.over(load) for name, peak in peaks.items()}
-            found.append(_CasePeaks(scaled, stretch, counted))
-        return found
+            case_peaks.append(_CasePeaks(scaled, stretch, counted))
+        return case_peaks
 
     def _forces(self, by_strain: FloatArray) -> FloatArray:
         """Turn a derivative by the strains (m, 3) in the plane into one by the displacement."""

@@ -102,7 +102,7 @@ class Worth:
     def __call__(
         self,
         strands: Strands,
-        found: Sequence[Equilibrium],
+        equilibria: Sequence[Equilibrium],
         normal: FloatArray | None = None,
         counts: FloatArray | None = None,
     ) -> FloatArray:
@@ -113,7 +113,7 @@ class Worth:
         """
         pieces = bars(strands, self.parts[0].system.problem.mesh)
         value = np.zeros(len(strands.length))
-        for worth in self.strain_worths(strands, found, normal, counts):
+        for worth in self.strain_worths(strands, equilibria, normal, counts):
             assert worth.adjoint is not None
             value += worth.value(pieces.strain(worth.displacement), pieces.strain(worth.adjoint))
         return value
@@ -121,7 +121,7 @@ class Worth:
     def strain_worths(
         self,
         strands: Strands,
-        found: Sequence[Equilibrium],
+        equilibria: Sequence[Equilibrium],
         normal: FloatArray | None = None,
         counts: FloatArray | None = None,
     ) -> tuple[StrainWorth, ...]:
@@ -129,7 +129,7 @@ class Worth:
 
         Parameters
         ----------
-        found : sequence of Equilibrium
+        equilibria : sequence of Equilibrium
             Of the part with them, under each load case.
         normal : (3,) array, optional
             Of all layers. Without it the bond between layers does not count.
@@ -141,16 +141,16 @@ class Worth:
         InputError
             Where no fibre is stretched.
         """
-        share = np.full(len(found), 1.0 / len(found)) if counts is None else counts
+        share = np.full(len(equilibria), 1.0 / len(equilibria)) if counts is None else counts
         axial, w = self.strand.stiffness(self.parts[0].modulus), self.strength
         pieces = bars(strands, self.parts[0].system.problem.mesh)
         length = strands.length * strands.share
-        strains = [pieces.strain(equilibrium.displacement) for equilibrium in found]
+        strains = [pieces.strain(equilibrium.displacement) for equilibrium in equilibria]
         check_stretched(strains)
-        works = [equilibrium.work for equilibrium in found]
+        works = [equilibrium.work for equilibrium in equilibria]
         peaks: dict[tuple[int, str], Peak] = {}
         for k, (judge, equilibrium, strain) in enumerate(
-            zip(self.judges, found, strains, strict=True)
+            zip(self.judges, equilibria, strains, strict=True)
         ):
             fibre = _fibre(
                 pieces, length, strain, equilibrium.displacement, self.limits.fibre / axial
@@ -163,7 +163,7 @@ class Worth:
         )[1]
         worths = []
         for k, (part, equilibrium, strain) in enumerate(
-            zip(self.parts, found, strains, strict=True)
+            zip(self.parts, equilibria, strains, strict=True)
         ):
             case_failing = {name: failing[case, name] for case, name in failing if case == k}
             loads = [count * peaks[k, name].by_displacement for name, count in case_failing.items()]

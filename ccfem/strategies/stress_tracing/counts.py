@@ -75,7 +75,7 @@ def _along(band: Band, wanted: FloatArray, pitch: float, section: Region) -> Flo
     joint = maximum_filter1d(band.free, reach, mode="constant", cval=1.0)[band.core] > 0.5
     joint = np.pad(joint, (band.core.start - first, last - band.core.stop))
     even, even_cost = min(
-        (_numbers(inner, joint, first, 2) for first in (1, 2)), key=lambda found: found[1]
+        (_numbers(inner, joint, first, 2) for first in (1, 2)), key=lambda candidate: candidate[1]
     )
     any_, any_cost = _numbers(inner, joint, 1, 1)
     shift = 0.0

@@ -64,7 +64,7 @@ def tracks(
     lines = band.middle + share[..., None] * band.half
     if stress is not None:
         lines = relaxed(lines, band, stress, section, share)
-    found = []
+    held = []
     for line, place in zip(lines, share, strict=True):
         line = eased(line, radius, band.closed)
         whole = band.closed and bool((np.abs(place) <= 1.0).all())
@@ -81,8 +81,8 @@ def tracks(
                 clipped(line[run], section, *_parts_of(band, run))
                 for run in _stretches(place, band.core)
             ]
-        found += [_held(piece, section, inner, whole) for piece in pieces if len(piece) > 1]
-    return found
+        held += [_held(piece, section, inner, whole) for piece in pieces if len(piece) > 1]
+    return held
 
 
 def _stretches(place: FloatArray, core: slice) -> list[slice]:
@@ -267,12 +267,12 @@ def _wanted(
     steps = _differences(lines, closed)
     middles = lines[:, : steps.shape[1]] + 0.5 * steps
     points = middles.reshape(-1, 2)
-    found = stress_lines(plane_stress_at(stress, points, STEP))
-    x, y = found.direction.T
+    stress_line = stress_lines(plane_stress_at(stress, points, STEP))
+    x, y = stress_line.direction.T
     heading = np.arctan2(steps[..., 1], steps[..., 0])
     turn = np.arctan2(y, x).reshape(heading.shape) - heading
     turn = (turn + 0.5 * np.pi) % np.pi - 0.5 * np.pi
-    counts = found.defined & shapely.contains_xy(section, points)
+    counts = stress_line.defined & shapely.contains_xy(section, points)
     weight = np.where(counts.reshape(turn.shape), np.maximum(np.cos(2.0 * turn), 0.0), 0.0)
     return weight, np.where(weight > 0.0, np.tan(turn), 0.0)
 

@@ -207,12 +207,12 @@ def _refined(
     last = int(target[np.argmin(distance[target])])
     if not np.isfinite(distance[last]):
         raise InputError("a hole of the layer cannot be joined with the others: name fewer joints")
-    found = _follow(before.astype(np.int64), last)
-    inner = np.array(found[1:-1], dtype=np.int64)
+    followed = _follow(before.astype(np.int64), last)
+    inner = np.array(followed[1:-1], dtype=np.int64)
     first = _PER_EDGE * len(edges)
     path = EdgePath(
-        int(ends[found[0] - first]),
-        int(ends[found[-1] - first]),
+        int(ends[followed[0] - first]),
+        int(ends[followed[-1] - first]),
         edges[inner // _PER_EDGE],
         np.asarray(share[inner % _PER_EDGE], dtype=np.float64),
     )

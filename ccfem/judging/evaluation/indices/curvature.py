@@ -153,8 +153,8 @@ def curvature_indices(samples: CurvatureSamples, machine: Machine) -> dict[str, 
         f"curvature_{name}": float(value)
         for name, value in zip(("50", "80", "95", "max"), quantiles, strict=True)
     }
-    for name, found in (("", curvature), ("_native", samples.native)):
-        ok = found * machine.minimum_radius < 1.0
+    for name, bend in (("", curvature), ("_native", samples.native)):
+        ok = bend * machine.minimum_radius < 1.0
         values[f"curvature_ok{name}"] = float(ok.mean()) if len(ok) else np.nan
     for degrees in (45, 90):
         count = float((samples.turns > np.radians(degrees) + 1e-9).sum())
