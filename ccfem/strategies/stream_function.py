@@ -237,7 +237,7 @@ class StreamFunction:
             layers,
             machine,
             lengths,
-            lambda strategy, some: strategy._cut(cases, layers, machine, some),
+            lambda strategy, some, whole: strategy._cut(cases, layers, machine, some, whole),
             again=self.turns == "tight",
         )
 
@@ -247,8 +247,12 @@ class StreamFunction:
         layers: Sequence[Layer],
         machine: Machine,
         lengths: Sequence[float],
+        whole: bool = False,
     ) -> list[Toolpaths]:
-        """Design for this coverage, and cut by tests of all cases to lengths, mm per layer."""
+        """Design for this coverage, and cut by tests of all cases to lengths, mm per layer.
+
+        With `whole`, plans that lay the length go before stiffer ones that do not.
+        """
         _check_tension(cases.fields, layers)
         in_all, strand = [length * len(layers) for length in lengths], Strand(self.rho)
         bounds = measures(self.objective, cases, layers, max(in_all), machine, strand)
@@ -274,10 +278,13 @@ class StreamFunction:
             tried = _with_first(candidates(strong), tried)
         cut_by = (_ROUNDS, self.strength, self.moves, TIGHT_SHARES[self.turns])
         plain = plain_plans(cases, layers, machine) if self.inset <= _PLAIN_INSET else []
-        return [
-            prune_and_move([*some, *plain], layers, goal, length, machine, strand, *cut_by)
-            for some, length in zip(tried, in_all, strict=True)
-        ]
+        plans = []
+        for some, length in zip(tried, in_all, strict=True):
+            offered = [*some, *plain]
+            enough = [paths for paths in offered if float(paths.lengths.sum()) >= length]
+            offered = enough if whole and enough else offered
+            plans.append(prune_and_move(offered, layers, goal, length, machine, strand, *cut_by))
+        return plans
 
     def extraction(
         self,
@@ -413,7 +420,7 @@ def designed_to_lengths(
     layers: Sequence[Layer],
     machine: Machine,
     lengths: Sequence[float],
-    cut: Callable[[Designed, Sequence[float]], list[Toolpaths]],
+    cut: Callable[[Designed, Sequence[float], bool], list[Toolpaths]],
     again: bool = True,
 ) -> list[tuple[Designed, LayerPlanner]]:
     """Design for the largest length, and again for much shorter ones.
@@ -424,7 +431,8 @@ def designed_to_lengths(
     lengths : sequence of float, mm per layer
         Lengths that need more than the largest coverage are reduced to that coverage.
     cut : callable
-        Designs for the coverage of a strategy and cuts the paths to each of the lengths.
+        Designs for the coverage of a strategy and cuts the paths to each of the lengths, given
+        whether plans that lay a length go before stiffer ones that do not.
     again : bool, default True
         Whether to design for more fibre where the paths are too short, and to take the longer ones.
 
@@ -447,12 +455,12 @@ def designed_to_lengths(
         of = dict(zip(short, anew, strict=True))
         return [of[k] if k in of else next(rest) for k in range(len(lengths))]
     asked = replace(strategy, coverage=longest / full)
-    plans = cut(asked, lengths)
+    plans = cut(asked, lengths, False)
     longest_plan = max(float(paths.lengths.sum()) for paths in plans) / len(layers)
     short_of = 0.0 < longest_plan < _ENOUGH * longest
     if again and short_of and strategy.overfill * asked.coverage < DENSEST:
         more = replace(asked, overfill=min(_MORE * longest / longest_plan, 2.0) * strategy.overfill)
-        longer = cut(more, lengths)
+        longer = cut(more, lengths, True)
         if max(float(paths.lengths.sum()) for paths in longer) > longest_plan * len(layers):
             asked, plans = more, longer
     designed = asked.overfill * asked.coverage
