@@ -281,7 +281,7 @@ class StreamFunction:
         plans = []
         for some, length in zip(tried, in_all, strict=True):
             offered = [*some, *plain]
-            enough = [paths for paths in offered if float(paths.lengths.sum()) >= length]
+            enough = [paths for paths in offered if float(paths.lengths.sum()) >= _WHOLE * length]
             offered = enough if whole and enough else offered
             plans.append(prune_and_move(offered, layers, goal, length, machine, strand, *cut_by))
         return plans
@@ -392,6 +392,9 @@ def _check_tension(stresses: Sequence[StressField], layers: Sequence[Layer]) -> 
 
 _ENOUGH = 0.99
 """Share of a wanted length below which the design is repeated."""
+
+_WHOLE = 0.995
+"""Share of a wanted length from which a plan, before it is cut, lays it."""
 
 _NEAR = 0.95
 """Share of the largest length above which shorter lengths are cut from its design."""

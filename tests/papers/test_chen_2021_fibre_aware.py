@@ -35,8 +35,9 @@ def test_designed_field(fibre_aware, most):
     # Half the evaluations of the default.
     found = fibre_aware.tested(fibre_aware.stream_function(evaluations=25))
     assert 0.995 * fibre_aware.LENGTH < found.length <= fibre_aware.LENGTH
-    assert 2.85 <= found.tension <= most
-    assert found.bearing >= 2.85
+    # 2.87 with strands that fold and credit for their folds; 2.834 without folds.
+    assert 2.83 <= found.tension <= most
+    assert found.bearing >= 2.83
     assert found.bonded >= found.tension
     authors = fibre_aware.tested(fibre_aware.authors_paths("ours"))
     assert found.failure > authors.failure
