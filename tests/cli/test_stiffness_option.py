@@ -25,13 +25,14 @@ def test_the_plan_is_the_least_fibre_that_reaches_a_stiffness_in_newtons_per_mm(
     specimen = Specimen.of(solve(case.problem)["pull"])
     field = specimen.unreinforced
     bare = specimen.stiffness(field.displacement, field.strain_energy)
-    planned = compare(case, ["zigzag"], layers=2, stiffness=f"{1.15 * bare}N/mm")
+    planned = compare(case, ["zigzag"], layers=2, stiffness=f"{1.13 * bare}N/mm")
     (run,) = planned.runs
     assert run.seconds["plan"] > 0.0  # as of every other run, for the report
     about = (planned.layers, case.problem.mesh, case.machine)
     strands = carrying_strands(run.toolpaths, run.strategy, *about)
     tested = virtual_test(strands, specimen, span=())
-    assert 1.15 * bare <= tested.stiffness <= 1.16 * bare
+    # Turns fold and carry nothing, so the stiffness rises in steps, by rows.
+    assert 1.13 * bare <= tested.stiffness <= 1.15 * bare
     # Asked for that length, the strategy lays the same: the plan can be repeated.
     strategy, stress = create("zigzag", {}), planned.stress
     again = plan_to_length(strategy, planned.layers, stress, case.machine, planned.wanted)

@@ -59,6 +59,7 @@ def test_links_by_worth_are_tried_at_whole_numbers_too(two_pulls, monkeypatch):
         return gains.get(along, 0.5)
 
     monkeypatch.setattr(Extraction, "strands", lambda self, layer, field, shift: [shift])
+    monkeypatch.setattr(Extraction, "round_holes", lambda self, lines, *_: (lines, 0))
     monkeypatch.setattr(Extraction, "linked", linked)
     monkeypatch.setattr(Extraction, "profiles", placed)
     monkeypatch.setattr(Extraction, "_price", lambda self, *_: 0.0)
