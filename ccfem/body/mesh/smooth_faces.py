@@ -250,10 +250,7 @@ def _true_wall(face: Face, corners: FloatArray) -> RoundWall | None:
     near = np.abs(distance) <= slack
     if not near.all() and ((distance > slack).any() or face.kind != "cylinder"):
         return None
-    arm = nodes - wall.centre
-    if not near.all() and not (
-        _fine(face, arm, distance, near) and _chords(face, arm, near, slack)
-    ):
+    if not near.all() and not _chords(face, nodes - wall.centre, distance, near, slack):
         return None
     places = np.concatenate([corners, 0.5 * (corners + np.roll(corners, 1, axis=1))])
     height = (nodes - wall.centre) @ wall.direction
@@ -267,29 +264,9 @@ def _true_wall(face: Face, corners: FloatArray) -> RoundWall | None:
     )
 
 
-def _fine(face: Face, arm: FloatArray, distance: FloatArray, near: BoolArray) -> bool:
-    """Whether columns of nodes stand close enough for a wall, and no node is off by more.
-
-    Parameters
-    ----------
-    arm : (k, 3) array, mm
-        Of the nodes, from a point of the axis.
-    distance : (k,) array, mm
-        Of the nodes from the wall; negative inside.
-    near : (k,) bool array
-        Nodes on the wall.
-    """
-    axes = np.linalg.svd(face.direction[None])[2][1:]
-    turn = np.sort(np.arctan2(arm[near] @ axes[1], arm[near] @ axes[0]))
-    if 1 + (np.diff(turn) > 1e-3).sum() < _COLUMNS:
-        return False
-    gaps = np.sort(np.diff(turn, append=turn[:1] + 2.0 * np.pi))
-    gaps = gaps[: len(gaps) - (face.turn < 359.0)]  # a wall that does not close has one more
-    chord = face.radius * (1.0 - np.cos(0.5 * gaps[-1]))
-    return bool(gaps[-1] < np.radians(COARSE_ANGLE)) and bool((distance > -1.1 * chord).all())
-
-
-def _chords(face: Face, arm: FloatArray, near: BoolArray, slack: float) -> bool:
+def _chords(
+    face: Face, arm: FloatArray, distance: FloatArray, near: BoolArray, slack: float
+) -> bool:
     """Whether nodes off a cylinder lie on chords between columns of nodes that are on it.
 
     Where the corner between two chords has no node, they are half as long as their columns tell, at
@@ -299,6 +276,8 @@ def _chords(face: Face, arm: FloatArray, near: BoolArray, slack: float) -> bool:
     ----------
     arm : (k, 3) array, mm
         Of the nodes, from a point of the axis.
+    distance : (k,) array, mm
+        Of the nodes from the wall; negative inside.
     near : (k,) bool array
         Nodes on the wall.
     slack : float, mm
@@ -309,6 +288,14 @@ def _chords(face: Face, arm: FloatArray, near: BoolArray, slack: float) -> bool:
     turn, away = np.arctan2(along, across), np.hypot(along, across)
     order = np.flatnonzero(near)[np.argsort(turn[near], kind="stable")]
     column = turn[order]
+    if 1 + (np.diff(column) > 1e-3).sum() < _COLUMNS:
+        return False
+    # Columns stand close together, and no node is farther off than the longest chord.
+    gaps = np.sort(np.diff(column, append=column[:1] + 2.0 * np.pi))
+    widest = gaps[: len(gaps) - (face.turn < 359.0)][-1]  # an open wall has one gap more
+    deepest = face.radius * (1.0 - np.cos(0.5 * widest))
+    if widest >= np.radians(COARSE_ANGLE) or not (distance > -1.1 * deepest).all():
+        return False
     # Columns before and behind each node off the wall; the first follows the last.
     place = np.searchsorted(column, turn[~near])
     before, after = order[place - 1], order[place % len(order)]
