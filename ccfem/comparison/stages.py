@@ -35,6 +35,7 @@ from ccfem.paths.planning.given_paths import GivenPaths
 from ccfem.paths.planning.plan import plan
 from ccfem.paths.planning.planned import Planned
 from ccfem.paths.planning.strategy import LengthStrategy
+from ccfem.paths.planning.unfolding import may_fold
 from ccfem.paths.splitting.printed_strands import printed_strands
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.curved_plan import curved_plan
@@ -304,7 +305,7 @@ def evaluated(run: Run, part: Part, tell: Tell) -> Run:
         )
         # Who planned given paths is not known: their folds are no published pattern.
         given = isinstance(run.strategy, GivenPaths)
-        by_design = not given and bool(getattr(run.strategy, "folds", False))
+        by_design = not given and may_fold(run.strategy)
         rules = strand_verdict(run.toolpaths, part.layers, part.machine, by_design)
         reasons = [
             *filter(None, [run.unprinted]),

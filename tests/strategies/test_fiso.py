@@ -9,6 +9,7 @@ import shapely
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import box_mesh
 from ccfem.machine import Machine
+from ccfem.papers.kipping_2023.contents import SHAPES
 from ccfem.paths.fields.chart import chart_of
 from ccfem.slicing.slicers import Planar
 from ccfem.strategies import create
@@ -19,36 +20,6 @@ WIDTH = 0.9
 
 def disc(x, y, radius):
     return shapely.Point(x, y).buffer(radius, quad_segs=24)
-
-
-def star():
-    angle = np.pi * np.arange(14) / 7.0
-    radius = np.where(np.arange(14) % 2, 14.0, 30.0)
-    return shapely.Polygon(np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
-
-
-def plate(length, width, holes):
-    return shapely.box(0.0, 0.0, length, width).difference(shapely.union_all(holes))
-
-
-SHAPES = {
-    "disc": disc(0.0, 0.0, 15.0),
-    "rectangle": plate(50.0, 20.0, []),
-    "dumbbell": shapely.union_all(
-        [disc(-20.0, 0.0, 10.0), disc(20.0, 0.0, 12.0), shapely.box(-20.0, -2.0, 20.0, 2.0)]
-    ),
-    "annulus": disc(0.0, 0.0, 20.0).difference(disc(0.0, 0.0, 8.0)),
-    "eccentric annulus": disc(0.0, 0.0, 20.0).difference(disc(6.0, 2.0, 8.0)),
-    "three holes": plate(
-        60.0, 30.0, [disc(12.0, 15.0, 5.0), disc(30.0, 11.0, 4.0), disc(47.0, 17.0, 6.0)]
-    ),
-    "twelve holes": plate(
-        80.0,
-        60.0,
-        [disc(10.0 + 20.0 * i, 10.0 + 20.0 * j, 4.0) for i in range(4) for j in range(3)],
-    ),
-    "star": star(),
-}
 
 
 def laid(section, closest=0.0, radius=0.0, entry=False, width=WIDTH):

@@ -17,7 +17,6 @@ import shapely
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.beads import Beads, beads
-from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
 from ccfem.geometry.polylines import arc_lengths
 from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
@@ -135,11 +134,7 @@ def strand_parts(
         if len(mine):
             plane = _in_plane(layer, parts.middle[mine], parts.direction[mine])
             inside[mine] = width_inside(*plane, machine.fibre_width, _section(layer))
-    if machine.minimum_radius > 0.0:
-        folds = folds_in(fibre, machine)
-    else:
-        none = np.zeros(0)
-        folds = Folds(np.zeros(0, dtype=np.int64), none, none, fibre.lengths, fibre.closed)
+    folds = folds_in(fibre, machine)
     return StrandParts(parts, link, inside, folds, _folded(folds, parts.line, arc))
 
 
@@ -155,12 +150,7 @@ def _in_plane(
     """Parts of strands in the plane of their layer, or in its chart."""
     if layer.flat is not None:
         return layer.plane.project(middle), layer.plane.project(direction)
-    chart = chart_of(layer)
-    nearest = nearest_on_triangles(layer.points, layer.triangles, middle)
-    corners = chart.flat.points[layer.triangles[nearest.triangle]]
-    image = np.einsum("qk,qkd->qd", nearest.weights, corners)
-    assert chart.flat.turns is not None
-    turned = np.einsum("qij,qj->qi", chart.flat.turns[nearest.triangle], direction)
+    image, turned, _ = chart_of(layer).pieces(middle, direction, np.inf)
     return image[:, :2], turned[:, :2]
 
 

@@ -74,7 +74,7 @@ class Chart:
         return replace(paths, points=points, normals=normals)
 
     def pieces(
-        self, middle: FloatArray, tangent: FloatArray
+        self, middle: FloatArray, tangent: FloatArray, most: float = _ON
     ) -> tuple[FloatArray, FloatArray, BoolArray]:
         """Images of small pieces of fibre, and the mask of those that lie on the layer.
 
@@ -82,16 +82,18 @@ class Chart:
         ----------
         middle, tangent : (s, 3) arrays
             Middle and direction of each piece, on any layer.
+        most : float, default 0.01 mm
+            Distance from the layer below which a piece lies on it.
 
         Returns
         -------
         middle, tangent : (k, 3) arrays
-            Of the pieces within 0.01 mm of the layer.
+            Of the pieces on the layer.
         near : (s,) bool array
             Mask of these pieces.
         """
         nearest = nearest_on_triangles(self.layer.points, self.layer.triangles, middle)
-        near = nearest.distance < _ON
+        near = nearest.distance < most
         triangle = nearest.triangle[near]
         corners = self.flat.points[self.layer.triangles[triangle]]
         points = np.einsum("qk,qkd->qd", nearest.weights[near], corners)
