@@ -21,7 +21,7 @@ from ccfem.geometry.tight_bends import tight_bends, tight_samples
 from ccfem.machine.machine import Machine
 from ccfem.paths.linking.joining import Joined
 from ccfem.paths.planning.strategy import Amount, LayerPlanner
-from ccfem.paths.planning.unfolding import off_links, piece
+from ccfem.paths.planning.unfolding import off_links, part_of_line
 from ccfem.paths.raster.bitmap import Bitmap, bitmap
 from ccfem.paths.raster.patterns import Regions
 from ccfem.paths.raster.raster_plan import RasterPlan, raster_plan
@@ -257,7 +257,7 @@ def cut_turns(
         else:
             along = along_line(line)
             pieces = _pieces(line, along, radius, width, least, pitch)
-            parts = [piece(line, along, mark, *ends) for ends in pieces] or [(line, mark)]
+            parts = [part_of_line(line, along, mark, *ends) for ends in pieces] or [(line, mark)]
         result.lines.extend(part for part, _ in parts)
         result.link.extend(marked for _, marked in parts)
     return result
@@ -288,7 +288,7 @@ def _unbent(
     if not len(a):
         return [(line, link)]
     pieces = _between_bends(line, along, link, a, b, width, least)
-    parts = [piece(line, along, link, *ends) for ends in pieces]
+    parts = [part_of_line(line, along, link, *ends) for ends in pieces]
     return [each for part in parts for each in _unbent(*part, radius, width, least, True)]
 
 

@@ -151,7 +151,7 @@ def without_folds(paths: Toolpaths, layers: Sequence[Layer], machine: Machine) -
     )
 
 
-def piece(
+def part_of_line(
     line: FloatArray, along: FloatArray, link: BoolArray, start: float, stop: float
 ) -> _Marked:
     """Part of a line (n, c) between two places of its arc length, and which of its steps are links.
@@ -223,7 +223,8 @@ def _cut(marked: _Marked, radius: float, least: float) -> list[_Marked]:
             a, b = off_links(start[own], stop[own], along, link)
             long = b - a >= least
             parts += [
-                piece(line, along, link, *ends) for ends in zip(a[long], b[long], strict=True)
+                part_of_line(line, along, link, *ends)
+                for ends in zip(a[long], b[long], strict=True)
             ]
         pieces = parts
         if not pieces:
@@ -256,7 +257,7 @@ class _Rounding:
                 return line, link
             longest = int(np.argmax(stop - start))
             middle, along = 0.5 * float(start[longest] + stop[longest]), along_line(line)
-            line, link = piece(line, along, link, middle, middle + float(along[-1]))
+            line, link = part_of_line(line, along, link, middle, middle + float(along[-1]))
             line[-1] = line[0]
             bends = _folds_of([line], _MARGIN * self.radius)
         for start, stop in zip(bends.start[::-1], bends.stop[::-1], strict=True):

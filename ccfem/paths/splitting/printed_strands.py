@@ -27,6 +27,7 @@ from ccfem.geometry.polylines import (
 )
 from ccfem.geometry.shapes import Region, strings
 from ccfem.machine.machine import Machine
+from ccfem.paths.planning.unfolding import part_of_line
 from ccfem.paths.splitting.slabs import LOW, Slab, slabs_of
 from ccfem.paths.splitting.strand_density import StrandDensity
 from ccfem.paths.toolpaths import FIBRE, MATRIX, Toolpaths
@@ -183,18 +184,9 @@ class _Piece:
     link: BoolArray
 
     def between(self, interval: Interval) -> "_Piece":
-        """Piece between two arc lengths."""
-        along = along_line(self.line)
-        total, (start, end) = float(along[-1]), interval
-        line, link = self.line, self.link
-        if end > total + 1e-9:  # a ring goes on through its first point
-            line, link = np.concatenate([line, line[1:]]), np.concatenate([link[:-1], link])
-            along = np.concatenate([along, total + along[1:]])
-        inner = along[(along > start + 1e-6) & (along < end - 1e-6)]
-        places = np.concatenate([[start], inner, [end]])
-        middle = 0.5 * (places[1:] + places[:-1])
-        step = np.clip(np.searchsorted(along, middle) - 1, 0, len(line) - 2)
-        return _Piece(self.path, points_along(line, along, places), np.append(link[step], False))
+        """Piece between two arc lengths; a ring goes on through its first point."""
+        line, link = part_of_line(self.line, along_line(self.line), self.link, *interval)
+        return _Piece(self.path, line, link)
 
 
 def _whole(fibre: Toolpaths, layer: int) -> list[_Piece]:

@@ -16,7 +16,7 @@ from ccfem.paths.folds import folds, folds_in
 from ccfem.paths.linking.joining import Joined
 from ccfem.paths.planning.plan import plan_layers
 from ccfem.paths.planning.strategy import Amount
-from ccfem.paths.planning.unfolding import may_fold, piece, unfolded, unfolded_paths
+from ccfem.paths.planning.unfolding import may_fold, part_of_line, unfolded, unfolded_paths
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.slicers import Planar
 from ccfem.strategies import create, named
@@ -119,7 +119,7 @@ def test_ring_stays_closed_where_it_is_led_round():
 def test_piece_of_a_ring_runs_on_over_its_start():
     ring = np.array([(0, 0), (10, 0), (10, 10), (0, 10), (0, 0)], dtype=float)
     link = np.array([False, False, True, False, False])
-    part, marks = piece(ring, along_line(ring), link, 25.0, 45.0)
+    part, marks = part_of_line(ring, along_line(ring), link, 25.0, 45.0)
     np.testing.assert_allclose(part, [(5, 10), (0, 10), (0, 0), (5, 0)])
     assert marks.tolist() == [True, False, False, False]
 
