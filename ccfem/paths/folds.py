@@ -11,6 +11,7 @@ radius is less than r / 1.512. A square corner is no fold.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -33,6 +34,10 @@ ANGLE = np.pi / 2.0
 
 _SAMPLES = 40
 """Samples of the tangent in a window."""
+_BATCH = 2_000_000
+"""Samples that are looked at together: about 300 MB."""
+_FINEST = 0.02
+"""Least distance of the samples, mm: with radii below .8 mm fewer of them lie in a window."""
 _SMOOTH = 2
 """Samples before and behind one over which the tangent is averaged."""
 _SLACK = 2e-3
@@ -41,6 +46,9 @@ _SPREAD = 0.25
 """Largest length, in windows, over which a vertex of a polyline spreads its turn to each side."""
 _STRAIGHT = 1e-6
 """Turn, radians, up to which a point lies on a straight piece: it then decides nothing."""
+
+
+_NONE = (np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -151,8 +159,34 @@ def folds(points: FloatArray, offsets: IntArray, closed: BoolArray, radius: floa
     window = WINDOW * radius
     size = lengths(points, offsets)
     if radius == 0.0:  # the machine turns on the spot
-        none = np.zeros(0)
-        return Folds(none.astype(np.int64), none, none, lengths=size, closed=closed)
+        return Folds(*_NONE, lengths=size, closed=closed)
+    # As many lines at a time as the memory for their samples allows.
+    batch = np.floor(np.cumsum(size) / (_BATCH * _spacing(window))).astype(np.int64)
+    ends = np.flatnonzero(np.diff(batch, append=-1)) + 1
+    parts: list[tuple[IntArray, FloatArray, FloatArray]] = []
+    for first, last in pairwise([0, *ends.tolist()]):
+        some = slice(offsets[first], offsets[last])
+        lines = (points[some], offsets[first : last + 1] - offsets[first], closed[first:last])
+        k, start, stop = _stretches(*lines, begin[first:last], size[first:last], window)
+        parts.append((k + first, start, stop))
+    line, start, stop = (np.concatenate(column) for column in zip(_NONE, *parts, strict=True))
+    return Folds(line, start, stop, lengths=size, closed=closed)
+
+
+def _spacing(window: float) -> float:
+    """Distance of the samples in a window, mm."""
+    return max(window / _SAMPLES, _FINEST)
+
+
+def _stretches(
+    points: FloatArray,
+    offsets: IntArray,
+    closed: BoolArray,
+    begin: FloatArray,
+    size: FloatArray,
+    window: float,
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Polyline, start and stop, mm, of every fold of polylines that begin at `begin` (K,), mm."""
     line, position, tangent, step = _tangents(points, offsets, closed, window)
     # From each sample the nearest one ahead to which the tangent turns by more than the angle.
     samples = np.bincount(line, minlength=len(size))
@@ -180,11 +214,7 @@ def folds(points: FloatArray, offsets: IntArray, closed: BoolArray, radius: floa
     start = np.where(start >= size[line], start - size[line], start)
     order = np.lexsort((start, line))
     line, start, reach = line[order], start[order], reach[at][order]
-    return Folds(
-        *_merged(line, start, start + reach, size, closed),
-        lengths=size,
-        closed=closed,
-    )
+    return _merged(line, start, start + reach, size, closed)
 
 
 def folds_in(toolpaths: Toolpaths, machine: Machine) -> Folds:
@@ -243,7 +273,7 @@ def _tangents(
     """
     points, offsets = _without_straight_points(points, offsets)
     size, along = lengths(points, offsets), arc_lengths(points, offsets)
-    parts = np.maximum(1, np.round(size * (_SAMPLES / window))).astype(np.int64)
+    parts = np.maximum(1, np.round(size / _spacing(window))).astype(np.int64)
     parts[size == 0.0] = 0
     step: FloatArray = np.divide(size, parts, out=np.ones(len(size)), where=parts > 0)
     line, number = repeated(parts)

@@ -201,3 +201,21 @@ def test_folds_of_one_line_are_its_own_beside_a_longer_one():
 def test_a_machine_that_turns_on_the_spot_folds_nothing():
     hairpin = np.array([[0.0, 0.0], [50.0, 0.0], [50.0, 0.1], [0.0, 0.1]])
     assert of(hairpin, radius=0.0).counts.tolist() == [0]
+
+
+@pytest.mark.parametrize("radius", [1e-6, 1e-3, 0.05])
+def test_least_radii_take_no_more_samples_than_places_that_differ(radius):
+    """A hairpin 1 mm wide, with eight metres of strand."""
+    line = np.array([[0.0, 0.0], [4e3, 0.0], [4e3, 1.0], [0.0, 1.0]])
+    assert of(line, radius=radius).counts.tolist() == [0]
+
+
+def test_folds_of_many_lines_are_those_of_each(monkeypatch):
+    random = np.random.default_rng(1)
+    lines = [np.cumsum(random.normal(0.0, 3.0, (40, 2)), axis=0) for _ in range(30)]
+    whole = of(*lines)
+    assert whole.counts.sum() > 100
+    monkeypatch.setattr("ccfem.paths.folds._BATCH", 1000)  # a few lines at a time
+    few = of(*lines)
+    for name in ("line", "start", "stop"):
+        np.testing.assert_allclose(getattr(few, name), getattr(whole, name), rtol=1e-9)
