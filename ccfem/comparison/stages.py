@@ -284,8 +284,7 @@ def _setter(natural_runs: dict[str, Run], part: Part, tell: Tell) -> str | None:
 def _no_fibre(machine: Machine) -> str:
     return (
         "laid no fibre: the layers, or their areas in tension, are too small for the shortest "
-        f"strand (machine.minimum_length = {machine.minimum_length:g} mm): check that all lengths "
-        "are in mm"
+        f"strand of the machine, {machine.shortest_strand:g} mm: check that all lengths are in mm"
     )
 
 

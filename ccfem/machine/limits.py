@@ -16,7 +16,7 @@ class Limits:
     Attributes
     ----------
     short : float
-        Share of the fibre's length in paths shorter than `Machine.minimum_length`.
+        Share of the fibre's length in paths shorter than `Machine.shortest_strand`.
     tight : float
         Share of the fibre's length that turns tighter than `Machine.minimum_radius`.
     on_fibre : float

@@ -42,6 +42,10 @@ class Machine:
         Cross-section of one strand.
     minimum_length : float, mm
         Shortest strand that the cutter allows.
+    held_length : float, mm
+        Least length that lies, without a fold, between the start of a strand and its cut, so that
+        the strand holds. Default: 0, since the paper lays strands of 42 mm, the distance from its
+        cutter; a FibreSeek asks for 16 mm, as far as its cutter again.
     minimum_radius : float, mm
         Tightest turn that a strand follows without folding; 0.26 1/mm in curvature.
     fibre_speed, matrix_speed, travel_speed : float, mm/s
@@ -97,6 +101,7 @@ class Machine:
     pressed: bool = False
     filament_area: float = 0.1075
     minimum_length: float = 42.0
+    held_length: float = 0.0
     minimum_radius: float = 3.85
     fibre_speed: float = 5.0
     matrix_speed: float = 12.0
@@ -180,6 +185,11 @@ class Machine:
         if self.fibre_tex is not None:
             return 1e-6 * self.fibre_tex
         return 1e-3 * self.fibre_density * self.filament_area
+
+    @property
+    def shortest_strand(self) -> float:
+        """Shortest strand that is laid, mm: what the cutter allows, and what holds before a cut."""
+        return max(self.minimum_length, self.tail + self.held_length)
 
     @property
     def tail(self) -> float:

@@ -44,7 +44,7 @@ class Process:
         Before a change of tools the nozzle rises so far above all that is printed, and so much
         matrix filament of the matrix head, and of the fibre head, is drawn back (Aura: 5, 15, 12).
     short : {"matrix", "drop", "error"}
-        Strands below `Machine.minimum_length`: laid by the matrix nozzle, left out, or refused.
+        Strands below `Machine.shortest_strand`: laid by the matrix nozzle, left out, or refused.
     cover : float, mm
         Least height of matrix below the first and over the last layer of fibre.
     turns : {"pad", "cut", "inside"}

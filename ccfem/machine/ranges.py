@@ -38,6 +38,7 @@ RANGES = {
         "matrix_height": _HEIGHT,
         "filament_area": Range(0.0001, 100.0, "mm^2"),
         "minimum_length": _LENGTH,
+        "held_length": _LENGTH,
         "minimum_radius": _MOVE,
         "fibre_speed": _SPEED_OR_NONE,
         "matrix_speed": _SPEED_OR_NONE,

@@ -254,7 +254,7 @@ class Fiso:
         closest = max(self.closest, _NARROW) if radius > 0.0 else self.closest
         start = layer.plane.points[layer.loops[0][:2]].mean(axis=0)
         lines: list[FloatArray] = []
-        least = np.inf if self.turns == "tight" else machine.minimum_length
+        least = np.inf if self.turns == "tight" else machine.shortest_strand
         section = layer.plane.polygon
         for tree in contour_trees(section, spacing, start, closest, radius):
             lines += first_in_spiral_out(tree, spacing, start, self.entry, radius, least)

@@ -459,7 +459,7 @@ class _Planner:
         if not s.folds:
             link = [np.zeros(len(line), dtype=bool) for line in lines]
             lines = unfolded(Joined(lines, link), section, machine, _PIECE * width).lines
-        limit, least = s.link_limit * width, machine.minimum_length
+        limit, least = s.link_limit * width, machine.shortest_strand
         radius = machine.minimum_radius if s.smooth else 0.0
         paths = linked_paths(lines, section, width, limit, least, s.boundary_links, radius)
         return with_turns(s, paths.lines, machine, paths.link)

@@ -140,7 +140,7 @@ class Mps(Infill):
 
     def linked(self, lines: list[FloatArray], prepared: _Inside, machine: Machine) -> Joined:
         """Strands too short to be cut, joined to their neighbours by links inside the shells."""
-        least = machine.minimum_length if self.minimum_length is None else self.minimum_length
+        least = machine.shortest_strand if self.minimum_length is None else self.minimum_length
         short = any(line_length(line) < least for line in lines)
         if not short or shapely.is_empty(prepared.interior):
             return with_turns(self, lines, machine)

@@ -66,7 +66,7 @@ class Streamline:
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
         width = machine.fibre_width
-        least = machine.minimum_length if self.minimum_length is None else self.minimum_length
+        least = machine.shortest_strand if self.minimum_length is None else self.minimum_length
         lines = evenly_spaced_streamlines(
             layer.plane.points,
             layer.triangles,

@@ -188,7 +188,7 @@ class Svt:
 
     def _least(self, machine: Machine) -> float:
         """Length of the shortest path that is laid, mm."""
-        return machine.minimum_length if self.minimum_length is None else self.minimum_length
+        return machine.shortest_strand if self.minimum_length is None else self.minimum_length
 
     def _piece(self, piece: Region, stress: LayerStress, machine: Machine) -> list[_Marked]:
         """Paths of one piece of the section, with the mask of their links."""

@@ -388,7 +388,7 @@ class _Planner:
             line for shift in _BETWEEN for line in self.lines(piece, shift * step, step, -np.inf)
         ]
         border = border_tree(piece.piece.mesh.points, [*piece.piece.outer, *piece.piece.loops])
-        least = machine.minimum_length if s.minimum_length is None else s.minimum_length
+        least = machine.shortest_strand if s.minimum_length is None else s.minimum_length
         apart = CLOSEST * spacing
         lines = kept_apart(lines, apart, least)
         return lines + kept_apart(between, apart, least, lines, border)

@@ -437,7 +437,7 @@ def _no_room(case: Case) -> list[str]:
     """Say which measures of the machine leave no room for fibre on any layer of the part."""
     machine = case.machine
     _, side, longest = np.sort(np.ptp(case.problem.mesh.bounds, axis=0)).tolist()
-    width, least = machine.fibre_width, machine.minimum_length
+    width, least = machine.fibre_width, machine.shortest_strand
     if width > side:
         return [
             f"machine.fibre_width = {width:g} mm is wider than the part, {side:.4g} mm: no fibre "
@@ -446,8 +446,8 @@ def _no_room(case: Case) -> list[str]:
     most = side * longest / width
     if least > most:
         return [
-            f"machine.minimum_length = {least:g} mm: no layer has room for a strand that long, at "
-            f"most {most:.4g} mm of {width:g} mm width; are all lengths in mm?"
+            f"machine.minimum_length asks for strands of {least:g} mm: no layer has room for more "
+            f"than {most:.4g} mm of {width:g} mm width; are all lengths in mm?"
         ]
     return []
 

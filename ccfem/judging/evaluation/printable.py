@@ -16,7 +16,9 @@ class _Rule:
 
 
 _RULES = (
-    _Rule("short", "{found} of the fibre lies in paths shorter than {machine.minimum_length:g} mm"),
+    _Rule(
+        "short", "{found} of the fibre lies in paths shorter than {machine.shortest_strand:g} mm"
+    ),
     _Rule("tight", "{found} of the fibre turns tighter than {machine.minimum_radius:g} mm"),
     _Rule("on_fibre", "{found} of the fibre lies on other fibre of its direction"),
     _Rule("across_fibre", "{found} of the fibre lies across other fibre"),

@@ -3,6 +3,8 @@
 * A strand needs a run of the cutter's length free of folds (`ccfem.paths.folds`): what lies between
   two folds and is shorter is a scribble that no head lays. Patterns that turn so by design keep
   their turns, and are judged by what still carries.
+* It holds before it is cut: `Machine.held_length` lies without a fold behind its start, and as much
+  before its cut, a tail before its end.
 * Of the area of a strand, its length times a fibre width, no more than a twentieth lies outside the
   part. Links do not count as outside: those are laid on pads and cut off.
 """
@@ -33,11 +35,12 @@ class BrokenRule:
 
     Attributes
     ----------
-    rule : {"folds", "outside"}
+    rule : {"folds", "held", "outside"}
     strands : (k,) int array
         Numbers of the fibre paths, the worst first.
     places : (k, 3) array, mm
-        Where each breaks it: at its middle fold, and where most of its width is outside.
+        Where each breaks it: at its middle fold, at the fold near its start or cut, and where most
+        of its width is outside.
     words : str
         One line: how many, by how much, and where the worst is.
     """
@@ -91,6 +94,7 @@ def strand_verdict(
     fibre = toolpaths.of_kind(FIBRE)
     parts = strand_parts(toolpaths, machine, layers)
     folded = () if folds_by_design else _folded(fibre, parts, machine)
+    held = _not_held(fibre, parts, machine)
     count, places = int((parts.folds.counts > 0).sum()), len(parts.folds.line)
     remark = ""
     if count:
@@ -100,13 +104,13 @@ def strand_verdict(
             f"by more than 90 degrees within {WINDOW * machine.minimum_radius:.3g} mm: "
             f"{parts.folds.folded.sum():.0f} mm of fibre in these folds carry nothing"
         )
-    return StrandVerdict((*folded, *_outside(fibre, parts)), remark)
+    return StrandVerdict((*folded, *held, *_outside(fibre, parts)), remark)
 
 
 def _folded(fibre: Toolpaths, parts: StrandParts, machine: Machine) -> tuple[BrokenRule, ...]:
     """Strands without a run of the cutter's length free of folds."""
     folds = parts.folds
-    least = max(machine.tail, machine.minimum_length)
+    least = machine.shortest_strand
     free = folds.longest_free
     short = np.flatnonzero((folds.counts > 0) & (free < least * (1.0 - _ROUNDING)))
     if not len(short):
@@ -125,6 +129,28 @@ def _folded(fibre: Toolpaths, parts: StrandParts, machine: Machine) -> tuple[Bro
             f"{len(order)} of {len(fibre)} strands have no {least:g} mm free of turns by more than "
             f"90 degrees within {WINDOW * machine.minimum_radius:.3g} mm; the worst has "
             f"{free[order[0]]:.3g} mm",
+        ),
+    )
+
+
+def _not_held(fibre: Toolpaths, parts: StrandParts, machine: Machine) -> tuple[BrokenRule, ...]:
+    """Strands that fold before they hold, behind their start or before their cut."""
+    folds, held = parts.folds, machine.held_length
+    cut = folds.lengths[folds.line] - machine.tail
+    behind_start = folds.start < held
+    before_cut = (folds.stop > cut - held) & (folds.start < cut)
+    near = np.flatnonzero(behind_start | before_cut) if held > 0.0 else np.zeros(0, dtype=int)
+    if not len(near):
+        return ()
+    strands, first = np.unique(folds.line[near], return_index=True)
+    lines, places = list(fibre), folds.places[near[first]]
+    return (
+        _broken(
+            "held",
+            strands,
+            np.array([point_at(lines[k], at) for k, at in zip(strands, places, strict=True)]),
+            f"{len(strands)} of {len(fibre)} strands turn back within the {held:g} mm behind their "
+            "start or before their cut that are to hold them",
         ),
     )
 

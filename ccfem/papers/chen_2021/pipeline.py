@@ -137,7 +137,7 @@ def layer_stages(
         for distance in strategy.rings[:-1]:
             rings += parallel_curve(hole, distance * width, section)
         lines = lead_into(lines, hole, strategy.rings[-1] * width, section)
-    least = machine.minimum_length
+    least = machine.shortest_strand
     rings = keep_off_border(rings, section, 0.0)
     lines = keep_off_border(lines, section, 0.0)
     joined = linked_paths(

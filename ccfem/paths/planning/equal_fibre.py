@@ -485,7 +485,7 @@ class _Search:
             more.toolpaths,
             self.layers,
             wanted * count,
-            self.machine.minimum_length,
+            self.machine.shortest_strand,
         )
         length = length_per_layer(planned.toolpaths, self.layers)
         if not self.meets(length, wanted) and np.isfinite(close):
@@ -497,7 +497,7 @@ class _Search:
             said += (
                 f"; lays {length:.0f} of {wanted:.0f} mm per layer: the nearest that strands of "
             )
-            said += f"{self.machine.minimum_length:g} mm allow"
+            said += f"{self.machine.shortest_strand:g} mm allow"
         return Planned(less.strategy, planned.toolpaths, length, said, self.meets(length, wanted))
 
     def off(self, wanted: float) -> Planned:

@@ -54,7 +54,7 @@ def check_shells(strategy: object) -> None:
 
 def long_enough(paths: Toolpaths, least: float | None, machine: Machine) -> Toolpaths:
     """Paths no shorter than `least`, mm; None for the shortest that the machine can cut."""
-    return paths.select(paths.lengths >= (machine.minimum_length if least is None else least))
+    return paths.select(paths.lengths >= (machine.shortest_strand if least is None else least))
 
 
 def with_turns(
@@ -79,7 +79,7 @@ def with_turns(
     if strategy.turns == "tight":
         return joined
     width, least = machine.fibre_width, getattr(strategy, "minimum_length", None)
-    least = max(machine.minimum_length, least or 0.0)  # the cutter cannot make shorter pieces
+    least = max(machine.shortest_strand, least or 0.0)  # the cutter cannot make shorter pieces
     spacing = strategy.spacing if strategy.amount.parameter == "spacing" else 1.0
     every, radius = strategy.turns == "cut", machine.minimum_radius
     return cut_turns(joined, radius, width, least, spacing * width, every)

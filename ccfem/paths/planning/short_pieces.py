@@ -24,7 +24,7 @@ def short_share(layers: Sequence[Layer], machine: Machine) -> float:
         section = layer.plane.polygon
         whole += section.area
         for piece in shapely.get_parts(shapely.buffer(section, -half)):
-            if _extent(piece) < machine.minimum_length:
+            if _extent(piece) < machine.shortest_strand:
                 short += shapely.intersection(section, shapely.buffer(piece, half)).area
     return short / whole if whole else 0.0
 
@@ -35,7 +35,7 @@ def about_short_pieces(layers: Sequence[Layer], machine: Machine) -> str:
     if share < _WORTH_A_WORD:
         return ""
     return (
-        f"; {share:.0%} of the section lies in pieces less than {machine.minimum_length:.0f} mm "
+        f"; {share:.0%} of the section lies in pieces less than {machine.shortest_strand:.0f} mm "
         "across, the least length of a path"
     )
 

@@ -104,7 +104,7 @@ def unfolded_paths(
     least : float, mm, optional
         Pieces of cut paths that are shorter are dropped; by default the machine's least length.
     """
-    least, radius = machine.minimum_length if least is None else least, machine.minimum_radius
+    least, radius = machine.shortest_strand if least is None else least, machine.minimum_radius
     radius *= _MARGIN if layer is not None else 1.0
     bends = folds(paths.points, paths.offsets, paths.closed, radius)
     folded = (bends.counts > 0) & (paths.kind == FIBRE)

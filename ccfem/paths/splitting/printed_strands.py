@@ -111,7 +111,7 @@ def printed_strands(
             warnings = _end_in_stacks(pieces, used, borders, mesh, machine)
         removed = within - _total(pieces)
     cut_off = float(fibre.lengths.sum()) - removed - _total(pieces)
-    limit = max(machine.tail, machine.minimum_length) * (1.0 - SHORT)
+    limit = machine.shortest_strand * (1.0 - SHORT)
     split = sorted((piece for those in pieces.values() for piece in those), key=lambda p: p.path)
     long = [piece for piece in split if line_length(piece.line) >= limit]
     short = [piece for piece in split if line_length(piece.line) < limit]
@@ -141,7 +141,7 @@ def _check_fibre(fibre: Toolpaths, layers: Sequence[Layer], machine: Machine) ->
             f"fibre lies on layer {min(missing)}, which is not among the layers given: "
             "give those that it was planned on"
         )
-    limit = max(machine.tail, machine.minimum_length)
+    limit = machine.shortest_strand
     short = fibre.lengths < limit * (1.0 - SHORT)
     if short.any() and machine.process.short == "error":
         raise InputError(
@@ -442,7 +442,7 @@ def _passes(
     machine: Machine,
 ) -> list[tuple[float, int, int, float, float]]:
     """List passes through stacks that may be left out: excess, stack, strand and both ends."""
-    shortest = max(machine.tail, machine.minimum_length)
+    shortest = machine.shortest_strand
     passes = []
     for k, line in enumerate(lines):
         along = along_line(line)

@@ -94,7 +94,7 @@ def shorten_bent(
     tight : float in [0, 1]
         Share of the fibre's length; 1 for no limit.
     """
-    least = machine.minimum_length
+    least = machine.shortest_strand
     if tight >= 1.0:
         return shorten(toolpaths, along, length, least)
     best = max((float(np.abs(profile.value).max()) for profile in along), default=0.0) or 1.0

@@ -177,7 +177,7 @@ def strand_lines(
         fixed[[first, end - 1]] |= closed
         if hold:
             fixed[first:end] |= _bent(points[first:end], closed, machine)
-            fixed[first:end] |= closed and lengths[k] < _SMALL_RING * machine.minimum_length
+            fixed[first:end] |= closed and lengths[k] < _SMALL_RING * machine.shortest_strand
     return StrandLines(
         toolpaths=paths,
         frame=frame,
@@ -186,7 +186,7 @@ def strand_lines(
         path=path,
         arc=arc_lengths(points, offsets),
         fixed=fixed,
-        least=np.minimum(fibre.lengths, machine.minimum_length),
+        least=np.minimum(fibre.lengths, machine.shortest_strand),
     )
 
 

@@ -214,11 +214,11 @@ class Extraction:
         """Price of fibre at which a length is worth keeping, at the middle position of levels."""
         central = [one[self.phases // 2] for one in tried]
         along = [p for one, count in zip(central, counts, strict=True) for p in count * one]
-        return least_price(along, length, self.machine.minimum_length, _CUT_COST) if along else 0.0
+        return least_price(along, length, self.machine.shortest_strand, _CUT_COST) if along else 0.0
 
     def _gain(self, along: list[Profile], price: float) -> float:
         """Return the worth of fibre beyond its price."""
-        minimum = self.machine.minimum_length
+        minimum = self.machine.shortest_strand
         return sum(profile.kept(price, minimum, _CUT_COST)[1] for profile in along)
 
     def layer_paths(self, layer: Layer, field: FloatArray, shift: float) -> Toolpaths:
@@ -251,7 +251,7 @@ class Extraction:
 
         def printable(strands: list[FloatArray]) -> float:
             sizes = [line_length(line) for line in strands]
-            return sum(size for size in sizes if size >= machine.minimum_length)
+            return sum(size for size in sizes if size >= machine.shortest_strand)
 
         best, number, count = lines, 0, len(lines)
         for levels in tried if tried.start else ():
@@ -275,7 +275,7 @@ class Extraction:
         share of the longest link.
         """
         width, section = self.machine.fibre_width, layer.plane.polygon
-        limit, least = self.link_limit * width, self.machine.minimum_length
+        limit, least = self.link_limit * width, self.machine.shortest_strand
         radius = self.machine.minimum_radius
         if reach:
             worth = partial(self._worth, layer)
@@ -454,7 +454,7 @@ def _ends_cut(paths: Toolpaths, layer: Layer, inset: float, machine: Machine) ->
     shapely.prepare(border)
     places = shapely.points(paths.points @ layer.plane.frame[:2].T)
     missing = inset - shapely.distance(places, border)
-    left = paths.lengths - np.minimum(paths.lengths, machine.minimum_length)
+    left = paths.lengths - np.minimum(paths.lengths, machine.shortest_strand)
     cut = []
     for k, (first, end) in enumerate(pairwise(paths.offsets)):
         points, link, short = paths.points[first:end], paths.link[first:end], missing[first:end]

@@ -47,6 +47,26 @@ def test_pieces_between_hairpins_have_to_be_as_long_as_the_cutter_needs():
     assert rule.places[0] == pytest.approx([35.5, 12.5, 1.0], abs=0.3)
 
 
+def test_a_strand_holds_before_it_is_cut():
+    """A row of 95 mm after a hook of 10 mm: the hook's fold lies 10 mm behind the start."""
+    hook = [[20.0, 21.0], [10.0, 21.0], [10.0, 20.0], [95.0, 20.0]]
+    assert verdict([hook]).broken == ()
+    (rule,) = verdict([hook], machine=replace(MACHINE, held_length=16.0)).broken
+    assert (rule.rule, rule.strands.tolist()) == ("held", [0])
+    assert rule.places[0] == pytest.approx([10.0, 20.5, 1.0], abs=0.3)
+    assert verdict([hook], machine=replace(MACHINE, held_length=5.0)).broken == ()
+    # Backwards the fold lies in the tail, which is laid after the cut, 42 mm before the end.
+    assert verdict([hook[::-1]], machine=replace(MACHINE, held_length=16.0)).broken == ()
+    # With a cutter at 5 mm it lies before the cut.
+    near = replace(MACHINE, held_length=16.0, cutter_distance=5.0)
+    assert [rule.rule for rule in verdict([hook[::-1]], machine=near).broken] == ["held"]
+
+
+def test_the_shortest_strand_holds_before_its_cut():
+    assert replace(MACHINE, cutter_distance=16.0, held_length=30.0).shortest_strand == 46.0
+    assert MACHINE.shortest_strand == 42.0
+
+
 def test_a_published_pattern_keeps_its_turns_and_says_what_they_cost():
     judged = verdict([serpentine(15.5)], by_design=True)
     assert judged.broken == ()

@@ -157,7 +157,7 @@ def manufacture_indices(samples: ManufactureSamples, machine: Machine) -> dict[s
     length = samples.length
     total = float(length.sum())
     quantiles = np.quantile(length, [0.0, 0.5, 1.0]) if len(length) else np.full(3, np.nan)
-    enough = length >= machine.minimum_length * (1.0 - _ROUNDING)
+    enough = length >= machine.shortest_strand * (1.0 - _ROUNDING)
     matrix = max(float(samples.volume.sum()) - machine.filament_area * total, 0.0)
     line = machine.matrix_width * machine.matrix_height
     return {
