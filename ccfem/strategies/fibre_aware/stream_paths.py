@@ -53,6 +53,9 @@ _SAME = 0.5
 """Distance, in strand widths, up to which the borders of two sections count as the same. The levels
 that are best for one layer are then used for the other."""
 
+_EQUAL = 1e-6
+"""Distance, mm, up to which two sections are equal: paths drawn on one are those of the other."""
+
 
 def middle(numbers: IntArray) -> int:
     """Return the middle one of the numbers."""
@@ -113,20 +116,24 @@ class Extraction:
         list of list of Toolpaths
             For each length; the paths worth most first.
         """
-        alike = _alike(layers, group, self.machine.fibre_width)
+        alike = _alike(layers, group, _SAME * self.machine.fibre_width)
         kind = {int(k): middle(numbers) for numbers in alike for k in numbers}
+        equal = _alike(layers, group, _EQUAL)
+        source = {int(k): middle(numbers) for numbers in equal for k in numbers}
         cut: dict[tuple[int, int], list[FloatArray]] = {}
         levels: dict[tuple[int, int], int] = {}
         led: dict[tuple[int, int], list[FloatArray]] = {}
         drawn: dict[tuple[int, int, float], Toolpaths] = {}
 
         def strands(number: int, phase: int) -> list[FloatArray]:
+            number = source[number]
             if (number, phase) not in cut:
                 field = self.fields[group[number]]
                 cut[number, phase] = self.strands(layers[number], field, phase / self.phases)
             return cut[number, phase]
 
         def round_holes(number: int, phase: int) -> list[FloatArray]:
+            number = source[number]
             if (number, phase) not in led:
                 tried, first = range(1, LEVELS + 1), kind[number]
                 if number != first:  # as many as in the layer that stands for all of its kind
@@ -139,7 +146,9 @@ class Extraction:
 
         def paths(number: int, phase: int, reach: float = 0.0) -> Toolpaths:
             key = number, phase, reach
-            if key not in drawn:
+            if key not in drawn and not reach and number != source[number]:
+                drawn[key] = _on_layer(paths(source[number], phase), layers[number])
+            if key not in drawn:  # what links are worth differs from layer to layer
                 drawn[key] = self.linked(layers[number], round_holes(number, phase), reach)
             return drawn[key]
 
@@ -317,14 +326,20 @@ class Extraction:
         return profiles(toolpaths, strands, value)
 
 
-def _alike(layers: Sequence[Layer], group: IntArray, width: float) -> list[IntArray]:
-    """Numbers of the layers of each kind, which share a field and about the same section."""
+def _on_layer(paths: Toolpaths, layer: Layer) -> Toolpaths:
+    """Paths of a layer with the same section, drawn on another."""
+    points = layer.plane.to_space(layer.plane.project(paths.points))
+    return replace(paths, points=points, layer=np.full(len(paths), layer.index))
+
+
+def _alike(layers: Sequence[Layer], group: IntArray, distance: float) -> list[IntArray]:
+    """Numbers of the layers of each kind: they share a field, and a section up to a distance."""
     kinds: list[list[int]] = []
     borders = [shapely.boundary(layer.plane.polygon) for layer in layers]
     for k, border in enumerate(borders):
         for kind in kinds:
             same = group[kind[0]] == group[k]
-            if same and shapely.hausdorff_distance(borders[kind[0]], border) < _SAME * width:
+            if same and shapely.hausdorff_distance(borders[kind[0]], border) < distance:
                 kind.append(k)
                 break
         else:

@@ -66,3 +66,31 @@ def test_links_by_worth_are_tried_at_whole_numbers_too(two_pulls, monkeypatch):
     monkeypatch.setattr(Extraction, "_gain", gain)
     ((_, *_, best),) = extraction.candidates(layers, np.zeros(1, dtype=int), [100.0])
     assert placed(extraction, best) == (0.0, 1.0)
+
+
+def test_layers_of_one_section_are_drawn_once_for_each_field(two_pulls, monkeypatch):
+    mesh, layers = two_pulls[0].fields[0].mesh, two_pulls[1]
+    points = refined(layers[0])[0]
+    grid = SplineGrid.over(points, points.mean(axis=0), np.eye(2), 2.0)
+    rising = grid.centre[1] + grid.size * (grid.used[:, 1] + 0.5)  # levels a width apart
+    extraction = Extraction(
+        (rising, 0.5 * rising), grid, mesh, (), Machine(minimum_length=20.0), 1, 0.5, 10.0
+    )
+    drawn = []
+    linked = Extraction.linked
+
+    def counted(self, layer, lines, reach=0.0):
+        drawn.append((layer.index, len(lines)))
+        return linked(self, layer, lines, reach)
+
+    monkeypatch.setattr(Extraction, "linked", counted)
+    monkeypatch.setattr("ccfem.strategies.fibre_aware.stream_paths._REACHES", (0.0,))
+    ((paths,),) = extraction.candidates(layers, np.array([0, 1, 0, 0]), [1000.0])
+    # Once to choose the levels and once to draw them; layer 2 stands for 0 and 3 too.
+    assert sorted(layer for layer, _ in drawn) == [1, 1, 2, 2]
+    of = [[layers[k].plane.project(path) for path in paths.on_layer(k)] for k in range(4)]
+    for k in (0, 3):
+        np.testing.assert_allclose(np.concatenate(of[k]), np.concatenate(of[2]), atol=1e-9)
+        heights = paths.on_layer(k).points @ layers[k].plane.frame[2]
+        np.testing.assert_allclose(heights, layers[k].plane.height, atol=1e-9)
+    assert len(of[1]) < len(of[2])
