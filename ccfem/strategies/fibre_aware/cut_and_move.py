@@ -11,6 +11,7 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.machine.machine import Machine
+from ccfem.paths.planning.equal_fibre import TOLERANCE
 from ccfem.paths.planning.unfolding import without_folds
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
@@ -21,7 +22,7 @@ from ccfem.strategies.fibre_aware.judges import (
     stiffness_judge,
     strength_judge,
 )
-from ccfem.strategies.fibre_aware.prune import prune
+from ccfem.strategies.fibre_aware.prune import fibre_length, prune
 from ccfem.strategies.fibre_aware.strand_moves import kept_radius, moved
 
 _SHARES = (0.0, 0.5, 1.0)
@@ -61,12 +62,13 @@ def prune_and_move(
     def cut(toolpaths: Toolpaths, share: float, tests: int) -> Toolpaths:
         return prune(toolpaths, goal, length, machine, strand, tests, share, tight)
 
-    judges: tuple[Judge, ...] = (stiffness_judge(goal, machine, strand),)
+    judges: tuple[Judge, ...] = (stiffness_judge(goal, machine, strand, layers),)
     if strength:
         how = (goal, layers, machine, strand, strength)
         judges = tuple(strength_judge(*how, for_both) for for_both in _FOR_BOTH)
     kept = best_cut(candidates, cut, judges[0], strength, rounds)
-    return _moved(kept, layers, goal.mesh, machine, cut, judges, moves, tight)
+    enough = (1.0 - TOLERANCE) * min(length, fibre_length(kept))
+    return _moved(kept, layers, goal.mesh, machine, cut, judges, moves, tight, enough)
 
 
 def best_cut(
@@ -107,14 +109,17 @@ def _moved(
     judges: Sequence[Judge],
     moves: int,
     tight: float,
+    enough: float,
 ) -> Toolpaths:
     """Move the paths once for each judge, and cut those that have become longer.
 
-    The first judge chooses among the results, as they are without folds, and the unmoved paths.
+    The first judge chooses among the results that still lay enough, mm, as they are without folds,
+    and the unmoved paths.
     """
     radius, results = kept_radius(machine, tight), []
     for judge in judges if moves else ():
         slid = moved(kept, layers, mesh, machine, judge, moves, radius=radius)
         if slid is not kept:
             results.append(without_folds(cut(slid, 0.0, 1), layers, machine))
+    results = [paths for paths in results if fibre_length(paths) >= enough]
     return stiffest([*results, kept], judges[0])

@@ -173,14 +173,21 @@ Judge: TypeAlias = Callable[[Toolpaths], Judged]
 
 
 def stiffness_judge(
-    part: StressField | Specimen | Goal, machine: Machine, strand: Strand | None = None
+    part: StressField | Specimen | Goal,
+    machine: Machine,
+    strand: Strand | None = None,
+    layers: Sequence[Layer] = (),
 ) -> Judge:
-    """Judge of paths by the stiffness in all load cases, with the room that strands need."""
+    """Judge of paths by the stiffness in all load cases, of what carries of the printed strands.
+
+    Strands need room, and carry nothing in folds, where they cross, and outside their layers if
+    those are given: as a comparison tests them.
+    """
     goal = Goal.of(part)
     known: list[FloatArray] = []
 
     def judge(toolpaths: Toolpaths) -> Judged:
-        strands = cut_strands(toolpaths, goal.mesh, machine=machine)
+        strands = _carrying(toolpaths, goal, machine, layers)
         tested = equilibria(goal, strands, strand, known or None)
         known[:] = tested.displacements
         counts = goal.counts(tested.ratios) / tested.work
@@ -212,13 +219,13 @@ def strength_judge(
     bare = [one.force(one.unreinforced.reactions) for one in goal.parts]
 
     def judge(toolpaths: Toolpaths) -> Judged:
-        near = known or None
-        tested = virtual_tests(toolpaths, goal.parts, strand, machine=machine, known=near)
+        near, strands = known or None, _carrying(toolpaths, goal, machine, layers)
+        tested = virtual_tests(strands, goal.parts, strand, known=near)
         known[:] = [one.solution.displacement for one in tested.tests]
         loads = [one.load for one in cases_failure(tested, strand, layers=layers).each]
         factor = min(load / size for load, size in zip(loads, bare, strict=True))
         value = goal.merit(tested.ratios) ** (1.0 - strength) * factor**strength
-        strands, displaced = tested.tests[0].strands, tuple(known)
+        displaced = tuple(known)
         normal, counts = layer_normal(toolpaths), goal.counts(tested.ratios)
 
         def strain_worths() -> tuple[StrainWorth, ...]:
@@ -231,6 +238,13 @@ def strength_judge(
         return Judged(float(value), strain_worths)
 
     return judge
+
+
+def _carrying(
+    toolpaths: Toolpaths, goal: Goal, machine: Machine, layers: Sequence[Layer]
+) -> Strands:
+    """Strands of a strategy that plans no height of crossings, with what of them carries."""
+    return cut_strands(toolpaths, goal.mesh, machine=machine, layers=layers, crosses=False)
 
 
 def stiffest(candidates: Sequence[Toolpaths], judge: Judge) -> Toolpaths:

@@ -18,6 +18,7 @@ from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import FIBRE, TRAVEL, Toolpaths
 from ccfem.strategies import create
+from ccfem.strategies.fibre_aware import cut_and_move
 from ccfem.strategies.fibre_aware.judges import Goal, stiffness_judge
 from ccfem.strategies.fibre_aware.strain_worth import StrainWorth
 from ccfem.strategies.fibre_aware.strand_lines import strand_lines
@@ -194,6 +195,28 @@ def test_paths_that_no_step_helps_are_returned(bent_beam):
     judge = stiffness_judge(Specimen.of(stress), MACHINE)
     assert moved(paths, layers, stress.mesh, MACHINE, judge, 2) is paths
     assert moved(paths, layers, stress.mesh, MACHINE, judge, 0) is paths
+
+
+def test_half_a_strand_outside_counts_half(bent_beam):
+    """The strand on the border gains as much as two of half the stiffness: one, tested as such."""
+    stress, layers = bent_beam
+    paths = straight(layers, 0.0)
+    inside = stiffness_judge(stress, MACHINE, Strand(4.0), layers)(paths).value
+    half = virtual_test(paths, stress, Strand(2.0), span=()).ratio
+    assert inside == pytest.approx(half, rel=1e-6)
+    assert stiffness_judge(stress, MACHINE, Strand(4.0))(paths).value > 1.02 * inside
+
+
+@pytest.mark.parametrize("heights", [(0.0, 1.0), (0.5, 24.0), (0.5,)])
+def test_moves_that_make_paths_worse_or_shorter_are_not_taken(bent_beam, monkeypatch, heights):
+    """Onto the border, where half of a strand is outside; to the other side; and out of the part."""
+    stress, layers = bent_beam
+    paths, goal = straight(layers, 0.5, 1.5), Goal.of(stress)
+    monkeypatch.setattr(cut_and_move, "moved", lambda *_, **__: straight(layers, *heights))
+    kept = cut_and_move.prune_and_move(
+        [paths], layers, goal, float(paths.lengths.sum()), MACHINE, Strand(), 1, 0.0, 6
+    )
+    assert kept is paths
 
 
 def test_links_turns_and_other_kinds_stay(bent_beam):
