@@ -83,7 +83,8 @@ def shorten_bent(
 ) -> Toolpaths:
     """As `shorten`, with at most a share of the fibre in bends tighter than the machine's radius.
 
-    A mm of such a bend has an extra price, the smallest that meets the share.
+    A mm of such a bend has an extra price, the smallest that meets the share. Fibre that carries
+    nothing stays where there is room for it: plans are compared at equal length.
 
     Parameters
     ----------
@@ -95,8 +96,6 @@ def shorten_bent(
         Share of the fibre's length; 1 for no limit.
     """
     least = machine.shortest_strand
-    if tight >= 1.0:
-        return shorten(toolpaths, along, length, least)
     best = max((float(np.abs(profile.value).max()) for profile in along), default=0.0) or 1.0
     along = [
         replace(
@@ -106,7 +105,7 @@ def shorten_bent(
         for profile in along
     ]
     shortened = shorten(toolpaths, along, length, least)
-    if tight_share(shortened, machine) <= tight:
+    if tight >= 1.0 or tight_share(shortened, machine) <= tight:
         return shortened
     shares = _tight_pieces(toolpaths, along, machine)
     low, high = (np.log(price * best) for price in _PRICES)

@@ -143,7 +143,7 @@ def test_links_outside_the_part_stay_links(pulled_bar):
     paths = Toolpaths.concatenate(
         Toolpaths.from_plane([line, ring, *across], layer, link=link) for layer in layers
     )
-    left = prune(paths, stress, paths.lengths.sum() - len(layers) * 40.0, SHORT)
+    left = prune(paths, stress, paths.lengths.sum() - len(layers) * 60.0, SHORT)
     assert not left.closed.any()  # rings are opened at their links, which carry nothing
     step = np.flatnonzero(np.linalg.norm(np.diff(left.points, axis=0), axis=1) > 0.0)
     step = step[~np.isin(step, left.offsets[1:] - 1)]

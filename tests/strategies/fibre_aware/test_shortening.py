@@ -120,3 +120,15 @@ def test_a_share_above_one_is_refused(bent_beam):
     paths = Toolpaths.from_plane([hairpin((4.0, 5.0))], layers[0])
     with pytest.raises(InputError, match="tight must be at least 0 and at most 1"):
         prune(paths, stress, 10.0, MACHINE, tight=1.1)
+
+
+@pytest.mark.parametrize("tight", [0.0, 1.0])
+@pytest.mark.parametrize(("length", "strands"), [(40.0, 1), (80.0, 2), (200.0, 3)])
+def test_fibre_that_carries_nothing_stays_where_there_is_room(bent_beam, length, strands, tight):
+    """Plans are compared at equal length, also where less fibre than that is stretched."""
+    rows = [np.array([[10.0, y], [50.0, y]]) for y in (4.0, 10.0, 16.0)]
+    paths = Toolpaths.from_plane(rows, bent_beam[1][0])
+    left = shorten_bent(paths, even(paths, (0.0, 1.0, 0.0)), length, MACHINE, tight)
+    assert len(left) == strands
+    np.testing.assert_allclose(left.lengths, 40.0)
+    assert 10.0 in left.points[:, 1]

@@ -209,7 +209,7 @@ def test_half_a_strand_outside_counts_half(bent_beam):
 
 @pytest.mark.parametrize("heights", [(0.0, 1.0), (0.5, 24.0), (0.5,)])
 def test_moves_that_make_paths_worse_or_shorter_are_not_taken(bent_beam, monkeypatch, heights):
-    """Onto the border, where half of a strand is outside; to the other side; and out of the part."""
+    """Onto the border, half of a strand outside; to the other side; and one strand less."""
     stress, layers = bent_beam
     paths, goal = straight(layers, 0.5, 1.5), Goal.of(stress)
     monkeypatch.setattr(cut_and_move, "moved", lambda *_, **__: straight(layers, *heights))
