@@ -202,8 +202,11 @@ def sets() -> dict[str, list[Line]]:
 
 
 def bracket_rows() -> list[Line]:
-    """Straight rows along the wall of the bracket, on its side in tension."""
-    return [np.array([(x, 0.5), (x, ARM - 0.5)]) for x in 0.5 + np.arange(6.0)]
+    """Straight rows along the wall of the bracket, on its side in tension.
+
+    As many as make a length that `contour_zigzag` and `concentric` can lay too.
+    """
+    return [np.array([(x, 0.5), (x, ARM - 0.5)]) for x in 0.5 + np.arange(10.0)]
 
 
 def _stacked(lines: Sequence[Line]) -> Iterator[tuple[int, Line]]:
