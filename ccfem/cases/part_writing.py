@@ -1,14 +1,14 @@
 """A case as a part file: what `read_part` reads, written."""
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import tomlkit
 
 from ccfem.base.checks import member_name
-from ccfem.base.errors import InputError
+from ccfem.base.errors import InputError, shown
 from ccfem.cases.case import Case
 from ccfem.cases.part_fibre import fibre_table
 from ccfem.cases.part_loads import LOADS, SUPPORTS
@@ -60,8 +60,31 @@ def part_text(case: Case, mesh: str, comment: str = "") -> str:
         "machine": _changed(case.machine, Machine()),
         "strategies": {name: dict(entry) for name, entry in case.parameters.items()},
     }
-    lines = [f"# {line}".rstrip() for line in comment.splitlines()]
-    return "\n".join([*lines, "", *_table(content, "")]).lstrip("\n") + "\n"
+    document = tomlkit.document()
+    for line in comment.splitlines():
+        document.add(tomlkit.comment("".join(c if c.isprintable() else "?" for c in line)))
+    if comment:
+        document.add(tomlkit.nl())
+    document.update(_plain({k: v for k, v in content.items() if v not in ("", [])}))
+    text = document.as_string()
+    try:
+        text.encode()
+    except UnicodeEncodeError as error:
+        raise InputError(
+            f"names and texts of a part file must be Unicode; got {shown(text[error.start :])}: "
+            "rename what is named so"
+        ) from None
+    return text
+
+
+def _plain(value: Any) -> Any:
+    """Return a value in types of Python alone, without the tables in it that are empty."""
+    if isinstance(value, Mapping):
+        kept = {k: v for k, v in value.items() if not isinstance(v, Mapping) or v}
+        return {key: _plain(entry) for key, entry in kept.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_plain(entry) for entry in value]
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def _supports(problem: Problem) -> list[dict[str, Any]]:
@@ -125,48 +148,5 @@ def _material(material: Material) -> dict[str, Any]:
     for key in (*rest, "interlayer_tensile", "interlayer_shear"):
         if getattr(material, key) is not None:
             table[key] = getattr(material, key)
-    return table
-
-
-def _table(content: Mapping[str, Any], path: str) -> list[str]:
-    """Lines of a table: its values, then the tables in it; empty ones are left out."""
-    lines, below = [], []
-    for key, value in content.items():
-        name = _key(key)
-        if isinstance(value, Mapping):
-            if value:
-                below += [*_headed(value, f"{path}{name}")]
-        elif isinstance(value, list) and value and isinstance(value[0], Mapping):
-            for entry in value:
-                below += ["", f"[[{path}{name}]]", *_table(entry, f"{path}{name}.")]
-        elif not (isinstance(value, list | tuple | str) and not len(value)) or path:
-            lines.append(f"{name} = {_value(value)}")
-    return lines + below
-
-
-def _headed(value: Mapping[str, Any], path: str) -> list[str]:
-    lines = _table(value, f"{path}.")
-    return lines if lines and lines[0] == "" else ["", f"[{path}]", *lines]
-
-
-def _key(key: str) -> str:
-    plain = key.replace("_", "").replace("-", "").isalnum() and key.isascii()
-    return key if plain else _value(key)
-
-
-def _value(value: Any) -> str:
-    """Write a value as TOML does."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(_value(entry) for entry in value)}]"
-    if isinstance(value, str):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-        text = "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in escaped)
-        return f'"{text}"'
-    if isinstance(value, int):
-        return str(value)
-    number = float(value)
-    if math.isinf(number):
-        return "inf" if number > 0.0 else "-inf"
-    return repr(float(f"{number:.12g}"))
+    # Moduli come from an inverted stiffness: without rounding, 3500 is 3499.9999999999995.
+    return {k: v if isinstance(v, str) else float(f"{v:.12g}") for k, v in table.items()}

@@ -1,5 +1,6 @@
 import dataclasses
 import hashlib
+import math
 import tomllib
 
 import numpy as np
@@ -262,8 +263,30 @@ def test_a_case_is_a_value(case):
         case.name = "other"
 
 
-def test_text_of_any_character_is_written_to_a_part_file():
-    """Read back by another parser: quotes, backslashes, and characters beyond the first 65,536."""
-    odd = 'a "b" \\ c\n\u00e4 \u200b \U000e0001 \U0001f600'
-    case = dataclasses.replace(create_case("bar"), source=odd)
-    assert tomllib.loads(part_text(case, "bar.npz"))["source"] == odd
+@pytest.mark.parametrize(
+    "odd",
+    ["'", '"""', "a\nb", "a.b", "\\", "\t\r\n", "\x00\x7f", "\u2028 \u00e4 \U0001f600", "[x]"],
+)  # fmt: skip
+def test_text_and_names_of_any_character_are_written_to_a_part_file(odd):
+    """Read back by the parser of Python: in values, names of tables, tables in lists, comments."""
+    bar = create_case("bar")
+    cases = {odd: next(iter(bar.problem.loads.values()))}
+    case = dataclasses.replace(
+        bar,
+        source=odd,
+        problem=dataclasses.replace(bar.problem, loads=cases, combinations={}, case_supports={}),
+        weights={odd: 0.1 + 0.2},
+        parameters={"svt": {odd: [odd, math.inf, 10**400, np.float64(1e-7), np.int64(3)]}},
+    )
+    part = tomllib.loads(part_text(case, odd, comment=f"{odd}\n\ud800"))
+    assert (part["source"], part["mesh"]) == (odd, odd)
+    assert [load["patch"] for load in part["loads"][odd]] == [load.patch for load in cases[odd]]
+    assert part["weights"] == {odd: 0.1 + 0.2}  # to the last digit
+    assert part["strategies"]["svt"][odd] == [odd, math.inf, 10**400, 1e-7, 3]
+    assert type(part["strategies"]["svt"][odd][-1]) is int
+
+
+def test_half_a_character_is_refused_in_a_part_file():
+    case = dataclasses.replace(create_case("bar"), source="cut \ud800 short")
+    with pytest.raises(InputError, match=r"must be Unicode; got '\\ud800 short.*: rename"):
+        part_text(case, "bar.npz")
