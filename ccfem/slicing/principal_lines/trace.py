@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numba import njit
@@ -34,7 +34,7 @@ class Traced:
         Bit k is set where the line crosses a cell of region k.
     length : (s,) array, mm
     ends : (s, 2) int array
-        Why the two halves end: index into `cell_walk.ENDS`.
+        Why the two halves end: index into `ENDS`.
     """
 
     seeds: IntArray
@@ -78,29 +78,29 @@ class Tracer:
         return cls(mesh, direction, LONGEST * mean_edge(mesh) if longest is None else longest)
 
     @cached_property
-    def _place(self) -> IntArray:
-        """Place of each cell, (m,), in an order in which neighbours lie near each other.
+    def _order(self) -> IntArray:
+        """Cells, (m,), in an order in which neighbours lie near each other.
 
         A line then finds most cells in the processor's cache: three times as quick (measured).
         """
-        place = np.empty(len(self.mesh.cells), dtype=np.int64)
-        place[_along_curve(self.mesh.points[self.mesh.corners].mean(axis=1))] = np.arange(
-            len(place)
-        )
-        return place
+        return _along_curve(self.mesh.points[self.mesh.corners].mean(axis=1))
 
     @cached_property
-    def _arguments(self) -> tuple[Any, ...]:
-        """What the walk reads, in that order."""
-        mesh, order = self.mesh, np.argsort(self._place, kind="stable")
+    def _place(self) -> IntArray:
+        """Place of each cell, (m,), in that order."""
+        return np.argsort(self._order, kind="stable")
+
+    @cached_property
+    def _field(self) -> "_Field":
+        """The field as the walk reads it."""
+        mesh, order = self.mesh, self._order
         across = mesh.across[order]
-        return (
+        return _Field(
             self.direction[order],
             np.where(across >= 0, self._place[across], -1),
             mesh.points[mesh.corners[order]].mean(axis=1),
             cell_gradients(mesh)[order],
-            self.longest,
-            _MOST,
+            float(self.longest),
         )
 
     def survey(self, seeds: IntArray, touching: IntArray) -> Traced:
@@ -113,17 +113,14 @@ class Tracer:
         touching : (m,) int array
             Bit k is set in the cells of region k, of at most 62.
         """
-        place = self._place[seeds]
-        order = np.argsort(place, kind="stable")
-        start, touching = (
-            place[order],
-            touching[np.argsort(self._place, kind="stable")].astype(np.int64),
-        )
+        order = np.argsort(self._place[seeds], kind="stable")
+        start, touching = self._place[seeds][order], touching[self._order].astype(np.int64)
         mask, length = np.zeros(len(start), dtype=np.int64), np.zeros(len(start))
         ends = np.zeros((len(start), 2), dtype=np.int64)
+        field = self._field
 
         def part(a: int, b: int) -> None:
-            survey(start[a:b], *self._arguments, touching, mask[a:b], length[a:b], ends[a:b])
+            _survey(start[a:b], field, touching, mask[a:b], length[a:b], ends[a:b])
 
         _in_parts(part, len(start))
         back = np.argsort(order, kind="stable")
@@ -132,10 +129,11 @@ class Tracer:
     def crossings(self, seeds: IntArray) -> IntArray:
         """Count the lines from the seeds that cross each cell, (m,)."""
         start = np.sort(self._place[seeds])
+        field = self._field
 
         def part(a: int, b: int) -> IntArray:
             count = np.zeros(len(self.direction), dtype=np.int64)
-            count_crossings(start[a:b], *self._arguments, count)
+            _count_crossings(start[a:b], field, count)
             return count
 
         count = np.sum(_in_parts(part, len(start)), axis=0, dtype=np.int64)
@@ -144,7 +142,7 @@ class Tracer:
     def lines(self, seeds: IntArray) -> list[FloatArray]:
         """Lines from the seeds as (n_i, 3) arrays, mm."""
         stamp = np.full(len(self.direction), -1, dtype=np.int64)
-        return [collect(int(k), *self._arguments, stamp) for k in self._place[seeds]]
+        return [_collect(int(k), self._field, stamp) for k in self._place[seeds]]
 
 
 def mean_edge(mesh: TetMesh) -> float:
@@ -196,148 +194,177 @@ BOUNDARY, LOOP, TOO_LONG, TOO_MANY, NO_DIRECTION = range(5)
 _TURNED = 0.2
 """Cosine below which a field that points back out of a cell is taken the other way round; above
 it the line slides along the face."""
+_STUCK = 1e-6
+"""Share of the direction that must run along the face for the line to slide."""
+
+_Vector = tuple[float, float, float]
+
+
+class _Field(NamedTuple):
+    """A direction field as the compiled walk reads it, its m cells along the curve.
+
+    `direction` (m, 3), `centre` (m, 3) in mm, and for the corners of each cell the cell across from
+    them, `across` (m, 4), -1 for none, and the `gradient` (m, 4, 3) of their barycentric
+    coordinates, 1/mm; `longest` half of a line in mm.
+    """
+
+    direction: FloatArray
+    across: IntArray
+    centre: FloatArray
+    gradient: FloatArray
+    longest: float
+
+
+class _Half(NamedTuple):
+    """Room for half of a line: number of the last line in each cell, cells entered, points."""
+
+    stamp: IntArray
+    cells: IntArray
+    points: FloatArray
 
 
 @njit(cache=True, nogil=True)
-def _walk(  # type: ignore[no-untyped-def]
-    seed, sense, direction, across, centre, gradient, longest, most, stamp, mark, cells, points
-):
+def _half(stamp: IntArray) -> _Half:
+    return _Half(stamp, np.empty(_MOST + 1, np.int64), np.empty((_MOST + 2, 3)))
+
+
+@njit(cache=True, nogil=True)
+def _dot(a: _Vector, b: _Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(cache=True, nogil=True)
+def _gradient(field: _Field, cell: int, corner: int) -> _Vector:
+    g = field.gradient
+    return g[cell, corner, 0], g[cell, corner, 1], g[cell, corner, 2]
+
+
+@njit(cache=True, nogil=True)
+def _heading(field: _Field, cell: int, entry: int, before: _Vector) -> _Vector:
+    """Direction of a line in a cell that it enters across from a corner; zero where it has none."""
+    x, y, z = field.direction[cell, 0], field.direction[cell, 1], field.direction[cell, 2]
+    along = _dot((x, y, z), before)
+    # Directions have no sign: of the two senses, that which turns the line less.
+    if along < 0.0:
+        x, y, z, along = -x, -y, -z, -along
+    if entry < 0:
+        return x, y, z
+    g = _gradient(field, cell, entry)
+    inward = _dot(g, (x, y, z))
+    if inward > 0.0:
+        return x, y, z
+    # The sense points back out: the other one where both are nearly square to the line, else the
+    # projection onto the face that it came through.
+    if along < _TURNED:
+        return -x, -y, -z
+    share = inward / _dot(g, g)
+    x, y, z = x - share * g[0], y - share * g[1], z - share * g[2]
+    size = np.sqrt(_dot((x, y, z), (x, y, z)))
+    if size < _STUCK:
+        return 0.0, 0.0, 0.0
+    return x / size, y / size, z / size
+
+
+@njit(cache=True, nogil=True)
+def _exit(field: _Field, cell: int, entry: int, at: _Vector, way: _Vector) -> tuple[int, float]:
+    """Corner across from which a line leaves a cell, and the length to there.
+
+    Barycentric coordinates are 1/4 at the centre and fall linearly; the first to reach 0 decides.
+    """
+    c = field.centre
+    off = at[0] - c[cell, 0], at[1] - c[cell, 1], at[2] - c[cell, 2]
+    leaving, step = -1, np.inf
+    for corner in range(4):
+        if corner == entry:
+            continue
+        g = _gradient(field, cell, corner)
+        fall = -_dot(g, way)
+        if fall > 0.0:
+            length = max(0.25 + _dot(g, off), 0.0) / fall
+            if length < step:
+                leaving, step = corner, length
+    return leaving, step
+
+
+@njit(cache=True, nogil=True)
+def _walk(seed: int, sense: float, field: _Field, mark: int, half: _Half) -> tuple[int, float, int]:
     """Walk from the centre of a cell in one sense.
 
     Writes the cells entered, the seed first, and the points at which they are entered, the centre
-    first and the last point after them; marks the cells in `stamp`. Returns the number of cells,
-    the length and the reason of the end.
+    first and the last point after them; marks the cells. Returns the number of cells, the length
+    and the reason of the end.
     """
-    cell = seed
+    stamp, cells, points = half
+    centre, direction = field.centre, field.direction
     x, y, z = centre[seed, 0], centre[seed, 1], centre[seed, 2]
-    bx = sense * direction[seed, 0]
-    by = sense * direction[seed, 1]
-    bz = sense * direction[seed, 2]
-    entry = -1
-    length = 0.0
-    number = 0
+    way = sense * direction[seed, 0], sense * direction[seed, 1], sense * direction[seed, 2]
+    cell, entry, number, length = seed, -1, 0, 0.0
+    points[0, 0], points[0, 1], points[0, 2] = x, y, z
     while True:
         stamp[cell] = mark
         cells[number] = cell
-        points[number, 0], points[number, 1], points[number, 2] = x, y, z
         number += 1
-        dx, dy, dz = direction[cell, 0], direction[cell, 1], direction[cell, 2]
-        if dx == 0.0 and dy == 0.0 and dz == 0.0:
-            points[number, 0], points[number, 1], points[number, 2] = x, y, z
-            return number, length, NO_DIRECTION
-        along = dx * bx + dy * by + dz * bz
-        if along < 0.0:
-            dx, dy, dz, along = -dx, -dy, -dz, -along
-        if entry >= 0:
-            gx, gy, gz = (
-                gradient[cell, entry, 0],
-                gradient[cell, entry, 1],
-                gradient[cell, entry, 2],
-            )
-            inward = gx * dx + gy * dy + gz * dz
-            if inward <= 0.0:
-                if along < _TURNED:
-                    dx, dy, dz = -dx, -dy, -dz
-                else:
-                    square = gx * gx + gy * gy + gz * gz
-                    dx -= inward / square * gx
-                    dy -= inward / square * gy
-                    dz -= inward / square * gz
-                    size = np.sqrt(dx * dx + dy * dy + dz * dz)
-                    if size < 1e-6:
-                        points[number, 0], points[number, 1], points[number, 2] = x, y, z
-                        return number, length, NO_DIRECTION
-                    dx, dy, dz = dx / size, dy / size, dz / size
-        leaving = -1
-        step = np.inf
-        for i in range(4):
-            if i == entry:
-                continue
-            gx, gy, gz = gradient[cell, i, 0], gradient[cell, i, 1], gradient[cell, i, 2]
-            fall = -(gx * dx + gy * dy + gz * dz)
-            if fall <= 0.0:
-                continue
-            value = 0.25 + (
-                gx * (x - centre[cell, 0]) + gy * (y - centre[cell, 1]) + gz * (z - centre[cell, 2])
-            )
-            t = max(value, 0.0) / fall
-            if t < step:
-                step, leaving = t, i
-        x, y, z = x + step * dx, y + step * dy, z + step * dz
+        way = _heading(field, cell, entry, way)
+        step = 0.0
+        if way != (0.0, 0.0, 0.0):
+            leaving, step = _exit(field, cell, entry, (x, y, z), way)
+        x, y, z = x + step * way[0], y + step * way[1], z + step * way[2]
         length += step
         points[number, 0], points[number, 1], points[number, 2] = x, y, z
-        if length > longest:
+        if way == (0.0, 0.0, 0.0):
+            return number, length, NO_DIRECTION
+        if length > field.longest:
             return number, length, TOO_LONG
-        following = across[cell, leaving]
+        following = field.across[cell, leaving]
         if following < 0:
             return number, length, BOUNDARY
         if stamp[following] == mark:
             return number, length, LOOP
-        if number >= most:
+        if number >= _MOST:
             return number, length, TOO_MANY
         entry = 0
-        while across[following, entry] != cell:
+        while field.across[following, entry] != cell:
             entry += 1
         cell = following
-        bx, by, bz = dx, dy, dz
 
 
 @njit(cache=True, nogil=True)
-def survey(  # type: ignore[no-untyped-def]
-    seeds, direction, across, centre, gradient, longest, most, touching, mask, length, ends
-):
-    """Trace from the seeds; write which joints each line touches, its length and its two ends."""
-    stamp = np.full(len(direction), -1, np.int64)
-    cells = np.empty(most + 1, np.int64)
-    points = np.empty((most + 2, 3))
+def _survey(
+    seeds: IntArray, field: _Field, touching: IntArray,
+    mask: IntArray, length: FloatArray, ends: IntArray,
+) -> None:  # fmt: skip
+    """Trace from the seeds; write which regions each line touches, its length and its two ends."""
+    half = _half(np.full(len(field.direction), -1, np.int64))
     for s in range(len(seeds)):
         for side in range(2):
-            number, size, end = _walk(
-                seeds[s], 1.0 - 2.0 * side, direction, across, centre, gradient, longest, most,
-                stamp, s, cells, points,
-            )  # fmt: skip
+            number, size, end = _walk(seeds[s], 1.0 - 2.0 * side, field, s, half)
             length[s] += size
             ends[s, side] = end
             for k in range(number):
-                mask[s] |= touching[cells[k]]
+                mask[s] |= touching[half.cells[k]]
 
 
 @njit(cache=True, nogil=True)
-def count_crossings(  # type: ignore[no-untyped-def]
-    seeds, direction, across, centre, gradient, longest, most, count
-):
+def _count_crossings(seeds: IntArray, field: _Field, count: IntArray) -> None:
     """Add one to each cell that a line from one of the seeds crosses."""
-    stamp = np.full(len(direction), -1, np.int64)
-    cells = np.empty(most + 1, np.int64)
-    points = np.empty((most + 2, 3))
+    half = _half(np.full(len(field.direction), -1, np.int64))
     for s in range(len(seeds)):
         for side in range(2):
-            number, _, _ = _walk(
-                seeds[s], 1.0 - 2.0 * side, direction, across, centre, gradient, longest, most,
-                stamp, s, cells, points,
-            )  # fmt: skip
+            number, _, _ = _walk(seeds[s], 1.0 - 2.0 * side, field, s, half)
             # The second half begins in the cell of the first.
             for k in range(side, number):
-                count[cells[k]] += 1
+                count[half.cells[k]] += 1
 
 
 @njit(cache=True, nogil=True)
-def collect(  # type: ignore[no-untyped-def]
-    seed, direction, across, centre, gradient, longest, most, stamp
-):
+def _collect(seed: int, field: _Field, stamp: IntArray) -> FloatArray:
     """Trace one line; return its points from end to end."""
-    cells = np.empty(most + 1, np.int64)
-    back = np.empty((most + 2, 3))
-    forth = np.empty((most + 2, 3))
-    n, _, _ = _walk(
-        seed, 1.0, direction, across, centre, gradient, longest, most, stamp, seed, cells, forth
-    )
-    m, _, _ = _walk(
-        seed, -1.0, direction, across, centre, gradient, longest, most, stamp, seed, cells, back
-    )
+    forth, back = _half(stamp), _half(stamp)
+    n, _, _ = _walk(seed, 1.0, field, seed, forth)
+    m, _, _ = _walk(seed, -1.0, field, seed, back)
     line = np.empty((m + n + 1, 3))
     for k in range(m + 1):
-        line[k] = back[m - k]
+        line[k] = back.points[m - k]
     for k in range(1, n + 1):
-        line[m + k] = forth[k]
+        line[m + k] = forth.points[k]
     return line
