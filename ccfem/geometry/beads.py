@@ -27,6 +27,7 @@ from ccfem.geometry.polylines import lengths, resample, starts_segment
 
 SAME_DIRECTION = np.radians(30.0)
 """Largest angle, radians, between strands that lie side by side and do not cross."""
+_SAME_COSINE = float(np.cos(SAME_DIRECTION))
 
 _PARTS = 4
 """Number of parts a width that a strand is cut into."""
@@ -110,22 +111,24 @@ def beads(
     direction, straight, often = _chords(chord, length, line, first, closed)
     direction = direction - np.einsum("ij,ij->i", direction, normal)[:, None] * normal
     direction /= np.maximum(np.linalg.norm(direction, axis=1), 1e-300)[:, None]
-    shares = share_room(
-        bucket(middle, middle, 1.05 * width),
+    steps = np.ceil(width * (1.0 - 1e-9) / np.maximum(length, 1e-300)).clip(1, 1e9)
+    bands = _Bands(
         middle,
         direction,
         normal,
+        np.cross(normal, direction),
         length * straight,
         often,
         1.0 / straight,
         layer[line],
         line,
-        np.ceil(width * (1.0 - 1e-9) / np.maximum(length, 1e-300)).clip(1, 1e9).astype(np.int64),
+        steps.astype(np.int64),
         np.where(closed, count, 0)[line],
-        width,
-        height,
-        float(np.cos(SAME_DIRECTION)),
     )
+    # Largest distance of a middle whose rectangle can meet the line across a part.
+    half, longest = 0.5 * width, bands.ahead.max(initial=0.0)
+    reach = float(half + np.sqrt(half * half + 0.25 * longest**2)) * (1.0 + 1e-9)
+    shares = _shared(bucket(middle, middle, 1.05 * width), bands, width, height, reach)
     return Beads(line, first, length, middle, direction, normal, *shares.T)
 
 
@@ -151,13 +154,16 @@ def _normals(
 
 
 @njit(cache=True, nogil=True)
-def _chords(chord, length, line, first, closed):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _chords(
+    chord: FloatArray, length: FloatArray, line: IntArray, first: IntArray, closed: BoolArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:  # pragma: no cover
     """Direction (s, 3), share of the length that goes ahead (s,), and passes of the chord (s,)."""
     direction = np.empty((len(line), 3))
     straight, often = np.empty(len(line)), np.empty(len(line))
     for k in range(len(line)):
         low, high = first[line[k]], first[line[k] + 1]
         ring = closed[line[k]] and high - low > 2 * _AHEAD
+        # The chord over a width: what the strand gets ahead by, of the whole length that it runs.
         x, y, z, whole = 0.0, 0.0, 0.0, 0.0
         for near in range(k - _AHEAD, k + _AHEAD + 1):
             at = low + (near - low) % (high - low) if ring else near
@@ -171,6 +177,7 @@ def _chords(chord, length, line, first, closed):  # type: ignore[no-untyped-def]
             x, y, z = chord[k, 0], chord[k, 1], chord[k, 2]
         unit = max(np.sqrt(x * x + y * y + z * z), 1e-300)
         x, y, z = x / unit, y / unit, z / unit
+        # Its passes: the length along the chord, forth and back, over what it gets ahead by.
         passed = 0.0
         for near in range(k - _AHEAD, k + _AHEAD + 1):
             at = low + (near - low) % (high - low) if ring else near
@@ -191,153 +198,168 @@ _SLIVER = 1e-9
 """Share of a width below which an overlap counts as rounding error."""
 
 
-def share_room(
-    grid: Buckets,
-    middle: FloatArray,
-    direction: FloatArray,
-    normal: FloatArray,
-    ahead: FloatArray,
-    often: FloatArray,
-    fold: FloatArray,
-    layer: IntArray,
-    line: IntArray,
-    apart: IntArray,
-    ring: IntArray,
-    width: float,
-    height: float,
-    same_cosine: float,
-) -> FloatArray:
-    """Share the room across each part among the bands that cover it.
+class _Bands(NamedTuple):
+    """Parts of strands with the rectangles that they cover: a width wide, about their middles.
 
-    A neighbouring part covers a rectangle about its middle: one width wide, and as long as the part
-    goes ahead. Parts of the same line count from `apart` parts on; nearer ones are the same band.
-
-    Parameters
-    ----------
-    grid : Buckets
-        The middles.
-    middle, direction, normal : (s, 3) arrays
-        Of each part, mm and unit vectors.
-    ahead : (s,) array, mm
-        Distance by which each part goes ahead.
-    often, fold : (s,) arrays
-        Strands that lie along the band of the part, and strands that its length is equivalent to.
-    layer, line : (s,) int arrays
-        Of each part; parts come in the order of the lines.
-    apart : (s,) int array
-        Parts of the same line that are the part's own band, to either side.
-    ring : (s,) int array
-        Number of parts of the line where it is closed, else 0.
-    width, height : float, mm
-        Of a strand. Strands of different layers share room where they lie nearer than `height`.
-    same_cosine : float
-        Cosine of the largest angle between strands of the same direction.
-
-    Returns
-    -------
-    (s, 4) array
-        alone, every, fill and stack of `ccfem.geometry.beads.Beads`.
+    `middle`, `direction`, `normal` and `across` (s, 3), mm and unit vectors; `ahead` (s,), mm, the
+    length of the rectangle; `often` and `fold` (s,), the strands that lie along the band and those
+    that the length of the part is equivalent to; `layer` and `line` (s,) of each part, the parts of
+    a line one after the other; `apart` (s,), the number of parts of its line, to either side, that
+    are its own band; `ring` (s,), the number of parts of a closed line, else 0.
     """
-    half = 0.5 * width
-    # Largest distance of a middle whose rectangle can meet the line across a part.
-    reach = float(half + np.sqrt(half * half + 0.25 * ahead.max(initial=0.0) ** 2)) * (1.0 + 1e-9)
-    return np.asarray(
-        _shared(grid.origin, grid.cell, grid.shape, grid.starts, grid.items, middle, direction,
-                normal, np.cross(normal, direction), ahead, often, fold, layer, line, apart, ring,
-                width, height, same_cosine, reach)
-    )  # fmt: skip
+
+    middle: FloatArray
+    direction: FloatArray
+    normal: FloatArray
+    across: FloatArray
+    ahead: FloatArray
+    often: FloatArray
+    fold: FloatArray
+    layer: IntArray
+    line: IntArray
+    apart: IntArray
+    ring: IntArray
 
 
 @njit(cache=True, nogil=True)
-def _shared(  # type: ignore[no-untyped-def]
-    origin, cell, shape, starts, items, middle, direction, normal, across, ahead, often, fold,
-    layer, line, apart, ring, width, height, same_cosine, reach
-):  # fmt: skip  # pragma: no cover
-    half = 0.5 * width
-    shares = np.empty((len(middle), 4))
-    room = 64
-    at, change, order = np.empty(room), np.empty((room, 4)), np.empty(room, np.int64)
-    low, high = np.empty(3, np.int64), np.empty(3, np.int64)
-    current = np.empty(4)
-    for k in range(len(middle)):
-        for i in range(3):
-            low[i] = max(int(np.floor((middle[k, i] - reach - origin[i]) / cell)), 0)
-            high[i] = min(int(np.floor((middle[k, i] + reach - origin[i]) / cell)), shape[i] - 1)
-        events = 0
-        for a in range(low[0], high[0] + 1):
-            for b in range(low[1], high[1] + 1):
-                for c in range(low[2], high[2] + 1):
-                    box = (a * shape[1] + b) * shape[2] + c
-                    for item in range(starts[box], starts[box + 1]):
-                        other = items[item]
-                        square = 0.0
-                        for i in range(3):
-                            square += (middle[k, i] - middle[other, i]) ** 2
-                        if square > reach * reach:
-                            continue
-                        if line[other] == line[k]:
-                            between = abs(other - k)
-                            if ring[k]:
-                                between = min(between, ring[k] - between)
-                            if between < apart[k]:
-                                continue
-                        # Position of the middle of k along, across and above the other part, and
-                        # how these and the direction change along the way across k.
-                        along, side, above, turned, shift, cosine = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-                        for i in range(3):
-                            d = middle[k, i] - middle[other, i]
-                            along += d * direction[other, i]
-                            side += d * across[other, i]
-                            above += d * normal[k, i]
-                            turned += across[k, i] * direction[other, i]
-                            shift += across[k, i] * across[other, i]
-                            cosine += direction[k, i] * direction[other, i]
-                        if layer[other] != layer[k] and abs(above) >= height:
-                            continue
-                        begin, end = _clipped(-half, half, along, turned, 0.5 * ahead[other])
-                        begin, end = _clipped(begin, end, side, shift, half)
-                        if end - begin <= _SLIVER * width:
-                            continue
-                        if events + 2 > room:
-                            room *= 2
-                            at, change, order = _longer(at, change, order, room)
-                        beside = often[other] if abs(cosine) >= same_cosine else 0.0
-                        for i in range(2):
-                            sign = 1.0 - 2.0 * i
-                            at[events] = end if i else begin
-                            change[events, 0] = sign * beside
-                            change[events, 1] = sign * often[other]
-                            change[events, 2] = sign * fold[other]
-                            change[events, 3] = sign
-                            order[events] = events
-                            events += 1
-        if events == 0:
-            shares[k, 0], shares[k, 1] = 1.0 / often[k], 1.0 / often[k]
-            shares[k, 2], shares[k, 3] = fold[k], 1.0
-            continue
+def _shared(
+    grid: Buckets, bands: _Bands, width: float, height: float, reach: float
+) -> FloatArray:  # pragma: no cover
+    """Columns alone, every, fill and stack of `Beads`, (s, 4)."""
+    count = len(bands.middle)
+    shares = np.empty((count, 4))
+    # A band begins and ends at most once across a part. Memory that is not written costs nothing.
+    at, change = np.empty(2 * count), np.empty((2 * count, 4))
+    order = np.empty(2 * count, np.int64)
+    for k in range(count):
+        events = _edges(k, grid, bands, width, height, reach, at, change)
+        for e in range(events):
+            order[e] = e
         _sort(order[:events], at)
-        current[0], current[1], current[2], current[3] = often[k], often[k], fold[k], 1.0
-        alone, every, fill, most, here = 0.0, 0.0, 0.0, 1.0, -half
-        for e in range(events + 1):
-            following = half if e == events else min(at[order[e]], half)
-            step = following - here
-            if step > 0.0:
-                alone += step / current[0]
-                every += step / current[1]
-                fill += step * current[2]
-                if step > _SLIVER * width:
-                    most = max(most, current[3])
-                here = following
-            if e < events:
-                for i in range(4):
-                    current[i] += change[order[e], i]
-        shares[k, 0], shares[k, 1] = alone / width, every / width
-        shares[k, 2], shares[k, 3] = fill / width, most
+        _integrate(bands.often[k], bands.fold[k], width, at, change, order[:events], shares[k])
     return shares
 
 
 @njit(cache=True, nogil=True)
-def _clipped(low, high, value, slope, limit):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _edges(
+    k: int,
+    grid: Buckets,
+    bands: _Bands,
+    width: float,
+    height: float,
+    reach: float,
+    at: FloatArray,
+    change: FloatArray,
+) -> int:  # pragma: no cover
+    """Places across a part where bands begin and end, and what changes there; their number.
+
+    Changes are of the strands of its direction, the strands, the length and the bands over it.
+    """
+    half, events, middle = 0.5 * width, 0, bands.middle
+    low, high = np.empty(3, np.int64), np.empty(3, np.int64)
+    for i in range(3):
+        low[i] = max(int(np.floor((middle[k, i] - reach - grid.origin[i]) / grid.cell)), 0)
+        last = int(np.floor((middle[k, i] + reach - grid.origin[i]) / grid.cell))
+        high[i] = min(last, grid.shape[i] - 1)
+    for a in range(low[0], high[0] + 1):
+        for b in range(low[1], high[1] + 1):
+            # Boxes along the third axis are numbered one after the other.
+            row = (a * grid.shape[1] + b) * grid.shape[2]
+            for item in range(grid.starts[row + low[2]], grid.starts[row + high[2] + 1]):
+                other = grid.items[item]
+                square, cosine = 0.0, 0.0
+                for i in range(3):
+                    square += (middle[k, i] - middle[other, i]) ** 2
+                    cosine += bands.direction[k, i] * bands.direction[other, i]
+                if square > reach * reach or _same_band(k, other, bands):
+                    continue
+                begin, end = _covered(k, other, bands, half, height)
+                if end - begin <= _SLIVER * width:
+                    continue
+                beside = bands.often[other] if abs(cosine) >= _SAME_COSINE else 0.0
+                for i in range(2):
+                    sign = 1.0 - 2.0 * i
+                    at[events] = end if i else begin
+                    change[events, 0] = sign * beside
+                    change[events, 1] = sign * bands.often[other]
+                    change[events, 2] = sign * bands.fold[other]
+                    change[events, 3] = sign
+                    events += 1
+    return events
+
+
+@njit(cache=True, nogil=True)
+def _same_band(k: int, other: int, bands: _Bands) -> bool:  # pragma: no cover
+    """Whether two parts lie so near each other along one line that they are the same band."""
+    if bands.line[other] != bands.line[k]:
+        return False
+    between = abs(other - k)
+    if bands.ring[k]:
+        between = min(between, bands.ring[k] - between)
+    return between < bands.apart[k]
+
+
+@njit(cache=True, nogil=True)
+def _covered(
+    k: int, other: int, bands: _Bands, half: float, height: float
+) -> tuple[float, float]:  # pragma: no cover
+    """Interval across a part, about its middle, within the rectangle of another; or none."""
+    # Position of the middle of k along, across and above the other part, and how the first two
+    # change along the way across k.
+    along, side, above, turned, shift = 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        d = bands.middle[k, i] - bands.middle[other, i]
+        along += d * bands.direction[other, i]
+        side += d * bands.across[other, i]
+        above += d * bands.normal[k, i]
+        turned += bands.across[k, i] * bands.direction[other, i]
+        shift += bands.across[k, i] * bands.across[other, i]
+    if bands.layer[other] != bands.layer[k] and abs(above) >= height:
+        return 0.0, 0.0
+    begin, end = _clipped(-half, half, along, turned, 0.5 * bands.ahead[other])
+    return _clipped(begin, end, side, shift, half)
+
+
+@njit(cache=True, nogil=True)
+def _integrate(
+    often: float,
+    fold: float,
+    width: float,
+    at: FloatArray,
+    change: FloatArray,
+    order: IntArray,
+    shares: FloatArray,
+) -> None:  # pragma: no cover
+    """Write the shares of a part: its room is the mean of 1 / m(x) over its width."""
+    half = 0.5 * width
+    if not len(order):
+        shares[0], shares[1], shares[2], shares[3] = 1.0 / often, 1.0 / often, fold, 1.0
+        return
+    # What lies over the part at `here`: strands of its direction, strands, length and bands.
+    beside, strands, length, bands = often, often, fold, 1.0
+    alone, every, fill, most, here = 0.0, 0.0, 0.0, 1.0, -half
+    for e in range(len(order) + 1):
+        following = half if e == len(order) else min(at[order[e]], half)
+        step = following - here
+        if step > 0.0:
+            alone += step / beside
+            every += step / strands
+            fill += step * length
+            if step > _SLIVER * width:
+                most = max(most, bands)
+            here = following
+        if e < len(order):
+            beside += change[order[e], 0]
+            strands += change[order[e], 1]
+            length += change[order[e], 2]
+            bands += change[order[e], 3]
+    shares[0], shares[1], shares[2], shares[3] = alone / width, every / width, fill / width, most
+
+
+@njit(cache=True, nogil=True)
+def _clipped(
+    low: float, high: float, value: float, slope: float, limit: float
+) -> tuple[float, float]:  # pragma: no cover
     """Part of [low, high] where ``|value + x slope| < limit``; empty where low is not below."""
     if abs(slope) < 1e-12:
         return (low, high) if -limit <= value < limit else (1.0, 0.0)
@@ -346,7 +368,7 @@ def _clipped(low, high, value, slope, limit):  # type: ignore[no-untyped-def]  #
 
 
 @njit(cache=True, nogil=True)
-def _sort(order, at):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _sort(order: IntArray, at: FloatArray) -> None:  # pragma: no cover
     """Sort indices by the values they refer to, by insertion: there are few, nearly sorted."""
     for e in range(1, len(order)):
         index = order[e]
@@ -355,14 +377,3 @@ def _sort(order, at):  # type: ignore[no-untyped-def]  # pragma: no cover
             order[place] = order[place - 1]
             place -= 1
         order[place] = index
-
-
-@njit(cache=True, nogil=True)
-def _longer(at, change, order, room):  # type: ignore[no-untyped-def]  # pragma: no cover
-    longer, wider = np.empty(room), np.empty((room, 4))
-    more = np.empty(room, np.int64)
-    for e in range(len(at)):
-        longer[e], more[e] = at[e], order[e]
-        for i in range(4):
-            wider[e, i] = change[e, i]
-    return longer, wider, more
