@@ -1,6 +1,6 @@
 """The headline of a comparison: the few indices that tables show first."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,91 +11,142 @@ from ccfem.judging.virtual_testing.strength import FirstFailure
 
 _RATIO = "stiffness of the part with its fibres over that without"
 
-TEST_COLUMNS = (
-    Column(
+
+@dataclass(frozen=True)
+class _Index(Column):
+    """An index of the virtual test, and how it follows from the test; None where it does not."""
+
+    value: Callable[[Tested], float | None] = lambda tested: None
+
+
+def _of_failure(
+    value: Callable[[FirstFailure, Tested], float | None],
+) -> Callable[[Tested], float | None]:
+    """Value of the first failure, where the strengths are known."""
+    return lambda tested: None if tested.failure is None else value(tested.failure, tested)
+
+
+def _of_bond(value: Callable[[FirstFailure], float]) -> Callable[[Tested], float | None]:
+    """Value of the bond between layers, where it was judged."""
+    return _of_failure(lambda f, tested: value(f) if f.interlayer_zones else None)
+
+
+def _opening_along(axis: int) -> Callable[[Tested], float | None]:
+    """Coordinate of the place where layers first come apart."""
+    return _of_bond(lambda failure: failure.interlayer_where[axis])
+
+
+def _under_alternative(index: _Index) -> _Index:
+    """Index under the alternative supports of the part."""
+    return _Index(
+        f"{index.name}_alternative",
+        index.unit,
+        f"{index.name} under the alternative supports of the part.",
+        f"as {index.name}; missing where the part has none",
+        lambda tested: None if tested.alternative is None else index.value(tested.alternative),
+    )
+
+
+_TESTED = (
+    _Index(
         "stiffness_ratio_tension",
         "1",
         f"The {_RATIO}, fibres in compression carrying nothing; default EA/E = 4 mm^2.",
         ">= 1, higher is better; missing where there was no virtual test",
+        lambda tested: tested.bracket.tension.ratio,
     ),
-    Column(
+    _Index(
         "stiffness_ratio_low",
         "1",
         f"The {_RATIO}, tension only, at the lowest EA/E of the span (2 mm^2).",
         "as stiffness_ratio_tension",
+        lambda tested: min((ratio for _, ratio in tested.bracket.tension.span), default=None),
     ),
-    Column(
+    _Index(
         "stiffness_ratio_high",
         "1",
         f"The {_RATIO}, tension only, at the highest EA/E of the span (6 mm^2).",
         "as stiffness_ratio_tension",
+        lambda tested: max((ratio for _, ratio in tested.bracket.tension.span), default=None),
     ),
-    Column(
+    _Index(
         "stiffness_ratio_bonded",
         "1",
         f"The {_RATIO}, all fibres bonded and carrying tension and compression.",
         "as stiffness_ratio_tension",
+        lambda tested: tested.bracket.bonded.ratio,
     ),
-    Column(
+    _Index(
         "stiffness",
         "N/mm",
         "Size of the load squared over its work, fibres carrying tension only.",
         "> 0, higher is better",
+        lambda tested: tested.bracket.tension.stiffness,
     ),
-    Column(
+    _Index(
         "displacement",
         "mm",
         "Size of the load over the stiffness: how far the load moves along itself.",
         "> 0, lower is better under forces",
+        lambda tested: tested.bracket.tension.force / tested.bracket.tension.stiffness,
     ),
-    Column(
+    _Index(
         "share_of_gain",
         "1",
         "(stiffness_ratio_tension - 1) over the same of the bound that no paths of the compared "
         "length exceed, strands beside each other carrying tension only; empty at another length.",
         "at most 1, but where strands cross: see the remarks; higher is better",
+        lambda tested: (
+            (tested.bracket.tension.ratio - 1.0) / (tested.most - 1.0)
+            if tested.most > 1.0
+            else None
+        ),
     ),
-    Column(
+    _Index(
         "gain_per_metre",
         "1/m",
         "(stiffness_ratio_tension - 1) over the length of fibre inside the part.",
         ">= 0, higher is better",
+        lambda tested: tested.bracket.tension.gain_per_metre,
     ),
-    Column(
+    _Index(
         "strain_energy",
         "N mm",
         "Strain energy of matrix and fibres under the load, fibres carrying tension only.",
         "> 0, lower is better under forces",
+        lambda tested: tested.bracket.tension.solution.strain_energy,
     ),
-    Column(
+    _Index(
         "matrix_stress_change",
         "1",
         "Peak of the matrix's von Mises stress, averaged as for first_failure_load, over that of "
         "the part without fibre under the same load, less 1.",
         ">= -1, lower is better; missing where first_failure_load is",
+        _of_failure(lambda failure, tested: failure.matrix_index / tested.matrix_before - 1.0),
     ),
-    Column(
+    _Index(
         "printed_volume",
         "1",
         "Volume of matrix and fibre of the planned print over the volume of the part.",
         "about 1 is right; missing where no print was planned",
     ),
-    Column(
+    _Index(
         "whole_print_time",
         "s",
         "Time of the whole print as its file states it: matrix, fibre, tool changes and their "
         "waits, without the first heating.",
         "> 0, lower is better; missing where no print was planned",
     ),
-    Column(
+    _Index(
         "first_failure_load",
         "N",
         "Load at which the matrix (von Mises stress averaged over a 2 mm ball, away from loads and "
         "supports), the fibre (99th percentile of the axial force by length) or the bond between "
         "layers (interlayer_load) first reaches its strength, fibres carrying tension only.",
         "> 0, higher is better; missing where a strength is unknown",
+        _of_failure(lambda failure, tested: failure.load),
     ),
-    Column(
+    _Index(
         "interlayer_load",
         "N",
         "Load at which printed layers come apart: the stress tensor averaged over a 2 mm ball, "
@@ -103,61 +154,65 @@ TEST_COLUMNS = (
         "criterion), at least 3 mm from loads and supports.",
         "> 0, infinite where nothing opens; missing where the bond's strength is unknown; of use "
         "for comparing layers of one part, not as a load",
+        _of_bond(lambda failure: failure.interlayer_zones[0]),
     ),
-    Column(
+    _Index(
         "interlayer_load_near",
         "N",
         "As interlayer_load, at least 1.5 mm from loads and supports.",
         "<= interlayer_load; the difference shows the effect of that distance",
+        _of_bond(lambda failure: failure.interlayer_zones[1]),
     ),
-    Column(
+    _Index(
         "interlayer_load_everywhere",
         "N",
         "As interlayer_load, in all cells.",
         "<= interlayer_load_near",
+        _of_bond(lambda failure: failure.interlayer_zones[2]),
     ),
-    Column(
+    _Index(
         "interlayer_index",
         "1",
         "Largest value of that criterion under the load of the test.",
         ">= 0, 1 at failure, lower is better; missing as interlayer_load",
+        _of_bond(lambda failure: failure.interlayer_index),
     ),
     *(
-        Column(
+        _Index(
             f"interlayer_{axis}",
             "mm",
             f"Coordinate {axis} of the place where layers first come apart.",
             "in the frame of the mesh",
+            _opening_along(k),
         )
-        for axis in "xyz"
+        for k, axis in enumerate("xyz")
     ),
-    Column(
+    _Index(
         "interlayer_opening",
         "MPa",
         "Averaged traction across the layer at that place.",
         "negative where it presses",
+        _of_bond(lambda failure: failure.opening),
     ),
-    Column(
+    _Index(
         "interlayer_sliding",
         "MPa",
         "Averaged traction in the layer at that place.",
         ">= 0",
+        _of_bond(lambda failure: failure.sliding),
     ),
-    *(
-        Column(
-            f"{name}_alternative",
-            unit,
-            f"{name} under the alternative supports of the part.",
-            f"as {name}; missing where the part has none",
-        )
-        for name, unit in (
-            ("stiffness_ratio_tension", "1"),
-            ("stiffness_ratio_bonded", "1"),
-            ("stiffness", "N/mm"),
-            ("first_failure_load", "N"),
-            ("interlayer_load", "N"),
-        )
-    ),
+)
+_WITH_ALTERNATIVE = (
+    "stiffness_ratio_tension",
+    "stiffness_ratio_bonded",
+    "stiffness",
+    "first_failure_load",
+    "interlayer_load",
+)
+
+TEST_COLUMNS = (
+    *_TESTED,
+    *(_under_alternative(index) for index in _TESTED if index.name in _WITH_ALTERNATIVE),
 )
 """Indices of the virtual test, described as those of the evaluator are."""
 
@@ -276,72 +331,33 @@ def print_values(run: Run) -> dict[str, float]:
 
 
 def _test_values(run: Run) -> dict[str, float]:
-    """Values of the virtual test, and of that under the alternative supports."""
+    """Values of the virtual test; empty where there was none."""
     if run.tested is None:
         return {}
-    values, other = _values_of(run.tested), run.tested.alternative
-    if other is not None:
-        other_values = _values_of(other)
-        ends = [column.name for column in TEST_COLUMNS if column.name.endswith("_alternative")]
-        names = {name: name.removesuffix("_alternative") for name in ends}
-        values |= {name: other_values[own] for name, own in names.items() if own in other_values}
-    return values
-
-
-def _values_of(tested: Tested) -> dict[str, float]:
-    tension, bonded = tested.bracket.tension, tested.bracket.bonded
-    values = {
-        "stiffness_ratio_tension": tension.ratio,
-        "stiffness_ratio_bonded": bonded.ratio,
-        "stiffness": tension.stiffness,
-        "displacement": tension.force / tension.stiffness,
-        "gain_per_metre": tension.gain_per_metre,
-        "strain_energy": tension.solution.strain_energy,
-    }
-    if tested.most > 1.0:
-        values["share_of_gain"] = (tension.ratio - 1.0) / (tested.most - 1.0)
-    if tension.span:
-        ratios = [ratio for _, ratio in tension.span]
-        values["stiffness_ratio_low"] = min(ratios)
-        values["stiffness_ratio_high"] = max(ratios)
-    if tested.failure is not None:
-        values["first_failure_load"] = tested.failure.load
-        values["matrix_stress_change"] = tested.failure.matrix_index / tested.matrix_before - 1.0
-        values |= _between_layers(tested.failure)
-    return values
-
-
-def _between_layers(failure: FirstFailure) -> dict[str, float]:
-    """Values of the bond between layers; none where it was not judged."""
-    if not failure.interlayer_zones:
-        return {}
-    away, near, everywhere = failure.interlayer_zones
-    return {
-        "interlayer_load": away,
-        "interlayer_load_near": near,
-        "interlayer_load_everywhere": everywhere,
-        "interlayer_index": failure.interlayer_index,
-        **{f"interlayer_{c}": failure.interlayer_where[k] for k, c in enumerate("xyz")},
-        "interlayer_opening": failure.opening,
-        "interlayer_sliding": failure.sliding,
-    }
+    values = {index.name: index.value(run.tested) for index in TEST_COLUMNS}
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def cell_text(run: Run, head: Headline) -> tuple[str, str]:
     """Text of a cell of the headline table, and what to add to it in smaller letters."""
     values = headline_values(run)
-    value, extra = values.get(head.column, np.nan), ""
+    value = values.get(head.column, np.nan)
     if not np.isfinite(value):
         return "–", ""
     if head.column == "printable":
         return ("yes" if run.printable else "no"), ""
     if head.column in ("print_time_nearest", "whole_print_time"):
         value /= 60.0
-    if head.column == "stiffness_ratio_tension" and "stiffness_ratio_low" in values:
-        extra = f"{values['stiffness_ratio_low']:.2f}–{values['stiffness_ratio_high']:.2f}"
-    if head.column == "first_failure_load" and run.tested is not None and run.tested.failure:
-        extra = run.tested.failure.what
-    if head.column == "first_failure_load_alternative":
-        other = None if run.tested is None else run.tested.alternative
-        extra = other.failure.what if other is not None and other.failure is not None else ""
-    return head.pattern.format(value), extra
+    return head.pattern.format(value), _beside(run, head.column, values)
+
+
+def _beside(run: Run, column: str, values: Mapping[str, float]) -> str:
+    """Text beside a value: the range of a stiffness ratio, what fails first."""
+    if column == "stiffness_ratio_tension" and "stiffness_ratio_low" in values:
+        return f"{values['stiffness_ratio_low']:.2f}–{values['stiffness_ratio_high']:.2f}"
+    tested = run.tested
+    if tested is not None and column.endswith("_alternative"):
+        tested = tested.alternative
+    if column.startswith("first_failure_load") and tested is not None and tested.failure:
+        return tested.failure.what
+    return ""
