@@ -45,8 +45,7 @@ def check_number(
     ccfem.base.errors.InputError: share must be above 0 and at most 1; got 2.0: give one in this
     range
     """
-    number = isinstance(value, Real) and not isinstance(value, bool)
-    finite = number and math.isfinite(value)
+    finite = _finite(value)
     if (
         finite
         and (at_least is None or value >= at_least)
@@ -63,7 +62,15 @@ def check_number(
     elif unit:
         words = [f"a finite number of {unit}"]
     cure = f"give {'one in this range' if bounds else 'a number'}"
-    raise InputError(f"{what} must be {', '.join(words)}; got {value!r}: {cure}")
+    raise InputError(f"{what} must be {', '.join(words)}; got {shown(value)}: {cure}")
+
+
+def _finite(value: Any) -> bool:
+    """Whether a value is a number that a float can hold; integers may be larger."""
+    try:
+        return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:
+        return False
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,12 @@ def signed_areas(points: FloatArray, triangles: IntArray) -> FloatArray:
     return np.asarray(0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]))
 
 
+def counter_clockwise(points: FloatArray, triangles: IntArray) -> IntArray:
+    """Triangles (t, 3) of points (n, 2), the clockwise ones turned over."""
+    turned = triangles[:, [0, 2, 1]]
+    return np.where((signed_areas(points, triangles) < 0.0)[:, None], turned, triangles)
+
+
 def signed_volumes(points: FloatArray, corners: IntArray) -> FloatArray:
     """Volume of straight-sided tetrahedra (m, 4), (m,), mm^3; negative where turned inside out."""
     a, b, c, d = np.moveaxis(points[corners], 1, 0)

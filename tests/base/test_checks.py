@@ -158,3 +158,13 @@ def test_a_class_in_place_of_a_strategy_or_slicer_is_refused_by_every_function()
     layers = ccfem.slice(stress, 2)
     with pytest.raises(InputError, match="got the class Zigzag"):
         ccfem.plan(Zigzag, layers, stress, ccfem.Machine())
+
+
+@pytest.mark.parametrize(
+    "value", [10**400, -(10**4000), float("inf"), np.float32("inf"), float("nan"), True, "2"]
+)
+def test_what_no_float_holds_is_refused_in_one_line(value):
+    with pytest.raises(InputError, match=r"^count must be a finite number, at least 1; got") as no:
+        check_number("count", value, at_least=1)
+    assert len(str(no.value)) < 140
+    check_number("count", 10**300, at_least=1)

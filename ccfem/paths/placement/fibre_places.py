@@ -11,6 +11,7 @@ from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.checks import check_choices, check_fields
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.geometry.measures import counter_clockwise
 from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
 from ccfem.paths.placement.region_shapes import Shape
@@ -291,7 +292,7 @@ def cut_layer(layer: Layer, region: Region, mesh: TetMesh) -> Layer | None:
     cut_triangles, parent = _pieces(triangles, crossed, beside, region)
     points, number = _numbered(shapely.get_coordinates(cut_triangles), plane.points)
     number = number.reshape(-1, 4)[:, :3]
-    kept = np.concatenate([layer.triangles[whole & ~touched], _counter_clockwise(points, number)])
+    kept = np.concatenate([layer.triangles[whole & ~touched], counter_clockwise(points, number)])
     parent = np.concatenate([np.flatnonzero(whole & ~touched), parent])
     if not len(kept):
         return None
@@ -348,15 +349,6 @@ def _numbered(vertices: FloatArray, known: FloatArray) -> tuple[FloatArray, IntA
     places, inverse = np.unique(vertices[new].round(6), axis=0, return_inverse=True)
     number[new] = len(known) + inverse.reshape(-1)
     return np.concatenate([known, places]), number
-
-
-def _counter_clockwise(points: FloatArray, triangles: IntArray) -> IntArray:
-    a, b, c = np.moveaxis(points[triangles], 1, 0)
-    u, v = b - a, c - a
-    clockwise = u[:, 0] * v[:, 1] < u[:, 1] * v[:, 0]
-    turned = triangles.copy()
-    turned[clockwise] = triangles[clockwise][:, [0, 2, 1]]
-    return turned
 
 
 def _in_cells(points: FloatArray, cells: IntArray, mesh: TetMesh) -> tuple[IntArray, FloatArray]:

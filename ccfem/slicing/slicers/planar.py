@@ -1,15 +1,17 @@
 """Flat layers across the build direction."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray, IntArray
-from ccfem.base.checks import check_choices
-from ccfem.base.errors import InputError, shown
+from ccfem.base.arrays import FloatArray
+from ccfem.base.checks import check_choices, check_number
+from ccfem.base.errors import InputError
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.geometry.measures import counter_clockwise
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.level_cut import border_edges, chain, cut_at_zero, patch_edges, wall_edges
@@ -68,24 +70,11 @@ class Planar:
             )
         if not given:
             object.__setattr__(self, "count", _COUNT)
-        if self.count is not None and self.count < 1:
-            raise InputError(f"the number of layers must be at least 1; got {self.count}")
-        if self.count is not None and self.count > _MOST:
-            raise InputError(
-                f"the number of layers must be at most {_MOST:,}; got {shown(self.count)}: correct "
-                "it"
-            )
+        if self.count is not None:
+            check_number("the number of layers", self.count, at_least=1)
+            check_number("the number of layers", self.count, at_most=_MOST)
         if self.heights is not None:
-            heights = tuple(sorted(float(height) for height in self.heights))
-            if not heights or not np.isfinite(heights).all():
-                raise InputError("give at least one layer height, a finite number in mm")
-            if (np.diff(heights) == 0.0).any():
-                again = heights[int(np.flatnonzero(np.diff(heights) == 0.0)[0])]
-                raise InputError(
-                    f"each layer height must be given once; got {again:g} mm more than once: a "
-                    "layer there has room for its fibre once"
-                )
-            object.__setattr__(self, "heights", heights)
+            object.__setattr__(self, "heights", _rising(self.heights))
 
     def __call__(self, stress: PartStress, build: Vector, machine: Machine) -> tuple[Layer, ...]:
         """Cut a part into flat layers; the stress has no influence.
@@ -130,16 +119,17 @@ class Planar:
         level = mesh.points @ frame[2]
         lowest, highest = float(level[mesh.corners].min()), float(level[mesh.corners].max())
         stack = self._stack(mesh, frame)
-        if stack[0] < lowest or stack[-1] > highest:
-            outside = stack[0] if stack[0] < lowest else stack[-1]
-            raise InputError(
-                f"layer height {outside:g} mm lies outside the part, which reaches from "
-                f"{lowest:g} to {highest:g} mm along the build direction"
-            )
-        edges = np.concatenate([[lowest], 0.5 * (stack[1:] + stack[:-1]), [highest]])
+        for height in (stack[0], stack[-1]):
+            if not lowest <= height <= highest:
+                raise InputError(
+                    f"layer height {height:g} mm lies outside the part, which reaches from "
+                    f"{lowest:g} to {highest:g} mm along the build direction"
+                )
+        # A layer stands for what is nearer to it than to the others.
+        edges = [lowest, *(0.5 * (stack[1:] + stack[:-1])).tolist(), highest]
         layers = [
-            _cut(mesh, Plane(frame, float(h)), level, k, float(edges[k + 1] - edges[k]))
-            for k, h in enumerate(stack)
+            _cut_plane(mesh, Plane(frame, float(height)), level, k, edges[k + 1] - edges[k])
+            for k, height in enumerate(stack)
         ]
         if layers[-1] is None and highest - stack[-1] < _TOP * (highest - lowest):
             raise InputError(
@@ -154,6 +144,20 @@ class Planar:
             return np.array(self.heights)
         level = mesh.points[mesh.corners] @ frame[2]
         return slice_heights(float(level.min()), float(level.max()), self.count, self.thickness)
+
+
+def _rising(heights: Sequence[float]) -> tuple[float, ...]:
+    """Heights of layers in order, mm; an error unless they are finite and all different."""
+    rising = np.sort(np.asarray(heights, dtype=float))
+    if not len(rising) or not np.isfinite(rising).all():
+        raise InputError("give at least one layer height, a finite number in mm")
+    again = rising[1:][np.diff(rising) == 0.0]
+    if len(again):
+        raise InputError(
+            f"each layer height must be given once; got {again[0]:g} mm more than once: a layer "
+            "there has room for its fibre once"
+        )
+    return tuple(rising.tolist())
 
 
 def slice_heights(
@@ -185,18 +189,20 @@ def slice_heights(
     return lowest + (np.arange(slabs, dtype=np.float64) + 0.5) * thickness
 
 
-def _cut(
+def _cut_plane(
     mesh: TetMesh, plane: Plane, level: FloatArray, index: int, thickness: float
 ) -> Layer | None:
-    frame, height = plane.frame, plane.height
+    """Layer where a mesh, whose nodes are at heights `level` (n,), meets a plane; None nowhere."""
+    signed = level - plane.height
     snap = _SNAP * float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
-    signed = level - height
     signed[np.abs(signed) < snap] = 0.0
     cut = cut_at_zero(mesh, signed)
     if cut is None:
         return None
-    points = cut.points + (height - cut.points @ frame[2])[:, None] * frame[2]
-    triangles = _counter_clockwise(points @ frame[:2].T, cut.triangles)
+    normal = plane.frame[2]
+    # Nodes that were taken to lie on the plane are moved onto it.
+    points = cut.points + (plane.height - cut.points @ normal)[:, None] * normal
+    triangles = counter_clockwise(plane.project(points), cut.triangles)
     border = border_edges(triangles, len(points))
     return Layer(
         points=points,
@@ -211,12 +217,3 @@ def _cut(
         patches=patch_edges(mesh, border, cut.nodes),
         walls=wall_edges(mesh, border, cut.nodes),
     )
-
-
-def _counter_clockwise(plane: FloatArray, triangles: IntArray) -> IntArray:
-    a, b, c = np.moveaxis(plane[triangles], 1, 0)
-    u, v = b - a, c - a
-    clockwise = u[:, 0] * v[:, 1] < u[:, 1] * v[:, 0]
-    turned = triangles.copy()
-    turned[clockwise] = triangles[clockwise][:, [0, 2, 1]]
-    return turned

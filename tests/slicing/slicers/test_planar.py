@@ -171,6 +171,6 @@ def test_far_too_many_layers_are_refused_before_any_is_cut(monkeypatch) -> None:
     stress = GivenStress(
         mesh, np.zeros((len(mesh.cells), 3, 3)), np.zeros((len(mesh.points), 3, 3))
     )
-    monkeypatch.setattr("ccfem.slicing.slicers.planar._cut", None)
+    monkeypatch.setattr("ccfem.slicing.slicers.planar._cut_plane", None)
     with pytest.raises(InputError, match=r"got 5e-05 mm between those at .* use fewer layers"):
         Planar(count=100_000)(stress, (0.0, 0.0, 1.0), Machine())
