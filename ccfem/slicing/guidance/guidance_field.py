@@ -7,7 +7,7 @@ of its own, so that a constant field minimises it. Here the joints set the scale
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -138,21 +138,87 @@ def guidance_field(
     SolveError
         When the solve misses its tolerance.
     """
-    gradients, cells, n = cell_gradients(mesh), mesh.corners, len(mesh.points)
-    volume = mesh.volumes
-    used = np.unique(cells)
-    place = np.full(n, -1)
-    place[used] = np.arange(len(used))
-    cells, points = place[cells], mesh.points[used]
     if not weights.joints > 0.0:  # joints without weight leave the field to the stress
         joints = ()
+    corners = _corners(mesh)
+    matrix, sources = _quadratic(corners, tension, importance, joints, weights, form, slab)
+    if not sources:
+        direction = _least_stressed(tension, mesh.volumes * importance, build)
+        share, count = _ANCHOR * mesh.volumes, matrix.shape[0]
+        matrix = matrix + gradient_energy(corners.gradients, corners.cells, share, count)
+        source = gradient_source(corners.gradients, corners.cells, direction, share, count)
+        sources = [source]
+    solve = _factorised(matrix)
+    solutions = np.stack([solve(source) for source in sources])
+    energies = _energies(np.array(sources) @ solutions.T, signs)
+    # The rise of each joint's field along the build direction, over the volume.
+    per_cell = (mesh.volumes, corners.gradients, solutions[:, corners.cells], build)
+    best = _lowest(energies, np.einsum("e,eid,kei,d->k", *per_cell, optimize=True))
+    values = np.zeros(len(mesh.points))
+    values[corners.nodes] = (np.array(best) @ solutions)[: len(corners.nodes)]
+    return _scaled(mesh, values, best, energies, build)
+
+
+def _scaled(
+    mesh: TetMesh,
+    values: FloatArray,
+    signs: tuple[int, ...],
+    energies: dict[tuple[int, ...], float],
+    build: FloatArray,
+) -> GuidanceField:
+    """Field with a mean gradient of size 1, which does not point against the build direction."""
+    volume = mesh.volumes
+    gradient = np.einsum("eid,ei->ed", cell_gradients(mesh), values[mesh.corners])
+    mean = float((volume * np.linalg.norm(gradient, axis=1)).sum() / volume.sum())
+    if not mean > 0.0:
+        raise InputError("the guidance field is constant: name joints, or give it stress to follow")
+    if float((volume @ gradient) @ build) < 0.0:
+        mean, signs = -mean, tuple(-sign for sign in signs)
+    return GuidanceField(mesh, values / mean, gradient / mean, signs, energies)
+
+
+class _Corners(NamedTuple):
+    """The corners of a mesh, which carry the field; quadratic cells have other nodes besides.
+
+    `nodes` (c,) of the mesh, their `points` (c, 3), the `cells` (m, 4) by position among them, the
+    `gradients` (m, 4, 3) of the barycentric coordinates in the cells, 1/mm.
+    """
+
+    mesh: TetMesh
+    nodes: IntArray
+    points: FloatArray
+    cells: IntArray
+    gradients: FloatArray
+
+
+def _corners(mesh: TetMesh) -> _Corners:
+    nodes, cells = np.unique(mesh.corners, return_inverse=True)
+    cells = cells.reshape(mesh.corners.shape)
+    return _Corners(mesh, nodes, mesh.points[nodes], cells, cell_gradients(mesh))
+
+
+def _quadratic(
+    corners: _Corners,
+    tension: FloatArray,
+    importance: FloatArray,
+    joints: Sequence[Joint],
+    weights: Weights,
+    form: JointForm,
+    slab: float,
+) -> tuple[sp.csr_array, list[FloatArray]]:
+    """Matrix of the energy, and its linear term for each joint with a direction.
+
+    The unknowns are the values at the corners, then one for each group of equal values.
+    """
+    mesh, _, points, cells, gradients = corners
+    volume = mesh.volumes
     groups = _groups(points, cells, joints, form, slab)
-    count = len(used) + sum(number for _, _, number in groups)
+    count = len(points) + sum(number for _, _, number in groups)
     stress = weights.stress * volume * importance
     matrix = alignment_energy(gradients, cells, tension, stress, count)
     smooth = smoothness_energy(points, gradients, cells, mesh.faces, mesh.across, count)
     matrix = matrix + weights.smoothness * weights.length**2 * smooth
-    sources, first = [], len(used)
+    sources, first = [], len(points)
     for k, joint in enumerate(joints):
         share = np.zeros(len(cells))
         share[joint.region] = weights.joints * volume[joint.region]
@@ -165,28 +231,7 @@ def guidance_field(
             first += number
         if joint.direction is not None:
             sources.append(gradient_source(gradients, cells, joint.direction, share, count))
-    if not sources:
-        direction = _least_stressed(tension, volume * importance, build)
-        share = _ANCHOR * volume
-        matrix = matrix + gradient_energy(gradients, cells, share, count)
-        sources.append(gradient_source(gradients, cells, direction, share, count))
-    solve = _factorised(matrix)
-    solutions = np.stack([solve(source) for source in sources])
-    energies = _energies(np.array(sources) @ solutions.T, signs)
-    rising = np.einsum(
-        "e,eid,kei,d->k", volume, gradients, solutions[:, cells], build, optimize=True
-    )
-    best = _lowest(energies, rising)
-    values = np.zeros(n)
-    values[used] = (np.array(best) @ solutions)[: len(used)]
-    gradient = np.einsum("eid,ei->ed", gradients, values[mesh.corners])
-    mean = float((volume * np.linalg.norm(gradient, axis=1)).sum() / volume.sum())
-    if not mean > 0.0:
-        raise InputError("the guidance field is constant: name joints, or give it stress to follow")
-    if float((volume @ gradient) @ build) < 0.0:
-        mean = -mean
-    signs_found = best if mean > 0.0 else tuple(-s for s in best)
-    return GuidanceField(mesh, values / mean, gradient / mean, signs_found, energies)
+    return matrix, sources
 
 
 def _groups(

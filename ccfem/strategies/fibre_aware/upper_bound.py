@@ -28,6 +28,7 @@ Without it hundreds of solves would be needed.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numba import njit
@@ -226,55 +227,108 @@ def upper_bound(
     parts = smeared_cases(cases.fields, layers[0].plane.frame)
     alone = (layers, length, machine, strand, _SINGLE_ITERATIONS, mode)
     singles = measures(objective, cases, *alone)
-    axial = (Strand() if strand is None else strand).stiffness(parts[0].modulus)
-    most = fibre_capacity(parts[0], layers, machine)
-    volume = parts[0].mesh.volumes
+    volume, most = parts[0].mesh.volumes, fibre_capacity(parts[0], layers, machine)
     length = min(length, float(volume @ most))
-    scale = singles / np.array([part.unreinforced.work for part in parts])
+    axial = (Strand() if strand is None else strand).stiffness(parts[0].modulus)
+    smeared = _Smeared(parts, singles, axial, most, length, mode)
 
-    angles, along = directions(_ANGLES)
-    outer = (along[:, :, None] * along[:, None, :]).reshape(_ANGLES, 9)
     ascent = DensityAscent.even(volume, most, length, _ANGLES)
     solutions = [part.unreinforced for part in parts]
     factors = sharpest = cases.weights
-    least = certificate(parts, solutions, factors * scale, axial, most, length, mode)
+    least = smeared.certificate(solutions, factors)
     best, attained = ascent.density, np.inf
     for k in range(iterations):
-
-        def fibre(strain: FloatArray, density: FloatArray = ascent.density) -> FloatArray:
-            carried = density
-            if mode == TENSION:
-                carried = np.where(strain @ along.T > 0.0, density, 0.0)
-            return axial * (carried @ outer).reshape(-1, 3, 3)
-
-        solutions = [
-            part.solve(fibre, start, 1e-3) for part, start in zip(parts, solutions, strict=True)
-        ]
-        works = [solution.work for solution in solutions]
-        ratios = np.array([part.ratio(work) for part, work in zip(parts, works, strict=True)])
-        terms = singles / ratios
+        solutions = smeared.solve(ascent.density, solutions)
+        terms = smeared.terms(solutions)
         value = _objective(terms, cases.weights, objective)
         if value < attained:
             best, attained = ascent.density, value
-        certified = certificate(parts, solutions, factors * scale, axial, most, length, mode)
+        certified = smeared.certificate(solutions, factors)
         if certified >= least:
             least, sharpest = certified, factors
         if attained <= (1.0 + gap) * least:
             break
         merit = -float(factors @ terms)
         if objective != SUM:
+            # The bound is on the largest term: the worst cases get more weight, in smaller and
+            # smaller steps.
             factors = factors * (terms / terms.max()) ** min(1.0, _FULL_STEPS / (k + 1))
             factors = factors / factors.sum()
-        squares = np.zeros_like(ascent.density)
-        for v, part, solution in zip(factors * scale, parts, solutions, strict=True):
-            strain = solution.strain @ along.T
-            stretch = np.maximum(strain, 0.0) if mode == TENSION else strain
-            squares += v * (part.pull(solution)[0] * stretch) ** 2
-        ascent = ascent.step(np.sqrt(squares), merit)
+        ascent = ascent.step(smeared.stretch(solutions, factors), merit)
     if len(cases) == 1 and objective != LEAST:  # it is measured by this bound itself
         singles, least, attained = singles / least, 1.0, attained / least
-    bound = (least, attained, sharpest, best, angles, k + 1)
+    bound = (least, attained, sharpest, best, directions(_ANGLES)[0], k + 1)
     return UpperBound(objective, singles, cases.weights, *bound)
+
+
+@dataclass(frozen=True)
+class _Smeared:
+    """A part with smeared fibre under its load cases: what `upper_bound` solves.
+
+    Attributes
+    ----------
+    parts : sequence of SmearedPart
+        One for each case.
+    singles : (n,) array
+        Stiffness ratio that each case is measured by.
+    axial_stiffness : float, N
+        EA of a strand.
+    most : (m,) array, mm/mm^3
+        Largest density of fibre in each cell.
+    length : float, mm
+        Of fibre.
+    mode : str
+        "tension" or "bonded".
+    """
+
+    parts: Sequence[SmearedPart]
+    singles: FloatArray
+    axial_stiffness: float
+    most: FloatArray
+    length: float
+    mode: str
+
+    @cached_property
+    def scale(self) -> FloatArray:
+        """Factor (n,) that turns a compliance, N mm, into a term of the objective."""
+        return self.singles / np.array([part.unreinforced.work for part in self.parts])
+
+    def solve(
+        self, density: FloatArray, starts: Sequence[SmearedSolution]
+    ) -> list[SmearedSolution]:
+        """Displacements with a density of fibre (m, k), of each case, from those of the last."""
+        along = directions(density.shape[1])[1]
+        outer = (along[:, :, None] * along[:, None, :]).reshape(-1, 9)
+
+        def fibre(strain: FloatArray) -> FloatArray:
+            """Stiffness (m, 3, 3) of the fibre that carries at a strain (m, 3)."""
+            carried = density
+            if self.mode == TENSION:
+                carried = np.where(strain @ along.T > 0.0, density, 0.0)
+            return self.axial_stiffness * (carried @ outer).reshape(-1, 3, 3)
+
+        pairs = zip(self.parts, starts, strict=True)
+        return [part.solve(fibre, start, 1e-3) for part, start in pairs]
+
+    def terms(self, solutions: Sequence[SmearedSolution]) -> FloatArray:
+        """Terms of the objective (n,): the measure of each case over its stiffness ratio."""
+        pairs = zip(self.parts, solutions, strict=True)
+        return self.singles / np.array([part.ratio(solution.work) for part, solution in pairs])
+
+    def certificate(self, solutions: Sequence[SmearedSolution], factors: FloatArray) -> float:
+        """Lower bound of the sum of the terms times their factors (n,)."""
+        weights = factors * self.scale
+        room = (self.axial_stiffness, self.most, self.length, self.mode)
+        return certificate(self.parts, solutions, weights, *room)
+
+    def stretch(self, solutions: Sequence[SmearedSolution], factors: FloatArray) -> FloatArray:
+        """Root of the mean squared strain along each direction over the cases, (m, k)."""
+        along, squares = directions(_ANGLES)[1], 0.0
+        for weight, part, solution in zip(factors * self.scale, self.parts, solutions, strict=True):
+            strain = solution.strain @ along.T
+            stretch = np.maximum(strain, 0.0) if self.mode == TENSION else strain
+            squares = squares + weight * (part.pull(solution)[0] * stretch) ** 2
+        return np.asarray(np.sqrt(squares))
 
 
 def affordable_iterations(cells: int) -> int:
@@ -394,11 +448,18 @@ def largest_gathered(strains: FloatArray, factors: FloatArray, mode: str = TENSI
     return result
 
 
-# The strain along t is a + b cos(2 angle - phase): its square bends down by at most 8 b (|a| + b),
-# and by 8 b (a + b) where only tension counts.
 @njit(cache=True)
-def _gathered(strains, factors, along, margin, bonded, result):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _gathered(
+    strains: FloatArray,
+    factors: FloatArray,
+    along: FloatArray,
+    margin: float,
+    bonded: bool,
+    result: FloatArray,
+) -> None:  # pragma: no cover
     for c in range(strains.shape[1]):
+        # The strain along t is a + b cos(2 angle - phase): its square bends down by at most
+        # 8 b (|a| + b), and by 8 b (a + b) where only tension counts.
         bend = 0.0
         for i in range(len(factors)):
             e1, e2, e12 = strains[i, c, 0], strains[i, c, 1], strains[i, c, 2]
