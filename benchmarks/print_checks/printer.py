@@ -106,98 +106,126 @@ def _moved(place: Place, shift: Place) -> Place:
 
 def follow(text: str, machine: str, offset=(0.0, 0.0, 0.0)) -> Run:
     """Follow a file to its end; the offset is one that the firmware does not know of."""
-    run, known = Run(), KNOWN[machine]
-    feeds = {0: "E", 1: "U" if machine == "aura_like" else "E"}
-    place, tool, speed, kind, strand = (0.0, 0.0, 0.0), -1, 0.0, "", ""
-    shift = tuple(float(one) for one in offset)
-    longest = LONGEST.get(machine, 200.0)
-    letters = set("XYZFEUV" if machine == "aura_like" else "XYZFE")
-    highest, changed, cut, ends = 0.0, -1, False, 0
-    active, standby, heat, waited = {}, {}, {0: 20.0, 1: 20.0}, {0: False, 1: False}
-    for raw in text.splitlines():
-        code, _, comment = raw.partition(";")
-        if comment.startswith("TYPE:"):
-            kind = comment[5:]
-        elif comment.startswith("CCFEM:strand="):
-            strand = re.match(r"CCFEM:strand=(\w+)", comment)[1]
-            strand += f"-{ends}" if strand == "beside" else ""
-        elif ":" in comment or "=" in comment:
-            name, _, value = comment.replace("=", ":", 1).partition(":")
-            run.head.setdefault(name.strip(), value.strip())
+    printer = _Printer(machine, tuple(float(x) for x in offset))
+    for line in text.splitlines():
+        printer.read(line)
+    return printer.run
+
+
+class _Printer:
+    """What a firmware keeps in mind between the lines of a file."""
+
+    def __init__(self, machine: str, shift: Place) -> None:
+        self.machine, self.shift, self.run = machine, shift, Run()
+        aura = machine == "aura_like"
+        self.letters = set("XYZFEUV" if aura else "XYZFE")
+        self.feeds = {0: "E", 1: "U" if aura else "E"}
+        self.cutting = 30 if aura else 90
+        self.longest = LONGEST.get(machine, 200.0)
+        self.place, self.tool, self.speed, self.highest = (0.0, 0.0, 0.0), -1, 0.0, 0.0
+        self.kind, self.strand, self.ends = "", "", 0
+        self.changed, self.cut = -1, False
+        self.active, self.standby = {}, {}
+        self.heat, self.waited = {0: 20.0, 1: 20.0}, {0: False, 1: False}
+
+    def read(self, line: str) -> None:
+        """Follow a line: its comment, then its command."""
+        code, _, comment = line.partition(";")
+        self._comment(comment)
         words = code.split()
         if not words:
-            continue
-        word = words[0]
-        if word not in known:
-            run.wrong.append(f"no {machine} knows {raw}")
-            continue
-        given = _values(words)
-        if word in ("G0", "G1"):
-            if not letters.issuperset(given):
-                run.wrong.append(f"no {machine} knows {raw}")
-            speed = given.get("F", 60.0 * speed) / 60.0
-            x, y, z = place
-            end = (given.get("X", x), given.get("Y", y), given.get("Z", z))
-            start, stop = place, end
-            if tool == 1 and any(shift):
-                start, stop = _moved(place, shift), _moved(end, shift)
-            step = Step(
-                start=start,
-                end=stop,
-                fed=given.get(feeds.get(tool, "E"), 0.0),
-                beside=given.get("V", 0.0),
-                speed=speed,
-                rapid=word == "G0",
-                tool=tool,
-                heat=heat.get(tool, 0.0),
-                waited=waited.get(tool, False),
-                kind=kind,
-                strand=strand,
-                number=len(run.steps),
-                changed=changed,
-                cut=cut,
-            )
-            if not step.length and abs(step.fed) > longest:
-                run.wrong.append(f"{machine} refuses more than {longest:g} mm alone: {raw}")
-            run.steps.append(step)
-            place = end
-            if step.lays:
-                highest = max(highest, step.end[2])
-            if step.rapid:
-                strand, cut = "", False
-                ends += 1
+            return
+        word, given = words[0], _values(words)
+        moves = word in ("G0", "G1")
+        if word not in KNOWN[self.machine] or (moves and not self.letters.issuperset(given)):
+            self.run.wrong.append(f"no {self.machine} knows {line}")
+        if word not in KNOWN[self.machine]:
+            return
+        if moves:
+            self._move(word == "G0", given, line)
         elif word == "G4":
-            run.waited += given["P"] / 1000.0
+            self.run.waited += given["P"] / 1000.0
         elif word == "G28" and "X" not in words:
-            place = (0.0, 0.0, 0.0)
+            self.place = (0.0, 0.0, 0.0)
         elif word in ("T0", "T1"):
-            new = int(word[1])
-            if tool >= 0 and machine == "reprap_duet":
-                told = standby[tool]
-            else:
-                told = active.get(tool, np.inf)
-            if new != tool:
-                run.changes.append(Change(tool, new, place[2], highest, len(run.steps), told))
-                waited[new] = False
-                changed = len(run.steps)
-            tool = new
-        elif word in ("M104", "M109"):
-            one = int(given.get("T", tool))
-            active[one] = given["S"]
-            heat[one] = given["S"] if word == "M109" else min(heat[one], given["S"])
-            waited[one] = word == "M109" or (waited[one] and heat[one] == given["S"])
-        elif word == "G10":
-            one = int(given["P"])
-            active[one] = given.get("S", active.get(one, 0.0))
-            standby[one] = given.get("R", standby.get(one, 0.0))
-            if one == tool:
-                heat[one] = min(heat[one], active[one])
-        elif word == "M116":
-            one = int(given["P"])
-            heat[one], waited[one] = active[one], True
-        elif (word == "M280" and given["S"] == (30 if machine == "aura_like" else 90)) or (
+            self._change(int(word[1]))
+        elif word in ("M104", "M109", "G10", "M116"):
+            self._warm(word, given)
+        elif (word == "M280" and given["S"] == self.cutting) or (
             word == "SET_SERVO" and "ANGLE=90" in words
         ):
-            run.cuts.append(len(run.steps))
-            cut = True
-    return run
+            self.run.cuts.append(len(self.run.steps))
+            self.cut = True
+
+    def _comment(self, comment: str) -> None:
+        """Note what kind of thing follows, the strand, or a line of the head."""
+        if comment.startswith("TYPE:"):
+            self.kind = comment[5:]
+        elif comment.startswith("CCFEM:strand="):
+            self.strand = re.match(r"CCFEM:strand=(\w+)", comment)[1]
+            self.strand += f"-{self.ends}" if self.strand == "beside" else ""
+        elif ":" in comment or "=" in comment:
+            name, _, value = comment.replace("=", ":", 1).partition(":")
+            self.run.head.setdefault(name.strip(), value.strip())
+
+    def _move(self, rapid: bool, given: dict[str, float], line: str) -> None:
+        """Move the nozzle, or filament alone; a rapid move ends the strand."""
+        self.speed = given.get("F", 60.0 * self.speed) / 60.0
+        x, y, z = start = self.place
+        self.place = end = (given.get("X", x), given.get("Y", y), given.get("Z", z))
+        if self.tool == 1 and any(self.shift):
+            start, end = _moved(start, self.shift), _moved(end, self.shift)
+        step = Step(
+            start=start,
+            end=end,
+            fed=given.get(self.feeds.get(self.tool, "E"), 0.0),
+            beside=given.get("V", 0.0),
+            speed=self.speed,
+            rapid=rapid,
+            tool=self.tool,
+            heat=self.heat.get(self.tool, 0.0),
+            waited=self.waited.get(self.tool, False),
+            kind=self.kind,
+            strand=self.strand,
+            number=len(self.run.steps),
+            changed=self.changed,
+            cut=self.cut,
+        )
+        if not step.length and abs(step.fed) > self.longest:
+            refused = f"{self.machine} refuses more than {self.longest:g} mm alone: {line}"
+            self.run.wrong.append(refused)
+        self.run.steps.append(step)
+        if step.lays:
+            self.highest = max(self.highest, step.end[2])
+        if rapid:
+            self.strand, self.cut = "", False
+            self.ends += 1
+
+    def _change(self, new: int) -> None:
+        """Change tools; a Duet sets the old one to its standby temperature by itself."""
+        told = self.active.get(self.tool, np.inf)
+        if self.tool >= 0 and self.machine == "reprap_duet":
+            told = self.standby[self.tool]
+        if new != self.tool:
+            count = len(self.run.steps)
+            change = Change(self.tool, new, self.place[2], self.highest, count, told)
+            self.run.changes.append(change)
+            self.waited[new], self.changed = False, count
+        self.tool = new
+
+    def _warm(self, word: str, given: dict[str, float]) -> None:
+        """Set a tool to a temperature, or wait for it; what is not waited for is not yet warm."""
+        tool = int(given.get("T" if word.startswith("M10") else "P", self.tool))
+        active, heat = self.active, self.heat
+        if word in ("M104", "M109"):
+            active[tool] = given["S"]
+            heat[tool] = given["S"] if word == "M109" else min(heat[tool], given["S"])
+            ready = self.waited[tool] and heat[tool] == given["S"]
+            self.waited[tool] = word == "M109" or ready
+        elif word == "M116":
+            heat[tool], self.waited[tool] = active[tool], True
+        else:
+            active[tool] = given.get("S", active.get(tool, 0.0))
+            self.standby[tool] = given.get("R", self.standby.get(tool, 0.0))
+            if tool == self.tool:
+                heat[tool] = min(heat[tool], active[tool])
