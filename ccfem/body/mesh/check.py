@@ -133,18 +133,7 @@ def check_mesh(mesh: TetMesh, merge: bool = False) -> tuple[TetMesh, MeshReport]
     """
     used = np.zeros(len(mesh.points), dtype=bool)
     used[mesh.cells] = True
-    wrong = np.flatnonzero(used & ~np.isfinite(mesh.points).all(axis=1))
-    if len(wrong):
-        raise InputError(
-            f"mesh coordinates must be finite; {len(wrong)} nodes have NaN or infinity, the first "
-            f"is node {wrong[0]} (from 0): repair the file"
-        )
-    far = np.flatnonzero(used & (np.abs(mesh.points) > FARTHEST).any(axis=1))
-    if len(far):
-        raise InputError(
-            f"mesh coordinates must lie within {FARTHEST:g} mm; {len(far)} nodes lie farther, the "
-            f"first is node {far[0]} (from 0): repair the file, or correct its scale"
-        )
+    _check_coordinates(mesh.points, used)
     diagonal = float(np.linalg.norm(np.ptp(mesh.points[used], axis=0)))
     leader, coincident = _leaders(mesh.points, used, diagonal)
     merged = merge and coincident > 0
@@ -201,6 +190,22 @@ def about_slivers(mesh: TetMesh) -> str:
         f"the flattest cell, at ({at}) mm, is {mesh.aspects[worst]:.3g} times as long as high: "
         "check that all lengths are in mm, or mesh the part with cells of more even shape"
     )
+
+
+def _check_coordinates(points: FloatArray, used: BoolArray) -> None:
+    """Refuse used nodes whose coordinates are not finite, or those of another scale."""
+    wrong = np.flatnonzero(used & ~np.isfinite(points).all(axis=1))
+    if len(wrong):
+        raise InputError(
+            f"mesh coordinates must be finite; {len(wrong)} nodes have NaN or infinity, the first "
+            f"is node {wrong[0]} (from 0): repair the file"
+        )
+    far = np.flatnonzero(used & (np.abs(points) > FARTHEST).any(axis=1))
+    if len(far):
+        raise InputError(
+            f"mesh coordinates must lie within {FARTHEST:g} mm; {len(far)} nodes lie farther, the "
+            f"first is node {far[0]} (from 0): repair the file, or correct its scale"
+        )
 
 
 def _leaders(points: FloatArray, used: BoolArray, diagonal: float) -> tuple[IntArray, int]:

@@ -190,9 +190,13 @@ def outline(
         raise InputError("the outline is empty: lower the threshold or raise the volume fraction")
     if keep is None:
         return max(pieces, key=lambda piece: piece.area)
-    anchors = shapely.points(np.asarray(keep, dtype=np.float64))
+    return _piece_at(shapely.points(np.asarray(keep, dtype=np.float64)), pieces, size, apart)
+
+
+def _piece_at(points: Any, pieces: Any, size: float, apart: str) -> Any:
+    """Piece that all of some points lie on, or within a pixel and a half of; else an error."""
     for piece in pieces:
-        if (shapely.distance(piece, anchors) <= 1.5 * size).all():
+        if (shapely.distance(piece, points) <= 1.5 * size).all():
             return piece
     raise InputError(apart)
 

@@ -117,23 +117,18 @@ def equilibrium(
         u = _mixed(matrix, forces, known)
         strain, carries = _state(pieces, u, mode)
         matrix = Reinforced(specimen.matrix, pieces, carries * full)
-    part = _reduced(specimen, held)
-    x, rhs = held.restrict(u), held.right_hand_side(matrix, forces)
+    part, x = _reduced(specimen, held), held.restrict(u)
     for update in range(most):
-        reduced = Reduced(part, matrix, held)
-        rest = rhs - reduced @ x
-        residual = float(np.linalg.norm(rest) / np.linalg.norm(rhs))
+        reduced, rest, residual = _imbalance(part, matrix, held, x, forces)
         if residual <= max(tolerance, _SETTLING if held.presses is not None else 0.0):
+            # Near enough to say which supports still press; with others the balance is another.
             internal = (matrix @ u.reshape(-1)).reshape(u.shape)
             following = held.following(u, internal - forces)
             if following is not held:
                 held = following
                 x = held.restrict(u)
-                u = held.expand(x)
-                part, rhs = _reduced(specimen, held), held.right_hand_side(matrix, forces)
-                reduced = Reduced(part, matrix, held)
-                rest = rhs - reduced @ x
-                residual = float(np.linalg.norm(rest) / np.linalg.norm(rhs))
+                u, part = held.expand(x), _reduced(specimen, held)
+                reduced, rest, residual = _imbalance(part, matrix, held, x, forces)
         if residual <= tolerance:
             check_pressed(held, (matrix @ u.reshape(-1)).reshape(u.shape) - forces, forces)
             return Equilibrium(u, matrix, strain, carries, update, total, residual)
@@ -146,11 +141,19 @@ def equilibrium(
         strain, carries = _state(pieces, u, mode)
         if (before != carries).any():
             matrix = Reinforced(specimen.matrix, pieces, carries * full)
-            rhs = held.right_hand_side(matrix, forces)
     raise SolveError(
         f"virtual test: relative residual {residual:.1e} after {most} updates of the fibres "
         f"that carry tension, above the tolerance {tolerance:.1e}"
     )
+
+
+def _imbalance(
+    part: sp.bsr_array, matrix: Reinforced, held: Held, x: FloatArray, forces: FloatArray
+) -> tuple[Reduced, FloatArray, float]:
+    """Stiffness on the free components, the forces out of balance there, and their share."""
+    reduced, rhs = Reduced(part, matrix, held), held.right_hand_side(matrix, forces)
+    rest = rhs - reduced @ x
+    return reduced, rest, float(np.linalg.norm(rest) / np.linalg.norm(rhs))
 
 
 def _reduced(specimen: Specimen, held: Held) -> sp.bsr_array:

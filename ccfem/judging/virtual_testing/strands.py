@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from ccfem.base.arrays import FloatArray, IntArray, freeze, in_brief
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, in_brief
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.buckets import Buckets, bucket
@@ -121,42 +121,49 @@ def cut_strands(
             f"the virtual test needs fibre; got {len(toolpaths)} paths and 0 mm of fibre: "
             "lower the least amount that the strategy lays, or test the unreinforced part"
         )
-    segment, cell, begin, end, share = cut_steps(start, step, length, mesh)
-    count = len(segment)
-    piece = (end - begin) * length[segment]
-    own = np.where(toolpaths.link[first_point], 0.0, length)
-    if not count and not own.any():
+    cut = cut_steps(start, step, length, mesh)
+    outside = _length_outside(cut, length, toolpaths.link[first_point], most_outside)
+    # Arc length of the path at the start of each step, then at the ends of each piece.
+    before = np.cumsum(length) - length
+    before -= before[np.searchsorted(path, path)]
+    size = length[cut.step]
+    first, last = (before[cut.step] + at * size for at in (cut.begin, cut.end))
+    lent = np.ones(len(cut.step))
+    if machine is not None:
+        lent = room_of(toolpaths, path[cut.step], first, last, machine, layers, crosses)
+    middle = 0.5 * (cut.begin + cut.end)
+    unit = step / np.maximum(length, 1e-300)[:, None]
+    return Strands(
+        cell=cut.cell,
+        length=(cut.end - cut.begin) * size * cut.share,
+        tangent=unit[cut.step],
+        path=path[cut.step],
+        arc=before[cut.step] + middle * size,
+        middle=start[cut.step] + middle[:, None] * step[cut.step],
+        outside=outside,
+        share=lent,
+    )
+
+
+def _length_outside(
+    cut: "CutSteps", length: FloatArray, link: BoolArray, most_outside: float
+) -> float:
+    """Length of steps, links left out, that lies outside the mesh, mm; an error for too much."""
+    strands = np.where(link, 0.0, length)
+    if not len(cut.step) and not strands.any():
         raise InputError(
             f"the virtual test needs fibre inside the mesh; got only {length.sum():.4g} mm of "
             "links outside it: lay strands, or mark as links only fibre that joins them"
         )
-    inside = float(((end - begin) * own[segment] * share).sum())
-    outside = max(float(own.sum()) - inside, 0.0)
-    if outside > most_outside * own.sum():
+    inside = float(((cut.end - cut.begin) * strands[cut.step] * cut.share).sum())
+    outside = max(float(strands.sum()) - inside, 0.0)
+    if outside > most_outside * strands.sum():
         raise InputError(
-            f"fibre must lie inside the mesh; {outside:.4g} mm of {own.sum():.4g} mm lie "
-            f"outside ({100 * outside / own.sum():.3g} %, allowed {100 * most_outside:g} %): "
+            f"fibre must lie inside the mesh; {outside:.4g} mm of {strands.sum():.4g} mm lie "
+            f"outside ({100 * outside / strands.sum():.3g} %, allowed {100 * most_outside:g} %): "
             "give paths and mesh in the same frame and unit"
         )
-    before = np.cumsum(length) - length
-    before -= before[np.searchsorted(path, path)]
-    middle = 0.5 * (begin + end)
-    unit = step / np.maximum(length, 1e-300)[:, None]
-    arc = before[segment] + middle * length[segment]
-    first, last = (before[segment] + at * length[segment] for at in (begin, end))
-    lent = np.ones(count)
-    if machine is not None:
-        lent = room_of(toolpaths, path[segment], first, last, machine, layers, crosses)
-    return Strands(
-        cell=cell,
-        length=piece * share,
-        tangent=unit[segment],
-        path=path[segment],
-        arc=arc,
-        middle=start[segment] + middle[:, None] * step[segment],
-        outside=outside,
-        share=lent,
-    )
+    return outside
 
 
 def carrying_strands(

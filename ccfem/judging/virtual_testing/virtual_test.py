@@ -9,7 +9,7 @@ import numpy as np
 from ccfem.base.arrays import FloatArray, freeze, in_brief
 from ccfem.base.display import Shown
 from ccfem.fem.elasticity.stress_field import SolveRecord, StressField
-from ccfem.judging.virtual_testing.equilibrium import BONDED, TENSION, equilibrium
+from ccfem.judging.virtual_testing.equilibrium import BONDED, TENSION, Equilibrium, equilibrium
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import RHO_SPAN, Strand
 from ccfem.judging.virtual_testing.strands import Strands, cut_strands
@@ -154,19 +154,8 @@ def virtual_test(
     )
     after = specimen.system.field(before.case, balanced.displacement, balanced.matrix, record)
     unreinforced = specimen.stiffness(before.displacement, before.strain_energy)
-    ratios, known = [], [before.displacement]
-    for rho in span:
-        other = equilibrium(
-            specimen,
-            strands,
-            rho * specimen.modulus,
-            mode,
-            known=[*known, balanced.displacement],
-            tolerance=_SPAN_TOLERANCE,
-        )
-        known.append(other.displacement)
-        stiffness = specimen.stiffness(other.displacement, 0.5 * other.work)
-        ratios.append((float(rho), stiffness / unreinforced))
+    stiffnesses = _stiffnesses(specimen, strands, mode, span, balanced)
+    ratios = [(float(rho), k / unreinforced) for rho, k in zip(span, stiffnesses, strict=True)]
     force = np.where(balanced.carries, axial * balanced.strain, 0.0)
     return VirtualTest(
         mode=mode,
@@ -182,6 +171,23 @@ def virtual_test(
         span=tuple(ratios),
         updates=balanced.updates,
     )
+
+
+def _stiffnesses(
+    specimen: Specimen,
+    strands: Strands,
+    mode: str,
+    span: Sequence[float],
+    balanced: Equilibrium,
+) -> list[float]:
+    """Stiffness at further values of rho, N/mm; each solve starts from those before."""
+    known, stiffnesses = [specimen.unreinforced.displacement], []
+    for rho in span:
+        axial, starts = rho * specimen.modulus, [*known, balanced.displacement]
+        other = equilibrium(specimen, strands, axial, mode, starts, _SPAN_TOLERANCE)
+        known.append(other.displacement)
+        stiffnesses.append(specimen.stiffness(other.displacement, 0.5 * other.work))
+    return stiffnesses
 
 
 def _prepared(
