@@ -27,7 +27,7 @@ Without it hundreds of solves would be needed.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -231,16 +231,28 @@ def upper_bound(
     length = min(length, float(volume @ most))
     axial = (Strand() if strand is None else strand).stiffness(parts[0].modulus)
     smeared = _Smeared(parts, singles, axial, most, length, mode)
+    bound = _searched(smeared, cases.weights, objective, iterations, gap)
+    if len(cases) > 1 or objective == LEAST:
+        return bound
+    # One case is measured by this bound itself.
+    attained, least = bound.attained / bound.least, bound.least
+    return replace(bound, singles=singles / least, least=1.0, attained=attained)
 
-    ascent = DensityAscent.even(volume, most, length, _ANGLES)
-    solutions = [part.unreinforced for part in parts]
-    factors = sharpest = cases.weights
+
+def _searched(
+    smeared: "_Smeared", weights: FloatArray, objective: str, iterations: int, gap: float
+) -> UpperBound:
+    """Search the best density and the sharpest bound, until they are close."""
+    volume = smeared.parts[0].mesh.volumes
+    ascent = DensityAscent.even(volume, smeared.most, smeared.length, _ANGLES)
+    solutions = [part.unreinforced for part in smeared.parts]
+    factors = sharpest = weights
     least = smeared.certificate(solutions, factors)
     best, attained = ascent.density, np.inf
     for k in range(iterations):
         solutions = smeared.solve(ascent.density, solutions)
         terms = smeared.terms(solutions)
-        value = _objective(terms, cases.weights, objective)
+        value = _objective(terms, weights, objective)
         if value < attained:
             best, attained = ascent.density, value
         certified = smeared.certificate(solutions, factors)
@@ -255,10 +267,8 @@ def upper_bound(
             factors = factors * (terms / terms.max()) ** min(1.0, _FULL_STEPS / (k + 1))
             factors = factors / factors.sum()
         ascent = ascent.step(smeared.stretch(solutions, factors), merit)
-    if len(cases) == 1 and objective != LEAST:  # it is measured by this bound itself
-        singles, least, attained = singles / least, 1.0, attained / least
     bound = (least, attained, sharpest, best, directions(_ANGLES)[0], k + 1)
-    return UpperBound(objective, singles, cases.weights, *bound)
+    return UpperBound(objective, smeared.singles, weights, *bound)
 
 
 @dataclass(frozen=True)
