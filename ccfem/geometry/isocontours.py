@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray, repeated
-from ccfem.geometry.buckets import bucket
+from ccfem.geometry.buckets import Buckets, bucket
 from ccfem.geometry.facets import unique_edges
 from ccfem.geometry.polylines import starts_segment
 
@@ -174,17 +174,25 @@ def least_distance(curves: Isocontours, reach: float, enough: float) -> float:
     # Each point then has all pieces within reach in its own cell.
     grid = bucket(np.minimum(a, b) - reach, np.maximum(a, b) + reach, reach)
     level = np.repeat(curves.level, np.diff(curves.offsets))
-    return float(_least_distance(*grid, start, curves.points, level, reach, enough))
+    return float(_least_distance(grid, start, curves.points, level, reach, enough))
 
 
 @njit(cache=True, nogil=True)
-def _least_distance(origin, cell, shape, starts, items, start, points, level, reach, enough):  # type: ignore[no-untyped-def]
+def _least_distance(
+    grid: Buckets,
+    start: IntArray,
+    points: FloatArray,
+    level: IntArray,
+    reach: float,
+    enough: float,
+) -> float:
     least = reach * reach
     for p in range(len(points)):
-        i = int((points[p, 0] - origin[0]) / cell)
-        j = int((points[p, 1] - origin[1]) / cell)
-        for item in range(starts[i * shape[1] + j], starts[i * shape[1] + j + 1]):
-            s = start[items[item]]
+        i = int((points[p, 0] - grid.origin[0]) / grid.cell)
+        j = int((points[p, 1] - grid.origin[1]) / grid.cell)
+        box = i * grid.shape[1] + j
+        for item in range(grid.starts[box], grid.starts[box + 1]):
+            s = start[grid.items[item]]
             if abs(level[s] - level[p]) != 1:
                 continue
             dx, dy = points[s + 1, 0] - points[s, 0], points[s + 1, 1] - points[s, 1]

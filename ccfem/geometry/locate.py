@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray
-from ccfem.geometry.buckets import bucket
+from ccfem.geometry.buckets import Buckets, bucket
 
 
 def locate(
@@ -48,7 +48,7 @@ def locate(
             break
         slack = margin + 1e-9 * float(np.abs(corners).max())
         grid = bucket(low - slack, high + slack)
-        index, weight = _search(*grid, origins, gradients, heights, queries[left], slack)
+        index, weight = _search(grid, origins, gradients, heights, queries[left], slack)
         weight = np.maximum(weight, 0.0)
         total = weight.sum(axis=1, keepdims=True)
         triangle[left], weights[left] = index, weight / np.where(total > 0.0, total, 1.0)
@@ -75,11 +75,7 @@ def _barycentric_maps(corners: FloatArray) -> tuple[FloatArray, FloatArray, Floa
 
 @njit(cache=True, nogil=True)
 def _search(
-    origin: FloatArray,
-    cell: float,
-    shape: IntArray,
-    starts: IntArray,
-    items: IntArray,
+    grid: Buckets,
     origins: FloatArray,
     gradients: FloatArray,
     heights: FloatArray,
@@ -97,14 +93,14 @@ def _search(
         for d in range(3):
             i = 0
             if d < dimension:
-                i = int(np.floor((queries[q, d] - origin[d]) / cell))
-            outside = outside or i < 0 or i >= shape[d]
-            c = c * shape[d] + i
+                i = int(np.floor((queries[q, d] - grid.origin[d]) / grid.cell))
+            outside = outside or i < 0 or i >= grid.shape[d]
+            c = c * grid.shape[d] + i
         if outside:
             continue
         best = -slack
-        for item in range(starts[c], starts[c + 1]):
-            k = items[item]
+        for item in range(grid.starts[c], grid.starts[c + 1]):
+            k = grid.items[item]
             if heights[k, 0] == 0.0:
                 continue
             depth = np.inf

@@ -29,12 +29,8 @@ def ball_averages(
     -------
     (k, c) array
     """
-    boxes = _boxes(points, radius)
-    order, result = boxes.order, np.zeros((len(judged), values.shape[1]))
-    _average(
-        points[order], values[order], weights[order], points[judged], boxes.number[judged],
-        boxes.offsets, boxes.shape, radius, result,
-    )  # fmt: skip
+    boxes, result = _boxes(points, weights, radius), np.zeros((len(judged), values.shape[1]))
+    _average(boxes, values[boxes.order], points[judged], boxes.number[judged], result)
     return result
 
 
@@ -55,27 +51,31 @@ def ball_shares(
     (n, c) array
         Derivatives by the values of all points.
     """
-    boxes = _boxes(points, radius)
-    order, spread = boxes.order, np.zeros((len(points), values.shape[1]))
-    _share(
-        points[order], weights[order], points[judged], boxes.number[judged], boxes.offsets,
-        boxes.shape, radius, values, spread,
-    )  # fmt: skip
+    boxes, spread = _boxes(points, weights, radius), np.zeros((len(points), values.shape[1]))
+    _share(boxes, points[judged], boxes.number[judged], values, spread)
     result = np.empty_like(spread)
-    result[order] = spread
+    result[boxes.order] = spread
     return result
 
 
 class _Boxes(NamedTuple):
-    """Points in boxes of a grid: order, number of the box of each, where each box begins."""
+    """Points in boxes of a grid, whose size is the radius of the ball.
 
+    `points` (n, 3), mm, and `weights` (n,) in the order of the boxes, `order` (n,); `number` (n,)
+    of the box of each in the order that they were given in; `offsets` where each box begins;
+    `shape` (3,), boxes along each axis, numbered with the last axis fastest.
+    """
+
+    points: FloatArray
+    weights: FloatArray
     order: IntArray
     number: IntArray
     offsets: IntArray
     shape: IntArray
+    radius: float
 
 
-def _boxes(points: FloatArray, size: float) -> _Boxes:
+def _boxes(points: FloatArray, weights: FloatArray, size: float) -> _Boxes:
     """Sort points into boxes of a given size, with a margin of empty boxes on every side."""
     first = points.min(axis=0)
     box = np.floor((points - first) / size).astype(np.int64) + 1
@@ -83,49 +83,56 @@ def _boxes(points: FloatArray, size: float) -> _Boxes:
     number = (box[:, 0] * shape[1] + box[:, 1]) * shape[2] + box[:, 2]
     order = np.argsort(number, kind="stable")
     offsets = np.searchsorted(number[order], np.arange(int(np.prod(shape)) + 1))
-    return _Boxes(order, number, offsets, shape)
+    return _Boxes(points[order], weights[order], order, number, offsets, shape, float(size))
 
 
 @njit(cache=True)
-def _average(points, values, weights, centres, box, offsets, shape, radius, result):  # type: ignore[no-untyped-def]  # pragma: no cover
-    columns = values.shape[1]
+def _gather(
+    boxes: _Boxes, centre: FloatArray, box: int, inside: IntArray
+) -> int:  # pragma: no cover
+    """Write the points in the ball round a centre, which lies in a box; return their number."""
+    points, shape, offsets = boxes.points, boxes.shape, boxes.offsets
+    count, square = 0, boxes.radius * boxes.radius
+    for i in range(-1, 2):
+        for j in range(-1, 2):
+            # The three boxes beside each other along the last axis follow one another.
+            row = box + (i * shape[1] + j) * shape[2]
+            for p in range(offsets[row - 1], offsets[row + 2]):
+                x = points[p, 0] - centre[0]
+                y = points[p, 1] - centre[1]
+                z = points[p, 2] - centre[2]
+                if x * x + y * y + z * z <= square:
+                    inside[count] = p
+                    count += 1
+    return count
+
+
+@njit(cache=True)
+def _average(
+    boxes: _Boxes, values: FloatArray, centres: FloatArray, box: IntArray, result: FloatArray
+) -> None:  # pragma: no cover
+    weights, inside = boxes.weights, np.empty(len(boxes.points), np.int64)
     for k in range(len(centres)):
         weight = 0.0
-        for i in range(-1, 2):
-            for j in range(-1, 2):
-                row = box[k] + (i * shape[1] + j) * shape[2]
-                for p in range(offsets[row - 1], offsets[row + 2]):
-                    if _near(points, p, centres, k, radius):
-                        for c in range(columns):
-                            result[k, c] += weights[p] * values[p, c]
-                        weight += weights[p]
-        for c in range(columns):
+        for q in range(_gather(boxes, centres[k], box[k], inside)):
+            p = inside[q]
+            for c in range(values.shape[1]):
+                result[k, c] += weights[p] * values[p, c]
+            weight += weights[p]
+        for c in range(values.shape[1]):
             result[k, c] /= weight
 
 
 @njit(cache=True)
-def _share(points, weights, centres, box, offsets, shape, radius, values, result):  # type: ignore[no-untyped-def]  # pragma: no cover
-    columns = values.shape[1]
-    inside = np.empty(len(points), np.int64)
+def _share(
+    boxes: _Boxes, centres: FloatArray, box: IntArray, values: FloatArray, result: FloatArray
+) -> None:  # pragma: no cover
+    weights, inside = boxes.weights, np.empty(len(boxes.points), np.int64)
     for k in range(len(centres)):
-        weight, count = 0.0, 0
-        for i in range(-1, 2):
-            for j in range(-1, 2):
-                row = box[k] + (i * shape[1] + j) * shape[2]
-                for p in range(offsets[row - 1], offsets[row + 2]):
-                    if _near(points, p, centres, k, radius):
-                        inside[count] = p
-                        count += 1
-                        weight += weights[p]
+        count, weight = _gather(boxes, centres[k], box[k], inside), 0.0
+        for q in range(count):
+            weight += weights[inside[q]]
         for q in range(count):
             share = weights[inside[q]] / weight
-            for c in range(columns):
+            for c in range(values.shape[1]):
                 result[inside[q], c] += share * values[k, c]
-
-
-@njit(cache=True)
-def _near(points, p, centres, k, radius):  # type: ignore[no-untyped-def]  # pragma: no cover
-    x = points[p, 0] - centres[k, 0]
-    y = points[p, 1] - centres[k, 1]
-    z = points[p, 2] - centres[k, 2]
-    return x * x + y * y + z * z <= radius * radius
