@@ -1,5 +1,7 @@
 """Points in cones: a print head is taken as a cone above its tip."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
@@ -79,25 +81,49 @@ def _in_cones(
         off = np.linalg.norm(points - np.repeat(centre, size, axis=0), axis=1)
         radius = np.maximum.reduceat(off, first)
     half = np.radians(half_angle)
-    tips_inside = _point_in_cones(
-        *(seen_only(np.asarray(values, dtype=np.float64)) for values in (tips, axes, points)),
+    cones = _Cones(
+        *(seen_only(np.asarray(values, dtype=np.float64)) for values in (tips, axes)),
         seen_only(np.asarray(when, dtype=np.int64)),
+        float(np.cos(half)),
+        float(np.sin(half)),
+        float(length),
+    )
+    blocks = _Blocks(
+        seen_only(np.asarray(points, dtype=np.float64)),
         ends.astype(np.int64),
         seen_only(np.asarray(group[first], dtype=np.int64)),
         centre,
         radius,
-        np.array([np.cos(half), np.sin(half), length]),
-        columns,
     )
-    return np.asarray(tips_inside)
+    return np.asarray(_point_in_cones(cones, blocks, columns))
+
+
+class _Cones(NamedTuple):
+    """Tips and unit axes (n, 3), the steps (n,) that count before, half angle and height, mm."""
+
+    tips: FloatArray
+    axes: FloatArray
+    when: IntArray
+    cosine: float
+    sine: float
+    length: float
+
+
+class _Blocks(NamedTuple):
+    """Points (p, 3) in blocks: their ends (b + 1,), groups (b,) and bounding spheres."""
+
+    points: FloatArray
+    ends: IntArray
+    group: IntArray
+    centre: FloatArray
+    radius: FloatArray
 
 
 @njit(cache=True, nogil=True)
-def _point_in_cones(  # type: ignore[no-untyped-def]
-    tips, axes, points, when, ends, group, centre, radius, cone, columns
-):  # pragma: no cover, compiled
-    """Do the same number by number."""
-    cosine, sine, length = cone[0], cone[1], cone[2]
+def _point_in_cones(cones: _Cones, blocks: _Blocks, columns: int) -> IntArray:  # pragma: no cover
+    """Point in each cone (n, columns), of each group; or (n, 1), of all, without columns."""
+    tips, axes, when, cosine, sine, length = cones
+    points, ends, group, centre, radius = blocks
     inside = np.full((len(tips), max(columns, 1)), -1)
     for k in range(len(tips)):
         for b in range(len(group)):
@@ -106,25 +132,29 @@ def _point_in_cones(  # type: ignore[no-untyped-def]
             g = group[b] if columns else 0
             if inside[k, g] >= 0:
                 continue
-            a = centre[b, 0] - tips[k, 0]
-            c = centre[b, 1] - tips[k, 1]
-            d = centre[b, 2] - tips[k, 2]
-            up = a * axes[k, 0] + c * axes[k, 1] + d * axes[k, 2]
+            # The sphere of the block first: above and beside the cone, and below its tip.
+            up, square = _height_in(tips, axes, k, centre, b)
             if up < -radius[b] or up > length + radius[b]:
                 continue
-            side = np.sqrt(max(a * a + c * c + d * d - up * up, 0.0))
+            side = np.sqrt(max(square - up * up, 0.0))
             if side * cosine - up * sine > radius[b]:
                 continue
             for p in range(ends[b], ends[b + 1]):
-                a = points[p, 0] - tips[k, 0]
-                c = points[p, 1] - tips[k, 1]
-                d = points[p, 2] - tips[k, 2]
-                up = a * axes[k, 0] + c * axes[k, 1] + d * axes[k, 2]
-                if up <= 0.0 or up > length:
-                    continue
-                if (a * a + c * c + d * d) * cosine * cosine < up * up:
+                up, square = _height_in(tips, axes, k, points, p)
+                if 0.0 < up <= length and square * cosine * cosine < up * up:
                     inside[k, g] = p
                     break
             if columns == 0 and inside[k, 0] >= 0:
                 break
     return inside
+
+
+@njit(cache=True, nogil=True)
+def _height_in(
+    tips: FloatArray, axes: FloatArray, k: int, points: FloatArray, p: int
+) -> tuple[float, float]:  # pragma: no cover
+    """Height of a point above the tip of a cone, along its axis, and its squared distance."""
+    a = points[p, 0] - tips[k, 0]
+    b = points[p, 1] - tips[k, 1]
+    c = points[p, 2] - tips[k, 2]
+    return a * axes[k, 0] + b * axes[k, 1] + c * axes[k, 2], a * a + b * b + c * c

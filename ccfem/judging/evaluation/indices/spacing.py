@@ -1,12 +1,13 @@
 """How far neighbouring strands lie apart."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray
-from ccfem.geometry.buckets import bucket
+from ccfem.geometry.buckets import Buckets, bucket
 from ccfem.geometry.polylines import arc_lengths, sample_midpoints, starts_segment, subdivide
 from ccfem.judging.evaluation.column import Column
 from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
@@ -76,30 +77,37 @@ def sample_spacing(paths: PlanePaths, width: float) -> SpacingSamples:
     owner = np.repeat(np.arange(len(paths)), np.diff(offsets))[start]
     grid = bucket(ends.min(axis=1), ends.max(axis=1), width)
     period = np.where(paths.closed, paths.lengths, np.inf)
-    distance = _nearest(
-        *grid, ends, along[start], along[start + 1], owner, points, line, position, period, reach
-    )
-    return SpacingSamples(distance, length)
+    strands = _Pieces(grid, ends, along[start], along[start + 1], owner, period)
+    return SpacingSamples(_nearest(strands, points, line, position, reach), length)
+
+
+class _Pieces(NamedTuple):
+    """Pieces of paths to be near to.
+
+    `grid` of the pieces; their `ends` (k, 2, 2), mm; the arc length of their path at the first end,
+    `along` (k,), and at the second, `along_end` (k,); the path of each, `owner` (k,); and the
+    `period` of the paths (n,): their length where they are closed, else infinite.
+    """
+
+    grid: Buckets
+    ends: FloatArray
+    along: FloatArray
+    along_end: FloatArray
+    owner: IntArray
+    period: FloatArray
 
 
 @njit(cache=True, nogil=True)
 def _nearest(
-    origin: FloatArray,
-    cell: float,
-    shape: IntArray,
-    starts: IntArray,
-    items: IntArray,
-    ends: FloatArray,
-    along: FloatArray,
-    along_end: FloatArray,
-    owner: IntArray,
-    points: FloatArray,
-    line: IntArray,
-    position: FloatArray,
-    period: FloatArray,
-    reach: float,
+    pieces: _Pieces, points: FloatArray, line: IntArray, position: FloatArray, reach: float
 ) -> FloatArray:
-    """Distance, at most `reach`, from each sample to the nearest piece, own ones beyond `reach`."""
+    """Distance (s,) from each sample to the nearest piece, at most `reach`.
+
+    `points` (s, 2), `line` and `position` (s,) are the places of the samples, their paths and the
+    arc lengths there. Pieces of their own paths count from `reach` of arc on.
+    """
+    grid, ends, along, along_end, owner, period = pieces
+    origin, cell, shape, starts, items = grid
     distance = np.empty(len(points))
     for q in range(len(points)):
         x, y = points[q, 0], points[q, 1]
@@ -116,23 +124,13 @@ def _nearest(
                     for item in range(starts[i * shape[1] + j], starts[i * shape[1] + j + 1]):
                         k = items[item]
                         low, high = 0.0, 1.0
-                        ax, ay = ends[k, 0, 0], ends[k, 0, 1]
-                        dx, dy = ends[k, 1, 0] - ax, ends[k, 1, 1] - ay
                         if owner[k] == line[q]:
-                            # Keep the part of the piece that is far enough along the path.
-                            size = along_end[k] - along[k]
-                            apart = along[k] - position[q]
-                            if np.isfinite(period[line[q]]):
-                                apart -= period[line[q]] * np.floor(apart / period[line[q]])
-                                low = (reach - apart) / size
-                                high = (period[line[q]] - reach - apart) / size
-                            elif apart >= 0.0:
-                                low = (reach - apart) / size
-                            else:
-                                high = (-reach - apart) / size
-                            low, high = max(low, 0.0), min(high, 1.0)
+                            apart, size = along[k] - position[q], along_end[k] - along[k]
+                            low, high = _far_along(apart, size, period[line[q]], reach)
                             if low > high:
                                 continue
+                        ax, ay = ends[k, 0, 0], ends[k, 0, 1]
+                        dx, dy = ends[k, 1, 0] - ax, ends[k, 1, 1] - ay
                         t = ((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy)
                         t = min(max(t, low), high)
                         ex, ey = ax + t * dx - x, ay + t * dy - y
@@ -140,6 +138,23 @@ def _nearest(
             ring += 1
         distance[q] = np.sqrt(best)
     return distance
+
+
+@njit(cache=True, nogil=True)
+def _far_along(apart: float, size: float, period: float, reach: float) -> tuple[float, float]:
+    """Shares of a piece between which it is farther than `reach` along its path from a place.
+
+    It begins `apart` beyond the place, and has the length `size`; a closed path has a period.
+    """
+    low, high = 0.0, 1.0
+    if np.isfinite(period):
+        apart -= period * np.floor(apart / period)
+        low, high = (reach - apart) / size, (period - reach - apart) / size
+    elif apart >= 0.0:
+        low = (reach - apart) / size
+    else:
+        high = (-reach - apart) / size
+    return max(low, 0.0), min(high, 1.0)
 
 
 def spacing_indices(samples: SpacingSamples, machine: Machine) -> dict[str, float]:
