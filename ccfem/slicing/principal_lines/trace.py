@@ -234,22 +234,24 @@ def _dot(a: _Vector, b: _Vector) -> float:
 
 
 @njit(cache=True, nogil=True)
-def _gradient(field: _Field, cell: int, corner: int) -> _Vector:
-    g = field.gradient
-    return g[cell, corner, 0], g[cell, corner, 1], g[cell, corner, 2]
+def _vector(gradient: FloatArray, cell: int, corner: int) -> _Vector:
+    return gradient[cell, corner, 0], gradient[cell, corner, 1], gradient[cell, corner, 2]
 
 
-@njit(cache=True, nogil=True)
-def _heading(field: _Field, cell: int, entry: int, before: _Vector) -> _Vector:
+# The two that follow are inlined into the walk: a tenth of its time (measured).
+@njit(cache=True, nogil=True, inline="always")
+def _heading(
+    direction: FloatArray, gradient: FloatArray, cell: int, entry: int, before: _Vector
+) -> _Vector:
     """Direction of a line in a cell that it enters across from a corner; zero where it has none."""
-    x, y, z = field.direction[cell, 0], field.direction[cell, 1], field.direction[cell, 2]
+    x, y, z = direction[cell, 0], direction[cell, 1], direction[cell, 2]
     along = _dot((x, y, z), before)
     # Directions have no sign: of the two senses, that which turns the line less.
     if along < 0.0:
         x, y, z, along = -x, -y, -z, -along
     if entry < 0:
         return x, y, z
-    g = _gradient(field, cell, entry)
+    g = _vector(gradient, cell, entry)
     inward = _dot(g, (x, y, z))
     if inward > 0.0:
         return x, y, z
@@ -265,19 +267,20 @@ def _heading(field: _Field, cell: int, entry: int, before: _Vector) -> _Vector:
     return x / size, y / size, z / size
 
 
-@njit(cache=True, nogil=True)
-def _exit(field: _Field, cell: int, entry: int, at: _Vector, way: _Vector) -> tuple[int, float]:
+@njit(cache=True, nogil=True, inline="always")
+def _exit(
+    centre: FloatArray, gradient: FloatArray, cell: int, entry: int, at: _Vector, way: _Vector
+) -> tuple[int, float]:
     """Corner across from which a line leaves a cell, and the length to there.
 
     Barycentric coordinates are 1/4 at the centre and fall linearly; the first to reach 0 decides.
     """
-    c = field.centre
-    off = at[0] - c[cell, 0], at[1] - c[cell, 1], at[2] - c[cell, 2]
+    off = at[0] - centre[cell, 0], at[1] - centre[cell, 1], at[2] - centre[cell, 2]
     leaving, step = -1, np.inf
     for corner in range(4):
         if corner == entry:
             continue
-        g = _gradient(field, cell, corner)
+        g = _vector(gradient, cell, corner)
         fall = -_dot(g, way)
         if fall > 0.0:
             length = max(0.25 + _dot(g, off), 0.0) / fall
@@ -295,7 +298,7 @@ def _walk(seed: int, sense: float, field: _Field, mark: int, half: _Half) -> tup
     and the reason of the end.
     """
     stamp, cells, points = half
-    centre, direction = field.centre, field.direction
+    direction, across, centre, gradient, longest = field
     x, y, z = centre[seed, 0], centre[seed, 1], centre[seed, 2]
     way = sense * direction[seed, 0], sense * direction[seed, 1], sense * direction[seed, 2]
     cell, entry, number, length = seed, -1, 0, 0.0
@@ -304,18 +307,18 @@ def _walk(seed: int, sense: float, field: _Field, mark: int, half: _Half) -> tup
         stamp[cell] = mark
         cells[number] = cell
         number += 1
-        way = _heading(field, cell, entry, way)
+        way = _heading(direction, gradient, cell, entry, way)
         step = 0.0
         if way != (0.0, 0.0, 0.0):
-            leaving, step = _exit(field, cell, entry, (x, y, z), way)
+            leaving, step = _exit(centre, gradient, cell, entry, (x, y, z), way)
         x, y, z = x + step * way[0], y + step * way[1], z + step * way[2]
         length += step
         points[number, 0], points[number, 1], points[number, 2] = x, y, z
         if way == (0.0, 0.0, 0.0):
             return number, length, NO_DIRECTION
-        if length > field.longest:
+        if length > longest:
             return number, length, TOO_LONG
-        following = field.across[cell, leaving]
+        following = across[cell, leaving]
         if following < 0:
             return number, length, BOUNDARY
         if stamp[following] == mark:
@@ -323,7 +326,7 @@ def _walk(seed: int, sense: float, field: _Field, mark: int, half: _Half) -> tup
         if number >= _MOST:
             return number, length, TOO_MANY
         entry = 0
-        while field.across[following, entry] != cell:
+        while across[following, entry] != cell:
             entry += 1
         cell = following
 
