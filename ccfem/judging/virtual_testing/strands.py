@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -236,19 +236,33 @@ def cut_steps(start: FloatArray, step: FloatArray, length: FloatArray, mesh: Tet
     room = 4 * len(start) + 1024
     while True:
         whole, real = np.empty((room, 2), dtype=np.int64), np.empty((room, 3))
-        count = _cut(start, step, length, *tables, whole, real)
+        count = _cut(start, step, length, tables, whole, real)
         if count <= room:
             return CutSteps(*whole[:count].T, *real[:count].T)
         room = count
 
 
-def _tables(mesh: TetMesh) -> tuple[Any, ...]:
+class _Tables(NamedTuple):
+    """A mesh as steps are cut in it; its cells are numbered from 0 to m.
+
+    `origin` (m, 3) are the first corners, `gradient` (m, 3, 3) those of the barycentric coordinates
+    of the others, 1/mm, `across` (m, 4) the cells across from the corners, and `grid` has the cells
+    by the boxes that each may touch.
+    """
+
+    origin: FloatArray
+    gradient: FloatArray
+    across: IntArray
+    grid: Buckets
+
+
+def _tables(mesh: TetMesh) -> _Tables:
     """Return the tables of a mesh that `_cut` uses; the mesh stores them."""
     known = mesh.__dict__
     if "cut_tables" not in known:
         across = np.ascontiguousarray(mesh.across)
-        known["cut_tables"] = (*_barycentric(mesh), across, *_grid(mesh))
-    tables: tuple[Any, ...] = known["cut_tables"]
+        known["cut_tables"] = _Tables(*_barycentric(mesh), across, _grid(mesh))
+    tables: _Tables = known["cut_tables"]
     return tables
 
 
@@ -272,10 +286,14 @@ def _grid(mesh: TetMesh) -> Buckets:
 
 
 @njit(cache=True)
-def _cut(  # type: ignore[no-untyped-def]
-    start, step, length, origin, gradient, across, first, spacing, shape, offsets, candidates,
-    whole, real,
-):  # fmt: skip  # pragma: no cover
+def _cut(
+    start: FloatArray,
+    step: FloatArray,
+    length: FloatArray,
+    tables: _Tables,
+    whole: IntArray,
+    real: FloatArray,
+) -> int:  # pragma: no cover
     """Write the pieces and return their number, which may exceed the room given.
 
     `whole` takes segment and cell; `real` takes begin, end (parameters in [0, 1]) and share. A step
@@ -283,11 +301,12 @@ def _cut(  # type: ignore[no-untyped-def]
     tested.
     """
     count, last = 0, -1
-    cells_met = np.empty(len(origin), dtype=np.int64)
-    ends = np.empty(2 * len(origin) + 1)
+    met = np.empty(len(tables.origin), dtype=np.int64)
+    ends = np.empty(2 * len(tables.origin) + 1)
     point, leap, middle = np.empty(3), np.empty(3), np.empty(3)
     for s in range(len(start)):
-        steps = int(np.ceil(length[s] / spacing))
+        # Parts no longer than a box of the grid, which then has few cells to test.
+        steps = int(np.ceil(length[s] / tables.grid.cell))
         for part in range(steps):
             t0, t1 = part / steps, (part + 1) / steps
             for i in range(3):
@@ -295,43 +314,38 @@ def _cut(  # type: ignore[no-untyped-def]
                 leap[i] = (t1 - t0) * step[s, i]
             passed = 0
             if last >= 0:
-                passed = _walk(point, leap, last, origin, gradient, across, cells_met, ends)
+                passed = _walk(point, leap, last, tables, met, ends)
             u0 = 0.0
             for e in range(passed):
                 begin, end = t0 + u0 * (t1 - t0), t0 + ends[e] * (t1 - t0)
-                u0, last = ends[e], cells_met[e]
+                u0, last = ends[e], met[e]
                 count = _write(whole, real, count, s, last, begin, end)
             if passed:
                 continue
-            number, size = _touching(
-                point, leap, origin, gradient, first, spacing, shape, offsets, candidates,
-                cells_met, ends,
-            )  # fmt: skip
+            number, size = _touching(point, leap, tables, met, ends)
             u0 = 0.0
             for e in range(size):
                 u1 = ends[e]
                 if u1 - u0 < _SLIVER:
                     continue
+                # The piece up to here belongs, in equal shares, to all cells that hold its middle.
                 for i in range(3):
                     middle[i] = point[i] + 0.5 * (u0 + u1) * leap[i]
-                number = _complete(
-                    middle, origin, gradient, first, spacing, shape, offsets, candidates, cells_met,
-                    number,
-                )  # fmt: skip
+                number = _complete(middle, tables, met, number)
                 sharing = 0
                 for f in range(number):
-                    if _least(middle, origin, gradient, cells_met[f]) >= -_TOUCH:
-                        cells_met[sharing], cells_met[f] = cells_met[f], cells_met[sharing]
+                    if _least(middle, tables.origin, tables.gradient, met[f]) >= -_TOUCH:
+                        met[sharing], met[f] = met[f], met[sharing]
                         sharing += 1
                 begin, end = t0 + u0 * (t1 - t0), t0 + u1 * (t1 - t0)
                 u0 = u1
                 if sharing == 1:
-                    last = cells_met[0]
+                    last = met[0]
                     count = _write(whole, real, count, s, last, begin, end)
                     continue
                 for f in range(sharing):
                     if count < len(whole):
-                        whole[count, 0], whole[count, 1] = s, cells_met[f]
+                        whole[count, 0], whole[count, 1] = s, met[f]
                         real[count, 0], real[count, 1] = begin, end
                         real[count, 2] = 1.0 / sharing
                     count += 1
@@ -339,7 +353,15 @@ def _cut(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _write(whole, real, count, segment, cell, begin, end):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _write(
+    whole: IntArray,
+    real: FloatArray,
+    count: int,
+    segment: int,
+    cell: int,
+    begin: float,
+    end: float,
+) -> int:  # pragma: no cover
     """Write a piece inside a cell, or make the last one longer; return the number of pieces."""
     old = min(count, len(whole)) - 1
     if (
@@ -355,14 +377,23 @@ def _write(whole, real, count, segment, cell, begin, end):  # type: ignore[no-un
 
 
 @njit(cache=True)
-def _walk(point, step, cell, origin, gradient, across, cells_met, ends):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _walk(
+    point: FloatArray,
+    step: FloatArray,
+    cell: int,
+    tables: _Tables,
+    met: IntArray,
+    ends: FloatArray,
+) -> int:  # pragma: no cover
     """Write the cells that a step passes, and where it leaves each; return the number of cells.
 
     The number is 0 where the step comes near an edge, runs along a face, or leaves the mesh.
     """
+    origin, gradient, across, _ = tables
     value, slope = np.empty(4), np.empty(4)  # of the barycentric coordinates, the first one last
     number, here = 0, 0.0
-    for _ in range(len(cells_met)):
+    for _ in range(len(met)):
+        # Barycentric coordinates along the step: value + u slope.
         value[3], slope[3] = 1.0, 0.0
         for i in range(3):
             a, b = 0.0, 0.0
@@ -372,6 +403,7 @@ def _walk(point, step, cell, origin, gradient, across, cells_met, ends):  # type
             value[i], slope[i] = a, b
             value[3] -= a
             slope[3] -= b
+        # The step is inside where none of them is negative; one that falls to 0 is left across.
         begin, end, leaves = 0.0, 1.0, -1
         for i in range(4):
             if slope[i] > 0.0:
@@ -380,6 +412,7 @@ def _walk(point, step, cell, origin, gradient, across, cells_met, ends):  # type
                 end, leaves = -value[i] / slope[i], i
         if abs(begin - here) > _SLIVER:
             return 0
+        # Two coordinates near 0 at an end: it is near an edge, where other cells touch too.
         counts = end - here >= _SLIVER
         near, off = 0, 0
         for i in range(4):
@@ -394,7 +427,7 @@ def _walk(point, step, cell, origin, gradient, across, cells_met, ends):  # type
         if counts:
             if number:
                 ends[number - 1] = min(here, begin)
-            cells_met[number], ends[number] = cell, end
+            met[number], ends[number] = cell, end
             number += 1
             here = end
         if leaves < 0 or 1.0 - end < _SLIVER:
@@ -406,7 +439,9 @@ def _walk(point, step, cell, origin, gradient, across, cells_met, ends):  # type
 
 
 @njit(cache=True)
-def _least(point, origin, gradient, cell):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _least(
+    point: FloatArray, origin: FloatArray, gradient: FloatArray, cell: int
+) -> float:  # pragma: no cover
     """Smallest barycentric coordinate of a point."""
     rest, least = 1.0, 1.0
     for i in range(3):
@@ -419,35 +454,38 @@ def _least(point, origin, gradient, cell):  # type: ignore[no-untyped-def]  # pr
 
 
 @njit(cache=True)
-def _complete(  # type: ignore[no-untyped-def]
-    point, origin, gradient, first, spacing, shape, offsets, candidates, cells_met, number
-):  # pragma: no cover
+def _complete(
+    point: FloatArray, tables: _Tables, met: IntArray, number: int
+) -> int:  # pragma: no cover
     """Add the cells that hold a point where rounding hid all of them; return the new number."""
+    origin, gradient, _, grid = tables
     for f in range(number):
-        if _least(point, origin, gradient, cells_met[f]) >= -_TOUCH:
+        if _least(point, origin, gradient, met[f]) >= -_TOUCH:
             return number
     box = 0
     for i in range(3):
-        at = int(np.floor((point[i] - first[i]) / spacing))
-        if at < 0 or at >= shape[i]:
+        at = int(np.floor((point[i] - grid.origin[i]) / grid.cell))
+        if at < 0 or at >= grid.shape[i]:
             return number
-        box = box * shape[i] + at
-    for c in range(offsets[box + 1] - 1, offsets[box] - 1, -1):
-        if _least(point, origin, gradient, candidates[c]) >= -_TOUCH:
-            cells_met[number] = candidates[c]
+        box = box * grid.shape[i] + at
+    for c in range(grid.starts[box + 1] - 1, grid.starts[box] - 1, -1):
+        if _least(point, origin, gradient, grid.items[c]) >= -_TOUCH:
+            met[number] = grid.items[c]
             number += 1
     return number
 
 
 @njit(cache=True)
-def _touching(  # type: ignore[no-untyped-def]
-    point, step, origin, gradient, first, spacing, shape, offsets, candidates, cells_met, ends
-):  # pragma: no cover
+def _touching(
+    point: FloatArray, step: FloatArray, tables: _Tables, met: IntArray, ends: FloatArray
+) -> tuple[int, int]:  # pragma: no cover
     """Cells that a step touches, and the sorted parameters of entry and exit, with 1."""
+    origin, gradient, _, grid = tables
+    corner, spacing, shape, offsets, candidates = grid
     low = np.empty(3, dtype=np.int64)
     high = np.empty(3, dtype=np.int64)
     for i in range(3):
-        a = (point[i] - first[i]) / spacing
+        a = (point[i] - corner[i]) / spacing
         b = a + step[i] / spacing
         low[i] = max(int(np.floor(min(a, b))), 0)
         high[i] = min(int(np.floor(max(a, b))) + 1, shape[i])
@@ -462,11 +500,12 @@ def _touching(  # type: ignore[no-untyped-def]
                     u0, u1 = _inside(point, step, origin, gradient, cell)
                     known = u1 - u0 < _SLIVER
                     for f in range(number):
-                        known = known or cells_met[f] == cell
+                        known = known or met[f] == cell
                     if known:
                         continue
-                    cells_met[number] = cell
+                    met[number] = cell
                     number += 1
+                    # Insertion keeps the parameters sorted: there are few.
                     for u in (u0, u1):
                         at = size
                         while at > 0 and ends[at - 1] > u:
@@ -478,7 +517,9 @@ def _touching(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _inside(point, step, origin, gradient, cell):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _inside(
+    point: FloatArray, step: FloatArray, origin: FloatArray, gradient: FloatArray, cell: int
+) -> tuple[float, float]:  # pragma: no cover
     """Interval of parameters in [0, 1] within which a step is inside a cell."""
     u0, u1, rest, change = 0.0, 1.0, 1.0, 0.0
     for i in range(4):
