@@ -14,14 +14,14 @@ import numpy as np
 import shapely
 from numba import njit
 
-from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.checks import check_fields, check_number
 from ccfem.base.errors import InputError
 from ccfem.base.tensor import in_plane, strongest_in_plane
 from ccfem.geometry.section_grid import SectionGrid, contains, section_grid
 from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
-from ccfem.paths.fields.streamlines import direction_at, line_field, streamline_step
+from ccfem.paths.fields.streamlines import LineField, direction_at, line_field, streamline_step
 from ccfem.paths.planning.infill import SPACING, check_fill, long_enough
 from ccfem.paths.planning.strategy import Amount
 from ccfem.paths.toolpaths import Toolpaths
@@ -149,18 +149,17 @@ def evenly_spaced_streamlines(
             "mm^2: choose a larger one"
         )
     grid = section_grid(region, 2.0 * separation)
-    traced, spans, closed = _lay(
+    section = _Section(
         line_field(points, triangles, plane_stress, _EVENLY_LEAST),
         grid,
-        _empty(grid, separation, int(room)),
-        middles[seeds],
-        seeds,
         np.asarray(region.centroid.coords[0]),
-        separation,
+        float(separation),
         closest * separation,
         step,
-        max(least_length, separation),
+        float(max(least_length, separation)),
     )
+    placed = _empty(grid, separation, int(room))
+    traced, spans, closed = _lay(section, placed, middles[seeds], seeds)
     lines = []
     for (start, turn, end), ring in zip(spans, closed, strict=True):
         ahead, back = traced[start:turn], traced[turn:end]
@@ -168,11 +167,28 @@ def evenly_spaced_streamlines(
     return lines
 
 
-class _Laid(NamedTuple):
+class _Section(NamedTuple):
+    """Where lines run, and how far apart, mm.
+
+    They keep `closest` from each other, begin `separation` apart, have points a `step` apart and
+    are no shorter than `least`; `centre` (2,) says which way those from triangles run first.
+    """
+
+    field: LineField
+    grid: SectionGrid
+    centre: FloatArray
+    separation: float
+    closest: float
+    step: float
+    least: float
+
+
+class _Placed(NamedTuple):
     """Points of lines, sorted into the cells of a grid.
 
-    For each point: place, unit direction, triangle, arc length from the seed (negative behind it),
-    line, and the previous point in the same cell.
+    For each point: place `spot` (p, 2), unit direction `way` (p, 2), triangle `home`, arc length
+    `along` from the seed (negative behind it), `line`, and the previous point in the same cell,
+    `following`; `head` (nx, ny) is the last point of each cell.
     """
 
     spot: FloatArray
@@ -186,10 +202,10 @@ class _Laid(NamedTuple):
     cell: float
 
 
-def _empty(grid: SectionGrid, cell: float, room: int) -> _Laid:
+def _empty(grid: SectionGrid, cell: float, room: int) -> _Placed:
     extent = np.array(grid.room.shape) * grid.cell
     nx, ny = (np.floor(extent / cell) + 1).astype(int)
-    return _Laid(
+    return _Placed(
         np.empty((room, 2)),
         np.empty((room, 2)),
         np.empty(room, np.int64),
@@ -203,13 +219,16 @@ def _empty(grid: SectionGrid, cell: float, room: int) -> _Laid:
 
 
 @njit(cache=True, nogil=True)
-def _lay(field, grid, placed, seeds, homes, centre, apart, test, step, least):  # type: ignore[no-untyped-def]
+def _lay(
+    section: _Section, placed: _Placed, seeds: FloatArray, homes: IntArray
+) -> tuple[FloatArray, IntArray, BoolArray]:
     """Points of all lines, their (start, turn, end) among these, and whether each is closed.
 
     From start to turn the points run ahead of the seed, from turn to end back from it. Ahead is the
     direction of the line beside which a line begins, or else away from the centre, so that the
     order of lines does not depend on the orientation of the part.
     """
+    _, grid, centre, apart, _, step, least = section
     way = np.zeros(2)
     spans = np.empty((len(placed.line) // 4, 3), np.int64)
     closed = np.zeros(len(spans), np.bool_)
@@ -234,7 +253,7 @@ def _lay(field, grid, placed, seeds, homes, centre, apart, test, step, least):  
         taken = _crowded(placed, x, y, no_line, 0.0, apart * (1.0 - _SLACK), homing)
         if taken or not contains(grid, x, y):
             continue
-        turn, end, ring = _trace(field, grid, placed, count, lines, x, y, way, home, test, step)
+        turn, end, ring = _trace(section, placed, count, lines, (x, y), way, home)
         if (end - count) * step < least:
             _take_back(placed, count, end)
             continue
@@ -246,16 +265,27 @@ def _lay(field, grid, placed, seeds, homes, centre, apart, test, step, least):  
 
 
 @njit(cache=True, nogil=True)
-def _trace(field, grid, placed, first, number, x0, y0, way, home, test, step):  # type: ignore[no-untyped-def]
+def _trace(
+    section: _Section,
+    placed: _Placed,
+    first: int,
+    number: int,
+    seed: tuple[float, float],
+    way: FloatArray,
+    home: int,
+) -> tuple[int, int, bool]:
     """Add points of a line from its seed ahead and back; return both ends, and if it is closed.
 
     The numbers of the points start at `first`; ahead is roughly along `way`.
     """
+    field, grid, _, _, closest, step, _ = section
+    x0, y0 = seed
     dx, dy, home, fine = direction_at(field, home, x0, y0, -1.0, way)
     count = first
     if not fine:
         return count, count, False
-    _add(placed, count, x0, y0, dx, dy, home, 0.0, number)
+    way[0], way[1] = dx, dy
+    _add(placed, count, seed, way, home, 0.0, number)
     count += 1
     turn = count
     for sense in (1.0, -1.0):
@@ -269,13 +299,13 @@ def _trace(field, grid, placed, first, number, x0, y0, way, home, test, step):  
             # Back at the seed from behind: the line is closed.
             ahead = (x0 - x) * way[0] + (y0 - y) * way[1]
             aside = abs((x0 - x) * way[1] - (y0 - y) * way[0])
-            homing = abs(along) > 4.0 * test and aside < 0.2 * test
-            homing = homing and -step < ahead < 2.0 * test
+            homing = abs(along) > 4.0 * closest and aside < 0.2 * closest
+            homing = homing and -step < ahead < 2.0 * closest
             if homing and ahead <= 0.5 * step and sense > 0.0:
                 return count, count, True
-            if _crowded(placed, x, y, number, along, test, homing):
+            if _crowded(placed, x, y, number, along, closest, homing):
                 break
-            _add(placed, count, x, y, way[0], way[1], cell, along, number)
+            _add(placed, count, (x, y), way, cell, along, number)
             count += 1
         if sense > 0.0:
             turn = count
@@ -283,22 +313,30 @@ def _trace(field, grid, placed, first, number, x0, y0, way, home, test, step):  
 
 
 @njit(cache=True, nogil=True)
-def _cell(placed, x, y):  # type: ignore[no-untyped-def]
+def _cell(placed: _Placed, x: float, y: float) -> tuple[int, int]:
     return int((x - placed.origin[0]) / placed.cell), int((y - placed.origin[1]) / placed.cell)
 
 
 @njit(cache=True, nogil=True)
-def _add(placed, p, x, y, dx, dy, home, along, number):  # type: ignore[no-untyped-def]
-    placed.spot[p, 0], placed.spot[p, 1] = x, y
-    placed.way[p, 0], placed.way[p, 1] = dx, dy
+def _add(
+    placed: _Placed,
+    p: int,
+    spot: tuple[float, float],
+    way: FloatArray,
+    home: int,
+    along: float,
+    number: int,
+) -> None:
+    placed.spot[p, 0], placed.spot[p, 1] = spot
+    placed.way[p, 0], placed.way[p, 1] = way[0], way[1]
     placed.home[p], placed.along[p], placed.line[p] = home, along, number
-    i, j = _cell(placed, x, y)
+    i, j = _cell(placed, spot[0], spot[1])
     placed.following[p] = placed.head[i, j]
     placed.head[i, j] = p
 
 
 @njit(cache=True, nogil=True)
-def _take_back(placed, first, end):  # type: ignore[no-untyped-def]
+def _take_back(placed: _Placed, first: int, end: int) -> None:
     """Remove the points that were added last."""
     for p in range(end - 1, first - 1, -1):
         i, j = _cell(placed, placed.spot[p, 0], placed.spot[p, 1])
@@ -306,7 +344,15 @@ def _take_back(placed, first, end):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _crowded(placed, x, y, number, along, limit, homing):  # type: ignore[no-untyped-def]
+def _crowded(
+    placed: _Placed,
+    x: float,
+    y: float,
+    number: int,
+    along: float,
+    limit: float,
+    homing: bool,
+) -> bool:
     """Whether a point of another line, or of another stretch of this one, is nearer than a limit.
 
     The stretch round the seed does not count for a line that returns to it. Line -1 has no points
