@@ -1,11 +1,12 @@
 """Strands kept apart: parts closer than a strand's width to a longer strand are cut away."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from ccfem.base.arrays import FloatArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.polylines import is_closed, line_length, pack, runs
 
 
@@ -40,8 +41,9 @@ def trim_to_clearance(
     low = points.min(axis=0)
     shape = ((points.max(axis=0) - low) / clearance).astype(np.int64) + 1
     keep = np.ones(len(points), dtype=bool)
-    head = np.full(int(shape.prod()), -1)
-    _lay(points, offsets, clearance, least_length, low, shape, head, keep)
+    head, following = np.full(int(shape.prod()), -1), np.empty(len(points), dtype=np.int64)
+    grid = _Grid(low, shape, float(clearance), head, following)
+    _clear(points, offsets, grid, float(least_length), keep)
     masks = np.split(keep, offsets[1:-1])
     kept: list[FloatArray] = []
     for line, mask in zip(ordered, masks, strict=True):
@@ -55,12 +57,27 @@ def trim_to_clearance(
     return [line for line in kept if line_length(line) >= least_length]
 
 
+class _Grid(NamedTuple):
+    """Points in cells as wide as the clearance, `low` (2,) the corner of the first, mm.
+
+    `shape` (2,) cells along each axis; `head` (c,) the last point in each cell, -1 for none, and
+    `following` (p,) the one before each point in its cell.
+    """
+
+    low: FloatArray
+    shape: IntArray
+    clearance: float
+    head: IntArray
+    following: IntArray
+
+
 @njit(cache=True, nogil=True)
-def _lay(points, offsets, clearance, least_length, low, shape, head, keep):  # type: ignore[no-untyped-def]
-    """Clear `keep` for points that are too near; `head` is the last point in each grid cell."""
+def _clear(
+    points: FloatArray, offsets: IntArray, grid: _Grid, least_length: float, keep: BoolArray
+) -> None:
+    """Clear `keep` (p,) for points that are too near to others."""
+    low, shape, clearance, head, following = grid
     count = len(points)
-    x0, y0, nx, ny = low[0], low[1], shape[0], shape[1]
-    following = np.empty(count, np.int64)
     along = np.zeros(count)
     line = np.zeros(count, np.int64)
     for k in range(len(offsets) - 1):
@@ -76,12 +93,15 @@ def _lay(points, offsets, clearance, least_length, low, shape, head, keep):  # t
         # would be too near to itself.
         waiting = first
         for p in range(first, last):
-            i, j = int((points[p, 0] - x0) / clearance), int((points[p, 1] - y0) / clearance)
+            i, j = (
+                int((points[p, 0] - low[0]) / clearance),
+                int((points[p, 1] - low[1]) / clearance),
+            )
             for cell in range(9):
                 a, b = i + cell // 3 - 1, j + cell % 3 - 1
-                if a < 0 or b < 0 or a >= nx or b >= ny:
+                if a < 0 or b < 0 or a >= shape[0] or b >= shape[1]:
                     continue
-                q = head[a * ny + b]
+                q = head[a * shape[1] + b]
                 while q >= 0 and keep[p]:
                     apart = along[p] - along[q]
                     if closed:
@@ -93,24 +113,30 @@ def _lay(points, offsets, clearance, least_length, low, shape, head, keep):  # t
                             keep[p] = False
                     q = following[q]
             while waiting < p and along[waiting] < along[p] - 2.0 * clearance:
-                _add(points, keep, waiting, head, following, x0, y0, clearance, ny)
+                _enter(points, keep, waiting, grid)
                 waiting += 1
         # Stretches too short to print must not displace others.
         _drop_short(keep, along, first, last, least_length, closed)
         for q in range(waiting, last):
-            _add(points, keep, q, head, following, x0, y0, clearance, ny)
+            _enter(points, keep, q, grid)
 
 
 @njit(cache=True, nogil=True)
-def _add(points, keep, p, head, following, x0, y0, size, ny):  # type: ignore[no-untyped-def]
+def _enter(points: FloatArray, keep: BoolArray, p: int, grid: _Grid) -> None:
+    """Put a point into its cell if it is kept."""
     if keep[p]:
-        cell = int((points[p, 0] - x0) / size) * ny + int((points[p, 1] - y0) / size)
-        following[p] = head[cell]
-        head[cell] = p
+        size = grid.clearance
+        i, j = int((points[p, 0] - grid.low[0]) / size), int((points[p, 1] - grid.low[1]) / size)
+        cell = i * grid.shape[1] + j
+        grid.following[p] = grid.head[cell]
+        grid.head[cell] = p
 
 
 @njit(cache=True, nogil=True)
-def _drop_short(keep, along, first, last, least_length, closed):  # type: ignore[no-untyped-def]
+def _drop_short(
+    keep: BoolArray, along: FloatArray, first: int, last: int, least_length: float, closed: bool
+) -> None:
+    """Drop stretches of a line shorter than a length; round a closed one they may go on."""
     start = -1
     for p in range(first, last + 1):
         if p < last and keep[p]:

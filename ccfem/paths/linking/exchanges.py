@@ -96,7 +96,9 @@ def greedy_order(clusters: Clusters) -> IntArray:
 
 
 @njit(cache=True, nogil=True)
-def _step(value, c, d, clusters, entry, out):  # type: ignore[no-untyped-def]
+def _step(
+    value: FloatArray, c: int, d: int, clusters: Clusters, entry: FloatArray, out: FloatArray
+) -> float:
     """Write costs of leaving cluster d to `out`, given those of leaving c; return the least."""
     links, visit, offsets, _, _ = clusters
     least = np.inf
@@ -114,7 +116,7 @@ def _step(value, c, d, clusters, entry, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _begin(c, clusters, out):  # type: ignore[no-untyped-def]
+def _begin(c: int, clusters: Clusters, out: FloatArray) -> float:
     """Write costs of leaving the first cluster c of a way to `out`; return the least."""
     _, visit, offsets, first, _ = clusters
     least = np.inf
@@ -128,7 +130,7 @@ def _begin(c, clusters, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _table(order, clusters, ahead, behind):  # type: ignore[no-untyped-def]
+def _table(order: IntArray, clusters: Clusters, ahead: FloatArray, behind: FloatArray) -> float:
     """Fill tables of costs: from the start to leaving each cluster, from entering it to the end."""
     links, visit, offsets, first, last = clusters
     entry = np.empty(len(links))
@@ -157,7 +159,7 @@ def _table(order, clusters, ahead, behind):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _rearranged(window, variant, out):  # type: ignore[no-untyped-def]
+def _rearranged(window: IntArray, variant: int, out: IntArray) -> bool:
     """Fill `out` with the window reversed, or with a block moved from one of its ends to the other.
 
     Variant 0 reverses. Then, for 1 to 3 clusters: a block from the front, from the back, each as it
@@ -181,13 +183,24 @@ def _rearranged(window, variant, out):  # type: ignore[no-untyped-def]
     return True
 
 
+class _Costs(NamedTuple):
+    """Costs by terminal (t,): from the start to leaving it, from entering it to the end; and room.
+
+    `value` and `entry` are the costs of leaving and of entering along a part that is tried.
+    """
+
+    ahead: FloatArray
+    behind: FloatArray
+    value: FloatArray
+    entry: FloatArray
+
+
 @njit(cache=True, nogil=True)
-def _exchange(order, clusters):  # type: ignore[no-untyped-def]
+def _exchange(order: IntArray, clusters: Clusters) -> float:
     """Rearrange windows of `order`, in place, until no rearrangement helps; the cost."""
     count = len(clusters.links)
-    ahead, behind = np.empty(count), np.empty(count)
-    value, entry = np.empty(count), np.empty(count)
-    least = _table(order, clusters, ahead, behind)
+    costs = _Costs(np.empty(count), np.empty(count), np.empty(count), np.empty(count))
+    least = _table(order, clusters, costs.ahead, costs.behind)
     trial = np.empty_like(order)
     lowest, highest = int(clusters.first >= 0), len(order) - int(clusters.last >= 0)
     helped = True
@@ -200,19 +213,22 @@ def _exchange(order, clusters):  # type: ignore[no-untyped-def]
                     if not _rearranged(order[i:j], variant, part):
                         continue
                     limit = least * (1.0 - 1e-9)
-                    cost = _cost_with(part, i, order, clusters, ahead, behind, value, entry, limit)
+                    cost = _cost_with(part, i, order, clusters, costs, limit)
                     if cost < limit:
                         for k in range(j - i):
                             order[i + k] = part[k]
-                        least = _table(order, clusters, ahead, behind)
+                        least = _table(order, clusters, costs.ahead, costs.behind)
                         helped = True
     return least
 
 
 @njit(cache=True, nogil=True)
-def _cost_with(part, i, order, clusters, ahead, behind, value, entry, limit):  # type: ignore[no-untyped-def]
+def _cost_with(
+    part: IntArray, i: int, order: IntArray, clusters: Clusters, costs: _Costs, limit: float
+) -> float:
     """Cost of the way with `part` from position i on; inf once it cannot be below the limit."""
     links, _, offsets, _, _ = clusters
+    ahead, behind, value, entry = costs
     j = i + len(part)
     rest = 0.0
     if j < len(order):

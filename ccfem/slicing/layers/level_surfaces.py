@@ -1,7 +1,7 @@
 """Curved layers: level surfaces of a field on the mesh, cleaned, with a thickness at each point."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -246,20 +246,35 @@ def clean(
     locked = fixed | (size > _FAN)
     border = np.full((len(points), 2), -1, dtype=np.int64)
     _find_border(triangles, fan, size, border, locked)
+    fans = _Fans(points, triangles, alive, fan, size, border)
     for _ in range(_ROUNDS):
-        if not _collapse(
-            points, triangles, alive, fan, size, border, locked, shortest, sag, _TILT
-        ):  # fmt: skip
+        if not _collapse(fans, locked, float(shortest), float(sag)):
             break
     triangles, cell = triangles[alive], cell[alive]
     for _ in range(_ROUNDS):
-        if not _flip(points, triangles, *_twins(triangles, len(points)), _TILT):
+        if not _flip(points, triangles, *_twins(triangles, len(points))):
             break
     return triangles, cell
 
 
+class _Fans(NamedTuple):
+    """A surface whose triangles are known by their points, changed in place.
+
+    `points` (n, 3), mm; `triangles` (t, 3) and whether they are `alive` (t,); the triangles at each
+    point, ``fan[p, : size[p]]``; and the points before and after it on the `border` (n, 2), -1 for
+    none.
+    """
+
+    points: FloatArray
+    triangles: IntArray
+    alive: BoolArray
+    fan: IntArray
+    size: IntArray
+    border: IntArray
+
+
 @njit(cache=True, nogil=True)
-def _gather(triangles, fan, size):  # type: ignore[no-untyped-def]
+def _gather(triangles: IntArray, fan: IntArray, size: IntArray) -> None:
     """Triangles round each point."""
     for t in range(len(triangles)):
         for i in range(3):
@@ -270,7 +285,9 @@ def _gather(triangles, fan, size):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _find_border(triangles, fan, size, border, locked):  # type: ignore[no-untyped-def]
+def _find_border(
+    triangles: IntArray, fan: IntArray, size: IntArray, border: IntArray, locked: BoolArray
+) -> None:
     """Write the border neighbours before and after each point; lock points where borders touch."""
     for p in range(len(fan)):
         if size[p] > fan.shape[1]:
@@ -298,7 +315,8 @@ def _find_border(triangles, fan, size, border, locked):  # type: ignore[no-untyp
 
 
 @njit(cache=True, nogil=True)
-def _normal(points, a, b, c):  # type: ignore[no-untyped-def]
+def _normal(points: FloatArray, a: int, b: int, c: int) -> tuple[float, float, float]:
+    """Cross product of two sides of a triangle: its normal, twice as long as its area."""
     ux, uy, uz = (
         points[b, 0] - points[a, 0],
         points[b, 1] - points[a, 1],
@@ -313,13 +331,14 @@ def _normal(points, a, b, c):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _square(points, a, b):  # type: ignore[no-untyped-def]
+def _square(points: FloatArray, a: int, b: int) -> float:
+    """Squared distance of two points."""
     x, y, z = points[a, 0] - points[b, 0], points[a, 1] - points[b, 1], points[a, 2] - points[b, 2]
     return x * x + y * y + z * z
 
 
 @njit(cache=True, nogil=True)
-def _off_segment(points, p, a, b):  # type: ignore[no-untyped-def]
+def _off_segment(points: FloatArray, p: int, a: int, b: int) -> float:
     """Distance of a point from the segment between two others."""
     nx, ny, nz = _normal(points, a, b, p)
     base = _square(points, a, b)
@@ -334,7 +353,7 @@ def _off_segment(points, p, a, b):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _shared(triangles, fan, size, u, v):  # type: ignore[no-untyped-def]
+def _shared(triangles: IntArray, fan: IntArray, size: IntArray, u: int, v: int) -> tuple[int, int]:
     """Count the triangles with both points, and the points adjacent to both."""
     both, common = 0, 0
     seen = np.empty(3 * fan.shape[1], np.int64)
@@ -365,7 +384,9 @@ def _shared(triangles, fan, size, u, v):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _may_move(points, triangles, fan, size, u, v, tilt):  # type: ignore[no-untyped-def]
+def _may_move(
+    points: FloatArray, triangles: IntArray, fan: IntArray, size: IntArray, u: int, v: int
+) -> bool:
     """Whether u can move to v without a triangle that inverts, tilts or gets thinner than any.
 
     Thinness is twice the area over the square of the longest side: the height over that side.
@@ -387,7 +408,7 @@ def _may_move(points, triangles, fan, size, u, v, tilt):  # type: ignore[no-unty
         nx, ny, nz = _normal(points, v, p, q)
         new = np.sqrt(nx * nx + ny * ny + nz * nz)
         # The normal of a needle-like triangle is unreliable.
-        if old > 1e-3 * longest and ox * nx + oy * ny + oz * nz < tilt * old * new:
+        if old > 1e-3 * longest and ox * nx + oy * ny + oz * nz < _TILT * old * new:
             return False
         longest = max(base, _square(points, v, p), _square(points, v, q))
         thinnest_after = min(thinnest_after, new / longest)
@@ -395,83 +416,101 @@ def _may_move(points, triangles, fan, size, u, v, tilt):  # type: ignore[no-unty
 
 
 @njit(cache=True, nogil=True)
-def _collapse(  # type: ignore[no-untyped-def]
-    points, triangles, alive, fan, size, border, locked, shortest, sag, tilt
-):
+def _collapse(fans: _Fans, locked: BoolArray, shortest: float, sag: float) -> int:
     """Try to move each point to its nearest neighbours; return the number of points removed."""
+    points, triangles, _, fan, size, border = fans
     removed = 0
-    limit = shortest * shortest
     near = np.empty(2 * fan.shape[1], np.int64)
     far = np.empty(2 * fan.shape[1])
     for u in range(len(points)):
         if locked[u] or size[u] == 0:
             continue
-        count = 0
-        for a in range(size[u]):
-            for i in range(3):
-                v = triangles[fan[u, a], i]
-                if v == u:
-                    continue
-                gap = _square(points, u, v)
-                if gap >= limit:
-                    continue
-                if border[u, 0] >= 0 and v != border[u, 0] and v != border[u, 1]:
-                    continue
-                known = False
-                for k in range(count):
-                    known |= near[k] == v
-                if not known:
-                    k = count
-                    while k > 0 and far[k - 1] > gap:
-                        near[k], far[k] = near[k - 1], far[k - 1]
-                        k -= 1
-                    near[k], far[k] = v, gap
-                    count += 1
-        for k in range(count):
+        for k in range(_neighbours(fans, u, shortest * shortest, near, far)):
             v = near[k]
             on_border = border[u, 0] >= 0
-            if on_border:
-                side = 0 if v == border[u, 0] else 1
-                w = border[u, 1 - side]
-                if w == v or border[v, 0] < 0 or _off_segment(points, u, v, w) > sag:
-                    continue
+            side = 1 if on_border and v != border[u, 0] else 0
+            w = border[u, 1 - side]
+            # The border keeps its shape, and no second border joins it.
+            if on_border and (
+                w == v or border[v, 0] < 0 or _off_segment(points, u, v, w) > sag
+            ):  # fmt: skip
+                continue
+            # The surface stays a manifold: beside the edge lie its own triangles alone, and both
+            # ends have no common neighbours but their tips.
             both, common = _shared(triangles, fan, size, u, v)
             if both != (1 if on_border else 2) or common != both:
                 continue
             if size[u] + size[v] - 2 * both > fan.shape[1]:
                 continue
-            if not _may_move(points, triangles, fan, size, u, v, tilt):
+            if not _may_move(points, triangles, fan, size, u, v):
                 continue
-            for a in range(size[u]):
-                t = fan[u, a]
-                i, has = 0, False
-                for j in range(3):
-                    has |= triangles[t, j] == v
-                    if triangles[t, j] == u:
-                        i = j
-                if has:
-                    alive[t] = False
-                    for j in range(3):
-                        p = triangles[t, j]
-                        if p == u:
-                            continue
-                        b = 0
-                        while fan[p, b] != t:
-                            b += 1
-                        size[p] -= 1
-                        fan[p, b] = fan[p, size[p]]
-                else:
-                    triangles[t, i] = v
-                    fan[v, size[v]] = t
-                    size[v] += 1
-            size[u] = 0
+            _merge(fans, u, v)
             if on_border:
-                w = border[u, 1 - side]
                 border[v, 1 - side] = w
                 border[w, side] = v
             removed += 1
             break
     return removed
+
+
+@njit(cache=True, nogil=True)
+def _neighbours(fans: _Fans, u: int, limit: float, near: IntArray, far: FloatArray) -> int:
+    """Write the points that u may move to, the nearest first; return their number.
+
+    Those at a squared distance `far` below a limit; from the border, along the border alone.
+    """
+    points, triangles, _, fan, size, border = fans
+    count = 0
+    for a in range(size[u]):
+        for i in range(3):
+            v = triangles[fan[u, a], i]
+            if v == u:
+                continue
+            gap = _square(points, u, v)
+            if gap >= limit:
+                continue
+            if border[u, 0] >= 0 and v != border[u, 0] and v != border[u, 1]:
+                continue
+            known = False
+            for k in range(count):
+                known |= near[k] == v
+            if not known:
+                k = count
+                while k > 0 and far[k - 1] > gap:
+                    near[k], far[k] = near[k - 1], far[k - 1]
+                    k -= 1
+                near[k], far[k] = v, gap
+                count += 1
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _merge(fans: _Fans, u: int, v: int) -> None:
+    """Move u to v: triangles with both vanish, the others of u become triangles of v."""
+    _, triangles, alive, fan, size, _ = fans
+    for a in range(size[u]):
+        t = fan[u, a]
+        i, has = 0, False
+        for j in range(3):
+            has |= triangles[t, j] == v
+            if triangles[t, j] == u:
+                i = j
+        if has:
+            alive[t] = False
+            for j in range(3):
+                p = triangles[t, j]
+                if p == u:
+                    continue
+                b = 0
+                while fan[p, b] != t:
+                    b += 1
+                size[p] -= 1
+                fan[p, b] = fan[p, size[p]]
+        else:
+            triangles[t, i] = v
+            fan[v, size[v]] = t
+            size[v] += 1
+    size[u] = 0
 
 
 def _twins(triangles: IntArray, n: int) -> tuple[IntArray, IntArray]:
@@ -487,7 +526,7 @@ def _twins(triangles: IntArray, n: int) -> tuple[IntArray, IntArray]:
 
 
 @njit(cache=True, nogil=True)
-def _flip(points, triangles, across, corner, tilt):  # type: ignore[no-untyped-def]
+def _flip(points: FloatArray, triangles: IntArray, across: IntArray, corner: IntArray) -> int:
     """Flip sides whose opposite angles exceed a half turn (Delaunay); return their number."""
     flipped = 0
     touched = np.zeros(len(triangles), np.bool_)
@@ -519,9 +558,9 @@ def _flip(points, triangles, across, corner, tilt):  # type: ignore[no-untyped-d
             )
             sx, sy, sz = ax + bx, ay + by, az + bz
             total = np.sqrt(sx * sx + sy * sy + sz * sz)
-            if cx * sx + cy * sy + cz * sz < tilt * third * total or third == 0.0:
+            if cx * sx + cy * sy + cz * sz < _TILT * third * total or third == 0.0:
                 continue
-            if dx * sx + dy * sy + dz * sz < tilt * fourth * total or fourth == 0.0:
+            if dx * sx + dy * sy + dz * sz < _TILT * fourth * total or fourth == 0.0:
                 continue
             triangles[t, 0], triangles[t, 1], triangles[t, 2] = a, p, b
             triangles[u, 0], triangles[u, 1], triangles[u, 2] = a, b, q
