@@ -6,7 +6,7 @@ import shapely
 from benchmarks.print_checks.job import FILAMENT, PART, Job, Lines, own
 from benchmarks.print_checks.printer import Run
 
-__all__ = ["amount", "feeding", "fullness", "places", "volume"]
+__all__ = ["amount", "feeding", "fullness", "places", "shapes", "volume"]
 
 
 def fullness(job: Job, run: Run) -> tuple[float, list[tuple[float, float]]]:
@@ -80,6 +80,25 @@ def feeding(job: Job, run: Run) -> list[str]:
         fed = float(lines.fed[mine & (np.abs(lines.end[:, 2] - top) < 1e-6)].sum())
         if abs(fed - wanted) > 1e-3 * wanted + 1e-9:
             wrong.append(f"matrix at {top:g} gets {fed:.3f} mm, not {wanted:.3f}")
+    return wrong
+
+
+def shapes(job: Job, run: Run) -> list[str]:
+    """Matrix has the section that its comments say, no higher than its shape, nor too thin."""
+    lines, machine = Lines.of(run), job.machine
+    mine = lines.lays & (lines.tool == 0)
+    width, height, length = lines.width[mine], lines.height[mine], lines.length[mine]
+    wrong = [
+        f"a line {w:g} mm wide is {h:g} mm high"
+        for w, h in np.unique(np.stack([width, height], axis=1), axis=0).tolist()
+        if h > machine.line_shape * w + 1.5e-3 or h < machine.least_line - 1e-3
+    ]
+    for z in np.unique(lines.end[mine][:, 2].round(3)).tolist():
+        here = lines.end[mine][:, 2].round(3) == z
+        said = float((width * height * length)[here].sum())
+        laid = FILAMENT * float(lines.fed[mine][here].sum())
+        if abs(laid - said) > 3e-3 * said:
+            wrong.append(f"lines at {z:g} are said to hold {said:.2f} mm^3, and hold {laid:.2f}")
     return wrong
 
 

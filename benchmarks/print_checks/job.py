@@ -90,6 +90,8 @@ class Lines:
         self.fed = np.array([step.fed for step in steps])
         self.beside = np.array([step.beside for step in steps])
         self.speed = np.array([step.speed for step in steps])
+        self.width = np.array([step.width for step in steps])
+        self.height = np.array([step.height for step in steps])
         self.kind = np.array([step.kind for step in steps])
         self.in_part = np.isin(self.kind, PART)
         self.lays = ~self.rapid & (self.length > 0.0)

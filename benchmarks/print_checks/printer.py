@@ -46,6 +46,8 @@ class Step:
     heat: float
     waited: bool
     kind: str
+    width: float
+    height: float
     strand: str
     number: int
     changed: int
@@ -124,6 +126,7 @@ class _Printer:
         self.longest = LONGEST.get(machine, 200.0)
         self.place, self.tool, self.speed, self.highest = (0.0, 0.0, 0.0), -1, 0.0, 0.0
         self.kind, self.strand, self.ends = "", "", 0
+        self.line = {"WIDTH": np.nan, "HEIGHT": np.nan}
         self.changed, self.cut = -1, False
         self.active, self.standby = {}, {}
         self.heat, self.waited = {0: 20.0, 1: 20.0}, {0: False, 1: False}
@@ -161,6 +164,9 @@ class _Printer:
         """Note what kind of thing follows, the strand, or a line of the head."""
         if comment.startswith("TYPE:"):
             self.kind = comment[5:]
+        elif comment.startswith(("WIDTH:", "HEIGHT:")):
+            name, _, value = comment.partition(":")
+            self.line[name] = float(value)
         elif comment.startswith("CCFEM:strand="):
             self.strand = re.match(r"CCFEM:strand=(\w+)", comment)[1]
             self.strand += f"-{self.ends}" if self.strand == "beside" else ""
@@ -186,6 +192,8 @@ class _Printer:
             heat=self.heat.get(self.tool, 0.0),
             waited=self.waited.get(self.tool, False),
             kind=self.kind,
+            width=self.line["WIDTH"],
+            height=self.line["HEIGHT"],
             strand=self.strand,
             number=len(self.run.steps),
             changed=self.changed,

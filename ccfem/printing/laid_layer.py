@@ -45,6 +45,8 @@ class LaidLayer:
     ----------
     laid : (P,) array, mm
         Height of matrix, a line wide, on the step from each point.
+    room : (K,) array
+        Width that each line of matrix fills, over that of the machine's lines.
     short : (K,) bool array
         Lines of matrix in place of strands that are too short for the cutter.
     outside : float, mm
@@ -53,6 +55,7 @@ class LaidLayer:
 
     paths: Toolpaths
     laid: FloatArray
+    room: FloatArray
     short: BoolArray
     warning: str = ""
     outside: float = 0.0
@@ -78,16 +81,17 @@ def matrix_layer(
     """
     matrix, which = _printed(fill.lines, height, number, MATRIX)
     heights, warning = np.zeros(0), ""
+    room = np.array(fill.widths)[which] / machine.matrix_width
     strands = (below.strands, below.height, machine, below.sections)
     if len(matrix):
-        shares = np.array(fill.widths)[which] / machine.matrix_width
-        matrix, heights, warning = with_flow(matrix, fill.section, thickness, *strands, shares)
+        matrix, heights, warning = with_flow(matrix, fill.section, thickness, *strands, room)
     pad, _ = _printed(pads, height, number, SUPPORT)
     if len(pad):
         pad, high = pad_flow(pad, thickness, *strands)
         matrix, heights = Toolpaths.concatenate([matrix, pad]), np.append(heights, high)
+        room = np.append(room, np.ones(len(pad)))
     warning = f"at {height:.4g} mm {warning}" if warning else ""
-    return LaidLayer(matrix, heights, np.zeros(len(matrix), dtype=bool), warning)
+    return LaidLayer(matrix, heights, room, np.zeros(len(matrix), dtype=bool), warning)
 
 
 def fibre_layer(
@@ -114,7 +118,7 @@ def fibre_layer(
     after = Below(
         [*below.strands, *by_matrix, *lines], below.sections + sections, below.height + thickness
     )
-    return LaidLayer(fibre, heights, short, "", outside), after
+    return LaidLayer(fibre, heights, np.ones(len(fibre)), short, "", outside), after
 
 
 def _printed(

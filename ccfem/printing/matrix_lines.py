@@ -61,6 +61,8 @@ def matrix_fills(
         Subtracted from X and Y along these axes.
     """
     width, profile = machine.matrix_width, machine.gcode
+    # In a narrower gap a line of the least height would be higher than its shape allows.
+    narrow = machine.least_line / machine.line_shape
     of_matrix = [k for k, slab in enumerate(slabs) if slab.fibre is None]
     fills: list[MatrixFill | None] = [None] * len(slabs)
     for k in of_matrix:
@@ -73,7 +75,7 @@ def matrix_fills(
         contours = offset_rings(plane.polygon, 0.5 * width, width, width, 1)
         inside = zigzag(plane.polygon, (1.5 - _OVERLAP) * width, width, width, float(angle))
         lines = [ring for level in contours for ring in level] + inside
-        gaps, widths = gap_lines(plane.polygon, lines, width)
+        gaps, widths = gap_lines(plane.polygon, lines, width, narrow)
 
         def on_bed(points: FloatArray) -> FloatArray:
             return plane.to_space(points) @ frame[:2].T - origin
@@ -107,7 +109,7 @@ _ARC = 4
 
 
 def gap_lines(
-    section: Region, lines: Sequence[FloatArray], width: float
+    section: Region, lines: Sequence[FloatArray], width: float, narrow: float = 0.0
 ) -> tuple[list[FloatArray], list[float]]:
     """Lines along the middle of the gaps that lines of a width leave in a section.
 
@@ -118,6 +120,8 @@ def gap_lines(
         Lines that fill it so far.
     width : float, mm
         Of a line, > 0.
+    narrow : float, mm
+        Least width of a gap that gets a line, if that is more than 0.3 line widths.
 
     Returns
     -------
@@ -129,7 +133,7 @@ def gap_lines(
     # GEOS stumbles over the union of thousands of buffers, and its buffer of all may be invalid.
     covered = shapely.buffer(shapely.multilinestrings(strings(lines)), 0.5 * width, quad_segs=_ARC)
     gaps = shapely.difference(section, shapely.make_valid(covered))
-    reach = 0.5 * _NARROW * width
+    reach = 0.5 * max(narrow, _NARROW * width)
     wide = shapely.buffer(gaps, -reach, quad_segs=_ARC)
     opened = shapely.intersection(shapely.buffer(wide, 1.01 * reach, quad_segs=_ARC), gaps)
     filling: list[FloatArray] = []

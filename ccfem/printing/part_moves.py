@@ -76,8 +76,8 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
                 what = "short" if plan.short[k] else "contour" if paths.closed[k] else "infill"
                 what = "pad" if paths.kind[k] == SUPPORT else what
                 speed = _speed(below, machine)
-                heights = plan.laid[start : end - 1]
-                lay_matrix(recorder, line, normals, heights, what, machine, speed)
+                heights, room = plan.laid[start : end - 1], float(plan.room[k])
+                lay_matrix(recorder, line, normals, heights, what, machine, speed, room)
         below = top
     # Away from the part, before the end of the file moves the carriage home.
     recorder.rise(recorder.top + machine.process.tool_lift)
@@ -311,6 +311,24 @@ def change_tool(recorder: Recorder, tool: int, top: float, machine: Machine) -> 
     return True
 
 
+def line_sizes(heights: FloatArray, room: float, machine: Machine) -> tuple[FloatArray, FloatArray]:
+    """Width and height, mm, of a line of matrix of a given section on each of its steps.
+
+    A line is as wide as its room. Where it would then be higher than its shape allows, the same
+    section is wider: what stands beside it presses it into the room.
+
+    Parameters
+    ----------
+    heights : (n,) array, mm
+        That the section has at the width of the machine's lines.
+    room : float
+        Width of the room over that width.
+    """
+    section = machine.matrix_width * heights
+    width = np.maximum(room * machine.matrix_width, np.sqrt(section / machine.line_shape))
+    return width, section / width
+
+
 def lay_matrix(
     recorder: Recorder,
     line: FloatArray,
@@ -319,13 +337,18 @@ def lay_matrix(
     what: str,
     machine: Machine,
     speed: float,
+    room: float = 1.0,
 ) -> None:
-    """Lay a line (n, 3) of matrix, so high (n - 1,) on each of its steps, and leave it."""
-    profile, width = machine.gcode, machine.matrix_width
+    """Lay a line (n, 3) of matrix, so high (n - 1,) on each of its steps, and leave it.
+
+    Heights and `room` are those of `line_sizes`.
+    """
+    profile = machine.gcode
     recorder.travel(line[0], normals[0])
     if recorder.drawn_back:
         recorder.feed(recorder.drawn_back, profile.retract_speed)
         recorder.drawn_back = 0.0
+    width, heights = line_sizes(heights, room, machine)
     feed = width * heights / matrix_area(machine)
     speeds = np.full(len(heights), speed)
     recorder.lay(line, normals, speeds, feed, width, heights, what)
@@ -357,7 +380,7 @@ def lay_strand(
         recorder.feed(tail + process.restart_extra, profile.feed_speed)
     if process.start_wait:
         recorder.note(WAIT, process.start_wait)
-    steps, width = np.ones(len(speeds)), machine.fibre_width
+    steps = np.ones(len(speeds))
     for part, name, feed in (
         (slice(0, cut), "fibre", process.feed_ratio),
         (slice(cut, None), "tail", 0.0),
@@ -372,7 +395,7 @@ def lay_strand(
                 across[ends],
                 speeds[part],
                 feed * steps[part],
-                width,
+                np.full(count, machine.fibre_width),
                 np.full(count, height),
                 name,
                 np.full(count, round_it),
@@ -399,7 +422,8 @@ def _iron(
     across = points_along(normals, positions, back)
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     speeds = np.full(len(back) - 1, machine.process.finish_speed)
-    recorder.lay(line, across, speeds, 0.0 * speeds, 0.0, 0.0 * speeds, "travel")
+    nothing = 0.0 * speeds
+    recorder.lay(line, across, speeds, nothing, nothing, nothing, "travel")
 
 
 # Speed along a strand: slow at its start, in tight turns and corners, and behind its cut.

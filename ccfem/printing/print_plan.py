@@ -50,6 +50,9 @@ class PrintPlan:
     laid : (P,) array, mm, optional
         Height of the matrix, a line wide, that is laid on the step from each point of the paths;
         by default the thickness of its layer. Of no meaning for fibre, and at the ends of paths.
+    room : (K,) array, optional
+        Width that each line of matrix fills, over that of the machine's lines; by default 1, less
+        in gaps. Its section stays that of `laid` (`ccfem.printing.part_moves.line_sizes`).
     short : (K,) bool array, optional
         Which lines of matrix take the place of strands that are too short for the cutter.
     dropped, ended : float, mm
@@ -70,6 +73,7 @@ class PrintPlan:
     top: FloatArray
     thickness: FloatArray
     laid: FloatArray = None  # type: ignore[assignment]
+    room: FloatArray = None  # type: ignore[assignment]
     short: BoolArray = None  # type: ignore[assignment]
     dropped: float = 0.0
     trims: FloatArray = None  # type: ignore[assignment]
@@ -84,11 +88,13 @@ class PrintPlan:
         if self.laid is None:
             whole = np.repeat(self.thickness[self.paths.layer], np.diff(self.paths.offsets))
             object.__setattr__(self, "laid", whole)
+        if self.room is None:
+            object.__setattr__(self, "room", np.ones(len(self.paths)))
         if self.short is None:
             object.__setattr__(self, "short", np.zeros(len(self.paths), dtype=bool))
         if self.trims is None:
             object.__setattr__(self, "trims", np.zeros((0, 3)))
-        freeze(self, trims=float, top=float, thickness=float, laid=float, short=bool)
+        freeze(self, trims=float, top=float, thickness=float, laid=float, room=float, short=bool)
 
     def volume(self, machine: Machine) -> float:
         """Volume of matrix and of fibre inside the part, mm^3."""
@@ -180,6 +186,7 @@ def plan_print(
         np.array([slab.upper - lowest[2] for slab in slabs]).round(COORDINATE_DIGITS),
         np.array([slab.upper - slab.lower for slab in slabs]),
         np.concatenate([layer.laid for layer in done]),
+        np.concatenate([layer.room for layer in done]),
         np.concatenate([layer.short for layer in done]),
         strands.dropped,
         np.concatenate([np.zeros((0, 3)), *trims]),

@@ -112,7 +112,7 @@ class Recorder:
         normals: FloatArray,
         speeds: FloatArray,
         feed: FloatArray,
-        width: float,
+        widths: FloatArray,
         heights: FloatArray,
         what: str,
         beside: FloatArray | None = None,
@@ -135,8 +135,8 @@ class Recorder:
             ends, at = moved + 1, index[moved]
             same = np.broadcast_to([self.layer, self.strand], (len(moved), 2))
             full = np.ones(len(moved))
-            values = (self.tool * full, fed[moved], with_it[moved], speeds[at], width * full)
-            rest = (heights[at], 0.0 * full, number * full)
+            values = (self.tool * full, fed[moved], with_it[moved], speeds[at])
+            rest = (widths[at], heights[at], 0.0 * full, number * full)
             self._flush()
             self.blocks.append(
                 np.column_stack([LAY * full, line[ends], normals[ends], *values, *rest, same])

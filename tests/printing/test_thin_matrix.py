@@ -6,6 +6,7 @@ import pytest
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.machine import Machine, updated
+from ccfem.paths.splitting.slabs import check_cover, slabs_of
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.print_plan import plan_print
 from ccfem.slicing.slicers.planar import Planar
@@ -30,3 +31,15 @@ def test_thin_matrix_and_thin_cover_are_said_or_refused():
     assert sum("one layer of matrix" in line for line in strip(0.5, {}).warnings) == 2
     with pytest.raises(InputError, match=r"0\.146 mm of matrix below the first fibre layer do not"):
         strip(0.4, {"process": {"short": "drop"}})
+
+
+def test_layers_of_matrix_that_no_machine_prints_are_said():
+    """Fibre layers 0.13 mm apart and 0.1075 mm high leave 0.0225 mm."""
+    layers = Planar(heights=(0.5, 0.63)).cut(box_mesh((60.0, 20.0, 1.5), (6, 2, 1)))
+    said = check_cover(slabs_of(layers, 0.0, 1.5, Machine()), Machine())
+    assert said == [
+        "1 layer of matrix only 0.0225 mm high, less than machine.least_line, 0.05 mm: lay fibre "
+        "layers at least 0.158 mm apart, or with no matrix between them"
+    ]
+    layers = Planar(heights=(0.5, 0.6075)).cut(box_mesh((60.0, 20.0, 1.5), (6, 2, 1)))
+    assert check_cover(slabs_of(layers, 0.0, 1.5, Machine()), Machine()) == []

@@ -121,7 +121,8 @@ def printed_strands(
             "allows: set it to 'pad', or process.short to 'matrix'"
         )
     # In layers too low for a line of matrix, the matrix above fills the place of short strands.
-    if not (flat and process.short == "matrix" and machine.strand_height >= LOW):
+    low = max(LOW, machine.least_line)
+    if not (flat and process.short == "matrix" and machine.strand_height >= low):
         cut_off += sum(line_length(piece.line) for piece in short)
         short = []
     by_matrix = _toolpaths(short, fibre, MATRIX)

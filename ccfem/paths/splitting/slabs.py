@@ -95,12 +95,13 @@ def _matrix_slabs(
 
 
 def check_cover(slabs: Sequence[Slab], machine: Machine) -> list[str]:
-    """Check the matrix below the first and over the last layer of fibre.
+    """Check the matrix below the first and over the last layer of fibre, and between them.
 
     Returns
     -------
     list of str
-        A warning for each side where it is one layer alone.
+        A warning for each side where it is one layer alone, and for layers of matrix that are
+        lower than the machine's least line.
 
     Raises
     ------
@@ -124,4 +125,13 @@ def check_cover(slabs: Sequence[Slab], machine: Machine) -> list[str]:
             problems.append(
                 f"only one layer of matrix, {height:.3g} mm, {side} fibre layer: two hold it better"
             )
+    heights = [slab.upper - slab.lower for slab in slabs if slab.fibre is None]
+    thin = [height for height in heights if height < machine.least_line - _SAME]
+    if thin:
+        pitch = machine.strand_height + machine.least_line
+        problems.append(
+            f"{len(thin)} layer{'s' * (len(thin) > 1)} of matrix only {min(thin):.3g} mm high, "
+            f"less than machine.least_line, {machine.least_line:g} mm: lay fibre layers at least "
+            f"{pitch:.3g} mm apart, or with no matrix between them"
+        )
     return problems

@@ -191,7 +191,7 @@ class _Lines:
         kind = TYPES[self.profile.comments].get(ROLES[role])
         if kind is None:
             return
-        said = (f";TYPE:{kind}", f";WIDTH:{width:.3f}", f";HEIGHT:{height:.3f}")
+        said = (f";TYPE:{kind}", f";WIDTH:{width:.4f}", f";HEIGHT:{height:.4f}")
         self.lines += [new for new, old in zip(said, self._said, strict=True) if new != old]
         self._said = said
 
