@@ -2,7 +2,8 @@
 
 Run ``python -m benchmarks.print_checks [PART,...] [MACHINE,...] [--pictures FOLDER]``. Section 8 of
 the specification of the print has twelve checks; each is a column, with its first failure below the
-table, and so is what lines of matrix are said to measure (shapes). All numbers are those of a
+table, and so are what lines of matrix are said to measure (shapes) and whether they are laid on
+something (air); parts that hang over are printed on support. All numbers are those of a
 printer that reads the file (`printer`), and of VTK's sections of the part; s are seconds of CPU to
 write, follow and check a file. The twelfth, spoiled files, is
 `tests/printing/test_spoiled_files.py`. The columns behind the bar count the strands that break each

@@ -7,8 +7,9 @@ import numpy as np
 from benchmarks.print_checks.height_map import HeightMap, sampled
 from benchmarks.print_checks.job import Job, Lines
 from benchmarks.print_checks.printer import Run, Step
+from ccfem.machine import Machine
 
-__all__ = ["arc", "bed", "beneath", "free_fibre", "speeds", "support", "travel"]
+__all__ = ["air", "arc", "bed", "beneath", "free_fibre", "in_air", "speeds", "support", "travel"]
 
 STRAIGHT, CURVED = 8.0, 3.0
 """Longest span over nothing, mm, of a strand that turns by less than 10 degrees, and of others."""
@@ -176,3 +177,32 @@ def bed(job: Job, run: Run) -> list[str]:
         low, high = np.minimum(low, fibre.min(axis=0)), np.maximum(high, fibre.max(axis=0))
     inside = (low >= 0.0).all() and (high <= profile.bed).all()
     return [] if inside else [f"nozzles reach {low} to {high}"]
+
+
+def in_air(machine: Machine, run: Run) -> float:
+    """Share of the part's matrix, by volume, that is laid with nothing near below it.
+
+    A line is held by what lies no lower than its own height, and the fibre below it, within as much
+    to its sides.
+    """
+    lines, area = Lines.of(run), HeightMap(machine.gcode.bed)
+    matrix = lines.lays & (lines.tool == 0) & lines.in_part
+    height = lines.end[:, 2].round(3)
+    free = 0.0
+    for z in np.unique(height[lines.lays]).tolist():
+        mine = np.flatnonzero(matrix & (height == z))
+        if len(mine):
+            place, move = sampled(lines.start[mine], lines.end[mine])
+            reach = lines.height[mine][move] + machine.strand_height + 0.05
+            held = area.highest(place, float(lines.height[mine].max())) >= z - reach
+            share = np.bincount(move, ~held) / np.bincount(move)
+            free += float(share @ lines.fed[mine])
+        here = np.flatnonzero(lines.lays & (height == z))
+        area.lay(lines.start[here], lines.end[here], machine.matrix_width)
+    return free / float(lines.fed[matrix].sum())
+
+
+def air(job: Job, run: Run) -> list[str]:
+    """Matrix is laid on something, but for half a hundredth of it."""
+    share = in_air(job.machine, run)
+    return [f"{share:.1%} of the matrix is laid in air"] if share > 0.005 else []

@@ -19,6 +19,7 @@ from ccfem.paths.planning import plan
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.export.gcode import gcode
 from ccfem.printing.print_plan import plan_print
+from ccfem.printing.support.overhang import overhang
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.plane import plane_frame
 from ccfem.strategies import create
@@ -71,7 +72,8 @@ def job_of(part: Part, machine_name: str) -> tuple[Job, dict[str, float]]:
     strategy = create(chosen, dict(case.parameters.get(chosen, {})))
     paths = plan(strategy, layers, part.stress, machine)
     planned = time.process_time()
-    printed = plan_print(paths, layers, mesh, machine)
+    hangs = overhang(mesh, case.build, machine) is not None
+    printed = plan_print(paths, layers, mesh, machine, hangs)
     text = gcode(printed, machine)
     written = time.process_time()
     strands, sections = on_bed(paths, mesh, case.build, machine.gcode.bed)

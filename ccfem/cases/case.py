@@ -15,6 +15,7 @@ from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.support_kinds import AnySupport
 from ccfem.machine.machine import Machine
 from ccfem.paths.placement.fibre_places import FibrePlaces
+from ccfem.printing.line_counts import MOST_STRANDS, about_strands, check_strands
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.slicer import Slicer
 from ccfem.slicing.slicers.planar import Planar
@@ -86,13 +87,27 @@ class Case(Shown):
             return layers
         return self.fibre.on(layers, stress.mesh, self.machine)
 
-    def known_layers(self, slicer: Slicer | None = None) -> tuple[Layer, ...]:
-        """Layers that get fibre, where they are known before the part is solved: flat ones.
+    def check_layers(self, slicer: Slicer | None = None) -> None:
+        """Refuse flat layers that cannot be cut or planned on, before the part is solved.
 
-        Those across another axis than the build direction stand otherwise, and are left out.
+        Raises
+        ------
+        InputError
+            For layers outside the part or nearer to each other than a strand is high, places of
+            fibre on none of them, and more strands than are planned.
         """
+        chosen, mesh = self.slicing if slicer is None else slicer, self.problem.mesh
+        if not isinstance(chosen, Planar):
+            return
+        heights = chosen.check(mesh, self.build, self.machine)
+        many = about_strands(mesh, len(heights), self.build, self.machine) > MOST_STRANDS
+        if many or self.fibre is not None:
+            check_strands(self.known_layers(chosen), self.machine)
+
+    def known_layers(self, slicer: Slicer | None = None) -> tuple[Layer, ...]:
+        """Layers that get fibre, where they are known before the part is solved: flat ones."""
         chosen = self.slicing if slicer is None else slicer
-        if not isinstance(chosen, Planar) or chosen.axis != "build":
+        if not isinstance(chosen, Planar):
             return ()
         mesh = self.problem.mesh
         layers = chosen.cut(mesh, self.build)

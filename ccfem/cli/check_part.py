@@ -1,11 +1,12 @@
 """What ``ccfem check`` does: print what is known of a part before it is solved, and draw it."""
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 from ccfem.base.whole import check_writable, whole_file
 from ccfem.cases.inspection import check
-from ccfem.cli.run import complain, load
+from ccfem.cli.run import NOT_PRINTABLE, complain, load
 from ccfem.comparison.plot.canvas import check_picture, save
 from ccfem.comparison.plot.part_picture import part_page, part_picture
 from ccfem.machine.machine import Machine
@@ -37,7 +38,8 @@ def check_part(
     Returns
     -------
     int
-        Exit code: 2 where something keeps the part from being solved.
+        Exit code, that of a plan: 2 where something keeps the part from being solved or planned, 3
+        where it cannot be printed whatever is planned.
     """
     if picture is not None:
         check_picture(picture)
@@ -50,4 +52,8 @@ def check_part(
     with whole_file(page) as temporary:
         temporary.write_text(part_page(checked), encoding="utf-8")
     print(f"{picture}, and {page} with a rotatable view")
-    return complain(*checked.mistakes) if checked.mistakes else 0
+    for line in checked.not_printable:
+        print(f"ccfem: not printable as planned: {line}", file=sys.stderr)
+    if checked.mistakes or checked.not_planned:
+        return complain(*checked.mistakes, *checked.not_planned)
+    return NOT_PRINTABLE if checked.not_printable else 0

@@ -107,9 +107,10 @@ def support(
     names = part.problem.cases
     if load_case is not None:
         check_known("load case", load_case, names)
-    stress = solve(part.problem, backend=backend)[load_case or names[0]]
     chosen = layers_of(layers, None, slicing)
     slicer = as_slicer(part.slicing if chosen is None else chosen)
+    part.check_layers(slicer)
+    stress = solve(part.problem, backend=backend)[load_case or names[0]]
     stack, support_stack = slice_with_support(slicer, stress, part.build, part.machine, angle, lift)
     columns = support_stack.columns
     x, y, z = columns.up.tolist()

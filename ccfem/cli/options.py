@@ -95,7 +95,7 @@ Details = Annotated[
 ]
 PrintedSupport = Annotated[
     bool,
-    typer.Option("--support", help="With --gcode: print support below curved layers, too."),
+    typer.Option("--support", help="With --gcode: print support below what hangs over, too."),
 ]
 VirtualTest = Annotated[
     bool,

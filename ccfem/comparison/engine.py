@@ -34,7 +34,6 @@ from ccfem.comparison.request import (
     Spread,
     Stiffness,
     Wanted,
-    check_propped,
 )
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
@@ -64,10 +63,10 @@ from ccfem.paths.planning.given_paths import GivenPaths
 from ccfem.paths.planning.strategy import Strategy
 from ccfem.paths.planning.whole_part import full_length
 from ccfem.paths.toolpaths import Toolpaths
+from ccfem.printing.before_solving import check_support
 from ccfem.printing.line_counts import check_strands
 from ccfem.printing.support import SupportLayers, slice_with_support
 from ccfem.slicing.layers.slicer import Slicer, slicer_remarks
-from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies.fibre_aware.upper_bound import UpperBound, upper_bound
 
 _REPLACED = {
@@ -125,12 +124,11 @@ class Solved:
         ------
         InputError
             Where the part cannot be cut or its layers would have too many strands, or support is
-            wanted below flat layers, or below curved ones of a slicer that does not say the field
-            of its layers (`slice`).
+            wanted below flat layers that need none, or below curved ones of a slicer that does not
+            say the field of its layers (`slice`).
         """
         case, stress = self.case, self.planned_on
         chosen = case.slicing if slicer is None else slicer
-        check_propped(chosen, support)
         below: SupportLayers | None = None
         if support and hasattr(chosen, "slice"):
             layers, below = slice_with_support(chosen, stress, case.build, case.machine)
@@ -139,9 +137,11 @@ class Solved:
         else:
             layers = case.fibre_layers(stress, chosen)
         check_strands(layers, case.machine)
-        if support and all(layer.flat is not None for layer in layers):
-            check_propped(Planar(), support)
-        if support and below is None:
+        propped = support and all(layer.flat is not None for layer in layers)
+        if propped:
+            below = None
+            check_support(stress.mesh, layers, case.machine)
+        elif support and below is None:
             raise InputError(
                 "support continues the field whose levels the layers are, and these layers were "
                 "given without one: leave out support, or choose --slicing load_oriented or spatial"
@@ -149,7 +149,8 @@ class Solved:
         strand = None if self.tests is None else self.tests.strand
         said = slicer_remarks(chosen, stress)
         stack = tuple(layers)
-        return Part(stress, stack, case.machine, self.cases, strand, case.build, below, said)
+        about = (strand, case.build, below, propped, said)
+        return Part(stress, stack, case.machine, self.cases, *about)
 
 
 def solved(request: Request, seconds: dict[str, float] | None = None) -> Solved:
@@ -163,12 +164,13 @@ def solved(request: Request, seconds: dict[str, float] | None = None) -> Solved:
     Raises
     ------
     InputError
-        For a problem that cannot be solved, and stress on another mesh.
+        For layers that cannot be cut, a problem that cannot be solved, and stress on another mesh.
     SolveError
         When the solve misses its tolerance.
     """
     seconds = {} if seconds is None else seconds
     case, strand, backend = request.case, request.strand, request.backend
+    check_slicings(request)
     with timed(seconds, "solve"):
         fields = solve(case.problem, backend=backend)
         if request.all_cases:
@@ -297,9 +299,34 @@ def _cut(request: Request, basis: Solved) -> tuple[dict[str, Part], dict[str, st
         else:
             refused[name] = "it has no layer"
     if not parts:
-        reasons = "; ".join(f"{name}: {why}" for name, why in refused.items())
-        raise InputError(f"no slicing could cut '{request.case.name}': {reasons}")
+        raise _no_slicing(request, refused)
     return parts, refused
+
+
+def check_slicings(request: Request) -> None:
+    """Refuse flat layers that cannot be cut, before anything is solved.
+
+    Raises
+    ------
+    InputError
+        For the only way to cut the part; of several, where none can.
+    """
+    refused: dict[str, str] = {}
+    for name, slicing in request.slicings.items():
+        try:
+            if not slicing.as_thick:  # of which the part's own layers decide
+                request.case.check_layers(slicing.slicer)
+        except InputError as error:
+            if not request.named:
+                raise
+            refused[name] = str(error)
+    if len(refused) == len(request.slicings):
+        raise _no_slicing(request, refused)
+
+
+def _no_slicing(request: Request, refused: Mapping[str, str]) -> InputError:
+    reasons = "; ".join(f"{name}: {why}" for name, why in refused.items())
+    return InputError(f"no slicing could cut '{request.case.name}': {reasons}")
 
 
 def _own_thickness(request: Request, basis: Solved) -> float:
@@ -551,7 +578,7 @@ def compare(
     print_plans : bool, default False
         Also plan the print of the whole part, matrix and fibre, for every strategy.
     support : bool, default False
-        Also print support below a part of curved layers (`ccfem.printing.support`).
+        Also print support below the part (`ccfem.printing.support`).
     stress : ForeignStress, optional
         Stress file of another program, on the same mesh, to plan and evaluate on. Virtual tests and
         the bound still solve the part themselves.

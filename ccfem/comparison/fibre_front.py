@@ -116,6 +116,8 @@ def front_of(
         _check_counts(counts)
     # A front shows the supports of the part alone.
     request = replace(request, case=replace(request.case, alternative_supports=()))
+    if counts is not None:
+        request = replace(request, slicings=_slicings(counts), amount=spread)
     basis = solved(request) if known is None else known
     if len(basis.cases) > 1 and presses(basis.cases):
         raise InputError(
@@ -124,9 +126,13 @@ def front_of(
         )
     if counts is None:
         counts = counts_to_try(request.case, basis.planned_on)
-    slicings = {f"{count} layers": Slicing(Planar(count=count)) for count in sorted(set(counts))}
+    slicings = _slicings(counts)
     request = replace(request, strategies=kinds, slicings=slicings, amount=spread, curve=False)
     return _front(name, answer(request, progress, basis))
+
+
+def _slicings(counts: Sequence[int]) -> dict[str, Slicing]:
+    return {f"{count} layers": Slicing(Planar(count=count)) for count in sorted(set(counts))}
 
 
 def _check_counts(counts: Sequence[int]) -> None:

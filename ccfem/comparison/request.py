@@ -20,7 +20,7 @@ from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.paths.planning.equal_fibre import check_wanted
 from ccfem.paths.planning.given_paths import GivenPaths
 from ccfem.paths.planning.strategy import Strategy
-from ccfem.printing.before_solving import check_print
+from ccfem.printing.before_solving import check_print, check_support
 from ccfem.slicing.layers.plane import plane_frame
 from ccfem.slicing.layers.slicer import Slicer
 from ccfem.slicing.slicers import as_slicer, from_text
@@ -37,11 +37,6 @@ _UNIT = "N/mm"
 
 _COUNTED_BY = ("count", "thickness", "heights")
 """Parameters of flat layers that say how many there are."""
-
-_FLAT = (
-    "support is printed below curved layers alone; these are flat: leave out support, or choose "
-    "curved layers (--slicing load_oriented or spatial)"
-)
 
 
 @dataclass(frozen=True)
@@ -199,7 +194,7 @@ class Request:
     print_plans : bool, default False
         Also plan the print of the whole part, matrix and fibre, for every run.
     support : bool, default False
-        Also print support below a part of curved layers.
+        Also print support below the part.
 
     Raises
     ------
@@ -238,8 +233,6 @@ class Request:
             self._check_print()
         elif self.support:
             raise InputError("support is laid in a print: plan that too (print_plans, --gcode)")
-        for slicing in self.slicings.values():
-            check_propped(slicing.slicer or self.case.slicing, self.support)
         self._check_load_case()
 
     def _check_print(self) -> None:
@@ -248,6 +241,8 @@ class Request:
         (slicing,) = self.slicings.values()
         layers = case.known_layers(slicing.slicer)
         check_print(case.problem.mesh, case.build, case.machine, layers)
+        if self.support and layers:
+            check_support(case.problem.mesh, layers, case.machine)
 
     def _check_load_case(self) -> None:
         known = self.case.problem.cases
@@ -360,12 +355,6 @@ class Request:
     def on_slicing(self, strategy: str, slicing: str) -> str:
         """Name of the run of a strategy on a slicing."""
         return f"{strategy} on {slicing}" if slicing else strategy
-
-
-def check_propped(slicer: Slicer, support: bool) -> None:
-    """Raise where support is wanted below layers that are flat, before anything is solved."""
-    if support and isinstance(slicer, Planar):
-        raise InputError(_FLAT)
 
 
 def _amount(

@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import count
 from typing import Any
 
@@ -38,6 +39,7 @@ from ccfem.paths.planning.strategy import LengthStrategy
 from ccfem.paths.planning.unfolding import may_fold
 from ccfem.paths.splitting.printed_strands import printed_strands
 from ccfem.paths.toolpaths import Toolpaths
+from ccfem.printing.before_solving import why_not_printable
 from ccfem.printing.curved_plan import curved_plan
 from ccfem.printing.part_moves import part_moves
 from ccfem.printing.print_plan import plan_print
@@ -79,6 +81,10 @@ class Part:
     cases : WeightedCases
         The load cases that paths are planned for and tested under: one, or several.
     build : tuple of 3 floats, optional
+    support : SupportLayers, optional
+        Printed below curved layers.
+    propped : bool
+        Whether support is printed below what flat layers would lay in air.
     remarks : tuple of str
         Of the slicer, one line each.
     """
@@ -90,7 +96,15 @@ class Part:
     strand: Strand | None = None
     build: tuple[float, float, float] | None = None
     support: SupportLayers | None = None
+    propped: bool = False
     remarks: tuple[str, ...] = ()
+
+    @cached_property
+    def why_not_printable(self) -> tuple[str, ...]:
+        """What keeps it from being printed, whatever is planned."""
+        flat = all(layer.flat is not None for layer in self.layers)
+        build, layers = self.build or (0.0, 0.0, 1.0), self.layers if flat else ()
+        return why_not_printable(self.stress.mesh, build, self.machine, layers, self.propped)
 
     @property
     def several_cases(self) -> bool:
@@ -308,6 +322,7 @@ def evaluated(run: Run, part: Part, tell: Tell) -> Run:
         rules = strand_verdict(run.toolpaths, part.layers, part.machine, by_design)
         reasons = [
             *filter(None, [run.unprinted]),
+            *part.why_not_printable,
             *(rule.words for rule in rules.broken),
             *why_not(evaluation.total, part.machine),
         ]
@@ -326,10 +341,10 @@ def with_print(run: Run, part: Part, tell: Tell) -> Run:
         what = (run.strands, part.layers, part.stress.mesh, part.machine)
         flat = all(layer.flat is not None for layer in part.layers)
         build = part.build or (0.0, 0.0, 1.0)
-        plan = plan_print(*what) if flat else curved_plan(*what, build, part.support)
+        plan = plan_print(*what, part.propped) if flat else curved_plan(*what, build, part.support)
         moves = part_moves(plan, part.machine)
     except InputError as error:
-        reasons = [str(error), *filter(None, [run.why_not])]
+        reasons = dict.fromkeys([str(error), *filter(None, [run.why_not])])
         return replace(run, unprinted=str(error), why_not="; ".join(reasons))
     share = plan.volume(part.machine) / float(part.stress.mesh.volumes.sum())
     totals = print_totals(moves, part.machine)

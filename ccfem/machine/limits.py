@@ -33,6 +33,9 @@ class Limits:
         Share of the fibre's length that is marked as links.
     fraction : float
         Fibre volume fraction that 99 % of the fibre's length stays at or below.
+    overhang : float, degrees
+        Faces that lean over by more than this, from upright, are laid in air by flat layers,
+        except over gaps no wider than `free_span`; 90 allows all.
     """
 
     short: float = 0.01
@@ -44,6 +47,7 @@ class Limits:
     free_span: float = 8.0
     links: float = 0.3
     fraction: float = 1.0
+    overhang: float = 45.0
 
     def __post_init__(self) -> None:
         check_ranges(self)

@@ -131,6 +131,7 @@ RANGES = {
         "free_span": Range(0.01, 10000.0, "mm", zero=True),
         "links": _SHARE,
         "fraction": Range(0.0, 10.0),
+        "overhang": Range(0.0, 90.0, "degrees"),
     },
 }
 """Every value, by the class that holds it. Wider than any printer that we know of: what is outside

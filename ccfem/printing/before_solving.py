@@ -1,4 +1,4 @@
-"""What is known of a print before the part is solved: machine, number of lines, bed, covers."""
+"""What is known of a print before the part is solved: machine, lines, bed, covers, overhangs."""
 
 from collections.abc import Sequence
 
@@ -12,6 +12,7 @@ from ccfem.paths.toolpaths import MATRIX, Toolpaths
 from ccfem.printing.line_counts import check_matrix_lines
 from ccfem.printing.part_moves import part_moves
 from ccfem.printing.print_plan import PrintPlan, check_bed, check_machine
+from ccfem.printing.support.overhang import overhang
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.plane import plane_frame
 
@@ -40,18 +41,24 @@ def check_print(
         lines than are planned, a part that does not fit on the bed with all that is laid beside it,
         and layers without room, or without matrix to hold them.
     """
+    up = _upwards(build, layers)
     check_machine(machine)
-    check_matrix_lines(mesh, build, machine)
+    check_matrix_lines(mesh, up, machine)
     if not layers:
         return
-    _check_room(mesh, build, machine)
-    level = mesh.points[np.unique(mesh.corners)] @ layers[0].plane.frame[2]
+    _check_room(mesh, up, machine)
+    level = mesh.points[np.unique(mesh.corners)] @ up
     check_cover(slabs_of(layers, float(level.min()), float(level.max()), machine), machine)
+
+
+def _upwards(build: Sequence[float], layers: Sequence[Layer]) -> tuple[float, ...]:
+    """Direction in which a part stands: across its flat layers, where they are known."""
+    return tuple(layers[0].plane.frame[2].tolist() if layers else build)
 
 
 def _check_room(mesh: TetMesh, build: Sequence[float], machine: Machine) -> None:
     """Print the outline of the part's box, once at its top: with all that is laid beside it."""
-    corners = mesh.points[np.unique(mesh.corners)] @ plane_frame(tuple(build)).T
+    corners = mesh.points[np.unique(mesh.corners)] @ plane_frame(build).T
     low, high = corners.min(axis=0), corners.max(axis=0)
     half = 0.5 * np.maximum(high - low - machine.matrix_width, 0.0)[:2]
     turns = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]])
@@ -71,12 +78,41 @@ def _check_room(mesh: TetMesh, build: Sequence[float], machine: Machine) -> None
     part_moves(plan, machine)
 
 
-def reasons_not_to_print(
-    mesh: TetMesh, build: Sequence[float], machine: Machine, layers: Sequence[Layer] = ()
-) -> list[str]:
-    """Say why `check_print` refuses a print; empty where it does not."""
+def why_not_printable(
+    mesh: TetMesh,
+    build: Sequence[float],
+    machine: Machine,
+    layers: Sequence[Layer] = (),
+    support: bool = False,
+) -> tuple[str, ...]:
+    """Say what keeps a part from being printed whatever is planned on it.
+
+    Parameters
+    ----------
+    mesh, build, machine, layers
+        As of `check_print`.
+    support : bool, default False
+        Whether support is printed below what flat layers would lay in air.
+
+    Returns
+    -------
+    tuple of str
+        Why `check_print` refuses it, and what its flat layers would lay in air.
+    """
+    reasons = []
     try:
         check_print(mesh, build, machine, layers)
     except InputError as error:
-        return [f"cannot be printed: {error}"]
-    return []
+        reasons.append(str(error))
+    free = bool(layers) and not support
+    hanging = overhang(mesh, _upwards(build, layers), machine) if free else None
+    return (*reasons, *([] if hanging is None else [hanging.words]))
+
+
+def check_support(mesh: TetMesh, layers: Sequence[Layer], machine: Machine) -> None:
+    """Refuse support below flat layers that need none."""
+    if overhang(mesh, _upwards((), layers), machine) is None:
+        raise InputError(
+            f"no face of the part hangs over by more than {machine.limits.overhang:g} degrees, so "
+            "that its flat layers need no support: leave out --support"
+        )

@@ -31,10 +31,8 @@ def check_matrix_lines(mesh: TetMesh, build: Sequence[float], machine: Machine) 
     InputError
         With the estimate, before anything is computed.
     """
-    along = np.asarray(build, dtype=np.float64)
-    height = float(np.ptp(mesh.points @ (along / np.linalg.norm(along))))
+    height, section = _mean_section(mesh, build)
     layers = height / machine.matrix_height
-    section = float(mesh.volumes.sum()) / height
     lines = layers * np.sqrt(section) / machine.matrix_width
     if lines > MOST_LINES:
         raise InputError(
@@ -43,6 +41,19 @@ def check_matrix_lines(mesh: TetMesh, build: Sequence[float], machine: Machine) 
             f"{machine.matrix_width:g} mm; at most {MOST_LINES:,.0f} lines are planned: raise "
             "matrix_height or matrix_width in [machine]; are all lengths in mm?"
         )
+
+
+def _mean_section(mesh: TetMesh, build: Sequence[float]) -> tuple[float, float]:
+    """Height of a part along its build direction, mm, and its mean section across it, mm^2."""
+    along = np.asarray(build, dtype=np.float64)
+    height = float(np.ptp(mesh.points @ (along / np.linalg.norm(along))))
+    return height, float(mesh.volumes.sum()) / height
+
+
+def about_strands(mesh: TetMesh, layers: int, build: Sequence[float], machine: Machine) -> float:
+    """About how many strands side by side a number of flat layers holds, rather more."""
+    _, section = _mean_section(mesh, build)
+    return layers * float(np.sqrt(section)) / machine.fibre_width
 
 
 def check_strands(layers: Sequence[Layer], machine: Machine) -> None:

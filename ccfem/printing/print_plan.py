@@ -32,6 +32,7 @@ from ccfem.printing.laid_layer import (
     matrix_layer,
 )
 from ccfem.printing.matrix_lines import MatrixFill, matrix_fills
+from ccfem.printing.support.overhang import overhang
 from ccfem.slicing.layers import Layer
 
 
@@ -125,6 +126,7 @@ def plan_print(
     layers: Sequence[Layer],
     mesh: TetMesh,
     machine: Machine,
+    support: bool = False,
 ) -> PrintPlan:
     """Plan the print of a whole part.
 
@@ -146,6 +148,9 @@ def plan_print(
         Flat layers that the fibre lies on.
     mesh : TetMesh
         The part.
+    support : bool, default False
+        Whether columns of matrix, as pads are, stand below what would be laid in air
+        (`ccfem.printing.support.overhang`).
 
     Raises
     ------
@@ -174,7 +179,11 @@ def plan_print(
     slabs = slabs_of(used, float(lowest[2]), float(highest[2]), machine, over)
     fills = matrix_fills(slabs, mesh, frame, origin, machine)
     placed = _Strands(fibre, short, borders)
-    done = _layers(slabs, fills, placed, float(lowest[2]), machine)
+    hanging = overhang(mesh, frame[2], machine) if support else None
+    in_air = _NONE
+    if hanging is not None:
+        in_air = shapely.transform(hanging.region, lambda points: points - origin)
+    done = _layers(slabs, fills, placed, in_air, float(lowest[2]), machine)
     trims = [
         np.column_stack([np.full(len(places), number), places])
         for number, slab in enumerate(slabs)
@@ -229,12 +238,13 @@ def _layers(
     slabs: Sequence[Slab],
     fills: Sequence[MatrixFill | None],
     strands: _Strands,
+    in_air: Region,
     bottom: float,
     machine: Machine,
 ) -> list[LaidLayer]:
     """All layers, from the bed to the top."""
     sections = [fill and fill.section for fill in fills]
-    pads = pad_regions(sections, [strands.on(slab) for slab in slabs], machine)
+    pads = pad_regions(sections, [strands.on(slab) for slab in slabs], machine, in_air)
     layers, below = [], Below()
     for number, (slab, fill) in enumerate(zip(slabs, fills, strict=True)):
         size = (number, slab.upper - bottom, slab.upper - slab.lower, machine)
@@ -264,7 +274,8 @@ def check_bed(plan: PrintPlan, machine: Machine) -> None:
         )
 
 
-# Pads under fibre without a part below it: columns of matrix down to the bed or the part.
+# Pads under fibre without a part below it, and under what hangs over: columns of matrix down to the
+# bed or the part.
 
 
 _MORE = 1.0
@@ -284,7 +295,10 @@ _NONE = shapely.Polygon()
 
 
 def pad_regions(
-    sections: Sequence[Region | None], strands: Sequence[Sequence[FloatArray]], machine: Machine
+    sections: Sequence[Region | None],
+    strands: Sequence[Sequence[FloatArray]],
+    machine: Machine,
+    in_air: Region = _NONE,
 ) -> list[tuple[Region, Region]]:
     """Regions where each layer of matrix needs pads, and where they are solid.
 
@@ -294,6 +308,8 @@ def pad_regions(
         Of all layers from the bed to the top: section of a layer of matrix, None of one of fibre.
     strands : sequence of sequences of (n, 2) arrays, mm
         Fibre on each of them.
+    in_air : (Multi)Polygon, mm
+        Where layers that hang over get pads, seen from above.
 
     Returns
     -------
@@ -326,7 +342,9 @@ def pad_regions(
             room = shapely.union(shapely.difference(room, along), section)
             solid = _union(recent[:_SOLID])
             pads.append((shapely.difference(wide, room), shapely.difference(solid, room)))
-        recent, along = [_NONE, *recent[: _SOLID - 1]], _NONE
+        below = next((one for one in sections[:k][::-1] if one is not None), section)
+        hangs = shapely.intersection(shapely.difference(section, below), in_air)
+        recent, along = [hangs, *recent[: _SOLID - 1]], _NONE
     return pads[::-1]
 
 

@@ -80,3 +80,40 @@ def test_bad_words_are_one_line(ccfem, tmp_path, arguments, message):
     assert message in err
     assert err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+ARMS = "[20, 0], [40, 0], [40, 15], [60, 15], [60, 20], [0, 20], [0, 15], [20, 15]"
+TEE = 'build = "y"\n' + PART.replace("[0, 0], [60, 0], [60, 20], [0, 20]", ARMS)
+LAID_IN_AIR = "% of the matrix would be laid in air: "
+SAME = {
+    "sound": (PART, (), 0, ""),
+    "bed": (PART, ("gcode.bed=[50,50,50]",), 3, "the part needs 59.2 x 19.2 x 6 mm"),
+    "cover": (PART, ("process.cover=2",), 3, "fibre layer do not hold it; at least 2 mm do"),
+    "overhang": (TEE, (), 3, LAID_IN_AIR),
+    "layers": (PART, ("fibre_height=0.5",), 2, "layers must lie at least 0.5 mm apart"),
+}
+
+
+@pytest.mark.parametrize(("text", "machine", "code", "said"), SAME.values(), ids=SAME)
+def test_check_and_plan_say_the_same(ccfem, tmp_path, text, machine, code, said):
+    """And end with the same code; a comparison ranks, and names it in what it writes."""
+    (tmp_path / "strip.toml").write_text(text)
+    machine = [word for value in machine for word in ("--set-machine", value)]
+    quick = ("--no-virtual-test", "--out", "out", *machine)
+    checked, _, why = ccfem("check", "strip.toml", *machine)
+    planned, _, refused = ccfem("plan", "strip.toml", "--strategy", "zigzag", *quick)
+    assert (checked, planned) == (code, code)
+    (line,) = why.splitlines() or [""]
+    assert said in line
+    assert line in refused
+    compared, *_ = ccfem("compare", "strip.toml", "--strategies", "zigzag", *quick)
+    assert compared == (2 if code == 2 else 0)
+    if code == 3:
+        for name in ("results.csv", "results.json", "report.html"):
+            assert said in (tmp_path / "out" / name).read_text(encoding="utf-8")
+        gcode, _, wrong = ccfem("plan", "strip.toml", "--strategy", "zigzag", "--gcode", *quick)
+        assert (said in wrong, gcode) == (True, 3 if said == LAID_IN_AIR else 2)
+        if said == LAID_IN_AIR:
+            head = (tmp_path / "out" / "zigzag.gcode").read_text().partition("G21")[0]
+            assert "; NOT PRINTABLE as planned: " in head
+            assert said in head

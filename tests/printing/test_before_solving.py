@@ -8,7 +8,10 @@ import ccfem
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
+from ccfem.comparison.fibre_front import front_of
 from ccfem.comparison.request import Request
+from ccfem.comparison.studies import Study
+from ccfem.comparison.studies.jobs import jobs_of
 from ccfem.fem.elasticity.problem import Force, Problem, Support
 from ccfem.fem.materials import isotropic
 from ccfem.machine import GcodeProfile, Machine, Process
@@ -44,17 +47,54 @@ def test_it_is_refused_before_the_solve_and_named_by_a_check(case, said):
     with pytest.raises(InputError, match=said):
         Request.of(case, ["zigzag"], print_plans=True)
     Request.of(case, ["zigzag"])  # where no print is asked for it may be planned
-    (line,) = (line for line in ccfem.check(case).warnings if "cannot be printed" in line)
-    assert line.startswith("cannot be printed: ")
+    (line,) = ccfem.check(case).not_printable
+    with pytest.raises(InputError) as refused:
+        Request.of(case, ["zigzag"], print_plans=True)
+    assert line == str(refused.value)
 
 
 def test_what_fits_is_not_refused():
     for case in (part(), part(**bed(150.0, 90.0))):
         Request.of(case, ["zigzag"], print_plans=True)
-        assert not any("cannot be printed" in line for line in ccfem.check(case).warnings)
+        assert ccfem.check(case).not_printable == ()
     tight = replace(part(**bed(110.0, 200.0)).machine, process=Process(prime="none", skirt_loops=0))
     mesh = part().problem.mesh
     check_print(mesh, (0.0, 0.0, 1.0), tight, part().known_layers())
+
+
+LAYERS = {
+    "near": (Planar(heights=(1.0, 1.05)), "layers must lie at least 0.1075 mm apart"),
+    "outside": (Planar(heights=(1.0, 5.0)), "layer height 5 mm lies outside the part"),
+    "high": (Planar(thickness=5.0), "layer thickness must be above 0 and at most the part's"),
+    "many": (Planar(count=180), "layers would have about"),
+}
+
+
+@pytest.mark.parametrize(("slicer", "said"), LAYERS.values(), ids=LAYERS)
+def test_layers_that_cannot_be_planned_on_are_refused_before_the_solve(slicer, said, monkeypatch):
+    """By every command that plans, and in the words of the check."""
+    monkeypatch.setattr("ccfem.comparison.engine.solve", None)
+    monkeypatch.setattr("ccfem.comparison.studies.work.solve", None)
+    thin = {"fibre_width": 0.05, "fibre_height": 0.01, "filament_area": 1e-4}
+    machine = thin if "about" in said else {}
+    case = replace(part(**machine), slicing=slicer)
+    (line,) = ccfem.check(case).not_planned
+    assert said in line
+    with pytest.raises(InputError, match=said):
+        ccfem.compare(case, ["zigzag"])
+    with pytest.raises(InputError, match=f"no slicing could cut 'part': .*{said}"):
+        ccfem.compare(case, ["zigzag"], slicings={"a": slicer})
+    with pytest.raises(InputError, match=f"part, slicing own: .*{said}"):
+        jobs_of(Study((case,), ("zigzag",)))
+    with pytest.raises(InputError, match=said):
+        front_of(Request.of(case, ["zigzag"]))
+
+
+def test_numbers_of_layers_of_a_front_are_refused_before_the_solve(monkeypatch):
+    monkeypatch.setattr("ccfem.comparison.engine.solve", None)
+    request = Request.of(part(), ["zigzag"])
+    with pytest.raises(InputError, match="no slicing could cut 'part': 60 layers: layers must"):
+        front_of(request, [60])
 
 
 def test_layers_that_follow_the_stress_are_not_known():

@@ -122,21 +122,12 @@ def test_support_is_printed_below_the_part_and_before_it(part, kind):
     assert np.diff(heights).max() < 1.5 * STEP
 
 
-def test_flat_layers_are_not_propped_in_the_file(part):
-    mesh = part[0]
-    problem = Problem(mesh, isotropic(1.0, 0.3), (), {})
-    solved = Solved(Case("flat", "", problem), SimpleNamespace(heaviest=SimpleNamespace(mesh=mesh)))
-
-    def flat(stress, build, machine):
-        return Planar(count=2).cut(stress.mesh, build)
-
-    assert len(solved.cut(flat).layers) == 2
-    with pytest.raises(InputError, match="below curved layers alone; these are flat"):
-        solved.cut(flat, support=True)
+def test_support_below_flat_layers_is_refused_where_nothing_hangs_over():
+    """Nothing is solved before: this part has neither loads nor supports."""
+    problem = Problem(box_mesh((30.0, 10.0, 6.0), (3, 1, 1)), isotropic(1.0, 0.3), (), {})
     with pytest.raises(InputError, match="support is laid in a print"):
         compare("cantilever", ["zigzag"], support=True)
-    # Nothing is solved before: this part has neither loads nor supports.
-    with pytest.raises(InputError, match="these are flat: leave out support, or choose"):
+    with pytest.raises(InputError, match="no face of the part hangs over by more than 45 degrees"):
         compare(Case("flat", "", problem), ["zigzag"], support=True, print_plans=True)
 
 

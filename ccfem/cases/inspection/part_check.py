@@ -36,9 +36,8 @@ from ccfem.fem.elasticity.system import prepare
 from ccfem.fem.elasticity.volume_loads import volume_forces
 from ccfem.geometry.facets import facet_keys
 from ccfem.geometry.measures import connected
-from ccfem.printing.before_solving import reasons_not_to_print
+from ccfem.printing.before_solving import why_not_printable
 from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.slicers.planar import Planar
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -194,6 +193,10 @@ class Check(Shown):
         stress.
     mistakes : tuple of str
         What prevents the part from being solved.
+    not_planned : tuple of str
+        What prevents it from being planned, as layers that cannot be cut.
+    not_printable : tuple of str
+        What keeps it from being printed, whatever is planned: `Run.why_not` begins with it.
     """
 
     case: Case
@@ -203,6 +206,8 @@ class Check(Shown):
     warnings: tuple[str, ...]
     mistakes: tuple[str, ...]
     fibre: tuple[Layer, ...] = ()
+    not_planned: tuple[str, ...] = ()
+    not_printable: tuple[str, ...] = ()
 
     @property
     def known(self) -> str:
@@ -216,18 +221,33 @@ class Check(Shown):
         return "\n".join(line.rstrip() for line in lines)
 
     def __str__(self) -> str:
-        return "\n".join([self.known, *(f"mistake: {line}" for line in self.mistakes)])
+        faults = {
+            "not printable": self.not_printable,
+            "cannot be planned": self.not_planned,
+            "mistake": self.mistakes,
+        }
+        said = (f"{kind}: {line}" for kind, lines in faults.items() for line in lines)
+        return "\n".join([self.known, *said])
 
     def __repr__(self) -> str:
         return (
             f"Check of {self.case.name!r}: {len(self.patches)} patches, {len(self.loads)} loads, "
             f"{len(self.warnings)} warnings, {len(self.mistakes)} mistakes"
+            + (", cannot be planned" if self.not_planned else "")
+            + (", not printable" if self.not_printable else "")
         )
 
     def _repr_html_(self) -> str:
         from html import escape
 
-        rest = "".join(f"<p>{escape(x)}</p>" for x in (*self.facts, *self.warnings, *self.mistakes))
+        lines = (
+            *self.facts,
+            *self.warnings,
+            *self.not_printable,
+            *self.not_planned,
+            *self.mistakes,
+        )
+        rest = "".join(f"<p>{escape(x)}</p>" for x in lines)
         return self.to_frame().to_html(index=False) + self.load_frame().to_html(index=False) + rest
 
     def to_frame(self) -> "pd.DataFrame":
@@ -292,19 +312,14 @@ def check(part: str | os.PathLike[str] | Case, **parameters: Any) -> Check:
     rows.sort(key=lambda row: order.index(row.case))
     if not problem.loads:
         mistakes.lines.append("the part has no load case: give at least one load")
-    layers = Mistakes()  # which keep the part from being planned on, not from being solved
+    known: tuple[Layer, ...] = ()
+    not_printable: tuple[str, ...] = ()
+    layers = Mistakes()
     with layers.noted():
-        if isinstance(case.slicing, Planar):
-            case.slicing.check(problem.mesh, case.build, case.machine)
-    doubts += layers.lines
-    if not layers.lines:
-        machine = case.machine
-        with mistakes.noted():
-            known = case.known_layers()
-            doubts += reasons_not_to_print(problem.mesh, case.build, machine, known)
-    fibre: tuple[Layer, ...] = ()
-    with mistakes.noted():
-        fibre = _fibre_layers(case)
+        case.check_layers()
+        known = case.known_layers()
+        not_printable = why_not_printable(problem.mesh, case.build, case.machine, known)
+    fibre = () if case.fibre is None else known
     return Check(
         case,
         (*_facts(case), *_about_fibre(case, fibre)),
@@ -313,6 +328,8 @@ def check(part: str | os.PathLike[str] | Case, **parameters: Any) -> Check:
         tuple(dict.fromkeys(_warnings(case, rows, doubts))),
         tuple(dict.fromkeys(mistakes.lines)),
         fibre,
+        tuple(layers.lines),
+        not_printable,
     )
 
 
@@ -366,14 +383,6 @@ def _facts(case: Case) -> tuple[str, ...]:
         *information,
         f"solve of a load case, {costs}",
     )
-
-
-def _fibre_layers(case: Case) -> tuple[Layer, ...]:
-    """Layers that get fibre, where the part says which; none where they follow from the stress."""
-    if case.fibre is None or not isinstance(case.slicing, Planar):
-        return ()
-    mesh = case.problem.mesh
-    return case.fibre.on(case.slicing.cut(mesh, case.build), mesh, case.machine)
 
 
 def _about_fibre(case: Case, layers: Sequence[Layer]) -> tuple[str, ...]:

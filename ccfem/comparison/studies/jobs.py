@@ -7,7 +7,7 @@ from importlib.metadata import version
 from typing import Any, NamedTuple
 
 from ccfem.base.checks import check_known, member_name
-from ccfem.base.errors import InputError, shown
+from ccfem.base.errors import InputError, Mistakes, shown
 from ccfem.base.progress import Progress, silent
 from ccfem.cases.case import Case
 from ccfem.cases.reading import read
@@ -196,12 +196,13 @@ def jobs_of(study: Study, progress: Progress = silent) -> Jobs:
     Raises
     ------
     InputError
-        For parts, slicings and strategies that do not exist, and parameters that they do not take.
+        For parts, slicings and strategies that do not exist, parameters that they do not take, and
+        flat layers that cannot be cut.
     """
     slicings = _slicings(study)
     parts: list[Part] = []
     jobs: dict[str, Job] = {}
-    repeated = 0
+    repeated, mistakes = 0, Mistakes()
     whole = fingerprint(study.virtual_test, study.strand, study.backend, version("ccfem"))
     for label, variant, given in _entries(study.parts, "parts", Case):
         progress(f"reading {label}", 0.0)
@@ -210,6 +211,9 @@ def jobs_of(study: Study, progress: Progress = silent) -> Jobs:
             check_known(f"load case of {case.name}", load_case, case.problem.cases)
         if not case.problem.cases:
             raise InputError(f"part '{label}' has no load case: give it at least one load")
+        for cut, slicer in slicings:
+            with mistakes.noted(f"{label}, slicing {cut['slicing']}: "):
+                case.check_layers(slicer)
         part = Part(case, study.load_cases or case.problem.cases[:1])
         number = len(parts)
         parts.append(part)
@@ -231,6 +235,7 @@ def jobs_of(study: Study, progress: Progress = silent) -> Jobs:
                 labels["study.fibre_per_layer"] = length
             repeated += key in jobs
             jobs.setdefault(key, Job(key, number, load_case, chosen, values, length, labels))
+    mistakes.complain()
     return Jobs(tuple(parts), tuple(jobs.values()), repeated)
 
 

@@ -10,6 +10,7 @@ from ccfem.base.arrays import FloatArray, IntArray, freeze
 from ccfem.base.display import Shown
 from ccfem.base.errors import InputError
 from ccfem.base.threads import in_threads
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.fem.materials import Material, named_material
 from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
@@ -27,6 +28,7 @@ from ccfem.paths.fields.chart import chart_of
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.slicers.planar import Planar
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -156,7 +158,7 @@ def evaluate(
     def sampled(layer: Layer) -> dict[str, Any]:
         behind = int(np.count_nonzero(late == layer.index))
         on_layer = toolpaths.on_layer(layer.index)
-        below = _below(layer, layers)
+        below = _below(layer, layers, stress.mesh, machine)
         view = _view(on_layer, layer, stress, machine, below, behind, stack, upright)
         kinds = indices.named().items()
         return {name: kind.sample(view) for name, kind in kinds if hasattr(kind, "sample")}
@@ -200,13 +202,24 @@ def _upright(layers: Sequence[Layer], build: Sequence[float] | None) -> FloatArr
     return np.asarray(up / max(float(np.linalg.norm(up)), 1e-300))
 
 
-def _below(layer: Layer, layers: Sequence[Layer]) -> Layer | None:
-    """Find the flat layer under a flat one; None where it is the lowest, and for curved layers."""
+def _below(layer: Layer, layers: Sequence[Layer], mesh: TetMesh, machine: Machine) -> Layer | None:
+    """Find what the fibre of a flat layer lies on: the flat layer under it, or the matrix between.
+
+    None for the lowest layer, and for curved ones. The matrix is cut only where the layer reaches
+    beyond the one under it.
+    """
     if layer.flat is None:
         return None
     height = layer.flat.height
     flat = [each for each in layers if each.flat is not None and each.plane.height < height]
-    return max(flat, key=lambda each: each.plane.height, default=None)
+    lower = max(flat, key=lambda each: each.plane.height, default=None)
+    level = height - 0.5 * (machine.strand_height + machine.highest_matrix(0.0))
+    if lower is None or lower.plane.height >= level:
+        return lower
+    if lower.plane.polygon.buffer(0.5 * machine.fibre_width).covers(layer.plane.polygon):
+        return lower
+    sections = Planar(heights=(level,)).cut(mesh, tuple(layer.plane.frame[2].tolist()))
+    return sections[0] if sections else lower
 
 
 def _view(

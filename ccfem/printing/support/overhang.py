@@ -1,9 +1,28 @@
-"""Faces of a part that hang over while it is printed."""
+"""Faces of a part that hang over while it is printed, and the matrix laid in air below none."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+import shapely
 
-from ccfem.base.arrays import BoolArray, FloatArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.geometry.facets import paired
+from ccfem.geometry.measures import connected
+from ccfem.geometry.shapes import Region
+from ccfem.machine.machine import Machine
+from ccfem.slicing.layers.plane import plane_frame
+from ccfem.slicing.slicers.planar import Planar
+
+_SLACK = 2.0
+"""Degrees by which facets of a face that leans over by the allowed angle may lean over more."""
+_LINES = 2
+"""Least width of what is laid in air, in lines side by side: edges that are rounded below pass."""
+_ARC = 8
+"""Segments per quarter circle."""
+_SMOOTH = 0.02
+"""Deviation of sections that is no matter, mm."""
 
 
 def hanging_facets(
@@ -35,3 +54,114 @@ def hanging_facets(
     lean = normal @ frame[2]
     on_bed = ((mesh.points @ frame[2])[mesh.boundary] <= bed + reach).all(axis=1)
     return area, lean, (lean < -max(np.sin(np.radians(angle)), upright)) & ~on_bed
+
+
+@dataclass(frozen=True)
+class Overhang:
+    """What flat layers would lay in air.
+
+    Attributes
+    ----------
+    region : shapely (Multi)Polygon, mm
+        Seen along the build direction, in the frame of `ccfem.slicing.layers.plane.plane_frame`.
+    height : float, mm
+        Of the lowest of it, above the bed.
+    share : float
+        Of the matrix: one layer over that area.
+    angle : float, degrees
+        From upright, up to which the machine lays layers without support.
+    """
+
+    region: Region
+    height: float
+    share: float
+    angle: float
+
+    @property
+    def words(self) -> str:
+        """One line: how much it is, from where on, and the cure."""
+        share = f"{self.share:.1%}" if self.share >= 1e-3 else "less than 0.1%"
+        return (
+            f"{share} of the matrix would be laid in air: {self.region.area:.3g} mm^2 of the part, "
+            f"from {self.height:.3g} mm above the bed on, hang over by more than {self.angle:g} "
+            "degrees: turn the part, print support below it (--gcode --support), or raise "
+            "machine.limits.overhang"
+        )
+
+
+def overhang(mesh: TetMesh, build: Sequence[float], machine: Machine) -> Overhang | None:
+    """Find what flat layers would lay in air; None where all of it lies on something.
+
+    That is below faces that lean over by more than `Limits.overhang`. A gap no wider than
+    `Limits.free_span` is bridged: what stands on both sides of it holds the lines. Places where
+    less than two lines side by side lie in air, as on edges that are rounded below, pass.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+        The part.
+    build : 3 floats
+        Build direction, across which the layers lie.
+    """
+    limits, width = machine.limits, machine.matrix_width
+    thickness = machine.highest_matrix(0.0)
+    frame = plane_frame(tuple(build))
+    places = mesh.points @ frame.T
+    bed = float(places[np.unique(mesh.corners), 2].min())
+    top = float(places[np.unique(mesh.corners), 2].max())
+    angle = min(limits.overhang + _SLACK, 90.0)
+    *_, hanging = hanging_facets(mesh, frame, bed, angle, _SMOOTH, 0.0)
+    facets = mesh.boundary[hanging]
+    if angle >= 90.0 or not len(facets):
+        return None
+    regions: list[Region] = []
+    lowest: list[float] = []
+    for rows in _pieces(facets):
+        corners = places[facets[rows][:, :3]]
+        seen = shapely.union_all(shapely.polygons(corners[:, :, :2]))
+        if not shapely.buffer(seen, -0.5 * _LINES * width).is_empty:
+            regions.append(seen)
+            lowest.append(float(corners[:, :, 2].min()))
+    # Just below each piece lies what may hold it, or bridge to it.
+    step = 0.5 * thickness
+    below = np.clip(np.array(lowest) - step, bed + min(step, 0.5 * (top - bed)), None)
+    below = bed + np.floor((below - bed) / step + 0.5) * step
+    in_air, height = list[Region](), np.inf
+    held = _bridged(mesh, frame, np.unique(below), limits.free_span)
+    reach = 0.5 * _LINES * width
+    for seen, low, level in zip(regions, lowest, below.tolist(), strict=True):
+        free = shapely.difference(seen, held.get(level, shapely.Polygon()))
+        inner = shapely.buffer(free, -reach, quad_segs=_ARC)
+        if not inner.is_empty:
+            opened = shapely.buffer(inner, reach, quad_segs=_ARC)
+            in_air.append(shapely.intersection(opened, free))
+            height = min(height, low - bed)
+    if not in_air:
+        return None
+    share = sum(region.area for region in in_air) * thickness / float(mesh.volumes.sum())
+    return Overhang(shapely.union_all(in_air), height, share, limits.overhang)
+
+
+def _pieces(facets: IntArray) -> list[IntArray]:
+    """Rows of facets (f, 3 or more) that hang together through edges."""
+    edges = facets[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    pairs, _ = paired(edges)
+    piece = connected(pairs // 3, len(facets))
+    order = np.argsort(piece, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(piece[order])) + 1)
+
+
+def _bridged(
+    mesh: TetMesh, frame: FloatArray, levels: FloatArray, span: float
+) -> dict[float, Region]:
+    """Sections of a part with all gaps filled that are no wider than a span, by their levels."""
+    if not len(levels):
+        return {}
+    filled = {}
+    for layer in Planar(heights=tuple(levels.tolist())).cut(mesh, tuple(frame[2].tolist())):
+        section = shapely.simplify(layer.plane.polygon, _SMOOTH)
+        reach = 0.5 * span
+        wide = shapely.buffer(section, reach, quad_segs=_ARC)
+        closed = shapely.buffer(wide, -reach, quad_segs=_ARC)
+        filled[float(levels[layer.index])] = shapely.union(closed, section)
+    return filled

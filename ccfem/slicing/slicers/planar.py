@@ -87,15 +87,17 @@ class Planar:
         self.check(stress.mesh, build, machine)  # before thousands of layers are cut
         return self.cut(stress.mesh, build)
 
-    def check(self, mesh: TetMesh, build: Vector, machine: Machine) -> None:
-        """Refuse layers nearer to each other than a strand of a machine is high.
+    def check(self, mesh: TetMesh, build: Vector, machine: Machine) -> FloatArray:
+        """Refuse layers nearer to each other than a strand of a machine is high; their heights.
 
         Raises
         ------
         InputError
-            Also for a slab that is higher than the part.
+            Also for a height outside the part, and a slab that is higher than the part.
         """
-        check_heights(self._stack(mesh, plane_frame(_AXES.get(self.axis, build))), machine)
+        stack = self._stack(mesh, plane_frame(_AXES.get(self.axis, build)))
+        check_heights(stack, machine)
+        return stack
 
     def cut(self, mesh: TetMesh, build: Vector = (0.0, 0.0, 1.0)) -> tuple[Layer, ...]:
         """Cut a mesh into flat layers.
@@ -119,12 +121,6 @@ class Planar:
         level = mesh.points @ frame[2]
         lowest, highest = float(level[mesh.corners].min()), float(level[mesh.corners].max())
         stack = self._stack(mesh, frame)
-        for height in (stack[0], stack[-1]):
-            if not lowest <= height <= highest:
-                raise InputError(
-                    f"layer height {height:g} mm lies outside the part, which reaches from "
-                    f"{lowest:g} to {highest:g} mm along the build direction"
-                )
         # A layer stands for what is nearer to it than to the others.
         edges = [lowest, *(0.5 * (stack[1:] + stack[:-1])).tolist(), highest]
         layers = [
@@ -139,11 +135,19 @@ class Planar:
         return tuple(layer for layer in layers if layer is not None)
 
     def _stack(self, mesh: TetMesh, frame: FloatArray) -> FloatArray:
-        """Heights of the layers along the build direction, rising, mm."""
-        if self.heights is not None:
-            return np.array(self.heights)
-        level = mesh.points[mesh.corners] @ frame[2]
-        return slice_heights(float(level.min()), float(level.max()), self.count, self.thickness)
+        """Heights of the layers along the build direction, rising, mm; all of them in the part."""
+        level = mesh.points[np.unique(mesh.corners)] @ frame[2]
+        lowest, highest = float(level.min()), float(level.max())
+        if self.heights is None:
+            return slice_heights(lowest, highest, self.count, self.thickness)
+        stack = np.array(self.heights)
+        outside = stack[(stack < lowest) | (stack > highest)]
+        if len(outside):
+            raise InputError(
+                f"layer height {outside[0]:g} mm lies outside the part, which reaches from "
+                f"{lowest:g} to {highest:g} mm along the build direction"
+            )
+        return stack
 
 
 def _rising(heights: Sequence[float]) -> tuple[float, ...]:
