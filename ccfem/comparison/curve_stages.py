@@ -10,6 +10,7 @@ import numpy as np
 from ccfem.comparison.curve import Curve
 from ccfem.comparison.runs import Run
 from ccfem.comparison.stages import Part, Tell, attempted, evaluated, planned_to_lengths
+from ccfem.judging.evaluation.strand_rules import StrandVerdict
 from ccfem.paths.planning.equal_fibre import extremes
 from ccfem.paths.planning.given_paths import GivenPaths
 from ccfem.paths.planning.planned import Planned
@@ -135,6 +136,7 @@ def _planned(reach: _Reach, asked: Sequence[float], part: Part) -> list[Run]:
     bare = replace(
         reach.run,
         evaluation=None,
+        strand_verdict=StrandVerdict(),
         tested=None,
         print_plan=None,
         moves=None,

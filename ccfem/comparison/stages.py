@@ -17,7 +17,7 @@ from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.fem.elasticity.weighted_cases import WeightedCases
 from ccfem.judging.evaluation import evaluate
 from ccfem.judging.evaluation.printable import why_not
-from ccfem.judging.evaluation.strand_rules import strand_verdict
+from ccfem.judging.evaluation.strand_rules import StrandVerdict, strand_verdict
 from ccfem.judging.virtual_testing.equilibrium import BONDED, TENSION
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import RHO_SPAN, Strand
@@ -149,6 +149,7 @@ def with_plan(run: Run, plan: Planned, part: Part) -> Run:
         toolpaths=plan.toolpaths,
         length_per_layer=plan.length_per_layer,
         strands=None,
+        strand_verdict=StrandVerdict(),
         unprinted="",
         note=plan.note,
     )
@@ -408,7 +409,8 @@ def _tested(run: Run, tests: Tests, part: Part, tell: Tell, span: Sequence[float
 
     def work() -> Run:
         mesh = tests.models[0][0].unreinforced.mesh
-        strands = carrying_strands(run.toolpaths, run.strategy, part.layers, mesh, part.machine)
+        about = (run.strategy, part.layers, mesh, part.machine, run.strand_verdict.parts)
+        strands = carrying_strands(run.toolpaths, *about)
         tests_done = [_test(strands, *model, tests.strand, part, span) for model in tests.models]
         tested = replace(tests_done[0], alternative=[*tests_done[1:], None][0])
         if part.several_cases:

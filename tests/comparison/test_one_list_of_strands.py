@@ -5,6 +5,7 @@ The numbers of the file are read by the printer on paper of `benchmarks.print_ch
 
 import csv
 from dataclasses import replace
+from html.parser import HTMLParser
 
 import numpy as np
 import pytest
@@ -14,11 +15,14 @@ from benchmarks.print_checks.job import own
 from benchmarks.print_checks.printer import follow
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
-from ccfem.comparison.engine import compare
+from ccfem.comparison.engine import answer, compare
 from ccfem.comparison.files import record, results_rows, write_table
 from ccfem.comparison.headline import HEADLINE, cell_text
+from ccfem.comparison.report.html_report import report_html
+from ccfem.comparison.request import Request
 from ccfem.fem.elasticity.problem import Force, Problem, Support
 from ccfem.fem.materials import isotropic
+from ccfem.judging.virtual_testing.strand_room import strand_parts
 from ccfem.machine import Machine, machine_names, machine_table, updated
 from ccfem.paths.planning import GivenPaths
 from ccfem.paths.splitting.printed_strands import printed_strands
@@ -154,3 +158,62 @@ def test_a_border_cuts_a_strand_also_where_it_crosses_itself():
     assert line[:, 0].max() == pytest.approx(130.0)
     inner = shapely.intersection(shapely.LineString(loop), shapely.box(0.0, 0.0, 130.0, 60.0))
     assert length(line) == pytest.approx(inner.length, abs=1e-6)
+
+
+class Rows(HTMLParser):
+    """Rows of all tables of a page, as lists of the texts of their cells."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.rows, self.cell = [], None
+        self.feed(page)
+
+    def handle_starttag(self, tag, attrs):
+        if tag == "tr":
+            self.rows.append([])
+        elif tag in ("td", "th") and self.rows:
+            self.cell = ""
+
+    def handle_endtag(self, tag):
+        if tag in ("td", "th") and self.cell is not None:
+            self.rows[-1].append(self.cell.strip())
+            self.cell = None
+
+    def handle_data(self, data):
+        if self.cell is not None:
+            self.cell += data
+
+
+def test_the_page_says_what_is_in_the_file(printed):
+    """The page is read as a browser reads it, the file as a printer does."""
+    done, files = printed
+    page = report_html(done, {**record(done, "", {}), "left_out": []})
+    tables = {row[0]: row[1:] for row in Rows(page).rows if row}
+    names = [run.name for run in done.ranking if run.evaluation is not None]
+
+    def said(index):
+        (texts,) = (cells for name, cells in tables.items() if name.partition(" ")[0] == index)
+        return [float(text.replace(",", "")) for text in texts]
+
+    for k, name in enumerate(names):
+        run, head = files[name], files[name].head
+        matrix, fibre = (float(mass) for mass in head["filament used [g]"].split(","))
+        assert said("paths")[k] == said("cuts")[k] == len(own(run))
+        assert said("whole_print_time")[k] == pytest.approx(float(head["TIME"]), rel=0.02)
+        assert said("matrix_mass")[k] == pytest.approx(matrix, rel=0.01)
+        assert said("fibre_mass")[k] == pytest.approx(fibre, rel=0.01)
+
+
+def test_parts_of_strands_are_found_once_a_run(monkeypatch):
+    """By the rules for strands; the virtual test takes them from there."""
+    counted = []
+
+    def parts(*about):
+        counted.append(about)
+        return strand_parts(*about)
+
+    monkeypatch.setattr("ccfem.judging.evaluation.strand_rules.strand_parts", parts)
+    monkeypatch.setattr("ccfem.judging.virtual_testing.strands.strand_parts", None)
+    done = answer(Request.of(case_on("chen2021"), ["concentric"], natural=True, bound=False))
+    assert len(counted) == 1
+    assert done.runs[0].tested.bracket.tension.ratio > 1.0

@@ -65,10 +65,15 @@ class StrandVerdict:
     broken : tuple of BrokenRule
     remark : str
         What folds that are no reason to refuse the plan cost; empty without any.
+    parts : StrandParts, optional
+        Of the strands, as the virtual test takes them too.
     """
 
     broken: tuple[BrokenRule, ...] = ()
     remark: str = ""
+    parts: StrandParts | None = None
+
+    __repr__ = in_brief
 
     def strands(self, count: int) -> BoolArray:
         """Mask (count,) of the fibre paths that break a rule."""
@@ -104,7 +109,7 @@ def strand_verdict(
             f"by more than 90 degrees within {WINDOW * machine.minimum_radius:.3g} mm: "
             f"{parts.folds.folded.sum():.0f} mm of fibre in these folds carry nothing"
         )
-    return StrandVerdict((*folded, *held, *_outside(fibre, parts)), remark)
+    return StrandVerdict((*folded, *held, *_outside(fibre, parts)), remark, parts)
 
 
 def _folded(fibre: Toolpaths, parts: StrandParts, machine: Machine) -> tuple[BrokenRule, ...]:

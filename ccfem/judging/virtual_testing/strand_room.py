@@ -172,8 +172,7 @@ def room_of(
     path: IntArray,
     start: FloatArray,
     stop: FloatArray,
-    machine: Machine,
-    layers: Sequence[Layer] = (),
+    parts: StrandParts,
     crosses: bool = True,
 ) -> FloatArray:
     """Share of the fibre of pieces of paths that carries.
@@ -184,10 +183,10 @@ def room_of(
         Fibre path of each piece.
     start, stop : (s,) arrays, mm
         Arc lengths of the path at its ends.
-    machine : Machine
-        Width and height of a strand, and its least radius.
-    layers, crosses
-        As of `strand_parts` and `StrandParts.carrying`.
+    parts : StrandParts
+        Of the paths.
+    crosses
+        As of `StrandParts.carrying`.
 
     Returns
     -------
@@ -195,7 +194,6 @@ def room_of(
         Mean over each piece: 1 inside the part where no strand of the same direction is nearer than
         a width; 1/N in N copies of a line; 0 in a fold.
     """
-    parts = strand_parts(toolpaths, machine, layers)
     length, first = parts.beads.length, parts.beads.first
     carried = np.concatenate([[0.0], np.cumsum(length * parts.carrying(crosses))])
     axis = np.concatenate([[0.0], np.cumsum(length)])

@@ -12,7 +12,7 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.buckets import Buckets, bucket
 from ccfem.geometry.polylines import starts_segment
-from ccfem.judging.virtual_testing.strand_room import room_of
+from ccfem.judging.virtual_testing.strand_room import StrandParts, room_of, strand_parts
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.given_paths import GivenPaths
 from ccfem.paths.planning.strategy import Strategy
@@ -77,6 +77,7 @@ def cut_strands(
     machine: Machine | None = None,
     layers: Sequence[Layer] = (),
     crosses: bool = True,
+    parts: StrandParts | None = None,
 ) -> Strands:
     """Cut the fibre paths at the faces of the cells.
 
@@ -97,6 +98,8 @@ def cut_strands(
         That the paths lie on: width outside them carries nothing. Default: all width is inside.
     crosses : bool, default True
         Whether strands carry where they lie across other strands: those of strategies that plan so.
+    parts : StrandParts, optional
+        Of these paths, machine and layers, if they are known already.
 
     Returns
     -------
@@ -130,7 +133,8 @@ def cut_strands(
     first, last = (before[cut.step] + at * size for at in (cut.begin, cut.end))
     lent = np.ones(len(cut.step))
     if machine is not None:
-        lent = room_of(toolpaths, path[cut.step], first, last, machine, layers, crosses)
+        parts = strand_parts(toolpaths, machine, layers) if parts is None else parts
+        lent = room_of(toolpaths, path[cut.step], first, last, parts, crosses)
     middle = 0.5 * (cut.begin + cut.end)
     unit = step / np.maximum(length, 1e-300)[:, None]
     return Strands(
@@ -172,6 +176,7 @@ def carrying_strands(
     layers: Sequence[Layer],
     mesh: TetMesh,
     machine: Machine,
+    parts: StrandParts | None = None,
 ) -> Strands:
     """Strands of a strategy in a mesh, with what of them carries, as a comparison tests them.
 
@@ -179,11 +184,15 @@ def carrying_strands(
     ----------
     toolpaths : Toolpaths
         Strands as they are printed (`ccfem.paths.splitting.printed_strands`).
+    parts : StrandParts, optional
+        As of `cut_strands`.
     """
     # Nobody knows whether those who planned given paths planned for the height of crossings.
     given = isinstance(strategy, GivenPaths)
     crosses = not given and bool(getattr(strategy, "crosses", False))
-    return cut_strands(toolpaths, mesh, machine=machine, layers=layers, crosses=crosses)
+    return cut_strands(
+        toolpaths, mesh, machine=machine, layers=layers, crosses=crosses, parts=parts
+    )
 
 
 # Straight steps in the mesh, cut where they pass from one cell to the next.
