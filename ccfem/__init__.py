@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 from ccfem.base import display
 from ccfem.base.moved import MOVED, find_moved
+from ccfem.base.submodules import imported
 
 if TYPE_CHECKING:
     from ccfem.cases.case import Case
@@ -104,9 +105,9 @@ def __getattr__(name: str) -> Any:
     if name == "__version__":
         return importlib.import_module("importlib.metadata").version("ccfem")
     if name in _HOMES:
-        return getattr(importlib.import_module(f"ccfem.{_HOMES[name]}"), name)
+        return getattr(imported(f"ccfem.{_HOMES[name]}"), name)
     if name in _PACKAGES or name in MOVED:
-        return importlib.import_module(f"ccfem.{name}")
+        return imported(f"ccfem.{name}")
     raise AttributeError(f"module 'ccfem' has no attribute '{name}'")
 
 

@@ -26,7 +26,9 @@ _LARGEST_MARKER = 10_000_000
 
 
 @contextmanager
-def whole_folder(directory: Path, names: Sequence[str], force: bool = False) -> Iterator[Path]:
+def whole_folder(
+    directory: Path, names: Sequence[str], force: bool = False, beside: Sequence[str] = ()
+) -> Iterator[Path]:
     """Yield a temporary folder whose files all go into `directory` when the block ends well.
 
     Of what is in `directory`, only files that ccfem wrote there itself, and that nobody changed
@@ -42,6 +44,8 @@ def whole_folder(directory: Path, names: Sequence[str], force: bool = False) -> 
         removed.
     force : bool, default False
         Replace files of the same names whoever wrote them; others, and folders, stay even so.
+    beside : sequence of str
+        Patterns of files that the same command writes at other times.
 
     Raises
     ------
@@ -55,7 +59,7 @@ def whole_folder(directory: Path, names: Sequence[str], force: bool = False) -> 
             _mend(parent, directory, names)
             if directory.exists():
                 with Folder.opened(directory) as target:
-                    refuse_foreign(target, names, force)
+                    refuse_foreign(target, names, force, beside)
         # On one file system with the folder, which may be a link or have one of its own.
         with private_folder(directory if directory.exists() else parent) as private:
             (private / UNREADY).mkdir()
@@ -118,10 +122,13 @@ def _mend(parent: Path, directory: Path, names: Sequence[str]) -> None:
         sweep(target, (*names, _MARKER), finish)
 
 
-def refuse_foreign(target: Folder, names: Sequence[str], force: bool) -> None:
+def refuse_foreign(
+    target: Folder, names: Sequence[str], force: bool, beside: Sequence[str] = ()
+) -> None:
     """Refuse a folder with files that ccfem did not write, unless it also holds its results.
 
     In that one, entries of others are refused that have the names of results: see `whole_folder`.
+    So are results of another command, known by its record, of which some would be replaced.
     """
     there = [name for name in target.names() if name not in RESERVED]
     marked, ours = _marked(target), _ours(target, names)
@@ -130,6 +137,13 @@ def refuse_foreign(target: Folder, names: Sequence[str], force: bool) -> None:
             f"{target.path} holds files that ccfem did not write, such as "
             f"{(there or [_MARKER])[0]}: choose another folder with --out, or replace files of the "
             "same names with --force"
+        )
+    shared = any(_is_known(name, names) for name in marked or {})
+    record = next((k for k in marked or {} if _is_record(k, target, (*names, *beside))), None)
+    if record is not None and shared and not force:
+        raise InputError(
+            f"{target.path} holds the results of another command, with {record}, some of which "
+            "would be replaced: choose another folder with --out"
         )
     changed = {name for name in there if name in (marked or {}) and _is_known(name, names)}
     for name in sorted(changed.difference(ours)):
@@ -153,6 +167,11 @@ def _refuse_entry(target: Folder, name: str, ours: Mapping[str, str], force: boo
             f"{target.path / name} is not by ccfem and has the name of a result: move it"
             f"{',' if cure else ' or'} choose another folder with --out{cure}"
         )
+
+
+def _is_record(name: str, target: Folder, names: Sequence[str]) -> bool:
+    """Whether a file is there that is the record of a command that writes other names."""
+    return name.endswith(".json") and not _is_known(name, names) and target.is_file(name)
 
 
 def _is_known(name: str, names: Sequence[str]) -> bool:

@@ -330,6 +330,7 @@ def _version() -> str:
 _LOCK = ".lock"
 _RUNS = "runs"
 TABLES = ("results.csv", "results.parquet", "times.csv", "study.html")
+_FILES = ("study.json", *TABLES)
 
 
 class Store:
@@ -378,12 +379,12 @@ class Store:
     def writing(self, *names: str) -> Iterator[Path]:
         """Yield a temporary folder for files beside the runs: see `whole_folder`."""
         self._folder.check_place()
-        with whole_folder(self._folder.path, names, self._force) as folder:
+        with whole_folder(self._folder.path, names, self._force, _FILES) as folder:
             yield folder
 
     def sweep(self) -> None:
         """Remove what killed programs left behind."""
-        sweep(self._folder, ("study.json", *TABLES))
+        sweep(self._folder, _FILES)
         if self._folder.is_folder(_RUNS):
             with self._folder.inner(_RUNS) as runs:
                 sweep(runs, ())
@@ -422,7 +423,7 @@ def opened(folder: Path, force: bool = False) -> Iterator[Store]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with Folder.opened(folder) as held:
-            refuse_foreign(held, ("study.json", *TABLES), force)
+            refuse_foreign(held, _FILES, force)
             lock = held.open(_LOCK, os.O_RDWR | os.O_CREAT)
             try:
                 _lock(lock, folder)

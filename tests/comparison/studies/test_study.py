@@ -14,8 +14,10 @@ import pytest
 
 import ccfem
 from ccfem.base.errors import InputError
+from ccfem.base.result_folder import whole_folder
+from ccfem.comparison.files import RESULT_FILES
 from ccfem.comparison.studies.jobs import Part
-from ccfem.comparison.studies.running import opened
+from ccfem.comparison.studies.running import TABLES, opened
 from ccfem.comparison.studies.transport import unpacked
 from ccfem.comparison.studies.work import part_bytes, solve_part
 from ccfem.comparison.studies.worker import _stress
@@ -340,3 +342,27 @@ def test_a_pickle_in_place_of_the_stress_is_not_opened(tmp_path):
         with pytest.raises(ValueError, match="allow_pickle"):
             _stress(b"", str(file))
     assert not (tmp_path / "foreign").exists()
+
+
+def write_beside(out, record, names):
+    """Write what a command leaves in a folder."""
+    with whole_folder(out, names) as files:
+        for name in (record, "results.csv"):
+            (files / name).write_text(record)
+
+
+def test_a_study_and_a_comparison_do_not_mix_in_one_folder(tmp_path):
+    """Both write results.csv: the second of them is refused, and nothing is replaced."""
+    write_beside(tmp_path / "compared", "results.json", RESULT_FILES)
+    begun(tmp_path / "study")
+    with opened(tmp_path / "study") as store, store.writing(*TABLES) as files:
+        (files / "results.csv").write_text("study")
+    before = snapshot(tmp_path)
+    with pytest.raises(InputError, match=r"results of another command, with results\.json, some"):
+        ccfem.study(STUDY, tmp_path / "compared")
+    with pytest.raises(InputError, match=r"results of another command, with study\.json, some of"):
+        write_beside(tmp_path / "study", "results.json", RESULT_FILES)
+    assert snapshot(tmp_path) == before
+    with opened(tmp_path / "study") as store, store.writing(*TABLES) as files:  # its own go on
+        (files / "results.csv").write_text("again")
+    assert (tmp_path / "study" / "results.csv").read_text() == "again"
