@@ -241,12 +241,7 @@ def answer(
             parts, refused = _cut(request, basis)
     steps = (5 if request.print_plans else 4) * len(request.strategies) * len(parts) + 1
     tell = counted(progress, 0.1, steps)
-    wanted: Wanted
-    if isinstance(request.amount, Stiffness):
-        part, run, held = plan_to_stiffness(request, parts[""], basis.cut, tell)
-        parts, runs, wanted = {"": part}, [run], held
-    else:
-        runs, wanted = _planned(request, parts, tell)
+    parts, runs, wanted = _planned(request, basis, parts, tell)
     runs = [evaluated(run, parts[run.slicing], tell) for run in runs]
     if request.print_plans:
         runs = [with_print(run, parts[run.slicing], tell) for run in runs]
@@ -338,22 +333,42 @@ def _own_thickness(request: Request, basis: Solved) -> float:
     return float(np.mean([layer.thickness for layer in layers]))
 
 
-def _planned(request: Request, parts: Mapping[str, Part], tell: Tell) -> tuple[list[Run], Wanted]:
-    """Plan every strategy on every slicing; with the runs the length that all are held to."""
-    unplanned = {name: _unplanned(request, name, part) for name, part in parts.items()}
+_Plans = tuple[Mapping[str, Part], list[Run], Wanted]
+"""The part as it is cut, its runs, and the length that all are held to."""
+
+
+def _planned(request: Request, basis: Solved, parts: Mapping[str, Part], tell: Tell) -> _Plans:
+    """Plan every strategy on every slicing to the amount that is asked for.
+
+    A stiffness chooses among numbers of layers; every other amount leaves the slicings as they are.
+    """
     amount = request.amount
+    if isinstance(amount, Stiffness):
+        part, run, held = plan_to_stiffness(request, parts[""], basis.cut, tell)
+        return {"": part}, [run], held
+    unplanned = {name: _unplanned(request, name, part) for name, part in parts.items()}
     if isinstance(amount, Spread):
-        return _spread(unplanned, parts, amount.points, tell), None
-    if not isinstance(amount, Shortest):
-        wanted = _per_layer(amount, parts)
-        runs = [
-            planned(run, part, wanted[name], tell)
-            for name, part in parts.items()
-            for run in unplanned[name]
-        ]
-        if isinstance(amount, InAll) and request.named:
-            return runs, amount
-        return runs, wanted[""] if not request.named else None
+        return parts, _spread(unplanned, parts, amount.points, tell), None
+    if isinstance(amount, Shortest):
+        return parts, *_to_the_shortest(request, unplanned, parts, tell)
+    wanted = _per_layer(amount, parts)
+    runs = [
+        planned(run, part, wanted[name], tell)
+        for name, part in parts.items()
+        for run in unplanned[name]
+    ]
+    if not request.named:
+        return parts, runs, wanted[""]
+    return parts, runs, amount if isinstance(amount, InAll) else None
+
+
+def _to_the_shortest(
+    request: Request,
+    unplanned: Mapping[str, Sequence[Run]],
+    parts: Mapping[str, Part],
+    tell: Tell,
+) -> tuple[list[Run], Wanted]:
+    """Plan all runs to the shortest natural length of any; with them that length."""
     alone = {name: natural(unplanned[name], part, tell) for name, part in parts.items()}
     lengths = {
         name: runs[setter].length_per_layer * len(parts[name].layers)
@@ -363,15 +378,14 @@ def _planned(request: Request, parts: Mapping[str, Part], tell: Tell) -> tuple[l
     if not lengths:
         return [run for runs, _ in alone.values() for run in runs.values()], None
     first = min(lengths, key=lengths.__getitem__)
-    setting, least = alone[first][0], lengths[first]
-    runs = []
-    for name, (runs_alone, setter) in alone.items():
-        length = least / len(parts[name].layers)
-        if name == first and setter is not None:
-            length = setting[setter].length_per_layer
-            held: Wanted = length
-        runs += to_length(runs_alone, setter if name == first else None, length, parts[name], tell)
-    return runs, InAll(least) if request.named else held
+    in_all, runs = lengths[first], []
+    for name, (of_slicing, setter) in alone.items():
+        sets = setter if name == first else None
+        length = in_all / len(parts[name].layers)
+        if sets is not None:
+            least = length = of_slicing[sets].length_per_layer
+        runs += to_length(of_slicing, sets, length, parts[name], tell)
+    return runs, InAll(in_all) if request.named else least
 
 
 def _spread(

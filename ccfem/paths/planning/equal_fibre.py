@@ -15,6 +15,7 @@ import numpy as np
 from ccfem.base.checks import check_number
 from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.machine.machine import Machine
+from ccfem.paths.planning.bracketing import around, close_in, interpolated
 from ccfem.paths.planning.mixing import layer_lengths, mixed
 from ccfem.paths.planning.plan import check_layers, plan, plan_layers
 from ccfem.paths.planning.planned import Planned
@@ -29,16 +30,6 @@ from ccfem.slicing.layers.layer import Layer
 
 _POWERS = (0.5, 3.0)
 """Bounds of the power of the parameter that the length is assumed to be proportional to."""
-
-
-def around(lengths: Mapping[float, float], target: float) -> tuple[float | None, float | None]:
-    """Find the turn of longest length up to a target, and that of the next length above."""
-    low = [turn for turn in lengths if lengths[turn] <= target]
-    high = [turn for turn in lengths if lengths[turn] > target]
-    return (
-        max(low, key=lambda turn: (lengths[turn], turn), default=None),
-        min(high, key=lambda turn: (lengths[turn], turn), default=None),
-    )
 
 
 @dataclass(frozen=True)
@@ -129,8 +120,7 @@ class Dial:
         if low is not None and high is not None:
             a, b = lengths[low], lengths[high]
             even = self._even or max(low, high) > 1.0 or not a > 0.0
-            share = (target - a) / (b - a) if even else np.log(target / a) / np.log(b / a)
-            return float(low + np.clip(share, 0.05, 0.95) * (high - low))
+            return interpolated((low, high), (a, b), target, even)
         known = low if low is not None else high
         assert known is not None
         if known >= 1.0 and low is not None:
@@ -440,24 +430,24 @@ class _Search:
 
     def bracket(self, target: float) -> tuple[float | None, float | None]:
         """Find turns on either side of a length on the few layers, as near as a few steps allow."""
-        known, enough = self.sampled, (1.0 - 0.5 * self.tolerance) * target
-        turn = min(self.dial.own, 1.0)
-        low = high = None
-        for step in range(_STEPS):
-            self.sample(turn)
+        known, least = self.sampled, (1.0 - 0.5 * self.tolerance) * target
+
+        def following(step: int) -> float | None:
             low, high = around(known, target)
-            if low is not None and known[low] >= enough:
-                break
-            if low is not None and high is not None and abs(high - low) <= _FINEST:
-                break
-            turn = self.dial.guess(known, target, _BEYOND)
-            if low is not None and high is not None and step % 3 == 2:
-                turn = 0.5 * (low + high)  # so that a curved relation cannot stall the search
+            if low is not None and high is not None:
+                if abs(high - low) <= _FINEST:
+                    return None
+                if step % 3 == 2:  # so that a curved relation cannot stall the search
+                    return 0.5 * (low + high)
             if low is None and step == _STEPS - 2:  # out of proportion: the end itself
-                turn = 0.0
-            if turn in known:
-                break
-        return low, high
+                return 0.0
+            return self.dial.guess(known, target, _BEYOND)
+
+        def measured(turn: float) -> tuple[float, float]:
+            return turn, self.sample(turn)
+
+        close_in(known, measured, min(self.dial.own, 1.0), following, (least, target), _STEPS)
+        return around(known, target)
 
     def between(self, wanted: float, close: float) -> Planned | None:
         """Mix the known plans on either side of a length, if they are close enough."""

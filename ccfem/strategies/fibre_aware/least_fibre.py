@@ -1,6 +1,6 @@
 """How much fibre a wanted stiffness takes: the least length of a strategy that reaches it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +15,7 @@ from ccfem.judging.virtual_testing.several_cases import specimens, virtual_tests
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.judging.virtual_testing.strands import carrying_strands
 from ccfem.machine.machine import Machine
+from ccfem.paths.planning.bracketing import close_in, interpolated
 from ccfem.paths.planning.planned import Planned
 from ccfem.paths.planning.strategy import Strategy
 from ccfem.paths.planning.whole_part import full_length
@@ -34,6 +35,9 @@ _PLANS = 10
 
 _CLOSE = 0.01
 """Share of the wanted gain by which a plan may do better than asked."""
+
+_KEPT_AWAY = 0.1
+"""Share of the logarithm between two lengths that the next one is kept away from both."""
 
 _LEAP, _STEP = 4.0, 0.1
 """Largest factor between two lengths that are tried one after the other, and the logarithm of the
@@ -79,7 +83,7 @@ def least_fibre(
     ratio: float,
     strand: Strand | None = None,
 ) -> LeastFibre:
-    """Find the least fibre with which a strategy makes a part so and so stiff.
+    """Find the least fibre with which a strategy reaches a stiffness ratio.
 
     The gain in stiffness grows about as a power of the length; two plans say which, and the next
     length follows. Of every plan the strands that are printed are tested virtually.
@@ -109,31 +113,31 @@ def least_fibre(
         strategy = for_every_case(strategy)
     parts, most = specimens(cases), _MOST * full_length(layers, machine)
     mesh = parts[0].unreinforced.mesh
-    by_length: dict[float, LeastFibre] = {}
-    tried: list[tuple[float, float]] = []
-    length = _FIRST * most
-    for _ in range(_PLANS):
+    plans: dict[float, LeastFibre] = {}
+    tried: dict[float, float] = {}
+
+    def measured(length: float) -> tuple[float, float]:
         planned = plan_cases(strategy, layers, cases, machine, length, strand)
         printed = printed_strands(planned.toolpaths, layers, mesh, machine).fibre
         strands = carrying_strands(printed, planned.strategy, layers, mesh, machine)
         ratios = virtual_tests(strands, parts, strand).ratios
-        reached = float(ratios.min())
-        laid = planned.length_per_layer
-        if laid in by_length:  # no other length lies between
-            break
-        by_length[laid] = LeastFibre(planned, length, reached, ratios, ())
-        tried.append((laid, reached))
-        if 0.0 <= reached - ratio <= _CLOSE * (ratio - 1.0):
-            break
-        if reached < ratio and not planned.reached and laid < length:  # its most
-            break
-        following = _next(tried, ratio)
-        if following is None:
-            break
-        length = min(following, most)
-    enough = [laid for laid, plan in by_length.items() if plan.ratio >= ratio]
+        reached, laid = float(ratios.min()), planned.length_per_layer
+        plans.setdefault(laid, LeastFibre(planned, length, reached, ratios, ()))
+        return laid, reached
+
+    def following(_: int) -> float | None:
+        last = plans[[*tried][-1]]
+        lays_its_most = not last.planned.reached and last.planned.length_per_layer < last.asked
+        if last.ratio < ratio and lays_its_most:
+            return None
+        length = _next(tried, ratio)
+        return None if length is None else min(length, most)
+
+    wanted = (ratio, ratio + _CLOSE * (ratio - 1.0))
+    close_in(tried, measured, _FIRST * most, following, wanted, _PLANS)
+    enough = [laid for laid, plan in plans.items() if plan.ratio >= ratio]
     if not enough:
-        best = max(by_length.values(), key=lambda plan: plan.ratio)
+        best = max(plans.values(), key=lambda plan: plan.ratio)
         every, where = "", ""
         if len(cases) > 1:
             every = " in every load case"
@@ -144,7 +148,7 @@ def least_fibre(
             f"{best.planned.length_per_layer:.0f} mm per layer: ask for less, or give the part "
             "more layers"
         )
-    return replace(by_length[min(enough)], tried=tuple(tried))
+    return replace(plans[min(enough)], tried=tuple(tried.items()))
 
 
 def for_every_case(strategy: Strategy) -> Strategy:
@@ -157,20 +161,22 @@ def for_every_case(strategy: Strategy) -> Strategy:
     return replace(changed, objective=LEAST) if worst else strategy
 
 
-def _next(tried: list[tuple[float, float]], ratio: float) -> float | None:
+def _next(tried: Mapping[float, float], ratio: float) -> float | None:
     """Length at which the gain, a power of the length between two plans, is a little too large.
 
     None where the shortest that is enough and the longest below it that is not are alike.
     """
-    wanted = np.log((ratio - 1.0) * (1.0 + 0.5 * _CLOSE))
-    known = sorted((float(np.log(x)), float(np.log(max(r - 1.0, 1e-9)))) for x, r in tried)
-    above = min((point for point in known if point[1] >= np.log(ratio - 1.0)), default=None)
-    below = max((point for point in known if above is None or point < above), default=None)
+    gains = {length: max(reached - 1.0, 1e-9) for length, reached in tried.items()}
+    wanted = (ratio - 1.0) * (1.0 + 0.5 * _CLOSE)
+    above = min((length for length in gains if gains[length] >= ratio - 1.0), default=None)
+    below = max((length for length in gains if above is None or length < above), default=None)
     if above is None or below is None:
-        x, y = known[-1] if above is None else known[0]
-        leap = float(np.clip(wanted - y, -np.log(_LEAP), np.log(_LEAP)))
-        return float(np.exp(x + (max(leap, _STEP) if above is None else min(leap, -_STEP))))
-    if above[0] - below[0] < _CLOSE:
+        # The gain grows about in proportion while only too little or only enough is known.
+        nearest = max(gains) if above is None else min(gains)
+        leap = float(np.clip(np.log(wanted / gains[nearest]), -np.log(_LEAP), np.log(_LEAP)))
+        return nearest * float(np.exp(max(leap, _STEP) if above is None else min(leap, -_STEP)))
+    logarithms = float(np.log(below)), float(np.log(above))
+    if logarithms[1] - logarithms[0] < _CLOSE:
         return None
-    share = (wanted - below[1]) / max(above[1] - below[1], 1e-9)
-    return float(np.exp(below[0] + np.clip(share, 0.1, 0.9) * (above[0] - below[0])))
+    values = (gains[below], gains[above])
+    return float(np.exp(interpolated(logarithms, values, wanted, kept_away=_KEPT_AWAY)))
