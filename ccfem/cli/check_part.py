@@ -5,35 +5,22 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ccfem.base.whole import check_writable, whole_file
+from ccfem.cases.case import Case
 from ccfem.cases.inspection import check
-from ccfem.cli.run import NOT_PRINTABLE, complain, load
+from ccfem.cli.run import NOT_PRINTABLE, complain
 from ccfem.comparison.plot.canvas import check_picture, save
 from ccfem.comparison.plot.part_picture import part_page, part_picture
-from ccfem.machine.machine import Machine
-from ccfem.paths.placement.fibre_places import FibrePlaces
 
 
-def check_part(
-    part: str,
-    set_case: list[str] | None,
-    picture: Path | None,
-    machine: Callable[[Machine], Machine] | None = None,
-    fibre: Callable[[FibrePlaces | None], FibrePlaces] | None = None,
-) -> int:
+def check_part(read: Callable[[], Case], picture: Path | None) -> int:
     """Print a check; write its picture, and beside it the page that turns.
 
     Parameters
     ----------
-    part : str
-        Name of a case, or a part file.
-    set_case : list of str, optional
-        Parameters of a case.
+    read : callable
+        Returns the part; called when the name of the picture has been looked at.
     picture : Path, optional
         .png, .pdf or .svg; default the part's name and ``-check.png``.
-    machine : callable, optional
-        What it makes of the part's machine (`ccfem.cli.machines.machine_choice`).
-    fibre : callable, optional
-        What it makes of the layers that get fibre (`ccfem.cli.fibre_choice.fibre_choice`).
 
     Returns
     -------
@@ -43,7 +30,7 @@ def check_part(
     """
     if picture is not None:
         check_picture(picture)
-    checked = check(load(part, set_case, machine=machine, fibre=fibre))
+    checked = check(read())
     if picture is None:
         picture = check_picture(Path(f"{checked.case.name}-check.png"))
     page = check_writable(picture.with_suffix(".html"))

@@ -4,6 +4,7 @@ Everything heavy is imported by the command that needs it, so that ``ccfem --hel
 """
 
 import logging
+from functools import partial
 from importlib import metadata
 from importlib.resources import files
 from pathlib import Path
@@ -15,13 +16,14 @@ from ccfem.base.errors import InputError
 from ccfem.base.progress import progress_bar
 from ccfem.cli.arguments import drawings_of, names_of, parameters_by_strategy, path_of
 from ccfem.cli.fibre_amounts import front
-from ccfem.cli.fibre_choice import SetFibre, fibre_choice
-from ccfem.cli.machines import MachineName, SetMachine, machine_choice, machines
+from ccfem.cli.fibre_choice import SetFibre
+from ccfem.cli.machines import MachineName, SetMachine, machines
 from ccfem.cli.optimising import optimise
 from ccfem.cli.options import (
     Backend,
     Calibration,
     CasePath,
+    Curve,
     Details,
     Drawings,
     Fibre,
@@ -30,15 +32,23 @@ from ccfem.cli.options import (
     Heights,
     Layers,
     LoadCase,
+    Natural,
     OneLoadCase,
     Out,
+    Paths,
+    PathsFrame,
     Pictures,
     PrintedSupport,
+    PrintFile,
     Refine,
     SetCase,
+    SetOfOne,
+    SetOfStrategies,
     Slicing,
     Slicings,
     Stiffness,
+    Strategies,
+    Strategy,
     StressFile,
     StressUnit,
     VirtualTest,
@@ -366,23 +376,15 @@ def check(
     """Say and draw all that is known of a part before it is solved; all mistakes at once."""
     from ccfem.cli.check_part import check_part
 
-    code = check_part(
-        case, set_case, out, machine_choice(machine, set_machine), fibre_choice(set_fibre)
-    )
-    if code:
+    read = partial(load, case, set_case, False, machine, set_machine, set_fibre)
+    if code := check_part(read, out):
         raise typer.Exit(code)
 
 
 @app.command()
 def compare(
     case: CasePath,
-    strategies: Annotated[
-        str | None,
-        typer.Option(
-            metavar="A,B,..",
-            help="Strategies; default stream_function, isocurve, contour_zigzag and zigzag.",
-        ),
-    ] = None,
+    strategies: Strategies = None,
     set_case: SetCase = None,
     layers: Layers = None,
     heights: Heights = None,
@@ -390,37 +392,11 @@ def compare(
     slicings: Slicings = None,
     fibre_per_layer: Fibre = None,
     fibre: FibreInAll = None,
-    natural: Annotated[
-        bool, typer.Option("--natural", help="Let each strategy lay its own amount of fibre.")
-    ] = False,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="STRATEGY.NAME=VALUE", help="Set a parameter; repeatable."),
-    ] = None,
-    paths: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FILE,..",
-            help="Paths of other programs, judged beside the strategies: waypoints, or CSV with "
-            "x,y,z,path,layer.",
-        ),
-    ] = None,
-    paths_frame: Annotated[
-        str | None,
-        typer.Option(
-            metavar="mesh|tool",
-            help="Frame of their coordinates; default mesh for CSV, the printer's tool for "
-            "waypoints.",
-        ),
-    ] = None,
-    curve: Annotated[
-        bool | None,
-        typer.Option(
-            "--curve/--no-curve",
-            help="Test every strategy at three to five lengths of fibre and draw stiffness over "
-            "length; by default only where one cannot lay the length of the others.",
-        ),
-    ] = None,
+    natural: Natural = False,
+    set_: SetOfStrategies = None,
+    paths: Paths = None,
+    paths_frame: PathsFrame = None,
+    curve: Curve = None,
     virtual_test: VirtualTest = True,
     load_case: LoadCase = None,
     refine: Refine = False,
@@ -450,8 +426,7 @@ def compare(
         given = foreign_stress(stress, stress_unit, refine)
         if drawings is not None and slicings is not None:
             raise InputError("--drawings works with one slicing only; got --slicings: drop one")
-        printer, placed = machine_choice(machine, set_machine), fibre_choice(set_fibre)
-        part = load(case, set_case, refine, printer, placed)
+        part = load(case, set_case, refine, machine, set_machine, set_fibre)
         part, strand = calibrated(part, virtual_test, calibration)
         chosen = named_strategies(part, names, parameters) if names or not files else {}
         return Request.of(
@@ -475,13 +450,8 @@ def compare(
 @app.command()
 def plan(
     case: CasePath,
-    strategy: Annotated[
-        str, typer.Option(metavar="S", help="See ccfem strategies.")
-    ] = "stream_function",
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter; repeatable."),
-    ] = None,
+    strategy: Strategy = "stream_function",
+    set_: SetOfOne = None,
     set_case: SetCase = None,
     layers: Layers = None,
     heights: Heights = None,
@@ -496,10 +466,7 @@ def plan(
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
     backend: Backend = "auto",
-    gcode: Annotated[
-        bool,
-        typer.Option("--gcode", help="Also write STRATEGY.gcode, matrix and fibre of the part."),
-    ] = False,
+    gcode: PrintFile = False,
     support: PrintedSupport = False,
     stress: StressFile = None,
     stress_unit: StressUnit = None,
@@ -521,8 +488,7 @@ def plan(
         parameters = parameters_by_strategy(set_ or (), strategy)
         cut = layers_of(layers, heights, slicing)
         given = foreign_stress(stress, stress_unit, refine)
-        printer, placed = machine_choice(machine, set_machine), fibre_choice(set_fibre)
-        part = load(case, set_case, refine, printer, placed)
+        part = load(case, set_case, refine, machine, set_machine, set_fibre)
         part, strand = calibrated(part, virtual_test, calibration)
         return Request.of(
             part,
@@ -590,11 +556,7 @@ def calibrate(
         "strand": None,
         "load_case": load_case,
     }
-    chosen, placed = machine_choice(machine, set_machine), fibre_choice(set_fibre)
-
-    def read() -> Any:
-        return load(case, set_case, machine=chosen, fibre=placed)
-
+    read = partial(load, case, set_case, False, machine, set_machine, set_fibre)
     fit_material(read, unreinforced, reinforced, strategy, parameters, options, out)
 
 

@@ -8,9 +8,18 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ccfem.cli.arguments import numbers_of, parameters_by_strategy
-from ccfem.cli.fibre_choice import SetFibre, fibre_choice
-from ccfem.cli.machines import MachineName, SetMachine, machine_choice
-from ccfem.cli.options import Backend, CasePath, Force, LoadCase, Out, SetCase
+from ccfem.cli.fibre_choice import SetFibre
+from ccfem.cli.machines import MachineName, SetMachine
+from ccfem.cli.options import (
+    Backend,
+    CasePath,
+    Force,
+    LoadCase,
+    Out,
+    SetCase,
+    SetOfOne,
+    Strategy,
+)
 
 if TYPE_CHECKING:
     from ccfem.comparison.front_points import FibreFront
@@ -21,13 +30,8 @@ _FILES = ("front.csv", "front.png", "trade.png", "command.txt")
 
 def front(
     case: CasePath,
-    strategy: Annotated[
-        str, typer.Option(metavar="S", help="See ccfem strategies.")
-    ] = "stream_function",
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter; repeatable."),
-    ] = None,
+    strategy: Strategy = "stream_function",
+    set_: SetOfOne = None,
     set_case: SetCase = None,
     layers: Annotated[
         str | None,
@@ -72,8 +76,7 @@ def front(
     strengths = () if strength is None else numbers_of(strength)
     if strength is not None and not strengths:
         raise InputError(f"--strength expects numbers from 0 to 1 as 0,0.25,0.5; got '{strength}'")
-    printer, placed = machine_choice(machine, set_machine), fibre_choice(set_fibre)
-    part = load(case, set_case, machine=printer, fibre=placed)
+    part = load(case, set_case, False, machine, set_machine, set_fibre)
     chosen = named_strategies(part, (strategy,), parameters)
     request = Request(part, chosen, load_case=load_case, backend=backend)
     where = out if out is not None else Path("results") / f"{part.name}-front"

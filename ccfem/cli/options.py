@@ -164,3 +164,51 @@ StressUnit = Annotated[
         "--stress-unit", metavar="UNIT", help="MPa, Pa, .., where the file does not say it."
     ),
 ]
+SetOfStrategies = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="STRATEGY.NAME=VALUE", help="Set a parameter; repeatable."),
+]
+SetOfOne = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter; repeatable."),
+]
+Strategy = Annotated[str, typer.Option("--strategy", metavar="S", help="See ccfem strategies.")]
+Strategies = Annotated[
+    str | None,
+    typer.Option(
+        "--strategies",
+        metavar="A,B,..",
+        help="Strategies; default stream_function, isocurve, contour_zigzag and zigzag.",
+    ),
+]
+Natural = Annotated[
+    bool, typer.Option("--natural", help="Let each strategy lay its own amount of fibre.")
+]
+Paths = Annotated[
+    str | None,
+    typer.Option(
+        "--paths",
+        metavar="FILE,..",
+        help="Paths of other programs, judged beside the strategies: waypoints, or CSV with "
+        "x,y,z,path,layer.",
+    ),
+]
+PathsFrame = Annotated[
+    str | None,
+    typer.Option(
+        "--paths-frame",
+        metavar="mesh|tool",
+        help="Frame of their coordinates; default mesh for CSV, the printer's tool for waypoints.",
+    ),
+]
+Curve = Annotated[
+    bool | None,
+    typer.Option(
+        "--curve/--no-curve",
+        help="Test every strategy at three to five lengths of fibre and draw stiffness over "
+        "length; by default only where one cannot lay the length of the others.",
+    ),
+]
+PrintFile = Annotated[
+    bool, typer.Option("--gcode", help="Also write STRATEGY.gcode, matrix and fibre of the part.")
+]

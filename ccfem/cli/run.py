@@ -15,14 +15,14 @@ from ccfem.base.errors import InputError
 from ccfem.base.progress import Progress, progress_bar
 from ccfem.base.toml import assignment
 from ccfem.cli.arguments import numbers_of
+from ccfem.cli.fibre_choice import fibre_choice
+from ccfem.cli.machines import machine_choice
 
 if TYPE_CHECKING:
     from ccfem.cases.case import Case
     from ccfem.comparison.request import Request
     from ccfem.comparison.result import Comparison
     from ccfem.judging.virtual_testing.strand import Strand
-    from ccfem.machine.machine import Machine
-    from ccfem.paths.placement.fibre_places import FibrePlaces
     from ccfem.paths.planning.strategy import Strategy
 
 _STARTED = time.perf_counter()
@@ -40,17 +40,28 @@ def complain(*messages: str) -> int:
 
 def load(
     name: str,
-    set_case: Sequence[str] | None,
+    set_case: Sequence[str] | None = None,
     refine: bool = False,
-    machine: "Callable[[Machine], Machine] | None" = None,
-    fibre: "Callable[[FibrePlaces | None], FibrePlaces] | None" = None,
+    machine: str | None = None,
+    set_machine: Sequence[str] | None = None,
+    set_fibre: Sequence[str] | None = None,
 ) -> "Case":
     """Read a part file, or make a case from its name and parameters.
 
-    Its cells are refined if wanted; `machine` changes its machine, `fibre` which layers get fibre.
+    Parameters
+    ----------
+    set_case : sequence of str, optional
+        Parameters of a case by name, each as ``NAME=VALUE``.
+    refine : bool, default False
+        Refine cells until they are fine enough by the estimated error.
+    machine, set_machine
+        As in `machine_choice`.
+    set_fibre
+        As in `fibre_choice`.
     """
     from ccfem.cases.reading import read
 
+    printer, places = machine_choice(machine, set_machine), fibre_choice(set_fibre)
     _refuse_body(name)
     parameters = dict(assignment(text) for text in set_case or ())
     if parameters and name.endswith(".toml"):
@@ -58,10 +69,10 @@ def load(
             f"--set-case is for cases by name; '{name}' is a part file: change the file"
         )
     case = read(name, **parameters)
-    if machine is not None:
-        case = replace(case, machine=machine(case.machine))
-    if fibre is not None:
-        case = replace(case, fibre=fibre(case.fibre))
+    if printer is not None:
+        case = replace(case, machine=printer(case.machine))
+    if places is not None:
+        case = replace(case, fibre=places(case.fibre))
     return _refined(case) if refine else case
 
 

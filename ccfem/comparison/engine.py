@@ -563,11 +563,8 @@ def compare(
     to it, each by its own parameter (`LayerStrategy.amount`). Paths of another program
     (`GivenPaths`) are never changed: the shortest of their lengths then applies to all, and their
     heights are those of the layers if no others are given. A strategy that fails stays in the
-    result, with the reason. If a strategy cannot lay the length, stiffness is also compared along a
-    curve over the length of fibre.
-
-    With `slicings` the part is cut in several ways, and each strategy is planned on each of them.
-    All lay the same total length of fibre, whatever the number of layers.
+    result, with the reason. With `slicings` all lay the same length in all, whatever the number of
+    layers.
 
     Parameters
     ----------
@@ -578,37 +575,19 @@ def compare(
     layers : int, sequence of float, str or Slicer, optional
         Instead of the case's own slicing: a number of flat layers, their heights along the build
         direction in mm, the name of a slicer, or a slicer.
-    fibre_per_layer : float, mm, optional
-        Length that every strategy is held to, as a mean over the layers.
-    natural : bool, default False
-        Let every strategy lay its own amount instead.
-    strand : Strand or None
-        Stiffness and strength of a strand in the virtual test; None leaves the test out.
-    load_case : str, optional
-        Load case to plan, evaluate and test for; by default the first one. "all" plans for all of
-        them at once, weighted by `Case.weights`, tests under all and ranks by the worst.
-    backend : str, default "auto"
-        As in `solve`.
-    print_plans : bool, default False
-        Also plan the print of the whole part, matrix and fibre, for every strategy.
-    support : bool, default False
-        Also print support below the part (`ccfem.printing.support`).
-    stress : ForeignStress, optional
-        Stress file of another program, on the same mesh, to plan and evaluate on. Virtual tests and
-        the bound still solve the part themselves.
-    curve : bool, optional
-        Test every strategy at three to five lengths of fibre (`Comparison.curve`). By default only
-        if a strategy cannot change its amount of fibre to the wanted length. Never over several
-        slicings.
-    progress : callable, optional
-        Receives what is being done, and the share of the work that is done.
     slicings : sequence of str or Slicer, or mapping of name to Slicer, optional
         Ways to cut the part, instead of `layers`, such as ``["planar:z", "planar:x", "spatial"]``.
-    fibre : float, mm, optional
-        Total length that every strategy is held to in all layers, instead of `fibre_per_layer`.
+    fibre_per_layer, fibre : float, mm, optional
+        Length that every strategy is held to, as a mean over the layers or in all of them.
+    natural : bool, default False
+        Let every strategy lay its own amount instead.
     stiffness : str, optional
-        Lay the least fibre that makes the part so stiff, by one strategy: a ratio to the part
+        Lay the least fibre that reaches it, by one strategy: a ratio to the stiffness of the part
         without fibre as ``"2.5"``, or ``"1200N/mm"``.
+    strand, load_case, stress, backend, curve, print_plans, support
+        As in `Request`.
+    progress : callable, optional
+        Receives what is being done, and the share of the work that is done.
     **unknown
         Refused: a keyword that there is not.
 

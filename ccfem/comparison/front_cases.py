@@ -107,7 +107,7 @@ def stiffness_panels(
     alone: Curves = {WORST: [start, *((length, 1.0 / bound.least) for length, bound in bounds)]}
     together: Curves = {}
     for k, name in enumerate(plans[0].names):
-        label = f"{name}: times unreinforced stiffness"
+        label = f"{name}: stiffness ratio"
         values[label] = [float(point.ratios[k]) for point in plans]
         alone[label] = [start, *((length, float(bound.singles[k])) for length, bound in bounds)]
         at_once = ((length, float(bound.singles[k]) / bound.least) for length, bound in bounds)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-_STIFFNESS, _FAILURE = "times unreinforced stiffness", "first failure, kN"
+_STIFFNESS, _FAILURE = "stiffness ratio", "first failure, kN"
 _FACTOR = "first failure, times the load"
 
 

@@ -183,7 +183,8 @@ class Request:
     strand : Strand or None
         Stiffness and strength of a strand in the virtual test; None leaves the test out.
     stress : ForeignStress, optional
-        Stress of another program, on the same mesh, to plan and evaluate on.
+        Stress of another program, on the same mesh, to plan and evaluate on. Virtual tests and the
+        bound still solve the part themselves.
     backend : str, default "auto"
         As in `ccfem.solve`.
     curve : bool, optional
@@ -303,21 +304,8 @@ class Request:
 
         Parameters
         ----------
-        case : Case, str or path
-            A case, the name of one, or a part file.
-        strategies : sequence of str or Strategy, or mapping of name to Strategy
-            Strategies given by name take the parameters of the case.
-        layers : int, sequence of float, str or Slicer, optional
-            Instead of the case's own slicing: a number of flat layers, their heights along the
-            build direction in mm, the name of a slicer, or a slicer. Given paths bring the heights
-            of their layers.
-        slicings : sequence of str or Slicer, or mapping of name to Slicer, optional
-            Ways to cut the part that are compared, instead of `layers`.
-        fibre_per_layer, fibre : float, mm, optional
-            Length of fibre per layer, or in all.
-        natural : bool, default False
-        stiffness : str, optional
-            As in `Stiffness.parsed`.
+        case, strategies, layers, slicings, fibre_per_layer, fibre, natural, stiffness
+            As in `ccfem.compare`.
         **more
             As the attributes of the class.
 

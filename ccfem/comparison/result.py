@@ -314,7 +314,7 @@ class Comparison:
 SUMMARY = (
     Headline("printable", "printable", "", "{}"),
     Headline("stiffness", "stiffness, N/mm", "high", "{:.4g}"),
-    Headline("stiffness_ratio_tension", "times unreinforced", "high", "{:.2f}"),
+    Headline("stiffness_ratio_tension", "stiffness ratio", "high", "{:.2f}"),
     Headline("first_failure_load", "first failure, N", "high", "{:.0f}"),
     Headline("fibre_per_layer", "fibre, mm a layer", "", "{:.0f}"),
     Headline("efficiency", "efficiency", "high", "{:.3f}"),

@@ -124,7 +124,7 @@ def cases_rows(runs: Sequence[Run]) -> tuple[list[str], list[tuple[str, list[str
     if not tested:
         return [], []
     names = tested[0][1].names
-    heads = [f"stiffness × (of its bound), {name}" for name in names]
+    heads = [f"stiffness ratio (of its bound), {name}" for name in names]
     heads += ["worst of its bound", "above the bound of all", "first failure × load"]
     rows = []
     for name, test in tested:

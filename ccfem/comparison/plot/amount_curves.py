@@ -138,7 +138,7 @@ def amount_curves(
 def trade_curves(
     curves: Mapping[str, Sequence[TradePoint]],
     heading: str = "",
-    across: str = "times unreinforced stiffness",
+    across: str = "stiffness ratio",
     up: str = "first failure, kN",
 ) -> "Figure":
     """Draw first failure over stiffness: what one costs in the other.

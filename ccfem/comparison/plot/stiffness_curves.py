@@ -45,7 +45,7 @@ def stiffness_curves(
     colours : mapping of name to colour, optional
         Default `palette`.
     """
-    figure, axes = axes_below(heading, "fibre, mm a layer", "times unreinforced stiffness")
+    figure, axes = axes_below(heading, "fibre, mm a layer", "stiffness ratio")
     chosen = palette(curves) if colours is None else colours
     for length in marked:
         axes.axvline(length, color=OUTLINE, lw=0.8, ls=(0, (4, 3)), zorder=1.0)

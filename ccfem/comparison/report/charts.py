@@ -28,7 +28,7 @@ _COSTS = (
 _LEAST_SPAN = 0.2
 """Length of an axis over its largest value, so that what hardly differs looks so."""
 
-_STIFFNESS = "times unreinforced stiffness"
+_STIFFNESS = "stiffness ratio"
 
 
 def fronts(runs: Sequence[Run], colours: Mapping[str, str]) -> list[dict[str, Any]]:

@@ -479,7 +479,7 @@ def curve_table(curve: Curve | None) -> Table | None:
                 Cell(run.failure or run.why_not or "yes", bad=not run.printable),
             )
             rows.append((name, cells, ""))
-    titles = ("wanted, mm a layer", "laid", "stiffness ×, tension only", "bonded", "printable")
+    titles = ("wanted, mm a layer", "laid", "stiffness ratio, tension only", "bonded", "printable")
     return Table(tuple(map(Head, titles)), tuple(rows))
 
 

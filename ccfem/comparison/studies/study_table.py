@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 _COLUMNS = {
     "printable": "printable",
     "stiffness": "stiffness, N/mm",
-    "stiffness_ratio_tension": "times unreinforced",
+    "stiffness_ratio_tension": "stiffness ratio",
     "first_failure_load": "first failure, N",
     "fibre_length": "fibre, mm",
     "print_time_nearest": "laying fibre, s",
