@@ -229,9 +229,10 @@ def smoothed(
     count = len(groups.near_kernel)
     indptr, indices = _touched(matrix.indptr, matrix.indices, of_node, count)
     blocks: FloatArray = np.empty((len(indices), motions.shape[1], 6), dtype=np.float32)
-    _smooth(matrix.indptr, matrix.indices, matrix.data, inverse, of_node, motions, damping,
-            indptr, indices, np.zeros(count, dtype=np.int32), blocks)  # fmt: skip
-    return Prolongation(indptr, indices, blocks, count)
+    prolong = Prolongation(indptr, indices, blocks, count)
+    rows = _Rows(matrix.indptr, matrix.indices, matrix.data)
+    _smooth(rows, inverse, of_node, motions, float(damping), prolong)
+    return prolong
 
 
 def galerkin(matrix: sp.bsr_array, prolong: Prolongation) -> sp.bsr_array:
@@ -241,12 +242,21 @@ def galerkin(matrix: sp.bsr_array, prolong: Prolongation) -> sp.bsr_array:
     ----------
     matrix : bsr_array (d n, d n) with d x d blocks
     """
-    pattern, count = (matrix.indptr, matrix.indices), prolong.groups
-    indptr, indices = _met(*pattern, prolong.indptr, prolong.indices, count)
-    data = np.zeros((len(indices), 6, 6))
-    _project(*pattern, matrix.data, *prolong, indptr, indices, data)
-    _reflect(indptr, indices, data)
-    return sp.bsr_array((data, indices, indptr), shape=(6 * count, 6 * count))
+    rows, count = _Rows(matrix.indptr, matrix.indices, matrix.data), prolong.groups
+    indptr, indices = _met(rows.indptr, rows.indices, prolong.indptr, prolong.indices, count)
+    coarse = _Rows(indptr, indices, np.zeros((len(indices), 6, 6)))
+    _project(rows, prolong, coarse)
+    _reflect(*coarse)
+    shape = (6 * count, 6 * count)
+    return sp.bsr_array((coarse.data, indices, indptr), shape=shape)
+
+
+class _Rows(NamedTuple):
+    """A sparse matrix of blocks ``data[k]`` (k, d, d), row by row, for compiled functions."""
+
+    indptr: IntArray
+    indices: IntArray
+    data: FloatArray
 
 
 @njit(cache=True)
@@ -292,9 +302,18 @@ def _touched(indptr, indices, of_node, count):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=_CONTRACT)
-def _smooth(  # type: ignore[no-untyped-def]
-    indptr, indices, data, inverse, of_node, motions, damping, start, column, place, blocks
-):
+def _smooth(
+    rows: _Rows,
+    inverse: FloatArray,
+    of_node: IntArray,
+    motions: FloatArray,
+    damping: float,
+    prolong: Prolongation,
+) -> None:
+    """Write the blocks of ``(I - damping D^-1 A) T``, whose pattern is known."""
+    indptr, indices, data = rows
+    start, column, blocks, groups = prolong
+    place = np.zeros(groups, np.int32)
     d, most = data.shape[1], 1
     for i in range(start.size - 1):
         most = max(most, start[i + 1] - start[i])
@@ -304,6 +323,7 @@ def _smooth(  # type: ignore[no-untyped-def]
         for s in range(first, start[i + 1]):
             place[column[s]] = s - first
             _clear(sums[s - first])
+        # A T: the forces on node i where each group around it moves.
         for s in range(indptr[i], indptr[i + 1]):
             j = indices[s]
             if of_node[j] >= 0:
@@ -392,10 +412,11 @@ def _met(indptr, indices, start, column, count):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=_CONTRACT)
-def _project(  # type: ignore[no-untyped-def]
-    indptr, indices, data, start, column, blocks, count, first, other, result
-):
-    """Store the blocks of ``P^T A P`` up to the diagonal."""
+def _project(rows: _Rows, prolong: Prolongation, coarse: _Rows) -> None:
+    """Add the blocks of ``P^T A P`` up to the diagonal to a matrix of zeros with its pattern."""
+    indptr, indices, data = rows
+    start, column, blocks, count = prolong
+    first, other, result = coarse
     most = 0
     for k in range(count):
         most = max(most, first[k + 1] - first[k])
@@ -406,6 +427,7 @@ def _project(  # type: ignore[no-untyped-def]
         met = 0
         if start[i] == start[i + 1]:
             continue
+        # Row i of A P.
         for s in range(indptr[i], indptr[i + 1]):
             j = indices[s]
             for t in range(start[j], start[j + 1]):
@@ -415,6 +437,7 @@ def _project(  # type: ignore[no-untyped-def]
                     _clear(images[met])
                     met += 1
                 _add(data[s], blocks[t], images[place[k]])
+        # P^T times that row of A P, into the blocks of the groups of node i.
         for t in range(start[i], start[i + 1]):
             row, left = column[t], blocks[t].T
             for e in range(met):

@@ -8,7 +8,7 @@ Only steps that make the part better are kept.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -267,15 +267,42 @@ def fibre_energy(
     cell, weights = locate(strain.mesh.points, strain.mesh.corners, places, _REACH)
     energy, length = np.zeros(len(first)), np.zeros(len(first))
     gradient = np.zeros(points.shape)
-    at = (points, first, cell, weights, strain.mesh.corners, strain.slopes)
-    _energy(*at, strain.values, energy, length, gradient)
+    at = _Segments(points, first, cell, weights, strain.mesh.corners, strain.slopes)
+    _energy(at, strain.values, energy, length, gradient)
     if len(strain.pairs):
-        _strength(*at, strain.pairs, strain.terms, POWER, energy, gradient)
+        _strength(at, strain.pairs, strain.terms, energy, gradient)
     return energy, length, gradient
 
 
+class _Segments(NamedTuple):
+    """Segments of lines in the plane, and where their middles lie in a mesh.
+
+    `points` (P, 2), mm; the `first` point (s,) of each segment; the `cell` (s,) of its middle, -1
+    outside, and the `weights` (s, 4) of the cell's corners there; `corners` (m, 4) of the cells and
+    `slopes` (m, 4, 2) of their barycentric coordinates, 1/mm.
+    """
+
+    points: FloatArray
+    first: IntArray
+    cell: IntArray
+    weights: FloatArray
+    corners: IntArray
+    slopes: FloatArray
+
+
 @njit(cache=True)
-def _energy(points, first, cell, weights, corners, slopes, values, energy, length, gradient):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _energy(
+    segments: _Segments,
+    values: FloatArray,
+    energy: FloatArray,
+    length: FloatArray,
+    gradient: FloatArray,
+) -> None:  # pragma: no cover
+    """Add ``q^2 / |d|^3``, q = d . eps d where that is positive, and its derivatives by the ends.
+
+    d turns with the ends, and eps changes as the middle moves by half of each of them.
+    """
+    points, first, cell, weights, corners, slopes = segments
     for s in range(len(first)):
         i = first[s]
         dx, dy = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
@@ -311,7 +338,18 @@ def _energy(points, first, cell, weights, corners, slopes, values, energy, lengt
 
 
 @njit(cache=True)
-def _strength(points, first, cell, weights, corners, slopes, pairs, terms, power, energy, gradient):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _strength(
+    segments: _Segments,
+    pairs: FloatArray,
+    terms: FloatArray,
+    energy: FloatArray,
+    gradient: FloatArray,
+) -> None:  # pragma: no cover
+    """Add ``|d| (mixed e a - peak (e / most)^16)`` and its derivatives (`StrainWorth`).
+
+    e and a are the strains along d in a displacement and in its adjoint.
+    """
+    points, first, cell, weights, corners, slopes = segments
     for s in range(len(first)):
         i, c = first[s], cell[s]
         dx, dy = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
@@ -340,9 +378,9 @@ def _strength(points, first, cell, weights, corners, slopes, pairs, terms, power
             if strain[0] <= 0.0:
                 continue
             mixed, peak, most = terms[k, 0], terms[k, 1], terms[k, 2]
-            near = peak * (strain[0] / most) ** power
+            near = peak * (strain[0] / most) ** POWER
             worth = mixed * strain[0] * strain[1] - near
-            by, by_adjoint = mixed * strain[1] - power * near / strain[0], mixed * strain[0]
+            by, by_adjoint = mixed * strain[1] - POWER * near / strain[0], mixed * strain[0]
             energy[s] += size * worth
             slide_x = 0.5 * size * (by * px[0] + by_adjoint * px[1])
             slide_y = 0.5 * size * (by * py[0] + by_adjoint * py[1])
