@@ -94,7 +94,8 @@ def compared(name: str, parameters: Mapping[str, object], pictures: Path | None)
 def main(arguments: list[str]) -> None:
     """Print the table."""
     heads = (
-        "stiffness ratio by case | worst of best single | worst of bound | gap | first failure | time"
+        "stiffness ratio by case | worst of best single | worst of bound | gap | first failure "
+        "| time"
     )
 
     def rows(name: str, pictures: Path | None) -> list[str]:

@@ -245,7 +245,9 @@ HEADLINE = (
     Headline("stiffness_ratio_tension", "stiffness ratio, tension only", "high", "{:.2f}"),
     Headline("share_of_gain", "share of the possible gain", "high", "{:.0%}"),
     Headline("stiffness_ratio_bonded", "stiffness ratio, bonded", "high", "{:.2f}"),
-    Headline("stiffness_ratio_tension_alternative", "stiffness ratio, other supports", "", "{:.2f}"),
+    Headline(
+        "stiffness_ratio_tension_alternative", "stiffness ratio, other supports", "", "{:.2f}"
+    ),
     Headline("displacement", "displacement, mm", "low", "{:.3g}"),
     Headline("first_failure_load", "first failure, N", "high", "{:.0f}"),
     Headline("first_failure_load_alternative", "first failure, other supports, N", "", "{:.0f}"),

@@ -82,7 +82,8 @@ def _in_cones(
         radius = np.maximum.reduceat(off, first)
     half = np.radians(half_angle)
     cones = _Cones(
-        *(seen_only(np.asarray(values, dtype=np.float64)) for values in (tips, axes)),
+        seen_only(np.asarray(tips, dtype=np.float64)),
+        seen_only(np.asarray(axes, dtype=np.float64)),
         seen_only(np.asarray(when, dtype=np.int64)),
         float(np.cos(half)),
         float(np.sin(half)),
