@@ -9,6 +9,7 @@ another begins behind it.
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -233,6 +234,14 @@ def _cut(marked: _Marked, radius: float, least: float) -> list[_Marked]:
     return [marked for marked in pieces if line_length(marked[0][:, :3]) >= least * (1.0 - 1e-9)]
 
 
+class _Curve(NamedTuple):
+    """Points (n, 2) of a curve, mm, and the places of a line, by arc length, that it joins."""
+
+    points: FloatArray
+    start: float
+    stop: float
+
+
 class _Rounding:
     """Curves that replace folds, and the room for them."""
 
@@ -269,36 +278,38 @@ class _Rounding:
     ) -> _Marked | None:
         """Line with a curve in place of the fold between two places; None without room for it."""
         along = along_line(line)
-        size = float(along[-1])
+        curves = self._curves(line, along, start, stop)
+        curves = [curve for curve in curves if self._clear(k, line, along, curve)]
+        # What folds is told for all curves at once, each with a window of the line on both sides.
+        near = [_replaced(line, along, curve, self.window) for curve in curves]
+        fitting = np.flatnonzero(_folds_of(near, _MARGIN * self.radius).counts == 0)
+        if not len(fitting):
+            return None
+        curve = curves[fitting[0]]
+        self.curves.append(shapely.linestrings(curve.points))
+        marked = link[np.searchsorted(along, curve.start) : np.searchsorted(along, curve.stop)]
+        before, after = along < curve.start - 1e-9, along > curve.stop + 1e-9
+        marks = [link[before], np.full(len(curve.points), marked.any()), link[after]]
+        whole = np.concatenate(marks)
+        whole[-1] = False
+        return _replaced(line, along, curve, np.inf), whole
+
+    def _curves(
+        self, line: FloatArray, along: FloatArray, start: float, stop: float
+    ) -> list[_Curve]:
+        """Curves, no detours, in place of the part of a line between two places, best first."""
+        curves = []
         for radius in _RADII:
             for reach in _REACHES:
                 a, b = start - reach * self.window, stop + reach * self.window
-                if a < 0.0 or b > size:
+                if a < 0.0 or b > along[-1]:
                     break
-                curve = self._curve(line, along, a, b, radius * self.radius)
-                if line_length(curve) > _DETOUR * (b - a):
-                    continue
-                before = along < a - 1e-9
-                after = along > b + 1e-9
-                longer = np.concatenate([line[before], curve, line[after]])
-                near = slice(
-                    max(int(np.searchsorted(along, a - self.window)) - 1, 0),
-                    int(before.sum() + len(curve) + (along[after] < b + self.window).sum() + 1),
-                )
-                if len(_folds_of([longer[near]], _MARGIN * self.radius).line):
-                    continue
-                if not self._clear(k, curve, line[along < a - 2.0 * self.width],
-                                   line[along > b + 2.0 * self.width]):  # fmt: skip
-                    continue
-                marked = bool(link[np.searchsorted(along, a) : np.searchsorted(along, b)].any())
-                marks = [link[before], np.full(len(curve), marked), link[after]]
-                self.curves.append(shapely.linestrings(curve))
-                whole = np.concatenate(marks)
-                whole[-1] = False
-                return longer, whole
-        return None
+                points = self._shortest(line, along, a, b, radius * self.radius)
+                if line_length(points) <= _DETOUR * (b - a):
+                    curves.append(_Curve(points, a, b))
+        return curves
 
-    def _curve(
+    def _shortest(
         self, line: FloatArray, along: FloatArray, a: float, b: float, radius: float
     ) -> FloatArray:
         """Shortest curve of a radius that leaves a line at one place and meets it at another."""
@@ -311,13 +322,26 @@ class _Rounding:
 
         return shortest_curve(pose(a), pose(b), radius, _STEP * self.width)
 
-    def _clear(self, k: int, curve: FloatArray, *rest: FloatArray) -> bool:
+    def _clear(self, k: int, line: FloatArray, along: FloatArray, curve: _Curve) -> bool:
         """Whether a curve keeps its distances from the border, other strands and its own line."""
-        string, apart = shapely.linestrings(curve), _CLEARANCE * self.width
+        string, apart = shapely.linestrings(curve.points), _CLEARANCE * self.width
         if not shapely.covers(self.room, string):
             return False
         near = self.tree.query(string, predicate="dwithin", distance=apart)
         if (near != k).any():
             return False
+        rest = (
+            line[along < curve.start - 2.0 * self.width],
+            line[along > curve.stop + 2.0 * self.width],
+        )
         parts = [*self.curves, *(shapely.linestrings(part) for part in rest if len(part) > 1)]
         return not (parts and shapely.dwithin(string, np.array(parts), apart).any())
+
+
+def _replaced(line: FloatArray, along: FloatArray, curve: _Curve, window: float) -> FloatArray:
+    """Line with a curve in place of a part, as far as a window before and behind that part."""
+    first = max(int(np.searchsorted(along, curve.start - window)) - 1, 0)
+    last = int(np.searchsorted(along, curve.stop + window)) + 1
+    before = np.searchsorted(along, curve.start - 1e-9)
+    after = np.searchsorted(along, curve.stop + 1e-9, side="right")
+    return np.concatenate([line[first:before], curve.points, line[after:last]])
