@@ -28,7 +28,7 @@ VARIANTS = [
     f"{name}-{variant}" for name in NAMES for variant in getattr(named()[name], "variants", {})
 ]
 ALL = NAMES + VARIANTS
-QUICK = {"stream_function": {"evaluations": 5, "phases": 2}}
+QUICK = {"stream_function": {"evaluations": 5, "phases": 1}}
 """Parameters that none of the laws depends on, of strategies that are slow with their defaults."""
 
 ALLOWED = {"pruned": 0.01, "stream_function": 0.01}

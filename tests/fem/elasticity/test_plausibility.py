@@ -290,11 +290,11 @@ def test_the_same_words_everywhere():
 def test_layers_thinner_than_a_strand_are_seen_by_check():
     problem = bar(pulled(1.0))
     case = Case("bar", "A bar", problem, slicing=Planar(count=500))
-    (line,) = (x for x in ccfem.check(case).warnings if "layers" in x)
+    (line,) = (x for x in ccfem.check(case).not_planned if "layers" in x)
     assert line.startswith("layers must lie at least 0.1075 mm apart")
     assert line.endswith("use fewer layers")
     found = ccfem.check(replace(case, slicing=Planar(thickness=11.0)))
-    (line,) = (x for x in found.warnings if "thickness" in x)
+    (line,) = (x for x in found.not_planned if "thickness" in x)
     assert not found.mistakes
     assert "at most the part's height 10 mm; got 11" in line
 

@@ -56,24 +56,21 @@ def test_every_load_case_reaches_the_ratio_with_no_less_fibre_than_any_paths_tak
     assert found.planned.strategy.objective == "least"
 
 
-@pytest.mark.parametrize("name", ["stream_function", "pruned"])
-def test_the_objective_least_serves_the_case_that_gains_least(name):
+def test_the_objective_least_serves_the_case_that_gains_least():
     # As much fibre makes the plate 2.5 times as stiff in tension, 1.7 times in shear: measured by
     # these bounds, tension is to gain more; measured by the part without fibre, no more than shear.
-    case = read("two_load_plate", element_size=8.0)
+    case = read("two_load_plate", element_size=12.0)
     cases = weighted_cases(case, solve(case.problem))
     layers = Planar(count=4).cut(cases.mesh)
-    quick = {"evaluations": 15, "phases": 1} if name == "stream_function" else {}
     ratios = {}
     for objective in ("worst", "least"):
-        strategy = create(name, {**quick, "objective": objective})
+        strategy = create("pruned", {"objective": objective})
         paths = plan_cases(strategy, layers, cases, case.machine, 1500.0).toolpaths
         ratios[objective] = virtual_tests(paths, cases).ratios
     assert ratios["worst"].max() > 1.4 * ratios["worst"].min()
-    # Pruned gains 1.09, stream_function 1.07 (1.08 with twice the evaluations).
-    assert ratios["least"].min() > 1.06 * ratios["worst"].min()
+    assert ratios["least"].min() > 1.08 * ratios["worst"].min()
     most = upper_bound(cases, layers, 6000.0, case.machine, objective=LEAST).ratio
-    assert 0.88 * most < ratios["least"].min() <= most
+    assert 0.9 * most < ratios["least"].min() <= most
 
 
 def test_only_the_default_objective_is_changed():
