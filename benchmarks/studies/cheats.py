@@ -28,7 +28,7 @@ import shapely
 
 from benchmarks.print_checks.strand_rules import Rules, broken, measure
 
-__all__ = ["BRACKET", "CANTILEVER", "Posed", "judged", "sets"]
+__all__ = ["BRACKET", "CANTILEVER", "TOP", "Posed", "judged", "sets"]
 
 LAYERS, HEIGHT, LENGTH = 6, 6.0, 98.0
 """Layers of the parts, their height, and the length of each of six strands a layer, mm."""

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import ccfem
+from benchmarks.studies.cheats import TOP, sets
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import box_mesh
 from ccfem.cases.case import Case
@@ -154,11 +155,19 @@ class Cheat:
         return Toolpaths.from_plane(lines, layer, link=link)
 
 
-@pytest.fixture(scope="module", params=["bar", "loop"])
+PARTS: dict[str, tuple[float, tuple[str, ...]]] = {
+    "bar": (5.0, tuple(CHEATS)),
+    "loop": (10.0, ("bundles", "micro_waves", "on_the_border", "fan", "outside")),
+}
+"""Parts, with their element sizes; on the round one those cheats that lie otherwise there."""
+
+
+@pytest.fixture(scope="module", params=PARTS)
 def judged(request):
-    case = ccfem.read(request.param, element_size={"bar": 5.0, "loop": 8.0}[request.param])
+    size, cheats = PARTS[request.param]
+    case = ccfem.read(request.param, element_size=size)
     strategies = {name: create(name, case.parameters.get(name, {})) for name in HONEST}
-    strategies |= {name: Cheat(name) for name in CHEATS}
+    strategies |= {name: Cheat(name) for name in cheats}
     return ccfem.compare(case, strategies, layers=2, natural=True)
 
 
@@ -169,18 +178,19 @@ def test_no_cheat_ranks_above_an_honest_strategy(judged):
     assert not any(name in judged.verdict.split(" Not printable")[0] for name in CHEATS)
     table = judged.frame.set_index("strategy")
     assert table.loc[list(HONEST), "printable"].all()
-    assert not table.loc[list(CHEATS), "printable"].any()
+    assert not table.loc[order[len(HONEST) :], "printable"].any()
 
 
-@pytest.mark.parametrize("name", CHEATS)
-def test_each_cheat_is_named_for_what_it_is(judged, name):
-    (run,) = [run for run in judged.runs if run.name == name]
-    _, said = CHEATS[name]
-    reason = run.why_not or run.failure
-    assert said in reason, reason
-    assert any(name in line.split(":")[0] and said in line for line in judged.remarks)
+def test_each_cheat_is_named_for_what_it_is(judged):
+    cheats = [run for run in judged.runs if run.name in CHEATS]
+    assert len(cheats) >= 5
+    for run in cheats:
+        _, said = CHEATS[run.name]
+        assert said in (run.why_not or run.failure), run.name
+        assert any(run.name in line.split(":")[0] and said in line for line in judged.remarks)
 
 
+@pytest.mark.parametrize("judged", ["bar"], indirect=True)
 def test_piling_up_gains_nothing(judged):
     """Without the verdict too: copies and turns of a winding are worth the ring that they hide."""
     case, stress = judged.case, judged.stress
@@ -196,17 +206,14 @@ def test_piling_up_gains_nothing(judged):
     dense = ccfem.plan(create("concentric", {"spacing": 1.0}), judged.layers, stress, case.machine)
     full = ccfem.virtual_test(dense, stress, machine=case.machine, span=()).ratio
     piled = ("copies", "bundles", "winding", "one_layer", "there_and_back", "micro_waves")
-    # Bundles reach out of a round part, and are not tested there.
-    tested = [runs[name].tested for name in piled if runs[name].tested is not None]
-    assert len(tested) >= 5
-    assert all(each.bracket.tension.ratio < full for each in tested)
+    assert all(runs[name].tested.bracket.tension.ratio < full for name in piled)
 
 
 def test_no_cheat_exceeds_the_bound(judged):
     """The bound has one strand a width in each layer; only strands that cross may have more."""
     ratios = {run.name: run.tested.bracket.tension.ratio for run in judged.runs if run.tested}
     del ratios["fan"]
-    assert len(ratios) >= 10
+    assert len(ratios) >= len(HONEST) + 2
     assert max(ratios.values()) <= judged.bound.ratio
 
 
@@ -232,61 +239,56 @@ def test_layers_on_each_other_are_refused(layers, said):
         ccfem.compare(ccfem.read("bar", element_size=5.0), ["zigzag"], layers=layers)
 
 
-def rows(first):
-    """Six straight strands a width apart along a cantilever, from the top down."""
-    return [np.array([[1.0, first - k], [99.0, first - k]]) for k in range(6)]
-
-
-def serpentines():
-    """Pieces of 15.5 mm under the top, joined by hairpins of 1 mm: one strand."""
-    points = []
-    for column in range(6):
-        left = 1.0 + 16.5 * column
-        for k in range(7):
-            y = 7.5 + k if column % 2 else 13.5 - k
-            piece = [[left, y], [left + 15.5, y]]
-            points += piece[::-1] if k % 2 else piece
-    return [np.array(points)]
-
-
-def woven():
-    """Waves at 17.5 degrees to the axis, so that strands cross each other at 35 degrees."""
-    x = np.linspace(1.0, 99.0, 400)
-    period = 2.0 * 5.0 / np.tan(np.radians(17.5))
-    shifts = np.arange(6) / 6.0
-    waves = [2.0 * np.abs((x / period + shift) % 1.0 - 0.5) for shift in shifts]
-    return [np.stack([x, 8.5 + 5.0 * wave], axis=1) for wave in waves]
+NAMED = {
+    "rows_on_border": "lie outside the part by more than 5% of their width; the worst by 50%",
+    "woven": "lies across other fibre",
+    "hairpins": "have no 42 mm free of turns by more than 90 degrees within 4 mm",
+    "rows_too_close": "lies on other fibre",
+    "close_and_outside": "lie outside the part by more than 5% of their width; the worst by 40%",
+    "out_and_back": "50% of the fibre lies on other fibre of its direction",
+    "hairpins_on_border": "have no 42 mm free of turns",
+    "woven_and_outside": "lie outside the part",
+    "bulbs": "have no 42 mm free of turns",
+    "short_pieces": "no strand is left to print",
+    "bit_of_each": "lie outside the part",
+}
+"""What is said of the sets of `benchmarks.studies.cheats`, of 588 mm a layer."""
 
 
 @pytest.fixture(scope="module")
 def cantilever():
-    """Root held, tip pulled down, 588 mm of fibre on each of six layers."""
-    mesh = box_mesh((100.0, 14.0, 6.0), (25, 4, 6))
-    loads = {"down": (Force("x_max", (0.0, -20.0, 0.0)),)}
+    """Root held, tip pulled down: a third as high as in the study, with two layers."""
+    mesh = box_mesh((100.0, TOP, 2.0), (16, 4, 1))
+    loads = {"down": (Force("x_max", (0.0, -20.0 / 3.0, 0.0)),)}
     problem = Problem(mesh, isotropic(3500.0, 0.35), (Support("x_min"),), loads)
-    case = Case("cantilever", "Cantilever", problem, slicing=Planar(count=6))
+    case = Case("cantilever", "Cantilever", problem, slicing=Planar(count=2))
     layers = case.slicing.cut(mesh)
-    drawn = {"honest": rows(13.5), "border": rows(14.0), "serpentines": serpentines()}
-    drawn["woven"] = woven()
     given = {
         name: GivenPaths(
             Toolpaths.concatenate(Toolpaths.from_plane(lines, layer) for layer in layers), ""
         )
-        for name, lines in drawn.items()
+        for name, lines in sets().items()
     }
     return {run.name: run for run in ccfem.compare(case, given, natural=True).runs}
 
 
 def test_cheats_on_a_cantilever_are_named(cantilever):
-    assert cantilever["honest"].printable
-    border, serpentine = cantilever["border"].why_not, cantilever["serpentines"].why_not
-    assert "6 of 36 strands lie outside the part by more than 5% of their width" in border
-    assert "6 of 6 strands have no 42 mm free of turns by more than 90 degrees" in serpentine
+    assert [name for name, run in cantilever.items() if run.printable] == [
+        "honest_rows",
+        "two_corners",
+    ]
+    for name, said in NAMED.items():
+        assert said in cantilever[name].why_not + cantilever[name].failure, name
 
 
 def test_cheats_on_a_cantilever_gain_nothing(cantilever):
-    ratio = {name: run.tested.bracket.tension.ratio for name, run in cantilever.items()}
+    ratio = {
+        name: run.tested.bracket.tension.ratio for name, run in cantilever.items() if run.tested
+    }
+    honest = ratio.pop("honest_rows")
+    assert ratio.keys() == (NAMED.keys() | {"two_corners"}) - {"short_pieces"}
     # Half of the strand on the border counts: as much lies at the top of the honest rows.
-    assert ratio["border"] < 1.02 * ratio["honest"]
-    assert ratio["serpentines"] < ratio["honest"]
-    assert ratio["woven"] < 0.95 * ratio["honest"]
+    outside = {ratio.pop(name) for name in ("rows_on_border", "close_and_outside", "bit_of_each")}
+    assert max(outside) < 1.02 * honest
+    assert max(ratio.values()) < honest
+    assert ratio["woven"] < 0.95 * honest
