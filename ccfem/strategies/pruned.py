@@ -186,7 +186,7 @@ class Pruned:
         planners: list[tuple[Pruned, LayerPlanner]] = []
         for length in lengths:
             wanted = length * len(layers)
-            kept = prune_and_move(tried, layers, goal, wanted, machine, strand, *cut_by)
+            kept = prune_and_move(tried, layers, goal, wanted, machine, strand, *cut_by, self.folds)
             coverage = length / full
             overfill = max(planned / full / coverage, 1.0)
             planners.append((replace(self, coverage=coverage, overfill=overfill), WholePart(kept)))

@@ -19,6 +19,7 @@ from ccfem.base.tensor import largest_in_plane
 from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.fem.elasticity.stress_field import StressField, solved
 from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.judging.virtual_testing.several_cases import specimens
 from ccfem.judging.virtual_testing.strand import RHO, Strand
 from ccfem.machine.machine import Machine
 from ccfem.paths.fields.fill import fill_screened
@@ -257,8 +258,8 @@ class StreamFunction:
         in_all, strand = [length * len(layers) for length in lengths], Strand(self.rho)
         bounds = measures(self.objective, cases, layers, max(in_all), machine, strand)
         problem, group, designed = self.designed(cases, layers, machine, bounds)
-        specimens = tuple(part.specimen for part in problem.parts)
-        goal = Goal(specimens, cases.weights, bounds, self.objective)
+        parts = tuple(part.specimen for part in problem.parts)
+        goal = Goal(parts, cases.weights, bounds, self.objective)
         fields_of = layers_by_case(cases.weights, layers) * problem.model.groups + group
 
         def candidates(design: StreamDesign) -> list[list[Toolpaths]]:
@@ -277,13 +278,17 @@ class StreamFunction:
             strong = design_for_strength(problem, fields, solutions, *how)
             tried = _with_first(candidates(strong), tried)
         cut_by = (_ROUNDS, self.strength, self.moves, TIGHT_SHARES[self.turns])
+        # Fields are designed on linear cells; moves gain less than those may be off.
+        last = replace(goal, parts=specimens(cases)) if self.moves else None
         plain = plain_plans(cases, layers, machine) if self.inset <= _PLAIN_INSET else []
         plans = []
         for some, length in zip(tried, in_all, strict=True):
             offered = [*some, *plain]
             enough = [paths for paths in offered if float(paths.lengths.sum()) >= _WHOLE * length]
             offered = enough if whole and enough else offered
-            plans.append(prune_and_move(offered, layers, goal, length, machine, strand, *cut_by))
+            plans.append(
+                prune_and_move(offered, layers, goal, length, machine, strand, *cut_by, last=last)
+            )
         return plans
 
     def extraction(

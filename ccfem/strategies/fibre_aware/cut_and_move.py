@@ -7,12 +7,12 @@ the strength as asked for, and for half of that.
 
 from collections.abc import Callable, Sequence
 
-from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.equal_fibre import TOLERANCE
-from ccfem.paths.planning.unfolding import without_folds
+from ccfem.paths.planning.plan import plan_layers
+from ccfem.paths.planning.whole_part import WholePart
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.judges import (
@@ -34,6 +34,9 @@ _ALL_WAYS = 2
 _FOR_BOTH = (False, True)
 """Whether moves follow the strength too: tried once for the stiffness alone, and once for both."""
 
+_ROUGH, _EXACT = 1e-4, 1e-6
+"""Relative residuals of the tests, and of the last one of moved paths, which gain little."""
+
 _Cut = Callable[[Toolpaths, float, int], Toolpaths]
 """Cuts toolpaths to a length; takes toolpaths, weight of the strength and number of tests."""
 
@@ -49,26 +52,46 @@ def prune_and_move(
     strength: float,
     moves: int,
     tight: float = 1.0,
+    fold: bool = False,
+    last: Goal | None = None,
 ) -> Toolpaths:
     """Cut fibre to a length, mm in all, move the rest, and cut it again to the length.
 
     Each candidate is cut, and the best one is moved: the stiffest, or with strength the one of
     highest value. With strength it is moved once for the stiffness and once for both, and a test
     chooses. Parameters as in `ccfem.strategies.fibre_aware.prune.prune` and
-    `ccfem.strategies.fibre_aware.strand_moves.moved`.
+    `ccfem.strategies.fibre_aware.strand_moves.moved`; `fold` is whether strands may fold,
+    and `last` the goal on the cells of the last test, by which moved paths are taken or not.
     """
     goal = Goal.of(part)
 
     def cut(toolpaths: Toolpaths, share: float, tests: int) -> Toolpaths:
         return prune(toolpaths, goal, length, machine, strand, tests, share, tight)
 
-    judges: tuple[Judge, ...] = (stiffness_judge(goal, machine, strand, layers),)
-    if strength:
-        how = (goal, layers, machine, strand, strength)
-        judges = tuple(strength_judge(*how, for_both) for for_both in _FOR_BOTH)
+    def judges_of(aim: Goal, tolerance: float) -> tuple[Judge, ...]:
+        if not strength:
+            return (stiffness_judge(aim, machine, strand, layers, tolerance),)
+        how = (aim, layers, machine, strand, strength)
+        return tuple(strength_judge(*how, for_both) for for_both in _FOR_BOTH)
+
+    judges = judges_of(goal, _ROUGH)
     kept = best_cut(candidates, cut, judges[0], strength, rounds)
-    enough = (1.0 - TOLERANCE) * min(length, fibre_length(kept))
-    return _moved(kept, layers, goal.mesh, machine, cut, judges, moves, tight, enough)
+    if not moves:
+        return kept
+    radius, offered = kept_radius(machine, tight), [kept]
+    for judge in judges:
+        slid = moved(kept, layers, goal.mesh, machine, judge, moves, radius=radius)
+        if slid is not kept:
+            offered.append(cut(slid, 0.0, 1))
+    # Tested as they are planned in the end, and only if they still lay the length.
+    stress = goal.parts[0].unreinforced
+    final = [
+        plan_layers(WholePart(paths), layers, layers, stress, machine, fold) for paths in offered
+    ]
+    enough = (1.0 - TOLERANCE) * min(length, fibre_length(final[0]))
+    lays = [paths for paths in final if fibre_length(paths) >= enough]
+    best = stiffest(lays, judges_of(last or goal, _EXACT)[0])
+    return next(paths for paths, tested in zip(offered, final, strict=True) if tested is best)
 
 
 def best_cut(
@@ -98,28 +121,3 @@ def best_cut(
         for share in (_SHARES if strength and k < _ALL_WAYS else _SHARES[:1])
     ]
     return stiffest(cuts, judge)
-
-
-def _moved(
-    kept: Toolpaths,
-    layers: Sequence[Layer],
-    mesh: TetMesh,
-    machine: Machine,
-    cut: _Cut,
-    judges: Sequence[Judge],
-    moves: int,
-    tight: float,
-    enough: float,
-) -> Toolpaths:
-    """Move the paths once for each judge, and cut those that have become longer.
-
-    The first judge chooses among the results that still lay enough, mm, as they are without folds,
-    and the unmoved paths.
-    """
-    radius, results = kept_radius(machine, tight), []
-    for judge in judges if moves else ():
-        slid = moved(kept, layers, mesh, machine, judge, moves, radius=radius)
-        if slid is not kept:
-            results.append(without_folds(cut(slid, 0.0, 1), layers, machine))
-    results = [paths for paths in results if fibre_length(paths) >= enough]
-    return stiffest([*results, kept], judges[0])

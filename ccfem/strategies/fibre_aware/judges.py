@@ -177,6 +177,7 @@ def stiffness_judge(
     machine: Machine,
     strand: Strand | None = None,
     layers: Sequence[Layer] = (),
+    tolerance: float = _TOLERANCE,
 ) -> Judge:
     """Judge of paths by the stiffness in all load cases, of what carries of the printed strands.
 
@@ -188,7 +189,7 @@ def stiffness_judge(
 
     def judge(toolpaths: Toolpaths) -> Judged:
         strands = _carrying(toolpaths, goal, machine, layers)
-        tested = equilibria(goal, strands, strand, known or None)
+        tested = equilibria(goal, strands, strand, known or None, tolerance)
         known[:] = tested.displacements
         counts = goal.counts(tested.ratios) / tested.work
         worths = _stiff_worths(counts, tested.displacements)

@@ -66,7 +66,8 @@ def shorten(
             before = chosen[profile.path]
             longer = profile.kept(factor * price, minimum, cut_cost)[0]
             if profile.step * (longer.sum() - before.sum()) > room:
-                longer = _grown(before, longer, int(room / profile.step))
+                count = int(room / profile.step)
+                longer = _grown(before, longer, count, profile.value, profile.least(minimum))
             more = profile.step * float(longer.sum() - before.sum())
             if 0.0 < more <= room:
                 chosen[profile.path] = longer
@@ -161,9 +162,21 @@ def _tight_pieces(
     return tightness
 
 
-def _grown(kept: BoolArray, longer: BoolArray, count: int) -> BoolArray:
-    """Kept pieces (n,), and up to `count` adjoining pieces of a longer choice."""
+def _grown(
+    kept: BoolArray, longer: BoolArray, count: int, value: FloatArray, least: int
+) -> BoolArray:
+    """Kept pieces (n,), and up to `count` adjoining pieces of a longer choice.
+
+    Where none is kept, the `count` neighbours worth most, if a stretch may be so short.
+    """
     grown = kept.copy()
+    if not kept.any() and least <= count <= len(kept):
+        window = np.ones(count)
+        whole = np.convolve(longer, window, "valid") > count - 0.5
+        worth = np.where(whole, np.convolve(value, window, "valid"), -np.inf)
+        first = int(np.argmax(worth))
+        grown[first : first + count] = whole[first]
+        return grown
     while count > 0:
         beside = np.concatenate([[False], grown[:-1]]) | np.concatenate([grown[1:], [False]])
         fresh = np.flatnonzero(longer & ~grown & beside)[:count]

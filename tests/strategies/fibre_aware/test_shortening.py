@@ -132,3 +132,17 @@ def test_fibre_that_carries_nothing_stays_where_there_is_room(bent_beam, length,
     assert len(left) == strands
     np.testing.assert_allclose(left.lengths, 40.0)
     assert 10.0 in left.points[:, 1]
+
+
+def test_room_too_short_for_a_path_gets_the_part_of_it_that_is_worth_most(bent_beam):
+    rows = [np.array([[10.0, y], [50.0, y]]) for y in (4.0, 10.0)]
+    paths = Toolpaths.from_plane(rows, bent_beam[1][0])
+    falling = [Profile(0, np.ones(40), 1.0, 0.0), Profile(1, np.linspace(0.3, 0.1, 40), 1.0, 0.0)]
+    equal = [Profile(k, np.full(40, 1.0), 1.0, 0.0) for k in range(2)]
+    for along, ends in ((falling, (10.0, 25.0)), (equal, None)):
+        left = shorten_bent(paths, along, 55.0, MACHINE, 1.0)
+        np.testing.assert_allclose(np.sort(left.lengths), [15.0, 40.0])
+        if ends:
+            np.testing.assert_allclose(left.points[-2:, 0], ends)
+    # A part below the 10 mm of the machine is none.
+    assert shorten_bent(paths, equal, 49.0, MACHINE, 1.0).lengths.sum() == pytest.approx(40.0)
