@@ -106,7 +106,7 @@ def beads(
         return Beads(line, first, none, triples, triples, triples, none, none, none, none)
     length = (lengths(points, offsets) / count)[line]
     middle = 0.5 * (nodes[start] + nodes[start + 1])
-    normal = _normals(points, normals, offsets, middle, line)
+    normal = _layer_normals(points, normals, offsets, middle, line)
     chord = nodes[start + 1] - nodes[start]
     direction, straight, often = _chords(chord, length, line, first, closed)
     direction = direction - np.einsum("ij,ij->i", direction, normal)[:, None] * normal
@@ -132,7 +132,7 @@ def beads(
     return Beads(line, first, length, middle, direction, normal, *shares.T)
 
 
-def _normals(
+def _layer_normals(
     points: FloatArray,
     normals: FloatArray,
     offsets: IntArray,

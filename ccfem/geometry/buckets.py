@@ -58,12 +58,12 @@ def bucket(low: FloatArray, high: FloatArray, cell: float | None = None) -> Buck
     last = np.zeros((len(low), 3), dtype=np.int64)
     first[:, :dimension] = np.floor((low - origin) / cell)
     last[:, :dimension] = np.floor((high - origin) / cell)
-    starts, items = _fill(first, np.minimum(last, shape - 1), shape)
+    starts, items = _boxes_by_cell(first, np.minimum(last, shape - 1), shape)
     return Buckets(origin, cell, shape, starts, items)
 
 
 @njit(cache=True, nogil=True)
-def _fill(first: IntArray, last: IntArray, shape: IntArray) -> tuple[IntArray, IntArray]:
+def _boxes_by_cell(first: IntArray, last: IntArray, shape: IntArray) -> tuple[IntArray, IntArray]:
     """Items of each grid cell: boxes of cells from `first` to `last`, counted, then written."""
     starts = np.zeros(shape[0] * shape[1] * shape[2] + 1, np.int64)
     items = np.empty(0, np.int64)

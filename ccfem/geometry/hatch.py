@@ -164,7 +164,7 @@ def _links(lines: Hatch, section: Region, width: float) -> Links:
     for members in np.split(order, starts[1:]):
         for e, f in zip(members.tolist(), np.roll(members, -1).tolist(), strict=True):
             if e // 2 != f // 2:
-                arcs.append((e, f, _along(lines, e, f)))
+                arcs.append((e, f, _border_between(lines, e, f)))
     if not arcs:
         return links
     pairs = np.array([arc[:2] for arc in arcs])
@@ -201,7 +201,7 @@ def _clipped(lines: Hatch, pairs: IntArray) -> FloatArray:
     return chords
 
 
-def _along(lines: Hatch, e: int, f: int) -> FloatArray:
+def _border_between(lines: Hatch, e: int, f: int) -> FloatArray:
     """Border vertices between end e and the next end f on its ring."""
     ring, p, q = lines.border[lines.ring[e]][:-1], lines.position[e], lines.position[f]
     first, last = int(np.floor(p)) + 1, int(np.ceil(q)) - 1
@@ -225,13 +225,13 @@ def _sweep(lines: Hatch, links: Links, direction: int, side: int) -> list[list[i
         used[seed] = True
         chain = [2 * seed + side, 2 * seed + 1 - side]
         for _ in range(2):
-            _follow(chain, links, row, used)
+            _follow_links(chain, links, row, used)
             chain.reverse()
         chains.append(chain)
     return _merge(chains, links)
 
 
-def _follow(chain: list[int], links: Links, row: list[int], used: list[bool]) -> None:
+def _follow_links(chain: list[int], links: Links, row: list[int], used: list[bool]) -> None:
     """Lengthen a chain at its end as far as there are links to unused lines."""
     while True:
         free = [f for f in links[chain[-1]] if not used[f // 2]]

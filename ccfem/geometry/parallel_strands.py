@@ -84,7 +84,7 @@ def grow(
     ]
     lines = _without_crossings(lines, 0.1 * pitch)
     lines, rest = extend_free_ends(lines, region, pitch, closest, _REACH * pitch)
-    core = shapely.Polygon() if whole else _opened(rest, _ROUND * pitch)
+    core = shapely.Polygon() if whole else _morphological_opening(rest, _ROUND * pitch)
     if shapely.is_empty(core):
         return lines + _fill_rest(rest, pitch, closest)
     # Where one curve takes over from another the ends form steps: extend them to a smooth border.
@@ -105,7 +105,7 @@ def _kept_off(
     return open_lines(shapely.difference(strings(lines), taken))
 
 
-def _opened(rest: Region, radius: float) -> Region:
+def _morphological_opening(rest: Region, radius: float) -> Region:
     """Morphological opening: the part of a region that a disc reaches."""
     return shapely.buffer(shapely.buffer(rest, -radius), radius)
 

@@ -109,7 +109,7 @@ def _fill_places(grid):  # type: ignore[no-untyped-def]
         for i in range(nx - 1, -1, -1):
             about[i] += about[i + 1]
             around[i] += around[i + 1]
-            grid.places[i, j] = _place(about[i + 1], around[i + 1])
+            grid.places[i, j] = _place_by_winding(about[i + 1], around[i + 1])
 
 
 @njit(cache=True, nogil=True)
@@ -126,7 +126,7 @@ def place(grid, x, y):  # type: ignore[no-untyped-def]
             about += sense
             if grid.outer[k]:
                 around += sense
-    return _place(about, around)
+    return _place_by_winding(about, around)
 
 
 @njit(cache=True, nogil=True)
@@ -136,7 +136,7 @@ def contains(grid, x, y):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _place(about, around):  # type: ignore[no-untyped-def]
+def _place_by_winding(about, around):  # type: ignore[no-untyped-def]
     """Place from the winding numbers of all rings, and of the outer rings."""
     if about != 0:
         return INSIDE

@@ -29,7 +29,7 @@ def corners_only(section: Region) -> Region:
     """
     parts = []
     for part in shapely.get_parts(section):
-        rings = [_corners(shapely.get_coordinates(ring)) for ring in shapely.get_rings(part)]
+        rings = [_ring_corners(shapely.get_coordinates(ring)) for ring in shapely.get_rings(part)]
         if rings and len(rings[0]) > 2:
             inner = sorted((ring for ring in rings[1:] if len(ring) > 2), key=lambda x: tuple(x[0]))
             parts.append(shapely.Polygon(rings[0], inner))
@@ -37,7 +37,7 @@ def corners_only(section: Region) -> Region:
     return parts[0] if len(parts) == 1 else shapely.MultiPolygon(parts)
 
 
-def _corners(ring: FloatArray) -> FloatArray:
+def _ring_corners(ring: FloatArray) -> FloatArray:
     """Points of a closed ring where it turns, the first one not repeated."""
     points = ring[:-1]
     while len(points) > 2:

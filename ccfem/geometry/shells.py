@@ -90,7 +90,7 @@ def concentric(
     lines: list[FloatArray] = []
     level = 0
     while count is None or level < count:
-        level_rings = rings(_opened(section, first + level * pitch, closest * pitch))
+        level_rings = rings(_without_channels(section, first + level * pitch, closest * pitch))
         if not level_rings:
             break
         lines += level_rings
@@ -101,7 +101,7 @@ def concentric(
     return lines + _middle_lines(axis, lines, pitch, closest, first, count, walls)
 
 
-def _opened(section: Region, distance: float, width: float) -> Region:
+def _without_channels(section: Region, distance: float, width: float) -> Region:
     """Part of a section inside a distance, without channels narrower than a width.
 
     As `inset`, but corners stay sharp: strands fill them, at the cost of lying closer there.

@@ -172,11 +172,11 @@ class GcodeProfile:
         check_choices(self)
         for name in _FIELDS:
             for line in getattr(self, name):
-                self._check(name, line)
+                self._check_line(name, line)
         check_ranges(self)
 
     @staticmethod
-    def _check(name: str, line: str) -> None:
+    def _check_line(name: str, line: str) -> None:
         if not line.isprintable():
             raise InputError(f"{name} must be a list of single lines; got {line!r}: split it")
         known = _ALWAYS + _FIELDS[name]

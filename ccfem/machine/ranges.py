@@ -171,12 +171,12 @@ def check_ranges(value: object) -> None:
         given = getattr(value, name)
         if isinstance(given, tuple):
             for number in given:
-                _check(f"each number of {table}.{name}", number, allowed)
+                _check_range(f"each number of {table}.{name}", number, allowed)
         elif given is not None or type(None) not in get_args(hints[name]):
-            _check(f"{table}.{name}", given, allowed)
+            _check_range(f"{table}.{name}", given, allowed)
 
 
-def _check(what: str, value: Any, allowed: Range) -> None:
+def _check_range(what: str, value: Any, allowed: Range) -> None:
     check_number(what, value, unit=allowed.unit)
     if _within(value, allowed):
         return

@@ -167,7 +167,7 @@ def folds(points: FloatArray, offsets: IntArray, closed: BoolArray, radius: floa
     for first, last in pairwise([0, *ends.tolist()]):
         some = slice(offsets[first], offsets[last])
         lines = (points[some], offsets[first : last + 1] - offsets[first], closed[first:last])
-        k, start, stop = _stretches(*lines, begin[first:last], size[first:last], window)
+        k, start, stop = _fold_stretches(*lines, begin[first:last], size[first:last], window)
         parts.append((k + first, start, stop))
     line, start, stop = (np.concatenate(column) for column in zip(_NONE, *parts, strict=True))
     return Folds(line, start, stop, lengths=size, closed=closed)
@@ -178,7 +178,7 @@ def _spacing(window: float) -> float:
     return max(window / _SAMPLES, _FINEST)
 
 
-def _stretches(
+def _fold_stretches(
     points: FloatArray,
     offsets: IntArray,
     closed: BoolArray,
@@ -193,7 +193,7 @@ def _stretches(
     ahead = np.zeros(len(line), dtype=np.int64)
     first = np.cumsum(samples) - samples
     number = np.arange(len(line)) - first[line]
-    tangent = _smoothed(tangent, first[line], number, samples[line], closed[line])
+    tangent = _mean_tangents(tangent, first[line], number, samples[line], closed[line])
     # A ring goes on behind its last sample with its first one.
     most = np.minimum(np.floor(window / step + 1e-9), samples - 1).astype(np.int64)[line]
     most = np.where(closed[line], most, np.minimum(most, samples[line] - 1 - number))
@@ -214,7 +214,7 @@ def _stretches(
     start = np.where(start >= size[line], start - size[line], start)
     order = np.lexsort((start, line))
     line, start, reach = line[order], start[order], reach[at][order]
-    return _merged(line, start, start + reach, size, closed)
+    return _merged_stretches(line, start, start + reach, size, closed)
 
 
 def folds_in(toolpaths: Toolpaths, machine: Machine) -> Folds:
@@ -320,7 +320,7 @@ def _tangents(
     return line, position, tangent, step
 
 
-def _smoothed(
+def _mean_tangents(
     tangent: FloatArray,
     first: IntArray,
     number: IntArray,
@@ -352,7 +352,7 @@ def _may_fold(
     return np.asarray((most > 0) & (turn >= ANGLE))
 
 
-def _merged(
+def _merged_stretches(
     line: IntArray, start: FloatArray, stop: FloatArray, size: FloatArray, closed: BoolArray
 ) -> tuple[IntArray, FloatArray, FloatArray]:
     """Stretches of polylines, by ascending starts, with those that overlap as one."""

@@ -108,7 +108,7 @@ def contour_trees(
             deeper = shapely.get_parts(_level(section, (1.5 + depth) * spacing, narrow, radius))
             here = rings(shapely.multipolygons(deeper[shapely.intersects(deeper, piece)]))
         if sampled:
-            trees += _grown(sampled, np.array(level), spacing, _RIDGE + closest)
+            trees += _contour_trees(sampled, np.array(level), spacing, _RIDGE + closest)
     return trees
 
 
@@ -144,7 +144,7 @@ def _sampled(ring: FloatArray, spacing: float) -> FloatArray:
     return points[:-1]
 
 
-def _grown(
+def _contour_trees(
     rings: Sequence[FloatArray], level: IntArray, spacing: float, reach: float
 ) -> list[ContourTree]:
     """Trees of contours: minimum spanning trees over those that lie side by side."""
@@ -354,9 +354,9 @@ def first_in_spiral_out(
     places = _openings([tree.contours[k] for k in chain], gap, spacing, start)
     wide = np.linalg.norm(np.diff(places.points, axis=0), axis=1).max(initial=0.0) > _STEP * spacing
     laps = {} if wide else dict(zip(chain, places.before, strict=True))
-    loops, alone = _merged(tree, laps, gap, spacing, start, alone_from)
+    loops, alone = _merged_contours(tree, laps, gap, spacing, start, alone_from)
     if wide:
-        strands = [_opened(loops[0], SAMPLES)]
+        strands = [_opened_loop(loops[0], SAMPLES)]
     elif (
         entry
         and len(chain) > 1
@@ -366,10 +366,10 @@ def first_in_spiral_out(
     elif radius > 0.0:
         # On a ring round a small hole a long ramp would cut through the hole.
         gaps = [max(min(gap, len(tree.contours[k]) // _TURN), SAMPLES) for k in chain]
-        opened = [_opened(loop, each) for loop, each in zip(loops, gaps, strict=True)]
+        opened = [_opened_loop(loop, each) for loop, each in zip(loops, gaps, strict=True)]
         strands = [_ramped(opened[::-1])]
     else:
-        strands = [_laps([_opened(loop, gap) for loop in reversed(loops)])]
+        strands = [_laps([_opened_loop(loop, gap) for loop in reversed(loops)])]
     return [_smooth(line) for line in (*strands, *alone)]
 
 
@@ -423,7 +423,7 @@ def _openings(
     return _Openings(index, places)
 
 
-def _merged(
+def _merged_contours(
     tree: ContourTree,
     laps: Mapping[int, int],
     gap: int,
@@ -450,7 +450,7 @@ def _merged(
         parent = int(tree.parent[k])
         ring = np.concatenate([loops[k].points, loops[k].points[:1]])
         long = line_length(ring) >= alone_from
-        joined = None if long else _joined(loops[parent], loops[k], spacing, start)
+        joined = None if long else _joined_loops(loops[parent], loops[k], spacing, start)
         if joined is None:
             alone.append(ring)
         else:
@@ -458,9 +458,9 @@ def _merged(
     return [loops[k] for k in (laps or (0,))], alone
 
 
-def _joined(line: _Loop, other: _Loop, spacing: float, start: FloatArray) -> _Loop | None:
+def _joined_loops(line: _Loop, other: _Loop, spacing: float, start: FloatArray) -> _Loop | None:
     """Two closed lines joined to one where both links are shortest; None if there is no place."""
-    mine, theirs = (np.flatnonzero(~_touched(loop.kept)) for loop in (line, other))
+    mine, theirs = (np.flatnonzero(~_gap_touches(loop.kept)) for loop in (line, other))
     if min(len(line.points), len(other.points)) < SAMPLES + 2 or not (len(mine) and len(theirs)):
         return None
     middles = _middles(line.points)[mine]
@@ -499,7 +499,7 @@ def _middles(ring: FloatArray) -> FloatArray:
     return 0.5 * (ring + np.roll(ring, -1, axis=0))
 
 
-def _touched(kept: BoolArray) -> BoolArray:
+def _gap_touches(kept: BoolArray) -> BoolArray:
     """Whether a gap about the step from each sample would touch a sample in `kept`."""
     return kept | np.roll(kept, 1) | np.roll(kept, -1) | np.roll(kept, -2)
 
@@ -512,7 +512,7 @@ def _gap(loop: _Loop, at: int) -> _Loop:
     return _Loop(opened.points[:-2], kept, opened.opening[:-2])
 
 
-def _opened(loop: _Loop, gap: int) -> FloatArray:
+def _opened_loop(loop: _Loop, gap: int) -> FloatArray:
     """Open a loop by a number of samples about its opening, or at its first sample."""
     at = int(np.flatnonzero(loop.opening)[0]) if loop.opening.any() else 0
     before = (gap - 1) // 2
@@ -567,7 +567,7 @@ def _entered(loops: Sequence[_Loop], places: FloatArray) -> FloatArray:
     ring = np.stack([ring, ring[::-1]])[:, : max(len(ring) - wide + 1, 2)]
     path = [places]
     for number, loop in enumerate(reversed(loops[:-1])):
-        lap = _opened(loop, wide)
+        lap = _opened_loop(loop, wide)
         heres = ring[:, -1] if number == 0 else path[-1][-1:]
         links = np.array([[here, lip] for here in heres for lip in lap[[0, -1]]])
         across = shapely.intersects(shapely.linestrings(links), way_in)

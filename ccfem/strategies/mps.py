@@ -280,7 +280,7 @@ def clear_ends(lines: Sequence[FloatArray], distance: float, first: int = 0) -> 
     if not tips:
         return cut
     back = np.linspace(0.0, _MOST * distance, _STEPS)
-    places = np.stack([_places(lines[k], end, back) for k, end in tips])
+    places = np.stack([_points_before_end(lines[k], end, back) for k, end in tips])
     gap = _gaps(lines, places, np.array([k for k, _ in tips]), distance)
     far = gap >= _ENOUGH * distance
     for (k, end), reached, room in zip(tips, far, gap, strict=True):
@@ -292,7 +292,7 @@ def clear_ends(lines: Sequence[FloatArray], distance: float, first: int = 0) -> 
     return cut
 
 
-def _places(line: FloatArray, end: int, back: FloatArray) -> FloatArray:
+def _points_before_end(line: FloatArray, end: int, back: FloatArray) -> FloatArray:
     """Points (n, 2) of a line at lengths before one of its ends."""
     head = line if end == 0 else line[::-1]
     return points_along(head, along_line(head), back)

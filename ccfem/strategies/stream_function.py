@@ -190,7 +190,7 @@ class StreamFunction:
         """
         cases = WeightedCases.of(solved(stress, "stream_function"))
         length = self.natural_length(layers, machine)
-        return WholePart(self._cut(cases, layers, machine, (length,))[0])
+        return WholePart(self._cut_to_lengths(cases, layers, machine, (length,))[0])
 
     def to_lengths(
         self,
@@ -238,11 +238,13 @@ class StreamFunction:
             layers,
             machine,
             lengths,
-            lambda strategy, some, whole: strategy._cut(cases, layers, machine, some, whole),
+            lambda strategy, some, whole: strategy._cut_to_lengths(
+                cases, layers, machine, some, whole
+            ),
             again=self.turns == "tight",
         )
 
-    def _cut(
+    def _cut_to_lengths(
         self,
         cases: WeightedCases,
         layers: Sequence[Layer],

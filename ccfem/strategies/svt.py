@@ -138,7 +138,7 @@ class Svt:
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan one layer: one path for each piece of its section, or as few as possible."""
-        return self._on(layer, self._lines(layer, stress, machine), machine)
+        return self._on(layer, self._plane_paths(layer, stress, machine), machine)
 
     def for_part(
         self, stress: PartStress, layers: Sequence[Layer], machine: Machine
@@ -153,7 +153,7 @@ class Svt:
         paths = Toolpaths.from_plane(cut.lines, layer, link=cut.link)
         return long_enough(paths, self.minimum_length, machine)
 
-    def _lines(self, layer: Layer, stress: LayerStress, machine: Machine) -> list[_Marked]:
+    def _plane_paths(self, layer: Layer, stress: LayerStress, machine: Machine) -> list[_Marked]:
         """Paths in the plane of a layer, with the masks of their links."""
         pieces = shapely.get_parts(layer.plane.polygon)
         return [marked for piece in pieces for marked in self._piece(piece, stress, machine)]
@@ -181,12 +181,12 @@ class Svt:
         if lines_so_far and self.filled:
             width, least = (
                 machine.fibre_width,
-                max(self._least(machine), _LEAST * machine.fibre_width),
+                max(self._shortest(machine), _LEAST * machine.fibre_width),
             )
             groups += blobs(piece, lines_so_far, width, pitch, least)
         return groups
 
-    def _least(self, machine: Machine) -> float:
+    def _shortest(self, machine: Machine) -> float:
         """Length of the shortest path that is laid, mm."""
         return machine.shortest_strand if self.minimum_length is None else self.minimum_length
 
@@ -229,7 +229,7 @@ class _Alike:
         with self._locks.setdefault(twin.index, Lock()):
             if key not in self._known:
                 layer_stress = stress if twin is layer else stress_on(twin, self._stress)
-                self._known[key] = self._svt._lines(twin, layer_stress, machine)
+                self._known[key] = self._svt._plane_paths(twin, layer_stress, machine)
         return self._svt._on(layer, self._known[key], machine)
 
 
@@ -297,14 +297,14 @@ def blobs(
             continue
         nearest = shapely.shortest_line(border, shapely.centroid(place))
         start = shapely.get_coordinates(nearest)[0]
-        spirals = [_even(line) for line in join_rings(levels, start, spacing, width)]
+        spirals = [_even_line(line) for line in join_rings(levels, start, spacing, width)]
         spirals = [line for line in spirals if line_length(line) >= least]
         if spirals:
             spirals_of.append(spirals)
     return spirals_of
 
 
-def _even(line: FloatArray) -> FloatArray:
+def _even_line(line: FloatArray) -> FloatArray:
     """Line in even steps; a ring is opened where it begins."""
     curve = shapely.LineString(line)
     at = np.linspace(0.0, curve.length, max(4, round(curve.length / _STEP)) + 1)
@@ -349,10 +349,12 @@ def made_symmetric(
                 for image, partner in enumerate(partners):
                     line = symmetric[other][partner]
                     if k == other and partner == image:
-                        symmetric[k][image] = _within(_between(line, group[image]), line, section)
+                        symmetric[k][image] = _within(
+                            _middle_line(line, group[image]), line, section
+                        )
                     elif k != other or partner > image:
                         symmetric[other][partner] = _within(
-                            _along(group[image], line), line, section
+                            _in_direction_of(group[image], line), line, section
                         )
     return symmetric
 
@@ -394,21 +396,21 @@ def _within(image: FloatArray, line: FloatArray, section: Region) -> FloatArray:
     longest = max(pieces, key=lambda piece: piece.length, default=curve)
     if not pieces or curve.length - longest.length > _LOST or shapely.is_closed(curve):
         return line
-    return _along(shapely.get_coordinates(longest), line)
+    return _in_direction_of(shapely.get_coordinates(longest), line)
 
 
-def _along(image: FloatArray, line: FloatArray) -> FloatArray:
+def _in_direction_of(image: FloatArray, line: FloatArray) -> FloatArray:
     """Image walked the way that a line goes."""
     straight = np.linalg.norm(image[0] - line[0]) + np.linalg.norm(image[-1] - line[-1])
     crossed = np.linalg.norm(image[0] - line[-1]) + np.linalg.norm(image[-1] - line[0])
     return image if straight <= crossed else image[::-1]
 
 
-def _between(line: FloatArray, image: FloatArray) -> FloatArray:
+def _middle_line(line: FloatArray, image: FloatArray) -> FloatArray:
     """Line half way between one and its own mirror image."""
     if np.array_equal(line[0], line[-1]):
         return line
-    image = _along(image, line)
+    image = _in_direction_of(image, line)
     along, other = along_line(line), along_line(image)
     share = along / along[-1]
     both = 0.5 * (share + (1.0 - share)[::-1])
@@ -559,7 +561,7 @@ def walk(section: Region, stress: LayerStress, sampling: float) -> list[FloatArr
         while True:
             near = np.array(tree.query_ball_point(points[path[-1]], _RULE.distance))
             near = near[(left[near] > 0) & ~np.isin(near, path)]
-            following = _next(path, near, points, plane_stress, section)
+            following = _next_point(path, near, points, plane_stress, section)
             if following is None:
                 return path
             left[following] -= 1
@@ -597,7 +599,7 @@ def _points(section: Region, sampling: float) -> tuple[FloatArray, IntArray, Boo
     return points, uses, free
 
 
-def _next(
+def _next_point(
     path: list[int], near: IntArray, points: FloatArray, plane_stress: FloatArray, section: Region
 ) -> int | None:
     """Point of those near that a path goes on to."""

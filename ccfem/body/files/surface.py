@@ -105,7 +105,7 @@ def read_surface(path: str | os.PathLike[str], scale: float = 1.0) -> Surface:
     with np.errstate(over="ignore"):  # what overflows is refused as infinite
         points = arrays["points"] * scale
     try:
-        return Surface(*_merged(points, arrays["triangles"]))
+        return Surface(*_merged_points(points, arrays["triangles"]))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
@@ -125,7 +125,7 @@ def write_stl(path: Path, points: FloatArray, triangles: IntArray) -> None:
     path.write_bytes(bytes(80) + np.array(len(facets), "<u4").tobytes() + facets.tobytes())
 
 
-def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
+def _merged_points(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
     """Merge points that agree to 1e-6 of the size; drop triangles that lose a side by it."""
     points, triangles = np.asarray(points), np.asarray(triangles, dtype=np.int64)
     _check_near(points)

@@ -60,7 +60,7 @@ def write_vtk_xml(
                 f"the name {shown(name)} has characters that a file of VTK cannot hold: rename it"
             )
     with path.open("w", encoding="utf-8") as file:
-        file.writelines(_lines(kind, counts, sections, field or {}, components or {}))
+        file.writelines(_file_lines(kind, counts, sections, field or {}, components or {}))
 
 
 def as_bytes(text: str) -> NDArray[np.uint8]:
@@ -68,7 +68,7 @@ def as_bytes(text: str) -> NDArray[np.uint8]:
     return np.frombuffer(text.encode(), dtype=np.uint8)
 
 
-def _lines(
+def _file_lines(
     kind: str,
     counts: Mapping[str, int],
     sections: Mapping[str, Mapping[str, ArrayLike]],

@@ -29,7 +29,7 @@ def read_grid(path: str) -> dict[str, Any]:
         raise ValueError("cells do not fit their types")
     arrays["types"] = types
     for kind in np.unique(types).tolist():
-        arrays[f"cells:{kind}"] = _rows(nodes, offsets, types == kind, _NODES.get(kind, 0))
+        arrays[f"cells:{kind}"] = _node_table(nodes, offsets, types == kind, _NODES.get(kind, 0))
     for where, data in (
         ("point", grid.GetPointData()),
         ("cell", grid.GetCellData()),
@@ -50,7 +50,7 @@ def read_grid(path: str) -> dict[str, Any]:
     return arrays
 
 
-def _rows(
+def _node_table(
     nodes: NDArray[Any], offsets: NDArray[Any], chosen: NDArray[Any], count: int
 ) -> NDArray[Any]:
     """Nodes (m, count) of the chosen cells; of types whose nodes are not wanted, (m, 0)."""

@@ -48,12 +48,12 @@ def bisected(mesh: TetMesh, chosen: BoolArray) -> tuple[TetMesh, IntArray]:
     key = ends[:, 0] * n + ends[:, 1]
     order = np.argsort(key, kind="stable")
     cut = (n, key[order], rank[halved][order], n + order)
-    cells, parent = _cut(mesh.cells, *cut)
-    patches = {name: _cut(facets, *cut)[0] for name, facets in mesh.patches.items()}
+    cells, parent = _bisected(mesh.cells, *cut)
+    patches = {name: _bisected(facets, *cut)[0] for name, facets in mesh.patches.items()}
     return TetMesh(points, cells, patches, mesh.axes, mesh.walls), parent
 
 
-def _cut(
+def _bisected(
     cells: IntArray, n: int, key: IntArray, rank: IntArray, middle: IntArray
 ) -> tuple[IntArray, IntArray]:
     """Cut cells, or facets, at the edges of these keys; the pieces, and whose pieces they are."""

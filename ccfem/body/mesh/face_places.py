@@ -131,7 +131,7 @@ class BodyFaces:
             return table | {"normal": face.direction}
         triangles = self.triangles[face.facets]
         nearest = int(np.argmin(_distances(at, self.points, triangles)))
-        return table | {"normal": _normals(self.points, triangles[nearest : nearest + 1])[0]}
+        return table | {"normal": _unit_normals(self.points, triangles[nearest : nearest + 1])[0]}
 
     def number_at(
         self,
@@ -167,7 +167,7 @@ class BodyFaces:
         away = _distances(at, self.points, self.triangles)
         fits: BoolArray = np.ones(len(away), dtype=bool)
         if normal is not None:
-            fits = _normals(self.points, self.triangles) @ normal > _FACING
+            fits = _unit_normals(self.points, self.triangles) @ normal > _FACING
         distance = np.full(len(self.faces), np.inf)
         for k, face in enumerate(self.faces):
             rows = face.facets[fits[face.facets]]
@@ -216,7 +216,7 @@ def _is_wall(face: Face, axis: FloatArray, radius: float) -> bool:
     )
 
 
-def _normals(points: FloatArray, triangles: IntArray) -> FloatArray:
+def _unit_normals(points: FloatArray, triangles: IntArray) -> FloatArray:
     """Find the unit normals (t, 3) of triangles; zero of those without an area."""
     a, b, c = np.moveaxis(points[triangles], 1, 0)
     across = np.cross(b - a, c - a)
@@ -226,7 +226,7 @@ def _normals(points: FloatArray, triangles: IntArray) -> FloatArray:
 def _distances(place: FloatArray, points: FloatArray, triangles: IntArray) -> FloatArray:
     """Distance (t,), mm, of a place from each triangle."""
     corners = np.moveaxis(points[triangles] - place, 1, 0)
-    normal = _normals(points, triangles)
+    normal = _unit_normals(points, triangles)
     inside = normal.any(axis=1)
     least = np.full(len(triangles), np.inf)
     for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):

@@ -28,12 +28,12 @@ def reverse_cuthill_mckee(start: IntArray, neighbour: IntArray) -> IntArray:
     """
     degree = np.diff(start)
     first = np.argsort(degree, kind="stable")
-    order: IntArray = _numbered(start, neighbour, degree, first)
+    order: IntArray = _breadth_first(start, neighbour, degree, first)
     return order[::-1]
 
 
 @njit(cache=True, nogil=True)
-def _numbered(start, neighbour, degree, first):  # type: ignore[no-untyped-def]
+def _breadth_first(start, neighbour, degree, first):  # type: ignore[no-untyped-def]
     """Nodes in layers of neighbours; those that each node adds by rising degree."""
     order = np.empty(len(first), np.int64)
     seen = np.zeros(len(first), np.bool_)

@@ -144,7 +144,10 @@ class Box:
     def __post_init__(self) -> None:
         if self.normal is not None:
             unit_vector(self.normal, "box normal")
-        lower, upper = _vector(self.lower, "box lower"), _vector(self.upper, "box upper")
+        lower, upper = (
+            _checked_vector(self.lower, "box lower"),
+            _checked_vector(self.upper, "box upper"),
+        )
         if not (lower <= upper).all():
             raise InputError(
                 f"box lower must not exceed upper; got {self.lower} and {self.upper}: swap them"
@@ -328,7 +331,7 @@ def unit_vector(value: str | ArrayLike, what: str) -> FloatArray:
                 f'\'{value}\': write "z", "-z" or [0, 0, 1]'
             )
         return (-1.0 if value.startswith("-") else 1.0) * np.array(_AXES[value.removeprefix("-")])
-    vector = _vector(value, what)
+    vector = _checked_vector(value, what)
     largest = float(np.abs(vector).max())
     if not 0.0 < largest < np.inf:
         raise InputError(
@@ -337,7 +340,7 @@ def unit_vector(value: str | ArrayLike, what: str) -> FloatArray:
     return np.asarray(vector / largest / np.linalg.norm(vector / largest))
 
 
-def _vector(value: ArrayLike, what: str) -> FloatArray:
+def _checked_vector(value: ArrayLike, what: str) -> FloatArray:
     try:
         vector = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
@@ -348,7 +351,7 @@ def _vector(value: ArrayLike, what: str) -> FloatArray:
 
 
 def _place(value: ArrayLike, what: str) -> None:
-    for coordinate in _vector(value, what):
+    for coordinate in _checked_vector(value, what):
         check_number(what, float(coordinate), at_least=-FARTHEST, at_most=FARTHEST, unit="mm")
 
 

@@ -76,12 +76,12 @@ def refined(
             break
         middle = np.where(long, len(points) + np.cumsum(long) - 1, -1)
         points = np.concatenate([points, ends[long].mean(axis=1)])
-        triangles, parent = _cut(triangles, middle[place.reshape(-1)].reshape(-1, 3))
+        triangles, parent = _split_triangles(triangles, middle[place.reshape(-1)].reshape(-1, 3))
         origin = origin[parent]
     return points, triangles, origin
 
 
-def _cut(triangles: IntArray, middle: IntArray) -> tuple[IntArray, IntArray]:
+def _split_triangles(triangles: IntArray, middle: IntArray) -> tuple[IntArray, IntArray]:
     """Cut triangles at the middles (t, 3) of their sides, -1 for a side that stays; parents."""
     count = (middle >= 0).sum(axis=1)
     pieces, parents = [triangles[count == 0]], [np.flatnonzero(count == 0)]

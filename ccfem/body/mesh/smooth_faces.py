@@ -172,12 +172,12 @@ def smooth_faces(
     triangles = np.asarray(triangles, dtype=np.int64)
     surface = _surface(points, triangles)
     area = surface.area
-    pairs = _neighbours(triangles)
+    pairs = _adjacent_triangles(triangles)
     cosine = np.einsum("ij,ij->i", surface.normal[pairs[:, 0]], surface.normal[pairs[:, 1]])
     label = _components(len(triangles), pairs[cosine > np.cos(np.radians(angle))])
     flat = _components(len(triangles), pairs[cosine > np.cos(np.radians(_SEAM))])
     faces: list[Face] = []
-    for group in _groups(label):
+    for group in _rows_by_label(label):
         face = _face(surface, group)
         if face.kind != "other":
             faces.append(face)
@@ -186,8 +186,8 @@ def smooth_faces(
         smooth = pairs[np.isin(pairs, group[~wide]).all(axis=1)]
         smooth = smooth[np.isin(smooth[:, 0], group)]
         parts = _components(len(triangles), smooth)
-        faces += [_face(surface, piece) for piece in _groups(flat, group[wide])]
-        faces += [_face(surface, piece) for piece in _groups(parts, group[~wide])]
+        faces += [_face(surface, piece) for piece in _rows_by_label(flat, group[wide])]
+        faces += [_face(surface, piece) for piece in _rows_by_label(parts, group[~wide])]
     size = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
     return tuple(sorted(faces, key=lambda face: _order(face, size)))
 
@@ -351,7 +351,7 @@ def _order(face: Face, size: float) -> tuple[float, ...]:
     return (-round(face.area / size**2, _DIGITS), *place.tolist())
 
 
-def _neighbours(triangles: IntArray) -> IntArray:
+def _adjacent_triangles(triangles: IntArray) -> IntArray:
     """Pairs (k, 2) of triangles that share an edge."""
     edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     (key,) = facet_keys(edges)
@@ -367,7 +367,7 @@ def _components(count: int, pairs: IntArray) -> IntArray:
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
-def _groups(label: IntArray, among: IntArray | None = None) -> list[IntArray]:
+def _rows_by_label(label: IntArray, among: IntArray | None = None) -> list[IntArray]:
     """Rows of each label, among some rows or all."""
     rows = np.arange(len(label)) if among is None else among
     order = rows[np.argsort(label[rows], kind="stable")]

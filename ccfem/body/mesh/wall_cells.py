@@ -54,7 +54,7 @@ def coarse_wall(mesh: TetMesh) -> CoarseWall | None:
     """
     facets = np.flatnonzero(mesh.partners < 0)
     area, normal = mesh.facet_areas(mesh.facets[facets])
-    ray, thickness = _across(mesh, facets, normal)
+    ray, thickness = _rays_across(mesh, facets, normal)
     single = area[ray]
     if not len(ray) or single.sum() < _SHARE * area.sum():
         return None
@@ -78,7 +78,9 @@ def _median(values: FloatArray, weights: FloatArray) -> int:
     return int(order[np.searchsorted(np.cumsum(weights[order]), 0.5 * weights.sum())])
 
 
-def _across(mesh: TetMesh, facets: IntArray, normal: FloatArray) -> tuple[IntArray, FloatArray]:
+def _rays_across(
+    mesh: TetMesh, facets: IntArray, normal: FloatArray
+) -> tuple[IntArray, FloatArray]:
     """Rays (k,), as rows of the boundary facets, with one cell across; the thickness there, mm."""
     points, corners = mesh.points, mesh.corners
     outside = np.zeros(len(points), dtype=bool)

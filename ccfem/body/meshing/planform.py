@@ -69,7 +69,7 @@ def triangulate(
     InputError
         When the polygon is empty or not valid, or the edge length is too long or too short for it.
     """
-    _check(polygon, edge_length)
+    _check_planform(polygon, edge_length)
     places = None if keep is None else tuple(map(tuple, np.asarray(keep).tolist()))
     points, triangles = _triangulated(polygon, edge_length, places)
     return points.copy(), triangles.copy()
@@ -84,7 +84,7 @@ def _triangulated(
     rings = [np.asarray(r.coords)[:-1, :2] for r in (polygon.exterior, *polygon.interiors)]
     size = _size_function(rings, edge_length)
     marked = [_with_points(ring, keep, 0.25 * edge_length) for ring in rings]
-    outline = [_along(ring, corners, size) for ring, corners in marked]
+    outline = [_ring_points(ring, corners, size) for ring, corners in marked]
     inner = _grid(polygon, edge_length, size, np.concatenate(outline))
     outline, inner = _conforming(outline, inner)
     fixed = sum(map(len, outline))
@@ -93,14 +93,14 @@ def _triangulated(
     if not domain.is_valid:
         raise _not_followed()
     for _ in range(_ROUNDS):
-        points = _smoothed(points, _inside(points, domain), fixed, size)
+        points = _relaxed(points, _inside(points, domain), fixed, size)
     outline, inner = _conforming(outline, points[fixed:])
     points = np.concatenate([*outline, inner])
     used, triangles = np.unique(_inside(points, domain), return_inverse=True)
     return points[used], triangles.reshape(-1, 3)
 
 
-def _check(polygon: shapely.Polygon, edge_length: float) -> None:
+def _check_planform(polygon: shapely.Polygon, edge_length: float) -> None:
     """Raise on a planform or edge length that cannot be meshed."""
     if not isinstance(polygon, shapely.Polygon) or polygon.is_empty:
         raise InputError(
@@ -177,7 +177,7 @@ def _with_points(
     return ring, np.flatnonzero(np.insert(is_corner, place, True))
 
 
-def _along(ring: FloatArray, corners: IntArray, size: Size) -> FloatArray:
+def _ring_points(ring: FloatArray, corners: IntArray, size: Size) -> FloatArray:
     """Points (k, 2) along a ring at the wanted distances.
 
     Its corners are among them, or its outermost points in x and y where it has none.
@@ -297,7 +297,7 @@ def _inside(points: FloatArray, domain: Region) -> IntArray:
     return corners[(area > 1e-9 * longest**2) & shapely.contains_xy(domain, centre)]
 
 
-def _smoothed(points: FloatArray, corners: IntArray, fixed: int, size: Size) -> FloatArray:
+def _relaxed(points: FloatArray, corners: IntArray, fixed: int, size: Size) -> FloatArray:
     """Points moved to the weighted mean of the centres of the triangles round them."""
     centre = points[corners].mean(axis=1)
     weight = signed_areas(points, corners) / size(centre) ** 2

@@ -40,19 +40,19 @@ def fingerprint(*values: Any) -> str:
     False
     """
     digest = hashlib.sha256()
-    for piece in _pieces(values, ()):
+    for piece in _encoded(values, ()):
         digest.update(len(piece).to_bytes(8, "little"))
         digest.update(piece)
     return digest.hexdigest()[:40]
 
 
-def _pieces(value: Any, inside: tuple[int, ...]) -> Iterable[bytes]:
+def _encoded(value: Any, inside: tuple[int, ...]) -> Iterable[bytes]:
     """Bytes that stand for a value."""
     if isinstance(value, np.ndarray) and not value.dtype.hasobject:
         yield f"array {value.dtype.str} {value.shape}".encode()
         yield np.ascontiguousarray(value).tobytes()
     elif isinstance(value, np.generic):
-        yield from _pieces(value.item(), inside)
+        yield from _encoded(value.item(), inside)
     elif value is None or isinstance(value, bool | int | str | bytes):
         yield f"{type(value).__name__} {value!r}".encode()
     elif isinstance(value, float):
@@ -66,26 +66,26 @@ def _pieces(value: Any, inside: tuple[int, ...]) -> Iterable[bytes]:
     elif isinstance(value, CodeType):
         yield f"code {value.co_names} {value.co_varnames}".encode()
         yield value.co_code
-        yield from _pieces(value.co_consts, inside)
+        yield from _encoded(value.co_consts, inside)
     elif dataclasses.is_dataclass(value):
         yield from _type_pieces(type(value), inside)
         for field in dataclasses.fields(value):
             yield field.name.encode()
-            yield from _pieces(getattr(value, field.name), inside)
+            yield from _encoded(getattr(value, field.name), inside)
     elif isinstance(value, Mapping):
         yield f"mapping {len(value)}".encode()
         for key in sorted(value, key=str):
-            yield from _pieces(key, inside)
-            yield from _pieces(value[key], inside)
+            yield from _encoded(key, inside)
+            yield from _encoded(value[key], inside)
     elif isinstance(value, tuple | list):
         yield f"sequence {len(value)}".encode()
         for part in value:
-            yield from _pieces(part, inside)
+            yield from _encoded(part, inside)
     elif isinstance(value, frozenset | set):
-        yield from _pieces(sorted(value, key=repr), inside)
+        yield from _encoded(sorted(value, key=repr), inside)
     elif hasattr(value, "__dict__"):
         yield from _type_pieces(type(value), inside)
-        yield from _pieces(vars(value), inside)
+        yield from _encoded(vars(value), inside)
     else:
         raise InputError(
             f"a study tells runs apart by their content, and cannot look into a "
@@ -117,15 +117,15 @@ def _function_pieces(function: FunctionType, inside: tuple[int, ...]) -> Iterabl
     if _ours(function.__module__) or id(function) in inside:
         return
     inside = (*inside, id(function))
-    yield from _pieces(function.__code__, inside)
+    yield from _encoded(function.__code__, inside)
     for name in _names(function.__code__):
         other = function.__globals__.get(name)
         beside = getattr(other, "__module__", None) == function.__module__
         if isinstance(other, FunctionType | type) and beside:
-            yield from _pieces(other, inside)
+            yield from _encoded(other, inside)
         elif isinstance(other, bool | int | float | str | np.ndarray):
             yield name.encode()
-            yield from _pieces(other, inside)
+            yield from _encoded(other, inside)
 
 
 def _names(code: CodeType) -> list[str]:

@@ -58,17 +58,17 @@ class Pattern:
 def pattern(mesh: CellMesh) -> Pattern:
     """Find the pattern of the stiffness matrix of a mesh."""
     n = len(mesh.points)
-    order = _grouped(_lowest(mesh.cells), np.zeros(n + 1, dtype=np.int32))
+    order = _grouped(_lowest_nodes(mesh.cells), np.zeros(n + 1, dtype=np.int32))
     cells = mesh.cells[order].astype(np.int32)
     start: Any = np.zeros(n + 1, dtype=np.int32)
     touching = _grouped(cells, start)
     indptr: Any = np.zeros(n + 1, dtype=np.int32)
-    indices = _neighbours(cells, start, touching, indptr)
+    indices = _node_neighbours(cells, start, touching, indptr)
     return Pattern(indptr, indices, order, start, touching)
 
 
 @njit(cache=True)
-def _lowest(cells):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _lowest_nodes(cells):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Lowest node (m, 1) of each cell."""
     result = np.empty((len(cells), 1), np.int32)
     for i in range(len(cells)):
@@ -98,7 +98,7 @@ def _grouped(values, start):  # type: ignore[no-untyped-def]  # pragma: no cover
 
 
 @njit(cache=True)
-def _neighbours(cells, start, touching, indptr):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _node_neighbours(cells, start, touching, indptr):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Nodes that share a cell with each node, ascending; `indptr` becomes where each begins."""
     q = cells.shape[1]
     seen = np.full(start.size - 1, -1, np.int32)

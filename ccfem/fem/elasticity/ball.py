@@ -87,7 +87,7 @@ def _boxes(points: FloatArray, weights: FloatArray, size: float) -> _Boxes:
 
 
 @njit(cache=True)
-def _gather(
+def _points_in_ball(
     boxes: _Boxes, centre: FloatArray, box: int, inside: IntArray
 ) -> int:  # pragma: no cover
     """Write the points in the ball round a centre, which lies in a box; return their number."""
@@ -114,7 +114,7 @@ def _average(
     weights, inside = boxes.weights, np.empty(len(boxes.points), np.int64)
     for k in range(len(centres)):
         weight = 0.0
-        for q in range(_gather(boxes, centres[k], box[k], inside)):
+        for q in range(_points_in_ball(boxes, centres[k], box[k], inside)):
             p = inside[q]
             for c in range(values.shape[1]):
                 result[k, c] += weights[p] * values[p, c]
@@ -129,7 +129,7 @@ def _share(
 ) -> None:  # pragma: no cover
     weights, inside = boxes.weights, np.empty(len(boxes.points), np.int64)
     for k in range(len(centres)):
-        count, weight = _gather(boxes, centres[k], box[k], inside), 0.0
+        count, weight = _points_in_ball(boxes, centres[k], box[k], inside), 0.0
         for q in range(count):
             weight += weights[inside[q]]
         for q in range(count):

@@ -166,7 +166,9 @@ class Supernodes(NamedTuple):
         """Solution (n,) for a right-hand side (n,)."""
         x = np.empty(len(rhs))
         x[self.order] = rhs
-        _solve(self.first, self.starts, self.row_starts, self.values, self.rows, self.pivots, x)
+        _substitute_blocks(
+            self.first, self.starts, self.row_starts, self.values, self.rows, self.pivots, x
+        )
         return x[self.order]
 
 
@@ -183,7 +185,7 @@ def supernodes(factor: SuperLU) -> Supernodes | None:
     lower = factor.L
     lower.sort_indices()
     first = _first_columns(lower.indptr, lower.indices)
-    blocks = _blocks(lower.indptr, lower.indices, lower.data, first)
+    blocks = _supernode_blocks(lower.indptr, lower.indices, lower.data, first)
     order = np.asarray(factor.perm_r, dtype=np.int64)
     return Supernodes(order, factor.U.diagonal(), first, *blocks)
 
@@ -206,7 +208,7 @@ def _first_columns(indptr, indices):  # type: ignore[no-untyped-def]  # pragma: 
 
 
 @njit(cache=True, nogil=True)
-def _blocks(indptr, indices, data, first):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _supernode_blocks(indptr, indices, data, first):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Return where blocks and their rows begin, values and rows."""
     count = len(first) - 1
     starts, row_starts = np.zeros(count + 1, np.int64), np.zeros(count + 1, np.int64)
@@ -261,7 +263,7 @@ def _four_products(a, b, c, d, other):  # type: ignore[no-untyped-def]  # pragma
 
 
 @njit(cache=True, nogil=True)
-def _solve(first, starts, row_starts, values, rows, pivots, x):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _substitute_blocks(first, starts, row_starts, values, rows, pivots, x):  # type: ignore[no-untyped-def]  # pragma: no cover
     count, room = len(first) - 1, np.empty(len(x))
     for s in range(count):
         own = x[first[s] : first[s + 1]]

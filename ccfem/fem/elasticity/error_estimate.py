@@ -76,14 +76,14 @@ def estimate_error(
     arguments = (mesh.cells, gradients, seen_only(displacement), stiffness, ease, edges)
     samples = SAMPLES[mesh.order]
     stress = np.empty((m, len(samples), 6))
-    _stress(*arguments, samples, stress)
+    _stress_at(*arguments, samples, stress)
     _curved_stress(mesh, displacement, stiffness, ease, samples, stress)
     patches = stress_patches(mesh, stress, np.trace(stiffness, axis1=1, axis2=2))
     corner = stress
     if mesh.order == 2:
         # Linear in a cell, so the values at its corners determine it.
         corner = np.empty((m, 4, 6))
-        _stress(*arguments, np.eye(4), corner)
+        _stress_at(*arguments, np.eye(4), corner)
         _curved_stress(mesh, displacement, stiffness, ease, np.eye(4), corner)
     compliance = np.linalg.inv(stiffness)
     error, energy = np.empty(m), np.empty(m)
@@ -96,7 +96,7 @@ def estimate_error(
 
 
 @njit(cache=True)
-def _stress(cells, gradients, u, stiffness, free, edges, at, result):  # type: ignore[no-untyped-def]
+def _stress_at(cells, gradients, u, stiffness, free, edges, at, result):  # type: ignore[no-untyped-def]
     """Stress, Voigt, of each cell at barycentric coordinates."""
     slope, strain = np.empty((3, 3)), np.empty(6)
     for cell in range(len(cells)):
@@ -347,7 +347,7 @@ def _terms(x, y, z, p):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _gather(group, corners, of_corner, start, cells, least, stamp, gathered):  # type: ignore[no-untyped-def]
+def _gather_patch(group, corners, of_corner, start, cells, least, stamp, gathered):  # type: ignore[no-untyped-def]
     """Store the cells of a patch and return their number: those at the node, more if too few."""
     count = 0
     for k in range(start[group], start[group + 1]):
@@ -410,7 +410,7 @@ def _fit(  # type: ignore[no-untyped-def]
         if start[group] == start[group + 1]:
             size[group] = 1.0
             continue
-        count = _gather(group, corners, of_corner, start, cells, least, stamp, gathered)
+        count = _gather_patch(group, corners, of_corner, start, cells, least, stamp, gathered)
         extent, s = 0.0, 0
         for k in range(count):
             for q in range(len(at)):

@@ -84,7 +84,7 @@ class _Curved:
         return result
 
 
-def _spread(mesh: LoadedBody, facets: IntArray, forces: FloatArray) -> FloatArray:
+def _consistent_forces(mesh: LoadedBody, facets: IntArray, forces: FloatArray) -> FloatArray:
     """Nodal forces (n, 3) of forces (k, 3) spread evenly over facets; (n, 2) of (k, 2) on a sheet.
 
     A linear facet gives a third to each corner; a quadratic one a third to each middle; an edge
@@ -99,7 +99,7 @@ def _spread(mesh: LoadedBody, facets: IntArray, forces: FloatArray) -> FloatArra
     return result
 
 
-def _vector(mesh: LoadedBody, load: Force | Traction | Bearing | PointForce) -> FloatArray:
+def _load_vector(mesh: LoadedBody, load: Force | Traction | Bearing | PointForce) -> FloatArray:
     """Components of a load in the space of the mesh; PlaneProblem refuses one out of its plane."""
     return np.array(load.vector, dtype=np.float64)[: mesh.points.shape[1]]
 
@@ -108,24 +108,26 @@ def _force(mesh: LoadedBody, load: Force) -> FloatArray:
     facets = patch_facets(mesh, load.patch)
     curved = _Curved.among(mesh, facets)
     area = curved.true_areas(mesh.facet_areas(facets)[0])
-    forces, vector = area[:, None] / area.sum() * _vector(mesh, load), _vector(mesh, load)
+    forces, vector = area[:, None] / area.sum() * _load_vector(mesh, load), _load_vector(mesh, load)
     exact = curved.area[:, :, None] / area.sum() * vector
-    return curved.replaced(_spread(mesh, facets, forces), forces, exact)
+    return curved.replaced(_consistent_forces(mesh, facets, forces), forces, exact)
 
 
 def _traction(mesh: LoadedBody, load: Traction) -> FloatArray:
     facets = patch_facets(mesh, load.patch)
     curved = _Curved.among(mesh, facets)
-    forces = mesh.facet_areas(facets)[0][:, None] * _vector(mesh, load)
-    exact = curved.area[:, :, None] * _vector(mesh, load)
-    return curved.replaced(_spread(mesh, facets, forces), forces, exact)
+    forces = mesh.facet_areas(facets)[0][:, None] * _load_vector(mesh, load)
+    exact = curved.area[:, :, None] * _load_vector(mesh, load)
+    return curved.replaced(_consistent_forces(mesh, facets, forces), forces, exact)
 
 
 def _pressure(mesh: LoadedBody, load: Pressure) -> FloatArray:
     facets, area, normal = _outward(mesh, load.patch)
     curved = _Curved.among(mesh, facets)
     forces = -load.magnitude * area[:, None] * normal
-    return curved.replaced(_spread(mesh, facets, forces), forces, -load.magnitude * curved.vector)
+    return curved.replaced(
+        _consistent_forces(mesh, facets, forces), forces, -load.magnitude * curved.vector
+    )
 
 
 def _bearing(mesh: LoadedBody, load: Bearing) -> FloatArray:
@@ -139,7 +141,7 @@ def _bearing(mesh: LoadedBody, load: Bearing) -> FloatArray:
         # Where the resultant of what a facet gives to its nodes acts.
         places = mesh.points[mesh.facet_nodes(facets)[:, -3:]].mean(axis=1)
         normal = facet_normals(mesh, facets, places[:, None])[:, 0]
-    force = _vector(mesh, load)
+    force = _load_vector(mesh, load)
     touched = normal @ force < 0.0
     for _ in range(50):
         weighted = (area * touched)[:, None] * normal
@@ -156,12 +158,12 @@ def _bearing(mesh: LoadedBody, load: Bearing) -> FloatArray:
             "across the axis of the hole, toward the wall that the patch covers"
         )
     # The axis of a wall is that of its nodes, which is off by rounding or by chords.
-    return _spread(mesh, facets, forces + area[:, None] / area.sum() * rest)
+    return _consistent_forces(mesh, facets, forces + area[:, None] / area.sum() * rest)
 
 
 def _point(mesh: LoadedBody, load: PointForce) -> FloatArray:
     result = np.zeros(mesh.points.shape)
-    result[nearest_node(mesh, load.point, "a point force")] = _vector(mesh, load)
+    result[nearest_node(mesh, load.point, "a point force")] = _load_vector(mesh, load)
     return result
 
 

@@ -133,7 +133,7 @@ def two_level(matrix: sp.bsr_array, points: FloatArray, parents: IntArray | Coar
         Rows of the two corners whose midpoint each node is (twice its own row for a corner), -1
         for a corner without a row; or the linear displacements, if the rows do not define them.
     """
-    rough = parents if isinstance(parents, Coarse) else _corners(parents)
+    rough = parents if isinstance(parents, Coarse) else _from_corners(parents)
     prolong = rough.prolong
     if points.shape[1] == 3:
         coarse_points = points[rough.nodes]
@@ -146,7 +146,7 @@ def two_level(matrix: sp.bsr_array, points: FloatArray, parents: IntArray | Coar
     return _cycle(finest, prolong, prolong.T.tocsr(), below)
 
 
-def _corners(parents: IntArray) -> Coarse:
+def _from_corners(parents: IntArray) -> Coarse:
     """Linear displacements of the corners: a midpoint takes the mean of its two."""
     n = len(parents)
     nodes = np.flatnonzero(parents[:, 0] == np.arange(n))

@@ -151,7 +151,7 @@ def _about_motion(where: str, motion: float | tuple[float, ...], problem: Proble
     )
 
 
-def _moved(problem: Problem, case: str) -> float:
+def _farthest_support_move(problem: Problem, case: str) -> float:
     """Farthest that a load case moves a support, mm: `about_problem` remarks on it."""
     motions = [getattr(support, "value", 0.0) for support in problem.supports]
     motions += [load.vector for load in problem.loads_of(case) if isinstance(load, Displacement)]
@@ -337,12 +337,12 @@ def check_size_of_motion(problem: Problem, case: str, displacement: FloatArray) 
     InputError
         That names a part which hardly anything holds as such.
     """
-    far, size = _spread(displacement), _size(problem)
+    far, size = _largest_difference(displacement), _size(problem)
     if not far <= _FARTHEST * size:
         raise InputError(f"load case '{case}': {_about_far(problem, displacement, far, size)}")
 
 
-def _spread(displacement: FloatArray) -> float:
+def _largest_difference(displacement: FloatArray) -> float:
     """Difference of the displacements of a part, mm: moving as a whole is no matter."""
     return float(np.linalg.norm(np.ptp(displacement, axis=0)))
 
@@ -391,8 +391,8 @@ def about_solution(
         One line each, with its cure.
     """
     lines = [about_error(error, problem)]
-    far, size = _spread(displacement), _size(problem)
-    if far > _LINEAR * size and not _moved(problem, case) > _LINEAR * size:
+    far, size = _largest_difference(displacement), _size(problem)
+    if far > _LINEAR * size and not _farthest_support_move(problem, case) > _LINEAR * size:
         lines.append(_about_far(problem, displacement, far, size))
     lines.append(_about_strength(problem, case, stress))
     return tuple(line for line in lines if line)

@@ -227,7 +227,7 @@ def smoothed(
     """
     of_node, motions = groups.of_node, groups.motions
     count = len(groups.near_kernel)
-    indptr, indices = _touched(matrix.indptr, matrix.indices, of_node, count)
+    indptr, indices = _neighbour_groups(matrix.indptr, matrix.indices, of_node, count)
     blocks: FloatArray = np.empty((len(indices), motions.shape[1], 6), dtype=np.float32)
     prolong = Prolongation(indptr, indices, blocks, count)
     rows = _Rows(matrix.indptr, matrix.indices, matrix.data)
@@ -284,7 +284,7 @@ def _prolong(indptr, indices, blocks, motions, x):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True)
-def _touched(indptr, indices, of_node, count):  # type: ignore[no-untyped-def]
+def _neighbour_groups(indptr, indices, of_node, count):  # type: ignore[no-untyped-def]
     """Find the groups of the neighbours of each node."""
     n = indptr.size - 1
     seen = np.full(count, -1, np.int32)
@@ -322,7 +322,7 @@ def _smooth(
         first = start[i]
         for s in range(first, start[i + 1]):
             place[column[s]] = s - first
-            _clear(sums[s - first])
+            _set_to_zero(sums[s - first])
         # A T: the forces on node i where each group around it moves.
         for s in range(indptr[i], indptr[i + 1]):
             j = indices[s]
@@ -342,7 +342,7 @@ def _smooth(
 
 
 @njit(cache=True)
-def _clear(values):  # type: ignore[no-untyped-def]
+def _set_to_zero(values):  # type: ignore[no-untyped-def]
     for p in range(values.shape[0]):
         for c in range(6):
             values[p, c] = 0.0
@@ -434,7 +434,7 @@ def _project(rows: _Rows, prolong: Prolongation, coarse: _Rows) -> None:
                 k = column[t]
                 if place[k] < 0:
                     place[k], groups[met] = met, k
-                    _clear(images[met])
+                    _set_to_zero(images[met])
                     met += 1
                 _add(data[s], blocks[t], images[place[k]])
         # P^T times that row of A P, into the blocks of the groups of node i.

@@ -86,7 +86,7 @@ def check_motion(mesh: CellMesh, points: FloatArray, holds: Holds) -> None:
         node = np.concatenate([key // count, *holds.bodies])
         added = [np.full(len(nodes), count + k) for k, nodes in enumerate(holds.bodies)]
         members = _Members(node, np.concatenate([key % count, *added]))
-        members, holds = _joined(points, members, holds, count)
+        members, holds = _merged_bodies(points, members, holds, count)
         size = members.bodies
         joined = np.stack([members.owner, size + members.node], axis=1)
         piece = connected(joined, size + len(points))[:size]
@@ -126,7 +126,7 @@ class _Members:
         return first, first + 1
 
 
-def _joined(
+def _merged_bodies(
     points: FloatArray, members: _Members, holds: Holds, count: int
 ) -> tuple[_Members, Holds]:
     """Merge bodies with three common nodes off a line; `count` are bodies of cells."""

@@ -102,7 +102,7 @@ def _substitute(first, start, values, x):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _fill(indptr, indices, place, start, data, values):  # type: ignore[no-untyped-def]
+def _fill_profile(indptr, indices, place, start, data, values):  # type: ignore[no-untyped-def]
     """Put the lower triangle of a block matrix in its place."""
     d = data.shape[1]
     for block in range(indptr.size - 1):
@@ -116,7 +116,7 @@ def _fill(indptr, indices, place, start, data, values):  # type: ignore[no-untyp
                         values[start[row + p] + column + r] = data[slot, p, r]
 
 
-def _lowest(matrix: sp.bsr_array, place: IntArray) -> IntArray:
+def _lowest_columns(matrix: sp.bsr_array, place: IntArray) -> IntArray:
     """Lowest new place among the columns of each block row, in new order."""
     columns = np.minimum.reduceat(place[matrix.indices], matrix.indptr[:-1])
     lowest = np.empty_like(place)
@@ -133,13 +133,13 @@ def _ordering(matrix: sp.bsr_array) -> tuple[IntArray, IntArray]:
     """
     n = len(matrix.indptr) - 1
     natural = np.arange(n)
-    best = _lowest(matrix, natural)
+    best = _lowest_columns(matrix, natural)
     if ((natural - best) ** 2).mean() <= 1.21 * n:
         return natural, best
     order = reverse_cuthill_mckee(matrix.indptr, matrix.indices)
     place = np.empty(n, dtype=np.int64)
     place[order] = natural
-    other = _lowest(matrix, place)
+    other = _lowest_columns(matrix, place)
     if ((natural - other) ** 2).sum() < ((natural - best) ** 2).sum():
         return place, other
     return natural, best
@@ -193,7 +193,7 @@ def _factor(
     begin = np.cumsum(length) - length
     start = begin - first
     values = np.zeros(int(length.sum()))
-    _fill(matrix.indptr, matrix.indices, place, start, matrix.data, values)
+    _fill_profile(matrix.indptr, matrix.indices, place, start, matrix.data, values)
     values[start[n:] + np.arange(n, padded)] = 1.0
     bad = _factorise(first, start, values)
     if bad >= 0:

@@ -300,7 +300,7 @@ def factorise(
     because = "asked for"
     if backend == "auto":
         order = 1 if parents is None else 2
-        backend, because = choose(matrix.shape[0], order, solves, _neighbours(matrix))
+        backend, because = choose(matrix.shape[0], order, solves, _mean_neighbours(matrix))
     check_known("backend", backend, ["auto", *BACKENDS])
     if backend in _MODULES and find_spec(_MODULES[backend]) is None:
         raise InputError(f"backend '{backend}' is not installed: {_CURES[backend]}")
@@ -308,7 +308,7 @@ def factorise(
     return Solver(backend, matrix, make(matrix), backend in DIRECT, make, because)
 
 
-def _neighbours(matrix: sp.bsr_array) -> float:
+def _mean_neighbours(matrix: sp.bsr_array) -> float:
     """Mean number of neighbours of a node, including itself."""
     return len(matrix.indices) / max(1, len(matrix.indptr) - 1)
 
@@ -328,7 +328,7 @@ def _maker(
             raise InputError("backend 'two-level' is for quadratic meshes: use mesh.quadratic()")
         return partial(multigrid.two_level, points=points, parents=parents)
     if backend == "amg":
-        frugal = solves < _SEVERAL or _neighbours(matrix) >= _THIN
+        frugal = solves < _SEVERAL or _mean_neighbours(matrix) >= _THIN
         return partial(multigrid.smoothed_aggregation, points=points, frugal=frugal)
     if backend == "superlu":
         return partial(direct.superlu, often=solves >= _OFTEN)

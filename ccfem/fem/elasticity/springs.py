@@ -41,7 +41,9 @@ def soft_holds(
     if isinstance(support, Foundation):
         # At the corners of each facet, since directions differ between them on a curved patch.
         facets = patch_facets(surface, support.patch)
-        across = _across(facet_normals(surface, facets, surface.points[facets]).reshape(-1, 3))
+        across = _normal_frames(
+            facet_normals(surface, facets, surface.points[facets]).reshape(-1, 3)
+        )
         chosen = [across[:, 0]] if support.normal > 0.0 else []
         chosen += [across[:, 1], across[:, 2]] if support.tangential > 0.0 else []
         return [(facets.reshape(-1), held) for held in chosen]
@@ -94,6 +96,6 @@ def _elements(mesh: LoadedBody, support: Soft) -> tuple[IntArray, FloatArray]:
     return nodes, blocks.reshape(len(nodes), 3 * nodes.shape[1], -1)
 
 
-def _across(normal: FloatArray) -> FloatArray:
+def _normal_frames(normal: FloatArray) -> FloatArray:
     """Orthonormal rows (k, 3, 3), the first along a normal (k, 3)."""
     return np.asarray(np.linalg.svd(normal[:, None])[2])

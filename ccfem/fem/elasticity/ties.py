@@ -89,7 +89,7 @@ class Ties:
             columns += [np.full(count, n + 2 * k), np.full(count, n + 2 * k + 1)]
             # w x r = -r x w
             blocks += [np.tile(body.axes, (count, 1, 1)), -_cross(arm) @ body.axes]
-        return _blocks(np.concatenate(rows), np.concatenate(columns), np.concatenate(blocks),
+        return _block_matrix(np.concatenate(rows), np.concatenate(columns), np.concatenate(blocks),
                        (n, self.count))  # fmt: skip
 
     def reduce(self, matrix: sp.bsr_array) -> sp.bsr_array:
@@ -144,14 +144,18 @@ class Ties:
         n = len(self.points)
         node = np.arange(n)
         halves = np.tile(0.5 * np.eye(3), (2 * n, 1, 1))
-        middles = _blocks(np.repeat(node, 2), ends.reshape(-1), halves, (n, n))
+        middles = _block_matrix(np.repeat(node, 2), ends.reshape(-1), halves, (n, n))
         corner = (ends[:, 0] == node) & (ends[:, 1] == node)
         masters = np.flatnonzero(~self.slaves)
         bodies = n + np.arange(2 * len(self.bodies))
         kept = np.concatenate([np.flatnonzero(corner & ~self.slaves), bodies])
-        pick = _blocks(kept, kept, np.tile(np.eye(3), (len(kept), 1, 1)), 2 * (self.count,))
-        back = _blocks(masters, masters, np.swapaxes(self.axes[masters], 1, 2), (self.count, n))
-        rigid = _blocks(bodies, bodies, np.tile(np.eye(3), (len(bodies), 1, 1)), 2 * (self.count,))
+        pick = _block_matrix(kept, kept, np.tile(np.eye(3), (len(kept), 1, 1)), 2 * (self.count,))
+        back = _block_matrix(
+            masters, masters, np.swapaxes(self.axes[masters], 1, 2), (self.count, n)
+        )
+        rigid = _block_matrix(
+            bodies, bodies, np.tile(np.eye(3), (len(bodies), 1, 1)), 2 * (self.count,)
+        )
         return (back @ (middles @ (self.matrix @ pick)) + rigid).tobsr((3, 3))
 
 
@@ -162,7 +166,7 @@ def _cross(vectors: FloatArray) -> FloatArray:
     return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
 
 
-def _blocks(
+def _block_matrix(
     rows: IntArray, columns: IntArray, blocks: FloatArray, shape: tuple[int, int]
 ) -> sp.bsr_array:
     """Matrix of 3x3 blocks; those at one place are summed."""

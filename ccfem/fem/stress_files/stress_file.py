@@ -318,15 +318,15 @@ def frd_stress(path: Path) -> StressData:
     cells: list[list[int]] = []
     stress: dict[int, list[float]] = {}
     names: list[str] = []
-    for block, body in _blocks(lines, path):
+    for block, body in _result_blocks(lines, path):
         try:
             if block == "2C":
-                points = _rows(body, 3)
+                points = _node_rows(body, 3)
             elif block == "3C":
                 cells = _cells(body, path)
             elif block == "STRESS":
                 names = [line.split()[1] for line in body if line.startswith(" -5")]
-                stress = _rows([line for line in body if line.startswith(" -1")], 6)
+                stress = _node_rows([line for line in body if line.startswith(" -1")], 6)
         except (ValueError, IndexError) as error:
             if isinstance(error, InputError):
                 raise
@@ -342,7 +342,7 @@ def frd_stress(path: Path) -> StressData:
     return _mapped(points, cells, stress, order, path)
 
 
-def _blocks(lines: list[str], path: Path) -> Iterator[tuple[str, list[str]]]:
+def _result_blocks(lines: list[str], path: Path) -> Iterator[tuple[str, list[str]]]:
     """Nodes (2C), elements (3C), and results by their name, each with its lines."""
     name = ""
     body: list[str] = []
@@ -361,7 +361,7 @@ def _blocks(lines: list[str], path: Path) -> Iterator[tuple[str, list[str]]]:
         raise InputError(f"{path} is cut off in its block {name}: copy it again, or run ccx again")
 
 
-def _rows(lines: list[str], count: int) -> dict[int, list[float]]:
+def _node_rows(lines: list[str], count: int) -> dict[int, list[float]]:
     """First `count` values of each node: columns of twelve after the number of the node."""
     rows = {}
     for line in lines:

@@ -107,7 +107,7 @@ class Compliance:
         """
         equations, member = self._equations, self.cells.member
         elements = equations.elements(None if stiffness is None else stiffness[member])
-        self._solve(equations.assemble(factor[member], elements))
+        self._displacements(equations.assemble(factor[member], elements))
         cases, energy = {}, np.zeros(len(member))
         for case, displacement in self._displacement.items():
             forces = equations.system.forces[case]
@@ -116,7 +116,7 @@ class Compliance:
         compliance = sum(self.weights[case] * work for case, work in cases.items())
         return Response(cases, compliance, self.cells.sum(energy), dict(self._displacement))
 
-    def _solve(self, matrix: sp.bsr_array) -> None:
+    def _displacements(self, matrix: sp.bsr_array) -> None:
         """Find the displacement of every load case."""
         system = self._equations.system
         held = system.held

@@ -70,7 +70,7 @@ def _contour(nodes: FloatArray, threshold: float, size: float) -> list[FloatArra
     return contours.lines()
 
 
-def _smoothed(ring: FloatArray, step: float) -> FloatArray:
+def _taubin_smoothed(ring: FloatArray, step: float) -> FloatArray:
     """Resample a closed ring and smooth it by Taubin's passes 0.5 and -0.53, which keep its area.
 
     Taubin, Curve and surface smoothing without shrinkage, ICCV 1995.
@@ -85,7 +85,7 @@ def _smoothed(ring: FloatArray, step: float) -> FloatArray:
     return points
 
 
-def _region(rings: list[FloatArray]) -> Any:
+def _even_odd_region(rings: list[FloatArray]) -> Any:
     """Even-odd region of closed rings."""
     parts = [shapely.make_valid(shapely.Polygon(ring)) for ring in rings if len(ring) > 3]
     if not parts:
@@ -178,7 +178,7 @@ def outline(
 
     def region(level: float) -> Any:
         rings = [ring - shift for ring in _contour(nodes, level, size)]
-        return _region([_smoothed(ring, 0.5 * size) for ring in rings])
+        return _even_odd_region([_taubin_smoothed(ring, 0.5 * size) for ring in rings])
 
     if threshold is None:
         share = float(density[known].mean()) if volume_fraction is None else volume_fraction

@@ -279,7 +279,7 @@ class Walls:
             if edges.shape[1] == 1:
                 chosen = self._round(plate.points[edges[:, 0]])
             else:
-                chosen = self._along(plate, edges)
+                chosen = self._walls_along(plate, edges)
             if chosen.any():
                 patches[name] = self.facets[chosen]
             elif name in needed:
@@ -299,7 +299,7 @@ class Walls:
             )
         return self.facets[near]
 
-    def _along(self, plate: PlaneMesh, edges: IntArray) -> BoolArray:
+    def _walls_along(self, plate: PlaneMesh, edges: IntArray) -> BoolArray:
         """Walls (w,) that are nearest to edges (k, 2) of all edges of the plate, and face them."""
         boundary, reach = plate.boundary, _REACH * self.pixel
         held = are_among(boundary, edges)

@@ -237,7 +237,7 @@ def _field(problem: Problem, density: FloatArray) -> _Field:
     )
 
 
-def _pieces(field: _Field, chosen: BoolArray) -> IntArray:
+def _connected_nodes(field: _Field, chosen: BoolArray) -> IntArray:
     """Piece (n,) of each chosen node, by edges between chosen nodes; others by themselves."""
     return connected(field.pairs[chosen[field.pairs].all(axis=1)], len(chosen))
 
@@ -249,7 +249,7 @@ def _cleaned(field: _Field, level: float) -> FloatArray | None:
     """
     values = field.values.copy()
     inside = values > level
-    piece = _pieces(field, inside)
+    piece = _connected_nodes(field, inside)
     joining = None
     for nodes in field.anchors:
         here = np.unique(piece[nodes[inside[nodes]]])
@@ -257,7 +257,7 @@ def _cleaned(field: _Field, level: float) -> FloatArray | None:
     if joining is None or not len(joining):
         return None
     inside &= piece == joining[np.bincount(piece)[joining].argmax()]
-    piece = _pieces(field, ~inside)
+    piece = _connected_nodes(field, ~inside)
     enclosed = ~np.isin(piece, piece[np.unique(field.mesh.boundary)])
     small = np.bincount(piece, field.share)[piece] < _LEAST_VOID
     values[~inside] = np.minimum(values[~inside], level)

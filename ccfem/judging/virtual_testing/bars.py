@@ -97,7 +97,7 @@ class Bars:
         """
         u = _seen(displacement)
         result = np.zeros(u.shape)
-        _forces(self.nodes, self.slope, self.tangent, stiffness * self.length, u, result)
+        _bar_forces(self.nodes, self.slope, self.tangent, stiffness * self.length, u, result)
         return result
 
 
@@ -121,7 +121,7 @@ def _strain(nodes, slope, tangent, u, result):  # type: ignore[no-untyped-def]  
 
 
 @njit(cache=True)
-def _forces(nodes, slope, tangent, weight, u, result):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _bar_forces(nodes, slope, tangent, weight, u, result):  # type: ignore[no-untyped-def]  # pragma: no cover
     for s in range(len(nodes)):
         if weight[s] == 0.0:
             continue

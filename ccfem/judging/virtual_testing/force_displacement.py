@@ -83,7 +83,7 @@ class Curve:
                 f"{100 * _HIGH:g} % of the peak force; got {used.sum()}: record more points"
             )
         rows = np.flatnonzero(used)
-        ease, start = _line(self.force[rows], self.displacement[rows])
+        ease, start = _robust_line(self.force[rows], self.displacement[rows])
         gap = np.abs(self.displacement[rows] - start - ease * self.force[rows])
         # Measured by the whole range, since rows may crowd at one of its ends.
         if gap.max() > _OFF * abs(ease) * (_HIGH - _LOW) * self.peak:
@@ -103,7 +103,7 @@ class Curve:
         if len(others) < 3 or not self.peak > _HIGH_PEAK * self.force[others].max() > 0.0:
             return
         before = others[: max(int(self.force[others].argmax()) + 1, 3)]
-        ease, start = _line(self.force[before], self.displacement[before])
+        ease, start = _robust_line(self.force[before], self.displacement[before])
         if self.displacement[row] - start < _STIFF * ease * self.peak:
             raise InputError(self._off(row))
 
@@ -116,7 +116,7 @@ class Curve:
         )
 
 
-def _line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
+def _robust_line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
     """Slope and start of a line that up to a quarter of the points may miss (Theil and Sen)."""
     fitted = theilslopes(y, x) if np.ptp(x) > 0.0 else (0.0, float(np.median(y)))
     return float(fitted[0]), float(fitted[1])

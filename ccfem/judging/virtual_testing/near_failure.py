@@ -181,7 +181,7 @@ class MatrixPeaks:
         slope = np.where(index > 0.0, weight / (whole * np.where(index > 0.0, index, 1.0)), 0.0)
         return peak, peak * whole ** (1.0 / POWER), slope
 
-    def _forces(self, by_stress: FloatArray) -> FloatArray:
+    def _by_displacement(self, by_stress: FloatArray) -> FloatArray:
         """Turn a derivative by the stress (m, 6) of each cell into one by the displacement."""
         mesh, stiffness = self.part.mesh, self._stiffness
         turned = np.swapaxes(stiffness, -1, -2)
@@ -200,7 +200,7 @@ class MatrixPeaks:
         deviator = stress - np.trace(stress, axis1=1, axis2=2)[:, None, None] / 3.0 * np.eye(3)
         size = np.where(mises > 0.0, mises, 1.0)
         by_stress = to_voigt(1.5 * deviator) * _ENGINEERING * (by_mises / size[:, None])
-        return Peak(peak, norm, self._forces(by_stress))
+        return Peak(peak, norm, self._by_displacement(by_stress))
 
     def bond(
         self, displacement: FloatArray, normal: FloatArray, strength: tuple[float, float]
@@ -220,7 +220,7 @@ class MatrixPeaks:
         by_traction = opening[:, None] / tensile**2 * normal + sliding / shear**2
         by_traction *= (slope / np.where(index > 0.0, index, 1.0))[:, None]
         tensor = 0.5 * (by_traction[:, :, None] * normal + normal[:, None] * by_traction[:, None])
-        return Peak(peak, norm, self._forces(self._back(to_voigt(tensor) * _ENGINEERING)))
+        return Peak(peak, norm, self._by_displacement(self._back(to_voigt(tensor) * _ENGINEERING)))
 
     def peaks(
         self,

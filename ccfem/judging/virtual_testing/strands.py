@@ -245,7 +245,7 @@ def cut_steps(start: FloatArray, step: FloatArray, length: FloatArray, mesh: Tet
     room = 4 * len(start) + 1024
     while True:
         whole, real = np.empty((room, 2), dtype=np.int64), np.empty((room, 3))
-        count = _cut(start, step, length, tables, whole, real)
+        count = _cut_at_faces(start, step, length, tables, whole, real)
         if count <= room:
             return CutSteps(*whole[:count].T, *real[:count].T)
         room = count
@@ -266,7 +266,7 @@ class _Tables(NamedTuple):
 
 
 def _tables(mesh: TetMesh) -> _Tables:
-    """Return the tables of a mesh that `_cut` uses; the mesh stores them."""
+    """Return the tables of a mesh that `_cut_at_faces` uses; the mesh stores them."""
     known = mesh.__dict__
     if "cut_tables" not in known:
         across = np.ascontiguousarray(mesh.across)
@@ -295,7 +295,7 @@ def _grid(mesh: TetMesh) -> Buckets:
 
 
 @njit(cache=True)
-def _cut(
+def _cut_at_faces(
     start: FloatArray,
     step: FloatArray,
     length: FloatArray,
@@ -343,7 +343,7 @@ def _cut(
                 number = _complete(middle, tables, met, number)
                 sharing = 0
                 for f in range(number):
-                    if _least(middle, tables.origin, tables.gradient, met[f]) >= -_TOUCH:
+                    if _least_coordinate(middle, tables.origin, tables.gradient, met[f]) >= -_TOUCH:
                         met[sharing], met[f] = met[f], met[sharing]
                         sharing += 1
                 begin, end = t0 + u0 * (t1 - t0), t0 + u1 * (t1 - t0)
@@ -448,7 +448,7 @@ def _walk(
 
 
 @njit(cache=True)
-def _least(
+def _least_coordinate(
     point: FloatArray, origin: FloatArray, gradient: FloatArray, cell: int
 ) -> float:  # pragma: no cover
     """Smallest barycentric coordinate of a point."""
@@ -469,7 +469,7 @@ def _complete(
     """Add the cells that hold a point where rounding hid all of them; return the new number."""
     origin, gradient, _, grid = tables
     for f in range(number):
-        if _least(point, origin, gradient, met[f]) >= -_TOUCH:
+        if _least_coordinate(point, origin, gradient, met[f]) >= -_TOUCH:
             return number
     box = 0
     for i in range(3):
@@ -478,7 +478,7 @@ def _complete(
             return number
         box = box * grid.shape[i] + at
     for c in range(grid.starts[box + 1] - 1, grid.starts[box] - 1, -1):
-        if _least(point, origin, gradient, grid.items[c]) >= -_TOUCH:
+        if _least_coordinate(point, origin, gradient, grid.items[c]) >= -_TOUCH:
             met[number] = grid.items[c]
             number += 1
     return number

@@ -109,7 +109,7 @@ def first_failure(
     fibre_index, fibre_at = fibre_peak(test)
     matrix_load = test.force * limits.matrix / matrix_index
     fibre_load = test.force * limits.fibre / fibre_index if fibre_index > 0.0 else np.inf
-    bond = _between(test.solution, layers)
+    bond = _interlayer_result(test.solution, layers)
     zones: tuple[float, ...] = ()
     if isinstance(bond, Interlayer):
         zones = tuple(test.force / f if f > 0.0 else np.inf for f in bond.zone_indices)
@@ -131,7 +131,7 @@ def first_failure(
     )
 
 
-def _between(stress: StressField, layers: Sequence[Layer] | None) -> Interlayer | str:
+def _interlayer_result(stress: StressField, layers: Sequence[Layer] | None) -> Interlayer | str:
     """Return what `interlayer` finds, or why it finds nothing; empty without layers."""
     if layers is None:
         return ""

@@ -187,7 +187,7 @@ def _flattened(layer: Layer) -> Chart:
         points=np.column_stack([image, np.zeros(len(image))]),
         flat=Plane(np.eye(3), 0.0),
         turns=turns,
-        point_turns=_at_points(layer, turns),
+        point_turns=_point_rotations(layer, turns),
     )
     return Chart(layer, flat, stretches)
 
@@ -274,7 +274,7 @@ def _border(triangles: IntArray) -> IntArray:
     return np.asarray(sides[~np.isin(forth, back)])
 
 
-def _at_points(layer: Layer, turns: FloatArray) -> FloatArray:
+def _point_rotations(layer: Layer, turns: FloatArray) -> FloatArray:
     """Rotation (n, 3, 3) at each point, nearest to the mean of the triangles round it."""
     n, corners = len(layer.points), layer.triangles.ravel()
     first = np.zeros((n, 3))

@@ -120,7 +120,9 @@ def orient_along(surface: Surface, direction: FloatArray, confidence: FloatArray
     direction = orient(direction, surface.neighbours, confidence)
     triangles = surface.triangles
     weight = confidence + _LEAST_WEIGHT
-    relative = np.einsum("td,tkd->tk", direction, _at_points(surface, direction)[triangles])
+    relative = np.einsum(
+        "td,tkd->tk", direction, _mean_line_at_points(surface, direction)[triangles]
+    )
     sign = np.where(relative < 0.0, -1.0, 1.0)
 
     metric = direction[:, :, None] * direction[:, None, :] + _ACROSS * np.eye(2)
@@ -140,7 +142,7 @@ def orient_along(surface: Surface, direction: FloatArray, confidence: FloatArray
     return np.where(opposed[:, None], -direction, direction)
 
 
-def _at_points(surface: Surface, direction: FloatArray) -> FloatArray:
+def _mean_line_at_points(surface: Surface, direction: FloatArray) -> FloatArray:
     """Mean line at the points, (n, 2), of any sign."""
     cosine = surface.lumped(direction[:, 0] ** 2 - direction[:, 1] ** 2)
     sine = surface.lumped(2.0 * direction[:, 0] * direction[:, 1])

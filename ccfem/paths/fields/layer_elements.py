@@ -66,7 +66,7 @@ class Surface:
         return read_only(np.stack([first, np.cross(normal, first)], axis=1))
 
     @cached_property
-    def _corners(self) -> FloatArray:
+    def _plane_corners(self) -> FloatArray:
         """Corners of each triangle in its own plane, (t, 3, 2)."""
         corners = self.points[self.triangles]
         if self.points.shape[1] == 2:
@@ -78,12 +78,12 @@ class Surface:
     def areas(self) -> FloatArray:
         """Area of each triangle, (t,), mm^2; 0 where a chart inverts the triangle."""
         corners = np.arange(3 * len(self.triangles)).reshape(-1, 3)
-        return read_only(np.maximum(signed_areas(self._corners.reshape(-1, 2), corners), 0.0))
+        return read_only(np.maximum(signed_areas(self._plane_corners.reshape(-1, 2), corners), 0.0))
 
     @cached_property
     def gradients(self) -> FloatArray:
         """Gradients of the three shape functions on each triangle, (t, 3, 2), 1/mm."""
-        p = self._corners
+        p = self._plane_corners
         opposite = p[:, [2, 0, 1]] - p[:, [1, 2, 0]]
         turned = np.stack([-opposite[..., 1], opposite[..., 0]], axis=-1)
         thick = self.areas > _THIN * self.areas.mean()

@@ -72,11 +72,11 @@ def streamlines(
         if cell < 0:
             lines.append(np.zeros((0, 2)))
             continue
-        ahead, closed = _follow(field, start, cell, step, steps, 1)
+        ahead, closed = _follow_field(field, start, cell, step, steps, 1)
         if closed:
             lines.append(np.concatenate([ahead, ahead[:1]]))
             continue
-        back, _ = _follow(field, start, cell, step, steps, -1)
+        back, _ = _follow_field(field, start, cell, step, steps, -1)
         line = np.concatenate([back[:0:-1], ahead])
         lines.append(line if len(line) > 1 else line[:0])
     return lines
@@ -203,7 +203,7 @@ def streamline_step(field, cell, x, y, step, way):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True, nogil=True)
-def _follow(field, start, cell, step, most, sense):  # type: ignore[no-untyped-def]
+def _follow_field(field, start, cell, step, most, sense):  # type: ignore[no-untyped-def]
     """Points (m, 2) from `start` in one sense, and whether they come back to it."""
     line = np.empty((most + 1, 2))
     x, y = start[0], start[1]

@@ -43,7 +43,7 @@ def trim_to_clearance(
     keep = np.ones(len(points), dtype=bool)
     head, following = np.full(int(shape.prod()), -1), np.empty(len(points), dtype=np.int64)
     grid = _Grid(low, shape, float(clearance), head, following)
-    _clear(points, offsets, grid, float(least_length), keep)
+    _drop_near(points, offsets, grid, float(least_length), keep)
     masks = np.split(keep, offsets[1:-1])
     kept: list[FloatArray] = []
     for line, mask in zip(ordered, masks, strict=True):
@@ -72,7 +72,7 @@ class _Grid(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _clear(
+def _drop_near(
     points: FloatArray, offsets: IntArray, grid: _Grid, least_length: float, keep: BoolArray
 ) -> None:
     """Clear `keep` (p,) for points that are too near to others."""

@@ -73,7 +73,7 @@ def improved_order(order: IntArray, clusters: Clusters, rounds: int) -> IntArray
             best, least = trial, cost
     if not np.isfinite(least):
         raise InputError("there is no way through all clusters: some visit must be possible")
-    return _along(best, clusters)
+    return _best_terminals(best, clusters)
 
 
 def greedy_order(clusters: Clusters) -> IntArray:
@@ -253,7 +253,7 @@ def _cost_with(
     return cost
 
 
-def _along(order: IntArray, clusters: Clusters) -> IntArray:
+def _best_terminals(order: IntArray, clusters: Clusters) -> IntArray:
     """Terminals entered and left on the best way through clusters in a given order."""
     links, visit, offsets, first, last = clusters
     ahead, behind = np.full(len(links), np.inf), np.empty(len(links))

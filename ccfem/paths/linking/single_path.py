@@ -326,7 +326,7 @@ def link_tracks(
     if len(wanted) == len(wanted[0]) == 1:
         return LinkedPath(wanted[0][0], np.zeros(len(wanted[0][0]), dtype=bool))
     radius = max(radius, 0.05 * width)
-    opened = _opened(wanted, radius, width)
+    opened = _opened_tracks(wanted, radius, width)
     closed = [is_closed(track) for group in wanted for track in group]
     tracks = [track for group in opened for track in group]
     network = _Network.between(tracks, np.array(closed), section, radius)
@@ -354,7 +354,7 @@ def _clean(track: FloatArray) -> FloatArray:
     return track[np.concatenate([[True], (np.diff(track, axis=0) != 0.0).any(axis=1)])]
 
 
-def _opened(
+def _opened_tracks(
     groups: Sequence[Sequence[FloatArray]], radius: float, width: float
 ) -> list[list[FloatArray]]:
     """Open closed tracks side by side, as near to the other groups as possible.

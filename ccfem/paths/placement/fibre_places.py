@@ -103,11 +103,13 @@ class FibrePlaces:
         InputError
             Where no layer is left, and for regions on curved layers.
         """
-        kept = self._between(self._chosen(layers, mesh)[:: self.every], machine)
+        kept = self._with_matrix_between(self._chosen_layers(layers, mesh)[:: self.every], machine)
         if self.covered:
             kept = [layer for layer in kept if _is_covered(layer, mesh, machine)]
         if self.regions or self.covered:
-            kept = [cut for layer in kept if (cut := self._cut(layer, mesh, machine)) is not None]
+            kept = [
+                cut for layer in kept if (cut := self._restricted(layer, mesh, machine)) is not None
+            ]
         if not kept:
             raise InputError(
                 f"of {len(layers)} layers none is left for fibre ({self.about()}): choose more in "
@@ -139,7 +141,7 @@ class FibrePlaces:
             said.append("covered by matrix")
         return ", ".join(said) or "all layers"
 
-    def _chosen(self, layers: Sequence[Layer], mesh: TetMesh) -> list[Layer]:
+    def _chosen_layers(self, layers: Sequence[Layer], mesh: TetMesh) -> list[Layer]:
         """Layers by their numbers and heights."""
         known = [layer.index for layer in layers]
         if isinstance(self.layers, str):
@@ -162,7 +164,7 @@ class FibrePlaces:
             and (np.isinf([low, high]).all() or low <= _height(layer, mesh) <= high)
         ]
 
-    def _between(self, layers: Sequence[Layer], machine: Machine) -> list[Layer]:
+    def _with_matrix_between(self, layers: Sequence[Layer], machine: Machine) -> list[Layer]:
         """Layers with enough of matrix between them."""
         if not self.between:
             return list(layers)
@@ -176,7 +178,7 @@ class FibrePlaces:
                 kept.append(layer)
         return kept
 
-    def _cut(self, layer: Layer, mesh: TetMesh, machine: Machine) -> Layer | None:
+    def _restricted(self, layer: Layer, mesh: TetMesh, machine: Machine) -> Layer | None:
         """Part of a layer that gets fibre; None where nothing does."""
         if layer.flat is None:
             if self.regions:
@@ -185,7 +187,7 @@ class FibrePlaces:
                     "choose method = 'planar' in [slicing], or leave the regions out"
                 )
             return layer
-        region = self._region(layer, mesh)
+        region = self._fibre_region(layer, mesh)
         parts = shapely.get_parts(region)
         parts = parts[shapely.get_type_id(parts) == 3]
         if self.covered:
@@ -194,7 +196,7 @@ class FibrePlaces:
             return None
         return cut_layer(layer, shapely.multipolygons(list(parts)), mesh)
 
-    def _region(self, layer: Layer, mesh: TetMesh) -> Region:
+    def _fibre_region(self, layer: Layer, mesh: TetMesh) -> Region:
         """Region of a layer that gets fibre."""
         plane = layer.plane
         section = plane.polygon
@@ -289,8 +291,8 @@ def cut_layer(layer: Layer, region: Region, mesh: TetMesh) -> Layer | None:
     # Triangles beside those that are cut may get a point of theirs on an edge.
     touched = np.isin(layer.triangles, layer.triangles[crossed]).any(axis=1)
     beside = whole & touched
-    cut_triangles, parent = _pieces(triangles, crossed, beside, region)
-    points, number = _numbered(shapely.get_coordinates(cut_triangles), plane.points)
+    cut_triangles, parent = _retriangulated(triangles, crossed, beside, region)
+    points, number = _points_and_numbers(shapely.get_coordinates(cut_triangles), plane.points)
     number = number.reshape(-1, 4)[:, :3]
     kept = np.concatenate([layer.triangles[whole & ~touched], counter_clockwise(points, number)])
     parent = np.concatenate([np.flatnonzero(whole & ~touched), parent])
@@ -316,7 +318,7 @@ def cut_layer(layer: Layer, region: Region, mesh: TetMesh) -> Layer | None:
     )
 
 
-def _pieces(
+def _retriangulated(
     triangles: FloatArray, crossed: BoolArray, beside: BoolArray, region: Region
 ) -> tuple[FloatArray, IntArray]:
     """Triangles that the pieces of cut triangles and of those beside them are made of."""
@@ -340,7 +342,7 @@ def _pieces(
     return parts, parent[of_piece]
 
 
-def _numbered(vertices: FloatArray, known: FloatArray) -> tuple[FloatArray, IntArray]:
+def _points_and_numbers(vertices: FloatArray, known: FloatArray) -> tuple[FloatArray, IntArray]:
     """Points, those that are known first, and the number of each found place (k, 2)."""
     from scipy.spatial import KDTree
 

@@ -134,7 +134,7 @@ class NearPatch:
             far = float(np.sqrt(max(self.within**2 - at**2, 0.0)))
             shapes.append(shapely.buffer(shapely.union_all(faces), far, quad_segs=_ARC))
         for at in (self.within * np.sin(0.5 * np.pi * np.arange(-_CUTS, _CUTS + 1) / _CUTS))[1:-1]:
-            ends = _cut(corners, level - float(at))
+            ends = _section_edges(corners, level - float(at))
             if len(ends):
                 far = float(np.sqrt(self.within**2 - at**2))
                 lines = shapely.multilinestrings(shapely.linestrings(ends))
@@ -160,7 +160,7 @@ class InBody:
     def section(self, plane: Plane, mesh: TetMesh, reach: float) -> Region:
         """Section with a plane, in its coordinates."""
         corners = self.surface.points[self.surface.triangles]
-        ends = _cut(plane.project(corners), corners @ plane.frame[2] - plane.height)
+        ends = _section_edges(plane.project(corners), corners @ plane.frame[2] - plane.height)
         if not len(ends):
             return shapely.Polygon()
         ends = ends.round(_DIGITS)
@@ -181,7 +181,7 @@ def _half(region: Region, slope: FloatArray, least: float, reach: float) -> Regi
     return shapely.intersection(region, shapely.Polygon(ring))
 
 
-def _cut(corners: FloatArray, level: FloatArray) -> FloatArray:
+def _section_edges(corners: FloatArray, level: FloatArray) -> FloatArray:
     """Find the ends (k, 2, 2) of the sections of triangles where their level is 0."""
     # A corner on the plane counts as above it: each triangle is cut in two edges or in none.
     above = level >= 0.0

@@ -258,7 +258,7 @@ def plan_to_lengths(
         check_layers(strategy, layers, machine)
         planners = strategy.to_lengths(stress, layers, machine, lengths)
         return [
-            _planned(
+            _plan_at_length(
                 asked,
                 plan_layers(planner, layers, layers, stress, machine, may_fold(asked)),
                 layers,
@@ -292,7 +292,7 @@ def _length(planned: Planned) -> float:
     return planned.length_per_layer
 
 
-def _planned(
+def _plan_at_length(
     strategy: Strategy,
     toolpaths: Toolpaths,
     layers: Sequence[Layer],

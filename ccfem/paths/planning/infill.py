@@ -256,7 +256,7 @@ def cut_turns(
             parts = _unbent(line, mark, radius, width, least)
         else:
             along = along_line(line)
-            pieces = _pieces(line, along, radius, width, least, pitch)
+            pieces = _cut_spans(line, along, radius, width, least, pitch)
             parts = [part_of_line(line, along, mark, *ends) for ends in pieces] or [(line, mark)]
         result.lines.extend(part for part, _ in parts)
         result.link.extend(marked for _, marked in parts)
@@ -309,7 +309,7 @@ def _between_bends(
     # A piece is looked at in equal steps of about a width: the first may be a little shorter.
     step = width / (1.0 + 0.5 * width / least)
     stop, start = np.minimum(a + step, middle), np.maximum(b - step, middle)
-    stop, start = _off_corners(stop, start, _corners(line, along, closed), _STUB * width)
+    stop, start = _off_corners(stop, start, _sharp_turns(line, along, closed), _STUB * width)
     if closed:
         stop = np.append(stop[1:], stop[0] + size)
     else:
@@ -318,7 +318,7 @@ def _between_bends(
     kept = stop - start >= least
     start, stop = start[kept], stop[kept]
     # Of two that meet in a turn the first ends a width before the second, or that begins after it.
-    places, count = _places(line, along, closed), len(start)
+    places, count = _line_places(line, along, closed), len(start)
     for k in range(count if closed else count - 1):
         after = (k + 1) % count
         shorter = _room(places, float(stop[k]), -1, float(start[after]), width)
@@ -330,7 +330,7 @@ def _between_bends(
     return list(zip(start[kept].tolist(), stop[kept].tolist(), strict=True))
 
 
-def _pieces(
+def _cut_spans(
     line: FloatArray, along: FloatArray, radius: float, width: float, least: float, pitch: float
 ) -> _Pieces:
     """Start and end of each piece by arc length; none where nothing is cut.
@@ -345,7 +345,7 @@ def _pieces(
     if not len(turns.cost):
         return []
     if not closed:
-        cuts = _chosen(turns, size, least)
+        cuts = _chosen_turns(turns, size, least)
         starts = [0.0, *turns.begin[cuts].tolist()]
         return list(zip(starts, [*turns.end[cuts].tolist(), size], strict=True)) if cuts else []
     # A ring is cut at one turn first: of a few the one from which the others keep the least bent.
@@ -364,7 +364,7 @@ def _ring_pieces(turns: _Turns, first: int, size: float, least: float) -> tuple[
     stop += size if stop <= 0.0 else 0.0
     if stop < least:
         return whole, []
-    cuts = _chosen(_Turns(ends, begins, turns.cost[rest]), stop, least)
+    cuts = _chosen_turns(_Turns(ends, begins, turns.cost[rest]), stop, least)
     kept = whole - float(turns.cost[first] + turns.cost[rest][cuts].sum())
     starts = [0.0, *begins[cuts].tolist()]
     pieces = zip(starts, [*ends[cuts].tolist(), stop], strict=True)
@@ -383,16 +383,16 @@ def _turns(
     a, b = a[joined], b[np.append(joined[1:], True)]
     middle = 0.5 * (a + b)
     end, begin = np.minimum(a + width, middle), np.maximum(b - width, middle)
-    end, begin = _off_corners(end, begin, _corners(line, along, closed), _STUB * width)
+    end, begin = _off_corners(end, begin, _sharp_turns(line, along, closed), _STUB * width)
     kept = begin - end <= _LONGEST * pitch
     end, begin, cost = end[kept], begin[kept], cost[kept]
-    places = _places(line, along, closed)
+    places = _line_places(line, along, closed)
     for k in range(len(end)):
         end[k] -= _room(places, float(end[k]), -1, float(begin[k]), width)
     return _Turns(end, begin, cost)
 
 
-def _places(line: FloatArray, along: FloatArray, closed: bool) -> _Places:
+def _line_places(line: FloatArray, along: FloatArray, closed: bool) -> _Places:
     """Points of a line by arc length: round and round a closed one, no farther than an end."""
     size = float(along[-1])
     return lambda at: points_along(line, along, at % size if closed else at)
@@ -409,7 +409,7 @@ def _room(places: _Places, tip: float, way: int, other: float, width: float) -> 
     return float(taken[int(np.argmax(clear))] if clear.any() else taken[-1])
 
 
-def _corners(line: FloatArray, along: FloatArray, closed: bool) -> FloatArray:
+def _sharp_turns(line: FloatArray, along: FloatArray, closed: bool) -> FloatArray:
     """Places of a line at which it turns by more than it may on a stub, of a ring twice round."""
     step = np.diff(line, axis=0)
     after = np.roll(step, -1, axis=0)
@@ -431,7 +431,7 @@ def _off_corners(
     return end, np.where(ahead <= stub, corner[after], begin)
 
 
-def _chosen(turns: _Turns, size: float, least: float) -> list[int]:
+def _chosen_turns(turns: _Turns, size: float, least: float) -> list[int]:
     """Which turns to cut, so that the sum of the costs of the others is least."""
     count = len(turns.cost)
     starts = np.append(0.0, turns.begin)

@@ -87,7 +87,7 @@ def unfolded(joined: Joined, section: Region, machine: Machine, least: float) ->
     for k, marked in enumerate(zip(*joined, strict=True)):
         pieces = [marked]
         if bends.counts[k]:
-            pieces = _cut(rounding.led_round(k, *marked), radius, least)
+            pieces = _parts_without_folds(rounding.led_round(k, *marked), radius, least)
         result.lines.extend(line for line, _ in pieces)
         result.link.extend(link for _, link in pieces)
     return result
@@ -122,11 +122,13 @@ def unfolded_paths(
     for k, span in enumerate(spans):
         pieces = [(np.hstack([paths.points[span], paths.normals[span]]), paths.link[span])]
         if folded[k] and rounding is not None and layer is not None:
-            cut = _cut(rounding.led_round(k, plane[k], paths.link[span]), radius, least)
+            cut = _parts_without_folds(
+                rounding.led_round(k, plane[k], paths.link[span]), radius, least
+            )
             up = paths.normals[span.start]
             pieces = [(_in_space(line, layer, up), link) for line, link in cut]
         elif folded[k]:
-            pieces = _cut(pieces[0], radius, least)
+            pieces = _parts_without_folds(pieces[0], radius, least)
         columns += [line for line, _ in pieces]
         links += [link for _, link in pieces]
         source += len(pieces) * [k]
@@ -206,7 +208,7 @@ def _in_space(line: FloatArray, layer: Layer, normal: FloatArray) -> FloatArray:
     return np.hstack([points, np.broadcast_to(normal, points.shape)])
 
 
-def _cut(marked: _Marked, radius: float, least: float) -> list[_Marked]:
+def _parts_without_folds(marked: _Marked, radius: float, least: float) -> list[_Marked]:
     """Parts of a line (n, c) without folds, or the line itself, as far as they are long enough."""
     pieces, again = [marked], _ROUNDS
     while again:

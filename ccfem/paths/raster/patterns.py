@@ -180,7 +180,7 @@ def stress_regions(mask: BoolArray, guides: IntArray, shells: int = 3) -> Region
 
 def _ladders(number: IntArray, counts: BoolArray) -> BoolArray:
     """Pixels (H, W) of dashes that lie side by side, of regions where these count."""
-    pieces = _pieces(number, counts)
+    pieces = _components(number, counts)
     size = np.bincount(pieces.ravel())
     dashes = counts & (number >= 0) & (size < _DASH)[pieces]
     together, count = ndimage.label(dashes, np.ones((3, 3)))
@@ -189,7 +189,7 @@ def _ladders(number: IntArray, counts: BoolArray) -> BoolArray:
     return dashes & many[together]
 
 
-def _pieces(number: IntArray, counts: BoolArray) -> IntArray:
+def _components(number: IntArray, counts: BoolArray) -> IntArray:
     """Give each piece (H, W) of a region that counts a number from 1; 0 where none counts."""
     components = np.zeros(number.shape, dtype=np.int64)
     total = 0

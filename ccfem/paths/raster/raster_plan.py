@@ -122,7 +122,7 @@ def _crosses(following, width, i, j, k):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _next(line, regions, linked, used, following, i, j, way):  # type: ignore[no-untyped-def]
+def _next_sense(line, regions, linked, used, following, i, j, way):  # type: ignore[no-untyped-def]
     """Sense (0 to 7) of the way on from a pixel, as straight as can be; -1 where there is none."""
     best, least = -1, 99
     for k in range(8):
@@ -141,7 +141,7 @@ def _next(line, regions, linked, used, following, i, j, way):  # type: ignore[no
 
 
 @njit(cache=True)
-def _follow(line, regions, linked, used, following, start, chain):  # type: ignore[no-untyped-def]
+def _follow_pixels(line, regions, linked, used, following, start, chain):  # type: ignore[no-untyped-def]
     """Follow a line both ways from a pixel into `chain`; the number of its pixels."""
     width = regions.shape[1]
     used[start // width, start % width] = True
@@ -157,7 +157,7 @@ def _follow(line, regions, linked, used, following, start, chain):  # type: igno
             way = (ahead + 4) % 8 if ahead >= 0 else -1
         while True:
             i, j = at // width, at % width
-            way = _next(line, regions, linked, used, following, i, j, way)
+            way = _next_sense(line, regions, linked, used, following, i, j, way)
             if way < 0:
                 break
             if at == start and half == 0:
@@ -223,7 +223,7 @@ def walk(line, regions, linked, used, following, before, stub):  # type: ignore[
                 continue
             if from_ends and _beside_on(line, regions, linked, i, j)[0] > 1:
                 continue
-            size = _follow(line, regions, linked, used, following, start, chain)
+            size = _follow_pixels(line, regions, linked, used, following, start, chain)
             short = size < stub and _beside(chain, size, regions, linked, already)
             if size == 1 or short:
                 for k in range(size):
@@ -497,11 +497,13 @@ def corners(pixels: IntArray, offsets: IntArray, stairs: bool = True) -> BoolArr
     -------
     (P,) bool array
     """
-    return np.asarray(_corners(np.ascontiguousarray(pixels), offsets, _STAIRS if stairs else 0))
+    return np.asarray(
+        _pixel_corners(np.ascontiguousarray(pixels), offsets, _STAIRS if stairs else 0)
+    )
 
 
 @njit(cache=True)
-def _corners(pixels, offsets, stairs):  # type: ignore[no-untyped-def]
+def _pixel_corners(pixels, offsets, stairs):  # type: ignore[no-untyped-def]
     keep = np.ones(len(pixels), dtype=np.bool_)
     for path in range(len(offsets) - 1):
         first, last = offsets[path], offsets[path + 1] - 1

@@ -116,7 +116,7 @@ def overhang(mesh: TetMesh, build: Sequence[float], machine: Machine) -> Overhan
         return None
     regions: list[Region] = []
     lowest: list[float] = []
-    for rows in _pieces(facets):
+    for rows in _facet_groups(facets):
         corners = places[facets[rows][:, :3]]
         seen = shapely.union_all(shapely.polygons(corners[:, :, :2]))
         if not shapely.buffer(seen, -0.5 * _LINES * width).is_empty:
@@ -142,7 +142,7 @@ def overhang(mesh: TetMesh, build: Sequence[float], machine: Machine) -> Overhan
     return Overhang(shapely.union_all(in_air), height, share, limits.overhang)
 
 
-def _pieces(facets: IntArray) -> list[IntArray]:
+def _facet_groups(facets: IntArray) -> list[IntArray]:
     """Rows of facets (f, 3 or more) that hang together through edges."""
     edges = facets[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     pairs, _ = paired(edges)

@@ -140,7 +140,7 @@ def guidance_field(
     """
     if not weights.joints > 0.0:  # joints without weight leave the field to the stress
         joints = ()
-    corners = _corners(mesh)
+    corners = _corners_of(mesh)
     matrix, sources = _quadratic(corners, tension, importance, joints, weights, form, slab)
     if not sources:
         direction = _least_stressed(tension, mesh.volumes * importance, build)
@@ -153,7 +153,7 @@ def guidance_field(
     energies = _energies(np.array(sources) @ solutions.T, signs)
     # The rise of each joint's field along the build direction, over the volume.
     per_cell = (mesh.volumes, corners.gradients, solutions[:, corners.cells], build)
-    best = _lowest(energies, np.einsum("e,eid,kei,d->k", *per_cell, optimize=True))
+    best = _best_signs(energies, np.einsum("e,eid,kei,d->k", *per_cell, optimize=True))
     values = np.zeros(len(mesh.points))
     values[corners.nodes] = (np.array(best) @ solutions)[: len(corners.nodes)]
     return _scaled(mesh, values, best, energies, build)
@@ -191,7 +191,7 @@ class _Corners(NamedTuple):
     gradients: FloatArray
 
 
-def _corners(mesh: TetMesh) -> _Corners:
+def _corners_of(mesh: TetMesh) -> _Corners:
     nodes, cells = np.unique(mesh.corners, return_inverse=True)
     cells = cells.reshape(mesh.corners.shape)
     return _Corners(mesh, nodes, mesh.points[nodes], cells, cell_gradients(mesh))
@@ -212,7 +212,7 @@ def _quadratic(
     """
     mesh, _, points, cells, gradients = corners
     volume = mesh.volumes
-    groups = _groups(points, cells, joints, form, slab)
+    groups = _joint_groups(points, cells, joints, form, slab)
     count = len(points) + sum(number for _, _, number in groups)
     stress = weights.stress * volume * importance
     matrix = alignment_energy(gradients, cells, tension, stress, count)
@@ -234,7 +234,7 @@ def _quadratic(
     return matrix, sources
 
 
-def _groups(
+def _joint_groups(
     points: FloatArray,
     cells: IntArray,
     joints: Sequence[Joint],
@@ -257,7 +257,7 @@ def _groups(
     return parts
 
 
-def _lowest(energies: dict[tuple[int, ...], float], rising: FloatArray) -> tuple[int, ...]:
+def _best_signs(energies: dict[tuple[int, ...], float], rising: FloatArray) -> tuple[int, ...]:
     """Signs of the lowest energy; of those that tie with it, the first of those that rise most.
 
     `rising`, (k,), is the rise of the field of each joint along the build direction.

@@ -84,7 +84,7 @@ def height_field(
             return _blended(direction, up, blend, solve)
         if not inverted_share(mesh, plain.gradient, up) > 0.0:
             return plain
-        return _least(mesh, direction, up, solve)
+        return _least_blend(mesh, direction, up, solve)
     bounds = Bounds(*lengths, up)
     field = plain
     for tried in _BLENDS if blend is None else (blend,):
@@ -102,7 +102,7 @@ def inverted_share(mesh: TetMesh, gradient: FloatArray, up: FloatArray) -> float
     return float(mesh.volumes[down].sum() / mesh.volumes.sum())
 
 
-def _least(
+def _least_blend(
     mesh: TetMesh,
     direction: FloatArray,
     up: FloatArray,

@@ -65,7 +65,7 @@ def normal_field(mesh: TetMesh, regions: StressRegions, build: FloatArray) -> No
     best: tuple[int, ...] = ()
     energy = np.inf
     for senses in _candidates(parts, one, other, area):
-        trial = _energy(parts, np.array((*senses, 1.0)), one, other, area)
+        trial = _jump_energy(parts, np.array((*senses, 1.0)), one, other, area)
         if trial < energy * (1.0 - 1e-9):
             best, energy = senses, trial
     mixed = np.tensordot(np.array((*best, 1.0)), parts, axes=1)
@@ -141,7 +141,7 @@ def _agreeing(form: FloatArray) -> FloatArray:
 
 
 @njit(cache=True, nogil=True)
-def _energy(parts, senses, one, other, area):  # type: ignore[no-untyped-def]
+def _jump_energy(parts, senses, one, other, area):  # type: ignore[no-untyped-def]
     """Sum over faces of area times (1 - cosine)^2 of the mixed field, normalised."""
     count, m, _ = parts.shape
     unit = np.zeros((m, 3))

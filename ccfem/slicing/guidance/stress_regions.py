@@ -102,8 +102,8 @@ def stress_regions(
             "a load that pulls"
         )
     axis = axes[cells, :, 0]
-    label, signed = _grown(mesh, cells, axis, alignment)
-    number = _numbered(label, volume[cells], most)
+    label, signed = _grown_regions(mesh, cells, axis, alignment)
+    number = _largest_regions(label, volume[cells], most)
     if number.max() < 0:
         raise InputError(
             f"no region of critical stress has {_FEWEST} cells: lower share, gap or alignment, or "
@@ -111,7 +111,7 @@ def stress_regions(
         )
     kept = number >= 0
     cells, number, signed = cells[kept], number[kept], signed[kept]
-    smooth = _smoothed(mesh, cells, number, signed, smoothing)
+    smooth = _smoothed_axes(mesh, cells, number, signed, smoothing)
     rising = np.bincount(number, volume[cells] * (smooth @ build))
     smooth = smooth * np.where(rising < 0.0, -1.0, 1.0)[number, None]
     region = np.full(len(mesh.cells), -1)
@@ -129,7 +129,7 @@ def _peak(values: FloatArray, volume: FloatArray, quantile: float) -> float:
     return float(values[order[at]])
 
 
-def _neighbours(mesh: TetMesh) -> sp.csr_array:
+def _face_adjacency(mesh: TetMesh) -> sp.csr_array:
     """Cells that share a face, as a matrix of ones."""
     one, other = mesh.neighbours.T
     n = len(mesh.cells)
@@ -137,14 +137,14 @@ def _neighbours(mesh: TetMesh) -> sp.csr_array:
     return sp.csr_array(half + half.T)
 
 
-def _grown(
+def _grown_regions(
     mesh: TetMesh, cells: IntArray, axis: FloatArray, alignment: float
 ) -> tuple[IntArray, FloatArray]:
     """Label connected aligned cells, and give their axes one sense in each region.
 
     Senses follow the spanning tree of the best-aligned pairs.
     """
-    near = _neighbours(mesh)
+    near = _face_adjacency(mesh)
     second = sp.csr_array(near + near @ near)[cells][:, cells].tocoo()
     one, other = second.row, second.col
     once = one < other
@@ -166,7 +166,7 @@ def _grown(
     return label, axis * sense[:, None]
 
 
-def _numbered(label: IntArray, volume: FloatArray, most: int) -> IntArray:
+def _largest_regions(label: IntArray, volume: FloatArray, most: int) -> IntArray:
     """Numbers of the largest regions by volume, from 0; -1 for cells of the others."""
     size, total = np.bincount(label), np.bincount(label, volume)
     total[size < _FEWEST] = 0.0
@@ -177,11 +177,11 @@ def _numbered(label: IntArray, volume: FloatArray, most: int) -> IntArray:
     return number[label]
 
 
-def _smoothed(
+def _smoothed_axes(
     mesh: TetMesh, cells: IntArray, number: IntArray, axis: FloatArray, passes: int
 ) -> FloatArray:
     """Directions after a number of passes of averaging over neighbours in the region."""
-    near = _neighbours(mesh)[cells][:, cells].tocoo()
+    near = _face_adjacency(mesh)[cells][:, cells].tocoo()
     same = number[near.row] == number[near.col]
     n = len(cells)
     ends = (near.row[same], near.col[same])

@@ -242,7 +242,7 @@ def clean(
     alive = np.ones(len(triangles), dtype=np.bool_)
     fan = np.full((len(points), _FAN), -1, dtype=np.int64)
     size = np.zeros(len(points), dtype=np.int64)
-    _gather(triangles, fan, size)
+    _gather_fans(triangles, fan, size)
     locked = fixed | (size > _FAN)
     border = np.full((len(points), 2), -1, dtype=np.int64)
     _find_border(triangles, fan, size, border, locked)
@@ -274,7 +274,7 @@ class _Fans(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _gather(triangles: IntArray, fan: IntArray, size: IntArray) -> None:
+def _gather_fans(triangles: IntArray, fan: IntArray, size: IntArray) -> None:
     """Triangles round each point."""
     for t in range(len(triangles)):
         for i in range(3):
@@ -425,7 +425,7 @@ def _collapse(fans: _Fans, locked: BoolArray, shortest: float, sag: float) -> in
     for u in range(len(points)):
         if locked[u] or size[u] == 0:
             continue
-        for k in range(_neighbours(fans, u, shortest * shortest, near, far)):
+        for k in range(_nearest_neighbours(fans, u, shortest * shortest, near, far)):
             v = near[k]
             on_border = border[u, 0] >= 0
             side = 1 if on_border and v != border[u, 0] else 0
@@ -454,7 +454,7 @@ def _collapse(fans: _Fans, locked: BoolArray, shortest: float, sag: float) -> in
 
 
 @njit(cache=True, nogil=True)
-def _neighbours(fans: _Fans, u: int, limit: float, near: IntArray, far: FloatArray) -> int:
+def _nearest_neighbours(fans: _Fans, u: int, limit: float, near: IntArray, far: FloatArray) -> int:
     """Write the points that u may move to, the nearest first; return their number.
 
     Those at a squared distance `far` below a limit; from the border, along the border alone.

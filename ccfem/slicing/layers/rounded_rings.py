@@ -65,32 +65,32 @@ def _ring(
     """Ring of corners (k, 2) whose sides lie on walls (k,), -1 for none."""
     changes = np.flatnonzero(wall != np.roll(wall, 1))
     if not len(changes):
-        return _curve(plane, np.concatenate([corners, corners[:1]]), walls[wall[0]][0])[:-1]
+        return _wall_curve(plane, np.concatenate([corners, corners[:1]]), walls[wall[0]][0])[:-1]
     pieces = []
     # From one change of wall to the next; each run leaves its last point to the next one.
     for start, stop in zip(changes, np.append(changes[1:], changes[0] + len(corners)), strict=True):
         run = corners[np.arange(start, stop + 1) % len(corners)]
         k = wall[start]
-        pieces.append((run if k < 0 else _curve(plane, run, walls[k][0]))[:-1])
+        pieces.append((run if k < 0 else _wall_curve(plane, run, walls[k][0]))[:-1])
     return np.concatenate(pieces)
 
 
-def _curve(plane: Plane, run: FloatArray, wall: RoundWall) -> FloatArray:
+def _wall_curve(plane: Plane, run: FloatArray, wall: RoundWall) -> FloatArray:
     """Curve (k, 2) of a wall from the first to the last point of a run (k, 2) of chords."""
     along = np.linalg.norm(np.cross(wall.direction, plane.frame[2]))
     if wall.slope == 0.0 and wall.direction.any() and along < _ALONG:
         start = run[0] if wall.start is None else plane.project(wall.start)
         return _arc(run, plane.project(wall.centre), wall.radius, start)
     closed = np.array_equal(run[0], run[-1])
-    inner = _moved(plane, run[:-1] if closed else run[1:-1], wall)
+    inner = _onto_wall(plane, run[:-1] if closed else run[1:-1], wall)
     run = np.concatenate([inner, inner[:1]] if closed else [run[:1], inner, run[-1:]])
     # As many points between two as keep the sides near the wall: their distance falls by squares.
     middle = 0.5 * (run[1:] + run[:-1])
-    sagitta = np.linalg.norm(_moved(plane, middle, wall) - middle, axis=1)
+    sagitta = np.linalg.norm(_onto_wall(plane, middle, wall) - middle, axis=1)
     count = np.clip(np.ceil(np.sqrt(sagitta / _SAGITTA)), 1, _MOST).astype(int)
     share = np.concatenate([np.arange(n) / n for n in count])[:, None]
     first = np.repeat(np.arange(len(count)), count)
-    between = _moved(plane, (1.0 - share) * run[first] + share * run[first + 1], wall)
+    between = _onto_wall(plane, (1.0 - share) * run[first] + share * run[first + 1], wall)
     between[share[:, 0] == 0.0] = run[:-1]
     return np.concatenate([between, run[-1:]])
 
@@ -114,7 +114,7 @@ def _arc(run: FloatArray, centre: FloatArray, radius: float, start: FloatArray) 
     return np.concatenate([run[:1], places, run[-1:]])
 
 
-def _moved(plane: Plane, places: FloatArray, wall: RoundWall) -> FloatArray:
+def _onto_wall(plane: Plane, places: FloatArray, wall: RoundWall) -> FloatArray:
     """Places (k, 2) moved onto a wall within the plane."""
     flat = np.tile(plane.frame[2], (len(places), 1))
     space = plane.to_space(places)

@@ -86,7 +86,7 @@ class Tracer:
         return _along_curve(self.mesh.points[self.mesh.corners].mean(axis=1))
 
     @cached_property
-    def _place(self) -> IntArray:
+    def _place_of_cell(self) -> IntArray:
         """Place of each cell, (m,), in that order."""
         return np.argsort(self._order, kind="stable")
 
@@ -97,7 +97,7 @@ class Tracer:
         across = mesh.across[order]
         return _Field(
             self.direction[order],
-            np.where(across >= 0, self._place[across], -1),
+            np.where(across >= 0, self._place_of_cell[across], -1),
             mesh.points[mesh.corners[order]].mean(axis=1),
             cell_gradients(mesh)[order],
             float(self.longest),
@@ -113,8 +113,8 @@ class Tracer:
         touching : (m,) int array
             Bit k is set in the cells of region k, of at most 62.
         """
-        order = np.argsort(self._place[seeds], kind="stable")
-        start, touching = self._place[seeds][order], touching[self._order].astype(np.int64)
+        order = np.argsort(self._place_of_cell[seeds], kind="stable")
+        start, touching = self._place_of_cell[seeds][order], touching[self._order].astype(np.int64)
         mask, length = np.zeros(len(start), dtype=np.int64), np.zeros(len(start))
         ends = np.zeros((len(start), 2), dtype=np.int64)
         field = self._field
@@ -128,7 +128,7 @@ class Tracer:
 
     def crossings(self, seeds: IntArray) -> IntArray:
         """Count the lines from the seeds that cross each cell, (m,)."""
-        start = np.sort(self._place[seeds])
+        start = np.sort(self._place_of_cell[seeds])
         field = self._field
 
         def part(a: int, b: int) -> IntArray:
@@ -137,12 +137,12 @@ class Tracer:
             return count
 
         count = np.sum(_in_parts(part, len(start)), axis=0, dtype=np.int64)
-        return np.asarray(count)[self._place]
+        return np.asarray(count)[self._place_of_cell]
 
     def lines(self, seeds: IntArray) -> list[FloatArray]:
         """Lines from the seeds as (n_i, 3) arrays, mm."""
         stamp = np.full(len(self.direction), -1, dtype=np.int64)
-        return [_collect(int(k), self._field, stamp) for k in self._place[seeds]]
+        return [_collect(int(k), self._field, stamp) for k in self._place_of_cell[seeds]]
 
 
 def mean_edge(mesh: TetMesh) -> float:
@@ -234,7 +234,7 @@ def _dot(a: _Vector, b: _Vector) -> float:
 
 
 @njit(cache=True, nogil=True)
-def _vector(gradient: FloatArray, cell: int, corner: int) -> _Vector:
+def _gradient_of(gradient: FloatArray, cell: int, corner: int) -> _Vector:
     return gradient[cell, corner, 0], gradient[cell, corner, 1], gradient[cell, corner, 2]
 
 
@@ -251,7 +251,7 @@ def _heading(
         x, y, z, along = -x, -y, -z, -along
     if entry < 0:
         return x, y, z
-    g = _vector(gradient, cell, entry)
+    g = _gradient_of(gradient, cell, entry)
     inward = _dot(g, (x, y, z))
     if inward > 0.0:
         return x, y, z
@@ -280,7 +280,7 @@ def _exit(
     for corner in range(4):
         if corner == entry:
             continue
-        g = _vector(gradient, cell, corner)
+        g = _gradient_of(gradient, cell, corner)
         fall = -_dot(g, way)
         if fall > 0.0:
             length = max(0.25 + _dot(g, off), 0.0) / fall

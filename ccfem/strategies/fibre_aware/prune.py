@@ -166,7 +166,7 @@ def profiles(toolpaths: Toolpaths, strands: Strands, value: FloatArray) -> list[
     value : (s,) array
         Of each piece of strand, per length.
     """
-    path, begin, end, work = _pieces(strands, value)
+    path, begin, end, work = _work_along_paths(strands, value)
     bounds = np.searchsorted(path, np.arange(len(toolpaths) + 1))
     total = toolpaths.lengths
     result = []
@@ -193,7 +193,7 @@ def _tilted(along: list[Profile]) -> list[Profile]:
     ]
 
 
-def _pieces(
+def _work_along_paths(
     strands: Strands, value: FloatArray
 ) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
     """Path, arc lengths of both ends, mm, and work of every piece, along the paths.

@@ -72,7 +72,7 @@ def shorten(
             if 0.0 < more <= room:
                 chosen[profile.path] = longer
                 room -= more
-    return _cut(toolpaths, along, chosen)
+    return _shortened(toolpaths, along, chosen)
 
 
 def shorten_bent(
@@ -187,7 +187,9 @@ def _grown(
     return grown
 
 
-def _cut(toolpaths: Toolpaths, along: Sequence[Profile], chosen: dict[int, BoolArray]) -> Toolpaths:
+def _shortened(
+    toolpaths: Toolpaths, along: Sequence[Profile], chosen: dict[int, BoolArray]
+) -> Toolpaths:
     """Toolpaths with each profiled path cut to its stretches."""
     profile = {one.path: one for one in along}
     parts: list[FloatArray] = []

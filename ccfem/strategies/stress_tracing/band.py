@@ -98,10 +98,10 @@ def band(
         strip, gap = _stub(strip), np.zeros(1, dtype=bool)
     if path.closed:
         strip, gap = _as_ring(strip, np.append(gap, not nodes[0] or not nodes[-1]))
-    strip = _even(_bridged(strip, gap), path.closed)
+    strip = _even_strip(_bridged(strip, gap), path.closed)
     width = 2.0 * np.linalg.norm(strip[:, 2:4], axis=1)
     if path.closed:
-        strip = _smoothed(strip[:-1], "wrap")
+        strip = _gaussian_smoothed(strip[:-1], "wrap")
         every = slice(0, len(strip))
         return Band(strip[:, :2], strip[:, 2:4], every, every, width, strip[:, 4], closed=True)
     ends = (path.members[0].ends[0], path.members[-1].ends[1])
@@ -115,7 +115,7 @@ def band(
     after = extension(strip, reach[1] + _PADDING, turns[1])
     padding = round(_PADDING / STEP)
     core = slice(len(before) - padding, len(before) - padding + len(strip))
-    strip = _smoothed(np.concatenate([before, strip, after]), "nearest")[padding:-padding]
+    strip = _gaussian_smoothed(np.concatenate([before, strip, after]), "nearest")[padding:-padding]
     within = slice(
         max(0, core.start - round(middle[0] / STEP)),
         min(len(strip), core.stop + round(middle[1] / STEP)),
@@ -218,7 +218,7 @@ def _cubic(
     return place, slope
 
 
-def _even(strip: FloatArray, closed: bool) -> FloatArray:
+def _even_strip(strip: FloatArray, closed: bool) -> FloatArray:
     """Strip in equal steps along its middle; a closed one from its point nearest to its centre."""
     along = along_line(strip[:, :2])
     at = np.linspace(0.0, along[-1], max(4, round(along[-1] / STEP)) + 1)
@@ -229,7 +229,7 @@ def _even(strip: FloatArray, closed: bool) -> FloatArray:
     return points_along(strip, along, at)
 
 
-def _smoothed(strip: FloatArray, mode: str) -> FloatArray:
+def _gaussian_smoothed(strip: FloatArray, mode: str) -> FloatArray:
     """Smooth a strip by a Gaussian, twice, so that arcs keep their radius."""
     once = gaussian_filter1d(strip, _SMOOTHING / STEP, axis=0, mode=mode)
     rest = gaussian_filter1d(strip - once, _SMOOTHING / STEP, axis=0, mode=mode)

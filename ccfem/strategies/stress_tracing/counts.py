@@ -58,11 +58,13 @@ def places(band: Band, pitch: float, section: Region) -> FloatArray:
     if band.closed:
         number = _round_ring(wanted, band.free > 0.5)
         shift = _outer(band, section) if np.ptp(number) else 0.0
-        return _spread(gaussian_filter1d(number, _SPREAD / STEP, mode="wrap"), shift)
-    return _along(band, wanted, pitch, section)
+        return _track_places(gaussian_filter1d(number, _SPREAD / STEP, mode="wrap"), shift)
+    return _places_between_ends(band, wanted, pitch, section)
 
 
-def _along(band: Band, wanted: FloatArray, pitch: float, section: Region) -> FloatArray:
+def _places_between_ends(
+    band: Band, wanted: FloatArray, pitch: float, section: Region
+) -> FloatArray:
     """Places (k, n) of tracks in a band with two ends, given the wanted numbers (n,) at a pitch."""
     # A free end continues to the border, by half its width.
     first, last = band.core.start, band.core.stop
@@ -75,9 +77,10 @@ def _along(band: Band, wanted: FloatArray, pitch: float, section: Region) -> Flo
     joint = maximum_filter1d(band.free, reach, mode="constant", cval=1.0)[band.core] > 0.5
     joint = np.pad(joint, (band.core.start - first, last - band.core.stop))
     even, even_cost = min(
-        (_numbers(inner, joint, first, 2) for first in (1, 2)), key=lambda candidate: candidate[1]
+        (_steady_numbers(inner, joint, first, 2) for first in (1, 2)),
+        key=lambda candidate: candidate[1],
     )
-    any_, any_cost = _numbers(inner, joint, 1, 1)
+    any_, any_cost = _steady_numbers(inner, joint, 1, 1)
     shift = 0.0
     number = even
     if any_cost < _ONE_SIDE * even_cost:
@@ -89,7 +92,7 @@ def _along(band: Band, wanted: FloatArray, pitch: float, section: Region) -> Flo
             np.full(len(wanted) - last, number[-1]),
         ]
     )
-    return _spread(
+    return _track_places(
         gaussian_filter1d(whole.astype(np.float64), _SPREAD / STEP, mode="nearest"), shift
     )
 
@@ -112,7 +115,7 @@ def _outer(band: Band, section: Region) -> float:
     return 1.0 if sizes[0] > sizes[1] else -1.0
 
 
-def _spread(number: FloatArray, shift: float) -> FloatArray:
+def _track_places(number: FloatArray, shift: float) -> FloatArray:
     """Places (k, n) of tracks whose number (n,) changes on both sides (0) or on one (1, -1)."""
     most = int(np.ceil(number.max() - 1e-9))
     k = np.arange(most)[:, None]
@@ -124,13 +127,15 @@ def _spread(number: FloatArray, shift: float) -> FloatArray:
 def _round_ring(wanted: FloatArray, joint: BoolArray) -> FloatArray:
     """Find whole numbers (n,) round a closed band: two rounds, cut in the middle of the first."""
     count = len(wanted)
-    number, _ = _numbers(np.tile(wanted, 2), np.tile(joint, 2), 1, 1)
+    number, _ = _steady_numbers(np.tile(wanted, 2), np.tile(joint, 2), 1, 1)
     if number[count // 2] != number[count // 2 + count]:
         return np.full(count, float(max(1, round(float(np.median(wanted))))))
     return np.roll(number[count // 2 : count // 2 + count], count // 2).astype(np.float64)
 
 
-def _numbers(wanted: FloatArray, joint: BoolArray, first: int, step: int) -> tuple[IntArray, float]:
+def _steady_numbers(
+    wanted: FloatArray, joint: BoolArray, first: int, step: int
+) -> tuple[IntArray, float]:
     """Whole numbers (n,) near the wanted ones (n,) that change seldom, and their cost.
 
     In joints (n,) they hardly change, since there is no border to leave through. They are `first`

@@ -107,7 +107,7 @@ def frame(section: Region, step: float) -> Frame:
             members.append(_member(segment, (a, b)))
     places, radius = _discs(axis, joint)
     for passed in range(len(places)):
-        members = _joined(members, passed)
+        members = _joined_members(members, passed)
     kept = sorted({end for member in members for end in member.ends} - {FREE})
     number = {FREE: FREE} | {old: new for new, old in enumerate(kept)}
     members = [replace(m, ends=(number[m.ends[0]], number[m.ends[1]])) for m in members]
@@ -130,7 +130,7 @@ def _joints(axis: MedialAxis) -> tuple[IntArray, BoolArray]:
     return joint, short
 
 
-def _joined(members: list[Member], joint: int) -> list[Member]:
+def _joined_members(members: list[Member], joint: int) -> list[Member]:
     """Members, merging two that are alone in a joint; a single one becomes a ring."""
     ends = ends_at(members, joint)
     if len(ends) != 2:

@@ -86,7 +86,7 @@ def _forked(paths: Sequence[MainPath], frame: Frame) -> list[MainPath]:
         assert right is not None
         ends = [_turned(left, sides[True][2]), _turned(right, sides[False][2])]
         wide = [float(np.median(turned.members[-1].width)) for turned in ends]
-        parts = _cut(stem, wide[0] / sum(wide))
+        parts = _split_by_share(stem, wide[0] / sum(wide))
         for side, turned, part in zip((True, False), ends, parts, strict=True):
             longer = replace(turned, members=(*turned.members, part))
             forked[sides[side][1]] = _turned(longer, sides[side][2])
@@ -128,8 +128,8 @@ def _divided(
     wide, beside = _widths(branch, whole)
     share = wide / (wide + beside)
     if _on_left(along, arrival):
-        return _cut(stem, share)
-    others, mine = _cut(stem, 1.0 - share)
+        return _split_by_share(stem, share)
+    others, mine = _split_by_share(stem, 1.0 - share)
     return mine, others
 
 
@@ -138,7 +138,7 @@ def _on_left(along: FloatArray, arrival: FloatArray) -> bool:
     return bool(along[0] * arrival[1] - along[1] * arrival[0] < 0.0)
 
 
-def _cut(stem: Member, share: float) -> tuple[Member, Member]:
+def _split_by_share(stem: Member, share: float) -> tuple[Member, Member]:
     """Left and right part of a stem, of which the left one has a share of the width."""
     cut = stem.left + share * (stem.right - stem.left)
     left = Member(0.5 * (stem.left + cut), stem.left, cut, stem.ends)

@@ -74,18 +74,18 @@ def tracks(
             # Open it where it lies farthest outside.
             start = -int(np.argmax(np.abs(place)))
             line, place = np.roll(line, start, axis=0), np.roll(place, start)
-            runs = _stretches(place, slice(0, len(line)))
+            runs = _track_stretches(place, slice(0, len(line)))
             pieces = [clipped(line[r], section, *2 * (slice(0, r.stop - r.start),)) for r in runs]
         else:
             pieces = [
                 clipped(line[run], section, *_parts_of(band, run))
-                for run in _stretches(place, band.core)
+                for run in _track_stretches(place, band.core)
             ]
         held += [_held(piece, section, inner, whole) for piece in pieces if len(piece) > 1]
     return held
 
 
-def _stretches(place: FloatArray, core: slice) -> list[slice]:
+def _track_stretches(place: FloatArray, core: slice) -> list[slice]:
     """Stretches of a track that lie within its band, or on beyond its ends."""
     within = np.abs(place) <= 1.0
     ends = np.flatnonzero(np.diff(np.concatenate([[False], within, [False]]).astype(np.int8)))
@@ -247,7 +247,7 @@ def relaxed(
         weight, slope = _wanted(lines + moved[..., None] * normal, band.closed, stress, section)
         slope += _differences(moved, band.closed) / STEP
         moved = np.stack(
-            [_least(w, g, hold, band.closed) for w, g in zip(weight, slope, strict=True)]
+            [_least_move(w, g, hold, band.closed) for w, g in zip(weight, slope, strict=True)]
         )
         moved = _apart(moved, band, share)
     return lines + moved[..., None] * normal
@@ -277,7 +277,9 @@ def _wanted(
     return weight, np.where(weight > 0.0, np.tan(turn), 0.0)
 
 
-def _least(weight: FloatArray, slope: FloatArray, hold: FloatArray, closed: bool) -> FloatArray:
+def _least_move(
+    weight: FloatArray, slope: FloatArray, hold: FloatArray, closed: bool
+) -> FloatArray:
     """Move (n,) of one line that minimises the sum."""
     here = eye_array(len(hold), format="csr")
     ahead = here[np.roll(np.arange(len(hold)), -1)]

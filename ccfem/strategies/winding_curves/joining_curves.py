@@ -97,7 +97,7 @@ def join(
         if min(near) == 0.0:
             continue
         end = int(loops[k][np.argmin(distance[0, loops[k]])])
-        way = _follow(before[0], end)
+        way = _way_back(before[0], end)
         path = _refined(mesh, way, tree, loops[k], cost)
         mesh, curve = insert(mesh, path)
         closed = np.concatenate([closed, np.zeros(len(mesh.points) - len(closed), dtype=bool)])
@@ -140,7 +140,7 @@ def _ways(graph: sp.csr_array, sources: Sequence[IntArray]) -> tuple[FloatArray,
     return np.stack([d for d, _, _ in ways]), np.stack([p for _, p, _ in ways]).astype(np.int64)
 
 
-def _follow(before: IntArray, end: int) -> list[int]:
+def _way_back(before: IntArray, end: int) -> list[int]:
     """Points of the way to an end, from the end back to the source."""
     way = [end]
     while before[way[-1]] >= 0:
@@ -207,7 +207,7 @@ def _refined(
     last = int(target[np.argmin(distance[target])])
     if not np.isfinite(distance[last]):
         raise InputError("a hole of the layer cannot be joined with the others: name fewer joints")
-    followed = _follow(before.astype(np.int64), last)
+    followed = _way_back(before.astype(np.int64), last)
     inner = np.array(followed[1:-1], dtype=np.int64)
     first = _PER_EDGE * len(edges)
     path = EdgePath(

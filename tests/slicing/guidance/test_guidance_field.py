@@ -229,12 +229,12 @@ def test_nothing_to_follow_is_refused(plate):
 
 
 def test_many_joints_are_flipped_in_turn():
-    from ccfem.slicing.guidance.guidance_field import _energies, _lowest
+    from ccfem.slicing.guidance.guidance_field import _best_signs, _energies
 
     rng = np.random.default_rng(8)
     factor = rng.normal(size=(13, 13))
     product = factor @ factor.T
-    found = _lowest(_energies(product, None), np.zeros(len(product)))
+    found = _best_signs(_energies(product, None), np.zeros(len(product)))
     every = itertools.product((1, -1), repeat=12)
     exact = min(-float(np.array((1, *s)) @ product @ np.array((1, *s))) for s in every)
     s = np.array(found, dtype=float)

@@ -149,7 +149,7 @@ def test_move_of_a_track_solves_its_equation(monkeypatch):
     free, slope = np.abs(x) < 10.0, np.where(np.abs(middles) < 10.0, 0.2, 0.0)
     hold = np.where(free, 1.0 / 12.0**2, 1.0 / 4.0**2)
     hold[np.abs(x) == 10.0] = 0.5 * (1.0 / 12.0**2 + 1.0 / 4.0**2)
-    moved = turning._least(np.ones(len(middles)), slope, hold, closed=False)
+    moved = turning._least_move(np.ones(len(middles)), slope, hold, closed=False)
     size = 0.2 / (np.cosh(10.0 / 12.0) / 12.0 + np.sinh(10.0 / 12.0) / 4.0)
     expected = size * np.where(
         free,

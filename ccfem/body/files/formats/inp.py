@@ -68,7 +68,7 @@ def read(path: Path) -> TetMesh:
         When the deck has no tetrahedra, several parts, or data that does not read.
     """
     deck = _Deck()
-    for block in _blocks(path):
+    for block in _keyword_blocks(path):
         try:
             _read_block(deck, block)
         except ValueError as error:
@@ -99,7 +99,7 @@ def read(path: Path) -> TetMesh:
     return mesh.with_patches(_patches(deck, mesh, labels, path))
 
 
-def _blocks(path: Path) -> Iterator[_Block]:
+def _keyword_blocks(path: Path) -> Iterator[_Block]:
     """Keywords of a deck with their data lines; comments are dropped."""
     text = path.read_text(encoding="utf-8-sig", errors="replace")
     current: _Block | None = None
@@ -137,7 +137,7 @@ def _read_block(deck: _Deck, block: _Block) -> None:
     elif block.keyword == "NODE":
         if parameters.get("SYSTEM", "R").upper() != "R":
             raise ValueError("only rectangular coordinates are read")
-        rows = _numbers(block.lines, 4)
+        rows = _number_rows(block.lines, 4)
         _check_labels(rows[:, :1])
         deck.nodes.append(rows)
         if "NSET" in parameters:
@@ -168,7 +168,7 @@ def _read_elements(deck: _Deck, block: _Block) -> None:
     _, kind, count = known[0]
     rows = np.zeros((1, 1), dtype=np.int64)
     if count:
-        values = _numbers(block.lines, count + 1)
+        values = _number_rows(block.lines, count + 1)
         _check_labels(values)
         rows = values.astype(np.int64)
     deck.elements.setdefault(kind, []).append(rows)
@@ -177,7 +177,7 @@ def _read_elements(deck: _Deck, block: _Block) -> None:
         deck.element_sets.setdefault(_key(deck, block.parameters["ELSET"]), []).extend(members)
 
 
-def _numbers(lines: list[str], columns: int) -> FloatArray:
+def _number_rows(lines: list[str], columns: int) -> FloatArray:
     """Comma-separated numbers as rows; a row may continue on the next line."""
     joined = ",".join(line.rstrip(",") for line in lines)
     values = np.array(joined.split(",") if joined else [], dtype=np.float64)

@@ -165,7 +165,7 @@ def sample_matching(
     if reading in ("path", "energy"):
         return along_fibre(sample_alignment(lines, stress, step))
     points, direction, size, area = _stress_vectors(stress)
-    starts, ends = _pieces(lines, max(step, reach))
+    starts, ends = _segments_inside(lines, max(step, reach))
     angle = np.full(len(points), np.inf)
     if len(starts) and len(points):
         tree = shapely.STRtree(shapely.linestrings(np.stack([starts, ends], axis=1)))
@@ -201,7 +201,7 @@ def _stress_vectors(stress: LayerStress) -> tuple[FloatArray, FloatArray, FloatA
     return centres[defined], direction[defined], np.abs(value[defined]), layer.areas[defined]
 
 
-def _pieces(paths: PlanePaths, longest: float) -> tuple[FloatArray, FloatArray]:
+def _segments_inside(paths: PlanePaths, longest: float) -> tuple[FloatArray, FloatArray]:
     """Both ends (s, 2) of the straight pieces of the fibre that lie in the section."""
     points, offsets, _ = subdivide(paths.points, paths.offsets, longest)
     first = np.flatnonzero(starts_segment(offsets))

@@ -84,7 +84,7 @@ def path_sinuosity(points: FloatArray, offsets: IntArray, width: float) -> Float
     count = len(offsets) - 1
     if not count:
         return np.zeros(0)
-    pieces, owner = _pieces(points, offsets)
+    pieces, owner = _open_lines(points, offsets)
     total = lengths(points, offsets)
     sinuosity = np.zeros(count)
     for tolerance in TOLERANCES:
@@ -93,7 +93,7 @@ def path_sinuosity(points: FloatArray, offsets: IntArray, width: float) -> Float
     return np.maximum(sinuosity / len(TOLERANCES), 1.0)
 
 
-def _pieces(points: FloatArray, offsets: IntArray) -> tuple[FloatArray, IntArray]:
+def _open_lines(points: FloatArray, offsets: IntArray) -> tuple[FloatArray, IntArray]:
     """Open lines, with the polyline each belongs to; closed polylines are halved."""
     sizes = np.diff(offsets)
     line = np.repeat(np.arange(len(sizes)), sizes)

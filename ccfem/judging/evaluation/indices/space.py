@@ -150,7 +150,7 @@ def sample_space(fibre: Toolpaths, layer: Layer, stress: PartStress, step: float
         length,
         angle,
         size,
-        _curvature(points, offsets, fibre.closed, step),
+        _even_curvature(points, offsets, fibre.closed, step),
         fibre.lengths,
         _linked(fibre, layer, stress.held_or_loaded, _REACH * step),
         layer.areas,
@@ -174,7 +174,9 @@ def _on_layer(layer: Layer, points: FloatArray) -> tuple[IntArray, FloatArray]:
     return triangle, weights
 
 
-def _curvature(points: FloatArray, offsets: IntArray, closed: BoolArray, step: float) -> FloatArray:
+def _even_curvature(
+    points: FloatArray, offsets: IntArray, closed: BoolArray, step: float
+) -> FloatArray:
     """Curvature at points equally far apart."""
     if not len(points):
         return np.zeros(0)
