@@ -106,6 +106,7 @@ def beads(
         return Beads(line, first, none, triples, triples, triples, none, none, none, none)
     length = (lengths(points, offsets) / count)[line]
     middle = 0.5 * (nodes[start] + nodes[start + 1])
+    # Direction of each part in the plane of its layer.
     normal = _layer_normals(points, normals, offsets, middle, line)
     chord = nodes[start + 1] - nodes[start]
     direction, straight, often = _chords(chord, length, line, first, closed)

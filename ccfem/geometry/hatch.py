@@ -92,6 +92,8 @@ def hatch(section: Region, angle: float, pitch: float) -> Hatch:
     count = np.abs(level_a - level_b).astype(np.int64)
     edge, row = repeated(count)
     row = row + first[edge]
+    # Where each edge crosses its rows; sorted by row, crossings alternate between entering and
+    # leaving.
     y = lowest + pitch * row
     t = np.clip((y - a[edge, 1]) / (b[edge, 1] - a[edge, 1]), 0.0, 1.0)
     x = a[edge, 0] + t * (b[edge, 0] - a[edge, 0])

@@ -67,6 +67,7 @@ def _near(
                 i, j = segment[items[m]], segment[items[n]]
                 if abs(i - j) < 2:
                     continue
+                # Boxes first.
                 apart = False
                 for d in range(2):
                     low = max(
@@ -78,6 +79,7 @@ def _near(
                     apart = apart or low > high + touch
                 if apart:
                     continue
+                # Side of each end on the line of the other segment; 0 within rounding.
                 for k in range(4):
                     a, p = (i, j + k) if k < 2 else (j, i + k - 2)
                     dx, dy = points[a + 1, 0] - points[a, 0], points[a + 1, 1] - points[a, 1]

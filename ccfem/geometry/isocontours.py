@@ -117,6 +117,7 @@ def _chain(of_triangle, low, high, start):  # type: ignore[no-untyped-def]
     """Curves as crossing numbers with offsets; open ones first end to end, then the closed."""
     count = start[-1]
     link = np.full((count, 2), -1)
+    # A level that crosses a triangle crosses two of its sides: link these two crossings.
     for t in range(len(of_triangle)):
         bottom = min(low[of_triangle[t, 0]], low[of_triangle[t, 1]], low[of_triangle[t, 2]])
         top = max(high[of_triangle[t, 0]], high[of_triangle[t, 1]], high[of_triangle[t, 2]])
@@ -136,6 +137,7 @@ def _chain(of_triangle, low, high, start):  # type: ignore[no-untyped-def]
     used = np.zeros(count, np.bool_)
     chains = 0
     size = 0
+    # Follow the links, first from the crossings with one link, which are ends; the rest are rings.
     for closed in range(2):
         for seed in range(count):
             if used[seed] or link[seed, 0] < 0 or (closed == 0 and link[seed, 1] >= 0):

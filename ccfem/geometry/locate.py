@@ -88,6 +88,7 @@ def _search(
     weights = np.zeros((count, dimension + 1))
     weight = np.empty(dimension + 1)
     for q in range(count):
+        # Bucket that the query lies in.
         c = 0
         outside = False
         for d in range(3):
@@ -103,6 +104,7 @@ def _search(
             k = grid.items[item]
             if heights[k, 0] == 0.0:
                 continue
+            # Depth inside: the least barycentric coordinate times the height over that side, in mm.
             depth = np.inf
             rest = 1.0
             for corner in range(1, dimension + 1):

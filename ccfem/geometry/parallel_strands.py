@@ -321,6 +321,7 @@ def extend_free_ends(
     ends = _free_ends(lines, pitch)
     if not ends:
         return led, rest
+    # Rays ahead of the ends, and the room that is as far from everything as sides have to be.
     here = np.array([lines[number][end] for number, end in ends])
     along = here - np.array([lines[number][1 if end == 0 else -2] for number, end in ends])
     along /= np.linalg.norm(along, axis=1)[:, None]

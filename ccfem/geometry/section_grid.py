@@ -59,6 +59,7 @@ def section_grid(section: Region, margin: float) -> SectionGrid:
         With cells of 0.5 mm, or larger ones if these would be more than a million. Room is known
         where the section and its voids are wider than a cell.
     """
+    # Edges of all rings, and whether of an outer one: the first ring of a part.
     parts = shapely.get_parts(section)
     rings = shapely.get_rings(shapely.normalize(parts))
     holes = shapely.get_num_interior_rings(parts)
@@ -70,6 +71,7 @@ def section_grid(section: Region, margin: float) -> SectionGrid:
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     cell = max(_CELL, float(np.sqrt(np.prod(high - low) / _MOST_CELLS)))
     nx, ny = (np.floor((high - low) / cell) + 1).astype(int)
+    # Edges by the rows of the grid that they meet.
     rows = np.sort(((edges[:, [1, 3]] - low[1]) / cell).astype(np.int64), axis=1)
     count = rows[:, 1] - rows[:, 0] + 1
     edge, row = repeated(count)

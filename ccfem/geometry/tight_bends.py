@@ -52,12 +52,14 @@ def tight_bends(
     def places(positions: FloatArray) -> FloatArray:
         return points_along(line, along, positions % size if closed else positions)
 
+    # Turn of the chords over a width, against that of an arc of the radius.
     here = places(at)
     angle = angles_between(here - places(at - width), places(at + width) - here)
     over = angle - width * (1.0 - 1e-6) / radius
     tight = over >= 0.0
     if closed and tight.all():
         return np.zeros((0, 2))
+    # Bends are runs of samples over the limit; their ends lie between samples.
     first = int(np.argmin(tight)) if closed else 0  # no bend extends over the start
     over = np.roll(over, -first)
     over_limit = runs(over >= 0.0)

@@ -563,6 +563,7 @@ def _straightened(  # type: ignore[no-untyped-def]
     n, half = len(points), len(spread) // 2
     over, wide, step = np.zeros(n), np.zeros(n + 2 * half), np.zeros((n, 3))
     for _ in range(rounds):
+        # Curvature at each point from the chords over two steps, and how far it is over the limit.
         sharp = 0
         for k in range(n):
             before, after, dot = 0.0, 0.0, 0.0
@@ -579,6 +580,8 @@ def _straightened(  # type: ignore[no-untyped-def]
             sharp += bend > _SLACK * largest
         if sharp < _LEFT * n:
             break
+        # Neighbours of sharp points move too, the less the farther away: maximum, then a weighted
+        # mean.
         for k in range(n):
             wide[half + k] = max(
                 over[k - 2], over[k - 1], over[k], over[(k + 1) % n], over[(k + 2) % n]
@@ -586,6 +589,8 @@ def _straightened(  # type: ignore[no-untyped-def]
         for k in range(half):
             wide[k] = wide[n + k]
             wide[half + n + k] = wide[half + k]
+        # The bend as a vector: to the middle of both neighbours. Moving by it, less the mean of
+        # those of its neighbours, evens bends out without shrinking the curve.
         for k in range(n):
             for i in range(3):
                 step[k, i] = 0.5 * (points[k - 1, i] + points[(k + 1) % n, i]) - points[k, i]

@@ -195,6 +195,7 @@ def _first_columns(indptr, indices):  # type: ignore[no-untyped-def]  # pragma: 
     """First columns of supernodes, and the number of columns."""
     n = len(indptr) - 1
     first, count = np.empty(n + 1, np.int64), 0
+    # A column goes on with a supernode where it has the rows of the one before, less its diagonal.
     for j in range(n):
         begin, size = indptr[j], indptr[j + 1] - indptr[j]
         goes_on = j > 0 and begin - indptr[j - 1] - 1 == size
@@ -212,6 +213,7 @@ def _supernode_blocks(indptr, indices, data, first):  # type: ignore[no-untyped-
     """Return where blocks and their rows begin, values and rows."""
     count = len(first) - 1
     starts, row_starts = np.zeros(count + 1, np.int64), np.zeros(count + 1, np.int64)
+    # A block is dense: its columns one after the other, the triangle first, then the rows below.
     for s in range(count):
         wide, high = first[s + 1] - first[s], indptr[first[s] + 1] - indptr[first[s]]
         starts[s + 1] = starts[s] + wide * high
@@ -265,6 +267,8 @@ def _four_products(a, b, c, d, other):  # type: ignore[no-untyped-def]  # pragma
 @njit(cache=True, nogil=True)
 def _substitute_blocks(first, starts, row_starts, values, rows, pivots, x):  # type: ignore[no-untyped-def]  # pragma: no cover
     count, room = len(first) - 1, np.empty(len(x))
+    # Forward: within the block of each supernode, then off what lies below it, all its columns at
+    # once.
     for s in range(count):
         own = x[first[s] : first[s + 1]]
         wide, below = len(own), rows[row_starts[s] : row_starts[s + 1]]
@@ -292,8 +296,10 @@ def _substitute_blocks(first, starts, row_starts, values, rows, pivots, x):  # t
                 c += 1
         for i in range(len(total)):
             x[below[i]] -= total[i]
+    # The pivots, which U has besides the transpose of L: L D L^T.
     for i in range(len(x)):
         x[i] /= pivots[i]
+    # Backward: gather what is known below the block, subtract its products, solve within the block.
     for s in range(count - 1, -1, -1):
         own = x[first[s] : first[s + 1]]
         wide, below = len(own), rows[row_starts[s] : row_starts[s + 1]]

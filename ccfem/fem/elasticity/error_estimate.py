@@ -108,6 +108,8 @@ def _stress_at(cells, gradients, u, stiffness, free, edges, at, result):  # type
                 slope[p, 0], slope[p, 1], slope[p, 2] = 0.0, 0.0, 0.0
             for a in range(cells.shape[1]):
                 node = cells[cell, a]
+                # Gradient of the shape function: L, L (2 L - 1), or 4 L_i L_j in the middle of a
+                # side.
                 if cells.shape[1] == 4:
                     x, y, z = g[a, 0], g[a, 1], g[a, 2]
                 elif a < 4:
@@ -204,9 +206,12 @@ def _compare_quadratic(  # type: ignore[no-untyped-def]
     p = np.empty(10)
     for cell in range(len(corners)):
         s = compliance[cell if len(compliance) > 1 else 0]
+        # At a corner the polynomial round it is its constant term: its origin is there.
         for a in range(4):
             for i in range(6):
                 difference[a, i] = coefficients[of_corner[cell, a], 0, i] - stress[cell, a, i]
+        # In the middle of a side: half of the polynomials of both ends, less the linear stress
+        # there.
         for k in range(6):
             ends = edges[k]
             for i in range(6):
@@ -224,6 +229,7 @@ def _compare_quadratic(  # type: ignore[no-untyped-def]
                     total += s[i, j] * difference[a, j]
                 image[a, i] = total
         total = 0.0
+        # Quadratic form of the difference, with the exact integrals of pairs of shape functions.
         for a in range(10):
             for b in range(10):
                 if a < 4 and b < 4:
@@ -356,6 +362,7 @@ def _gather_patch(group, corners, of_corner, start, cells, least, stamp, gathere
         count += 1
     if count >= least:
         return count
+    # Too few: the cells round all corners of those at the node.
     begin = count
     for k in range(begin):
         for a in range(4):
@@ -411,6 +418,8 @@ def _fit(  # type: ignore[no-untyped-def]
             size[group] = 1.0
             continue
         count = _gather_patch(group, corners, of_corner, start, cells, least, stamp, gathered)
+        # Sampling points of the patch from its node, in units of the farthest one: well
+        # conditioned.
         extent, s = 0.0, 0
         for k in range(count):
             for q in range(len(at)):
@@ -426,6 +435,7 @@ def _fit(  # type: ignore[no-untyped-def]
                 gram[i, j] = 0.0
             for j in range(6):
                 right[i, j] = 0.0
+        # Normal equations of the least squares fit of all six components.
         for s in range(count * len(at)):
             _terms(place[s, 0] / extent, place[s, 1] / extent, place[s, 2] / extent, p)
             cell, q = gathered[s // len(at)], s % len(at)
@@ -434,6 +444,7 @@ def _fit(  # type: ignore[no-untyped-def]
                     gram[i, j] += p[i] * p[j]
                 for j in range(6):
                     right[i, j] += p[i] * stress[cell, q, j]
+        # Ridge on all but the mean: patches that do not determine a term leave it out.
         for i in range(1, terms):
             gram[i, i] += ridge[0 if i < 4 else 1] * gram[0, 0]
         _cholesky(gram, right)

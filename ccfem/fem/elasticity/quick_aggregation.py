@@ -375,6 +375,7 @@ def _met(indptr, indices, start, column, count):  # type: ignore[no-untyped-def]
         first[k + 1] += 1
     for k in range(1, count + 1):
         first[k] += first[k - 1]
+    # Nodes of each group: the transpose of the pattern of P.
     nodes, place = np.empty(column.size, np.int32), first[:-1].copy()
     for i in range(n):
         for s in range(start[i], start[i + 1]):
@@ -389,6 +390,7 @@ def _met(indptr, indices, start, column, count):  # type: ignore[no-untyped-def]
             for t in range(last):
                 more[t] = result[t]
             result = more
+        # A group meets the groups of all neighbours of its nodes.
         for e in range(first[k], first[k + 1]):
             i = nodes[e]
             for s in range(indptr[i], indptr[i + 1]):
@@ -401,6 +403,7 @@ def _met(indptr, indices, start, column, count):  # type: ignore[no-untyped-def]
                         seen[column[t]] = k
                         result[last] = column[t]
                         last += 1
+        # Few a row, found nearly in order: sorted by insertion.
         for t in range(own[k] + 1, last):
             value, e = result[t], t
             while e > own[k] and result[e - 1] > value:

@@ -143,6 +143,8 @@ def _merged_bodies(
             left.append(first)
             right.append(first + step)
             step += 1
+        # Nodes that two bodies have in common, and their spread: a second axis off the line through
+        # them.
         i, j = np.concatenate(left), np.concatenate(right)
         pair, inverse = np.unique(
             members.owner[i] * members.bodies + members.owner[j], return_inverse=True
@@ -158,6 +160,7 @@ def _merged_bodies(
         stiff = np.linalg.eigvalsh(spread)[:, 1] > 1e-14 if len(pair) else np.zeros(0, dtype=bool)
         if not stiff.any():
             break
+        # Such bodies are one; this may give others three nodes in common, so it is repeated.
         ends = pair[stiff] // members.bodies, pair[stiff] % members.bodies
         graph = sp.coo_array((np.ones(len(ends[0]), dtype=bool), ends), shape=2 * (members.bodies,))
         label = connected_components(graph, directed=False)[1]

@@ -43,6 +43,7 @@ def _factorise(first, start, values):  # type: ignore[no-untyped-def]
     inverse of the factor's. Slices spare the compiler the check for negative indices, which would
     keep it from vectorising.
     """
+    # L[i, j] = (A[i, j] - sum_k L[i, k] L[j, k]) / L[j, j], in tiles of four rows and two columns.
     for i in range(0, first.size, 4):
         low = first[i]
         a = values[start[i] + low : start[i] + i]
@@ -55,6 +56,7 @@ def _factorise(first, start, values):  # type: ignore[no-untyped-def]
             x = values[start[j] + begin : start[j] + j + 1]
             y = values[start[j + 1] + begin : start[j + 1] + j + 2]
             p, q, r, s, t, u, v, w = _tile(a[m:], b[m:], c[m:], d[m:], x, y, n)
+            # The second column of a tile needs the first one, which has just been found.
             e, f, g = x[n], y[n], y[n + 1]
             a[k] = (a[k] - p) * e
             b[k] = (b[k] - q) * e
@@ -64,6 +66,7 @@ def _factorise(first, start, values):  # type: ignore[no-untyped-def]
             b[k + 1] = (b[k + 1] - u - b[k] * f) * g
             c[k + 1] = (c[k + 1] - v - c[k] * f) * g
             d[k + 1] = (d[k + 1] - w - d[k] * f) * g
+        # The triangle of the four rows themselves, entry by entry.
         for row in range(i, i + 4):
             for j in range(i, row + 1):
                 x = values[start[row] + low : start[row] + j + 1]

@@ -173,6 +173,7 @@ def solve_system(
     started = assembled
     for case in alone:
         work = partial(_solution, matrix, system.held_in(case), system.forces_in(case), tolerance)
+        # Where the quick solver fails and nobody named it, the exact one takes its place.
         try:
             contact, energy = work(solver)
         except SolveError:
@@ -196,6 +197,7 @@ def solve_system(
         )
         fields[case] = system.field(case, displacement[case], matrix, record)
         started = perf_counter()
+    # Superposition: combinations of linear load cases need no solve.
     for name, factors in sums.items():
         total = sum(
             (k * displacement[case] for case, k in factors.items()),

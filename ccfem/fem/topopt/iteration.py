@@ -36,6 +36,7 @@ def iterate(
     """
     parameters, volumes, free = space.parameters, space.cone.volumes, space.free
     variables, per_volume = space.start(start), space.volume_gradient()[free]
+    # Cells that are not free hold a part of the volume, whatever the design.
     fixed = float(space.density(np.where(free, 0.0, variables)) @ volumes)
     target = parameters.volume_fraction * float(volumes.sum()) - fixed
     compliance: list[float] = []
@@ -48,6 +49,7 @@ def iterate(
         converged = _converged(compliance, changes, parameters)
         if converged or len(changes) == parameters.max_iterations:
             break
+        # Response, sensitivities through the filter, update under the constraint on the volume.
         gradient = space.sensitivities(variables, density, response.energy)
         updated = variables.copy()
         updated[free] = optimality_criteria(

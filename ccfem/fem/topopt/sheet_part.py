@@ -132,6 +132,7 @@ def sheet_outline(design: Design, flat: FlatPart, edge_length: float, solid: Any
     left, bottom, right, top = flat.planform.bounds
     count = np.ceil((np.array([right - left, top - bottom]) / edge_length) - 1e-9).astype(int)
     origin = 0.5 * (np.array([left + right, bottom + top]) - count * edge_length)
+    # Density on an image centred on the planform, so that it has its mirror axes.
     rows, columns = np.mgrid[: count[1], : count[0]]
     x = origin[0] + (columns + 0.5) * edge_length
     y = origin[1] + (count[1] - rows - 0.5) * edge_length
@@ -300,6 +301,7 @@ def sheet_mesh(
     prism : (m,) int array
         Prism of each cell.
     """
+    # Only a half or a quarter is meshed where the planform is symmetric, and mirrored.
     mirrors = mirrors_of(planform)
     left, bottom, right, top = planform.bounds
     middle = np.array([0.5 * (left + right), 0.5 * (bottom + top)])
@@ -312,6 +314,7 @@ def sheet_mesh(
     quarter = shapely.intersection(planform, part) if mirrors else planform
     if quarter.geom_type != "Polygon":
         mirrors, quarter = (), planform
+    # Points to keep, mirrored into the part that is meshed.
     folded = keep.copy()
     for axis in mirrors:
         folded[:, axis] = middle[axis] - np.abs(folded[:, axis] - middle[axis])

@@ -106,14 +106,17 @@ def interlayer(
             f"no cell lies farther than {ZONE:g} mm from the patches of loads and supports, so the "
             "bond between layers cannot be judged: the part is too small for this index"
         )
+    # Singular stress at corners depends on the mesh; its mean over a ball does not.
     every = np.arange(len(centroid))
     tensor = ball_averages(centroid, stress.stress.reshape(-1, 9), mesh.volumes, every, radius)
     tensor = tensor.reshape(-1, 3, 3)
     normal = layer_normals(layers, centroid)
+    # Traction on the layer, across and along it; pressing does not open the bond.
     traction = np.einsum("mij,mj->mi", tensor, normal)
     opening = np.einsum("mi,mi->m", traction, normal)
     sliding = np.linalg.norm(traction - opening[:, None] * normal, axis=1)
     shear = tensile if shear is None else shear
+    # Quadratic criterion: 1 at failure.
     index = np.hypot(np.maximum(opening, 0.0) / tensile, sliding / shear)
     index[np.hypot(np.maximum(opening, 0.0), sliding) <= _ROUNDING * np.abs(tensor).max()] = 0.0
     zones = tuple(float(index[distance > zone].max()) for zone in ZONES)

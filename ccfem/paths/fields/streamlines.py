@@ -141,6 +141,8 @@ def direction_at(field, cell, x, y, sharpest, way):  # type: ignore[no-untyped-d
     corners, values, beside, least = field
     for _ in range(len(corners)):
         a, b, c = corners[cell, 0], corners[cell, 1], corners[cell, 2]
+        # Barycentric coordinates; the walk goes on across the side that the place is farthest
+        # beyond.
         det = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
         w1 = ((x - a[0]) * (c[1] - a[1]) - (y - a[1]) * (c[0] - a[0])) / det
         w2 = ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) / det
@@ -156,6 +158,7 @@ def direction_at(field, cell, x, y, sharpest, way):  # type: ignore[no-untyped-d
         cell = beside[cell, worst]
         if cell < 0:
             return 0.0, 0.0, cell, False
+    # Stress there: mean + radius and mean - radius are the principal stresses.
     v = values[cell]
     mean = w0 * v[0, 0] + w1 * v[1, 0] + w2 * v[2, 0]
     half = w0 * v[0, 1] + w1 * v[1, 1] + w2 * v[2, 1]

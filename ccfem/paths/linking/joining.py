@@ -176,6 +176,7 @@ def _accept(
         link, path = links[k], paths[k]
         if link.first in taken or link.second in taken:
             return False
+        # Links with corners serve chains that are too short by themselves.
         long = np.count_nonzero(length[chain[owners[k]]] >= enough)
         if not link.smooth and long > most_long:
             return False
@@ -193,6 +194,7 @@ def _accept(
         for owner, line in cut.items():
             length[chain[owner]] += line_length(line) - line_length(lines[owner])
             lines[owner] = line
+        # Both chains are one: its length, its ends.
         into, gone = chain[owners[k]]
         length[into] += float(path.length) + (0.0 if closes else length[gone])
         chain[chain == gone] = into

@@ -298,6 +298,7 @@ def cut_layer(layer: Layer, region: Region, mesh: TetMesh) -> Layer | None:
     parent = np.concatenate([np.flatnonzero(whole & ~touched), parent])
     if not len(kept):
         return None
+    # Points in use, and for each a triangle of the layer, in whose cell the stress is found.
     used, kept = np.unique(kept, return_inverse=True)
     kept = kept.reshape(-1, 3)
     owner = np.zeros(len(used), dtype=np.int64)

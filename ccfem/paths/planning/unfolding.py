@@ -116,6 +116,7 @@ def unfolded_paths(
     if layer is not None and layer.flat is not None:
         plane = [layer.plane.project(paths.points[span]) for span in spans]
         rounding = _Rounding(plane, layer.plane.polygon, machine)
+    # Points and normals of each path side by side, so that both are cut together.
     columns: list[FloatArray] = []
     links: list[BoolArray] = []
     source = []

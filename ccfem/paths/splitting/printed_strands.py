@@ -110,6 +110,7 @@ def printed_strands(
         if process.stacks == "end":
             warnings = _end_in_stacks(pieces, used, borders, mesh, machine)
         removed = within - _total(pieces)
+    # What leaves the part is cut off; what ends in stacks is removed.
     cut_off = float(fibre.lengths.sum()) - removed - _total(pieces)
     limit = machine.shortest_strand * (1.0 - SHORT)
     split = sorted((piece for those in pieces.values() for piece in those), key=lambda p: p.path)

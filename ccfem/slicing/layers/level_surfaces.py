@@ -129,10 +129,12 @@ def _surface(
         return None, 0, 0
     n = len(mesh.points)
     points, triangles, cell = cut.points, cut.triangles, cut.cell
+    # Counter-clockwise seen from where the field is higher.
     a, b, c = np.moveaxis(points[triangles], 1, 0)
     normal = np.cross(b - a, c - a)
     down = np.einsum("td,td->t", normal, gradient[cell]) < 0.0
     triangles = np.where(down[:, None], triangles[:, [0, 2, 1]], triangles)
+    # Points on edges of patches; where a patch ends on the border, its end stays.
     keys = cut.nodes[:, 0] * n + cut.nodes[:, 1]
     member = {name: np.isin(keys, edges) for name, edges in on_patch.items()}
     fixed = _ends_of_patches(triangles, member, len(points))
@@ -141,11 +143,13 @@ def _surface(
     triangles, cell = triangles[wanted], cell[wanted]
     if not len(triangles):
         return None, bubbles, specks
+    # Points that no triangle has any more are left out.
     used, triangles = np.unique(triangles, return_inverse=True)
     triangles = triangles.reshape(-1, 3)
     nodes, weights = cut.nodes[used], cut.weights[used]
     border = border_edges(triangles, len(used))
     patches = {name: border[on[used][border].all(axis=1)] for name, on in member.items()}
+    # Thickness at the points, between the ends of their edges; its mean by area.
     local = (1.0 - weights) * thickness[nodes[:, 0]] + weights * thickness[nodes[:, 1]]
     mean = np.average(local[triangles].mean(axis=1), weights=_areas(points[used], triangles))
     surface = {

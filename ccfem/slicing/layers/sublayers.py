@@ -66,6 +66,7 @@ def layers_within(
         limit = thickest * 2.0 ** (halving - 1)
         levels = whole
         if halving:
+            # Half way between the layers so far, where a cell that spans the level is too thick.
             odd = np.arange(1, 2**halving, 2) * (step / 2**halving)
             between = np.sort(np.add.outer(np.append(whole[0] - step, whole), odd).ravel())
             thick = values[mesh.corners[(raw[mesh.corners] > limit).any(axis=1)]]

@@ -242,6 +242,7 @@ class LoadOriented:
         )
         normals = normal_field(mesh, regions, up)
         field = height_field(mesh, normals.direction, self.blend, self._lengths)
+        # A step of the field is a layer of the wanted thickness on average over the volume.
         steep = np.linalg.norm(field.gradient, axis=1)
         step = self.thickness * float(mesh.volumes @ steep / mesh.volumes.sum())
         if not float(np.ptp(field.values[mesh.corners])) > step:
@@ -253,6 +254,7 @@ class LoadOriented:
         stack = layers_within(
             mesh, field.values, step, self.thinnest, self.thickest, edge, self.least_area
         )
+        # Tension across the layers, beside that of flat layers and of the best plane.
         best = best_plane(stress.stress, mesh.volumes, regions.critical)
         ours, flat, least = (
             across_layers(stress.stress, mesh.volumes, regions.critical, normal)

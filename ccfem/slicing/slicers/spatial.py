@@ -176,8 +176,10 @@ class Spatial:
             _THICKNESS if self.thickness is None else self.thickness,
             up / np.linalg.norm(up),
         )
+        # A field that is nearly linear gives flat layers, which can be printed with three axes.
         flat = _flat(guidance, joints, up, self.flat_within)
         values = guidance.values if flat is None else mesh.points @ flat
+        # The field has a mean gradient of 1: its range is a height.
         low, high = np.quantile(values[mesh.corners], [0.0, 1.0])
         count = self._count(high - low)
         step = float(high - low) / count

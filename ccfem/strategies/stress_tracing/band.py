@@ -104,6 +104,7 @@ def band(
         strip = _gaussian_smoothed(strip[:-1], "wrap")
         every = slice(0, len(strip))
         return Band(strip[:, :2], strip[:, 2:4], every, every, width, strip[:, 4], closed=True)
+    # Beyond its ends: far over a free end, and to the middle of a joint or across it.
     ends = (path.members[0].ends[0], path.members[-1].ends[1])
     farthest = _EXTENSION * (_LEAST_HALF + 0.5 * width[[0, -1]])
     middle = [
@@ -113,6 +114,7 @@ def band(
     reach = farthest if crossing else middle
     before = extension(strip[::-1] * _TURNED, reach[0] + _PADDING, turns[0])[::-1] * _TURNED
     after = extension(strip, reach[1] + _PADDING, turns[1])
+    # Smoothed with more on both sides than is kept, so that the ends do not shrink.
     padding = round(_PADDING / STEP)
     core = slice(len(before) - padding, len(before) - padding + len(strip))
     strip = _gaussian_smoothed(np.concatenate([before, strip, after]), "nearest")[padding:-padding]

@@ -78,6 +78,7 @@ def join(
     cost = _Cost(border_tree(mesh.points, outer), repulsion)
     graph = _edge_graph(mesh, cost, closed)
     far, _ = _ways(graph, loops)
+    # Three holes meet at the point of least total distance; others join the hole nearest to all.
     if len(loops) == 3:
         tree = np.array([int(np.argmin(np.where(closed, np.inf, far.sum(axis=0))))])
         left = list(range(3))
@@ -156,6 +157,7 @@ def _refined(
     cost: _Cost,
 ) -> EdgePath:
     """Shortest curve across the triangles round a way along edges, from the loop to the tree."""
+    # Triangles within two rings of the way.
     near = np.zeros(len(mesh.points), dtype=bool)
     near[way] = True
     for _ in range(2):
@@ -179,6 +181,8 @@ def _refined(
     number = np.full(n, -1)
     number[ends] = _PER_EDGE * len(edges) + np.arange(len(ends))
     where = np.concatenate([places.reshape(-1, 3), mesh.points[ends]])
+    # Within a triangle every crossing of a side is joined with every crossing of another side, and
+    # with the end in the corner across.
     rows, columns = [], []
     for i in range(3):
         for j in range(i):
@@ -195,6 +199,7 @@ def _refined(
     weight = np.linalg.norm(where[row] - where[column], axis=1)
     weight = weight * cost(0.5 * (where[row] + where[column]))
     graph = sp.coo_array((weight, (row, column)), shape=(len(where), len(where))).tocsr()
+    # Shortest way on this graph from any end on the tree to the nearest one on the loop.
     on_tree = np.zeros(n, dtype=bool)
     on_tree[tree] = True
     source = number[ends[on_tree[ends]]]
