@@ -76,6 +76,8 @@ def _needed(points, offsets, fixed, tolerance):  # type: ignore[no-untyped-def]
         if end < first:
             continue
         keep[first] = keep[end] = True
+        # Between two points that stay: keep the farthest from their chord, and look on both sides
+        # of it.
         count, begin = 0, first
         for p in range(first + 1, end + 1):
             if keep[p]:

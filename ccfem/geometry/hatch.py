@@ -163,6 +163,7 @@ def _links(lines: Hatch, section: Region, width: float) -> Links:
     arcs: list[tuple[int, int, FloatArray]] = []
     ring = lines.ring[order]
     starts = np.flatnonzero(np.concatenate([[True], ring[1:] != ring[:-1]]))
+    # Ends that follow each other on a ring of the border.
     for members in np.split(order, starts[1:]):
         for e, f in zip(members.tolist(), np.roll(members, -1).tolist(), strict=True):
             if e // 2 != f // 2:
@@ -178,6 +179,7 @@ def _links(lines: Hatch, section: Region, width: float) -> Links:
     straight = shapely.covers(grown, shapely.linestrings(lines.to_section(chords)))
     for k, (e, f, between) in enumerate(arcs):
         if lines.row[e // 2] == lines.row[f // 2]:
+            # Two ends of one row: only where the border between them keeps clear of the next row.
             rise = np.abs(between[:, 1] - lines.ends[e, 1]).max(initial=0.0)
             if rise > lines.pitch - width or f in links[e]:
                 continue

@@ -288,6 +288,7 @@ def _chains(edges: IntArray, kept: BoolArray, count: int) -> list[list[int]]:
         others.sort()
     seen: set[tuple[int, int]] = set()
     chains = []
+    # Ends and junctions first; what is left are closed chains.
     for first in sorted(beside, key=lambda node: (len(beside[node]) == 2, node)):
         for second in beside[first]:
             if (first, second) in seen:

@@ -37,6 +37,7 @@ def _own_way(line, seed, closed, width, free):  # type: ignore[no-untyped-def]
     along = np.zeros(count)
     for p in range(1, count):
         along[p] = along[p - 1] + np.sqrt(_squared(line, p, p - 1))
+    # Ahead and back from the seed, until a point is too near to one of those that are kept.
     first = last = seed
     for sense in (1, -1):
         p = seed + sense

@@ -407,6 +407,7 @@ def _openings(
             cost += _BEND * np.linalg.norm(line - chord, axis=1) / spacing
     cost = distances[-1]
     following: list[IntArray] = []
+    # From the inside out: the least sum from each place on, and the place that it goes on to.
     for k in range(len(rings) - 2, -1, -1):
         outer, inner = middles[k], middles[k + 1]
         count = min(_NEIGHBOURS, len(inner))

@@ -118,6 +118,7 @@ def _node_neighbours(cells, start, touching, indptr):  # type: ignore[no-untyped
                 if seen[j] == i:
                     continue
                 seen[j] = i
+                # Sorted by insertion: few neighbours, which come nearly in order.
                 k = last
                 while k > first and result[k - 1] > j:
                     result[k] = result[k - 1]
@@ -149,6 +150,8 @@ def _gradients(points, cells, result, volume):  # type: ignore[no-untyped-def]
         for a in range(3):
             for d in range(3):
                 e[a, d] = points[cells[cell, a + 1], d] - points[cells[cell, 0], d]
+        # Gradient a: cross product of the other two edges over their determinant, six times the
+        # volume.
         determinant = 0.0
         for a in range(3):
             b, c = (a + 1) % 3, (a + 2) % 3
@@ -158,6 +161,7 @@ def _gradients(points, cells, result, volume):  # type: ignore[no-untyped-def]
         for d in range(3):
             determinant += e[0, d] * result[cell, 1, d]
         volume[cell] = determinant / 6.0
+        # The four coordinates add up to 1, so that their gradients add up to 0.
         for d in range(3):
             total = 0.0
             for a in range(1, 4):
@@ -220,6 +224,7 @@ def _gather_linear(  # type: ignore[no-untyped-def]
     slot = np.empty(indptr.size - 1, np.int32)
     diagonal = np.empty(indptr.size - 1, np.int32)
     t = np.empty((6, 3))
+    # Row by row, so that every block is written by one node: ``K_ij = sum V B_i^T C B_j``.
     for i in range(indptr.size - 1):
         _mark(indptr, indices, i, slot)
         for e in range(start[i], start[i + 1]):

@@ -65,6 +65,8 @@ def _three(start, column, low, inverse, rest, x, backward):  # type: ignore[no-u
         v = m[1, 0] * a + m[1, 1] * b + m[1, 2] * c
         w = m[2, 0] * a + m[2, 1] * b + m[2, 2] * c
         x[i, 0], x[i, 1], x[i, 2] = u, v, w
+        # The transpose of the same blocks is the strict upper triangle: the residual follows at
+        # once.
         for s in range(start[i], start[i + 1]):
             m, y = low[s], rest[column[s]]
             y[0] -= m[0, 0] * u + m[1, 0] * v + m[2, 0] * w

@@ -81,6 +81,8 @@ def facet_normals(mesh: LoadedBody, facets: IntArray, places: FloatArray) -> Flo
             normals = mesh.round_walls[k].normals_at(places[on_wall].reshape(-1, 3))
             result[on_wall] = normals.reshape(-1, *result.shape[1:])
         rows = np.flatnonzero(wall < 0)
+    # Faces that are cylinders or cones within rounding have normals of their own: first those of
+    # few facets, whose edges are blunt, then the rest by the usual angle.
     for angle in (_COARSE, FEATURE_ANGLE):
         flat = []
         for face in smooth_faces(mesh.points, facets[rows], angle):

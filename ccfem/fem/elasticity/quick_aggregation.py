@@ -63,6 +63,7 @@ def aggregates(matrix: sp.bsr_array, near_kernel: FloatArray, strength: float) -
 def _strong(indptr, indices, data, strength):  # type: ignore[no-untyped-def]
     """Strong connections of each node with others."""
     n, d = indptr.size - 1, data.shape[1]
+    # Squared size of the blocks. Strong: above the strength times the mean of both diagonals.
     size, diagonal = np.empty(indices.size), np.zeros(n)
     for i in range(n):
         for s in range(indptr[i], indptr[i + 1]):

@@ -59,6 +59,7 @@ def _disagreeing(direction, cells, defined, cell_of, start):  # type: ignore[no-
     for e in range(count):
         if not defined[e]:
             continue
+        # Every cell that shares a node with this one is asked once.
         seen[e] = e
         for node in cells[e]:
             for k in range(start[node], start[node + 1]):

@@ -137,6 +137,7 @@ def _table(order: IntArray, clusters: Clusters, ahead: FloatArray, behind: Float
     _begin(order[0], clusters, ahead)
     for k in range(1, len(order)):
         _step(ahead, order[k - 1], order[k], clusters, entry, ahead)
+    # Backwards: what is left from entering a cluster, by what is left from leaving it.
     for k in range(len(order) - 1, -1, -1):
         c = order[k]
         for b in range(offsets[c], offsets[c + 1]):
@@ -206,6 +207,7 @@ def _exchange(order: IntArray, clusters: Clusters) -> float:
     helped = True
     while helped:
         helped = False
+        # Every window, in every rearrangement; the first that helps is taken at once.
         for i in range(lowest, highest):
             for j in range(i + 2, highest + 1):
                 for variant in range(1 + 4 * _BLOCK):

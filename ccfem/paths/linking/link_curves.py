@@ -118,6 +118,7 @@ def curve_cost(start, turns, sizes, radius, grid, weights, limit):  # type: igno
             if cost >= limit:
                 return np.inf
             px, py, _ = advance(x, y, heading, turn, sense * done, radius)
+            # A circle free of border: the place is the same for as long as the curve stays in it.
             where, room = place_and_room(grid, px, py)
             move = min(max(room, _SAMPLE), total - done)
             if room < move:
@@ -138,6 +139,7 @@ def _link_curves(ends, reach, radius, grid, weights, bound):  # type: ignore[no-
     word = np.zeros((count, count), np.int64)
     sizes, straight = np.empty((6, 3)), np.zeros(3)
     stub = np.empty(reach.shape)
+    # Straight extensions of the ends, which curves begin after.
     for a in range(count):
         for v in range(variants):
             straight[1] = reach[a, v]
@@ -150,6 +152,7 @@ def _link_curves(ends, reach, radius, grid, weights, bound):  # type: ignore[no-
             best = limit = min(bound[a, b], bound[b, a])
             for variant in range(variants * variants):
                 v, w = variant // variants, variant % variants
+                # Far apart, longer extensions change little.
                 if variant and apart > _NEAR * radius + reach[a, v] + reach[b, w]:
                     continue
                 start = _extended(ends[a], reach[a, v])

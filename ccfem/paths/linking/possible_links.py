@@ -351,6 +351,7 @@ def _best(poses, pairs, cuts, room, radius, limit):  # type: ignore[no-untyped-d
                 end[0], end[1] = poses[b, other, 0], poses[b, other, 1]
                 end[2] = poses[b, other, 2] + np.pi
                 word_sizes(poses[a, one], end, radius, sizes)
+                # The shortest of the six words of Dubins between both poses.
                 word, length = 0, np.inf
                 for w in range(6):
                     size = abs(sizes[w, 0]) + abs(sizes[w, 1]) + abs(sizes[w, 2])

@@ -541,6 +541,7 @@ def _costs_of_sets(clusters):  # type: ignore[no-untyped-def]
     count, terminals = len(offsets) - 1, len(links)
     best = np.full((1 << count, terminals), np.inf)
     entry = np.empty(terminals)
+    # Held and Karp: a set of clusters is a number, and larger sets come after those that they hold.
     for done in range((1 << count) - 1):
         for c in range(count):
             if done >> c & 1:
@@ -550,6 +551,7 @@ def _costs_of_sets(clusters):  # type: ignore[no-untyped-def]
                 if done == 0:
                     entry[a] = 0.0 if first < 0 or first == a else np.inf
                     continue
+                # Entered from the best exit of any cluster before.
                 for d in range(count):
                     if done >> d & 1:
                         for t in range(offsets[d], offsets[d + 1]):

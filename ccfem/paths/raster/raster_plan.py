@@ -134,6 +134,7 @@ def _next_sense(line, regions, linked, used, following, i, j, way):  # type: ign
         if _crosses(following, regions.shape[1], i, j, k):
             continue
         turn = 0 if way < 0 else min((k - way) % 8, (way - k) % 8)
+        # Straight on first; of equal turns, over a side rather than a corner.
         cost = 2 * turn + k % 2
         if cost < least:
             best, least = k, cost
@@ -201,6 +202,7 @@ def cut_spurs(line, regions, linked, least):  # type: ignore[no-untyped-def]
             i, j = i + _STEPS[way, 0], j + _STEPS[way, 1]
             count, way = _beside_on(line, regions, linked, i, j)
             count += 1
+        # No fork within the length: a line by itself, or a long branch, is put back.
         if count < 3 or size == least:
             for k in range(size):
                 line[chain[k] // width, chain[k] % width] = True
@@ -224,6 +226,7 @@ def walk(line, regions, linked, used, following, before, stub):  # type: ignore[
             if from_ends and _beside_on(line, regions, linked, i, j)[0] > 1:
                 continue
             size = _follow_pixels(line, regions, linked, used, following, start, chain)
+            # Beside an earlier path a stub adds nothing but a turn.
             short = size < stub and _beside(chain, size, regions, linked, already)
             if size == 1 or short:
                 for k in range(size):
@@ -265,6 +268,7 @@ def fill_corners(regions, linked, used, following, before):  # type: ignore[no-u
                     continue
                 a = (i + _STEPS[k, 0]) * width + j + _STEPS[k, 1]
                 b = (i + _STEPS[m, 0]) * width + j + _STEPS[m, 1]
+                # Paths have a sense: a comes before b.
                 if following[b] == a:
                     a, b = b, a
                 same = regions[a // width, a % width] == regions[i, j]
@@ -287,6 +291,7 @@ def extend_ends(regions, linked, used, following, before):  # type: ignore[no-un
         at, ahead = start, following[start] < 0
         while True:
             i, j = at // width, at % width
+            # Not back beside the last pixel, and over a side rather than a corner.
             last = before[at] if ahead else following[at]
             best = -1
             for k in range(8):

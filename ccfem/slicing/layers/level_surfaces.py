@@ -302,6 +302,7 @@ def _find_border(
             while triangles[t, i] != p:
                 i += 1
             after, before = triangles[t, (i + 1) % 3], triangles[t, (i + 2) % 3]
+            # A side that no other triangle at the point has lies on the border.
             alone_after, alone_before = True, True
             for b in range(size[p]):
                 u = fan[p, b]
@@ -379,6 +380,7 @@ def _shared(triangles: IntArray, fan: IntArray, size: IntArray, u: int, v: int) 
                 continue
             seen[known] = p
             known += 1
+            # Adjacent to v as well.
             near = False
             for b in range(size[v]):
                 for j in range(3):

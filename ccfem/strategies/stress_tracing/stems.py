@@ -38,6 +38,7 @@ def with_shared_stems(paths: Sequence[MainPath], frame: Frame) -> list[MainPath]
             if own.closed or joint == FREE:
                 continue
             arrival = -outward(own.members[-1].reversed, frame, joint)
+            # The stem ahead that turns least from the way that the path arrives.
             best, of, turned = _ALONG, -1, False
             for n, other in enumerate(forked):
                 for way in (False, True):
@@ -66,6 +67,7 @@ def _forked(paths: Sequence[MainPath], frame: Frame) -> list[MainPath]:
         if len(whole.members) > 1 or whole.closed or stem.ends[1] != FREE or joint == FREE:
             continue
         along = outward(stem, frame, joint)
+        # On both sides of the stem the path that arrives most nearly along it.
         sides: dict[bool, tuple[float, int, bool]] = {}
         for n, path in enumerate(forked):
             for way in (False, True):
