@@ -168,16 +168,33 @@ def test_slow_to_compile_is_found():
     assert len(list(slow_to_compile(ast.parse(text)))) == 3
 
 
-def test_compiled_functions_work_number_by_number():
-    """Error messages for shapes that do not fit, say, are compiled too: that takes seconds."""
-    found = []
+def compiled():
+    """Compiled functions, by their dotted names."""
     for name, path in modules().items():
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.FunctionDef) and any(
                 "njit" in ast.unparse(decorator) for decorator in node.decorator_list
             ):
-                found += [f"{name}.{node.name} {what}" for what in slow_to_compile(node)]
-    assert not found
+                yield f"{name}.{node.name}", node
+
+
+def test_compiled_functions_work_number_by_number():
+    """Error messages for shapes that do not fit, say, are compiled too: that takes seconds."""
+    slow = [f"{name} {what}" for name, node in compiled() for what in slow_to_compile(node)]
+    assert not slow
+
+
+def test_compiled_functions_have_few_parameters_of_known_types():
+    """More than eight are a value: a `NamedTuple`, which compiled functions take as it is."""
+    functions = dict(compiled())
+    assert len(functions) > 100
+    assert not [name for name, node in functions.items() if len(node.args.args) > 8]
+    untyped = [
+        name
+        for name, node in functions.items()
+        if node.returns is None or any(a.annotation is None for a in node.args.args)
+    ]
+    assert not untyped
 
 
 def unstable_sorts(tree):

@@ -70,7 +70,9 @@ def shortest_curve(start: FloatArray, end: FloatArray, radius: float, step: floa
 
 
 @njit(cache=True, nogil=True)
-def _sample(pose, turns, sizes, parts, radius):  # type: ignore[no-untyped-def]
+def _sample(
+    pose: FloatArray, turns: IntArray, sizes: FloatArray, parts: IntArray, radius: float
+) -> FloatArray:
     line = np.empty((parts[0] + parts[1] + parts[2] + 1, 2))
     x, y, heading = pose[0], pose[1], pose[2]
     line[0, 0], line[0, 1] = x, y
@@ -86,7 +88,9 @@ def _sample(pose, turns, sizes, parts, radius):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def advance(x, y, heading, turn, size, radius):  # type: ignore[no-untyped-def]
+def advance(
+    x: float, y: float, heading: float, turn: int, size: float, radius: float
+) -> tuple[float, float, float]:
     """Pose after a piece; arcs by their chord and its direction, which avoids cancellation."""
     half = 0.5 * turn * size / radius
     chord = size if turn == 0 else 2.0 * radius * np.sin(abs(half)) * np.sign(size)
@@ -98,7 +102,7 @@ def advance(x, y, heading, turn, size, radius):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _round(angle):  # type: ignore[no-untyped-def]
+def _round(angle: float) -> float:
     """Angle in [0, 2 pi), or one that is almost a full turn as a small negative one."""
     turn = 2.0 * np.pi
     angle -= turn * np.floor(angle / turn)
@@ -106,7 +110,7 @@ def _round(angle):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def word_sizes(start, end, radius, sizes):  # type: ignore[no-untyped-def]
+def word_sizes(start: FloatArray, end: FloatArray, radius: float, sizes: FloatArray) -> None:
     """Fill `sizes` (6, 3), mm, with the pieces of each of `WORDS`; inf where there is no curve.
 
     An arc that would turn almost all the way round is a tiny negative one instead.

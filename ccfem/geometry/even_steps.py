@@ -67,7 +67,7 @@ def even_steps(
 
 
 @njit(cache=True, nogil=True)
-def _needed(points, offsets, fixed, tolerance):  # type: ignore[no-untyped-def]
+def _needed(points: FloatArray, offsets: IntArray, fixed: BoolArray, tolerance: float) -> BoolArray:
     """Mask (P,) of the points that Douglas and Peucker keep, the fixed ones among them."""
     keep = fixed.copy()
     stack = np.empty((len(points) + 1, 2), np.int64)

@@ -99,7 +99,9 @@ def triangle_edges(triangles: IntArray) -> tuple[IntArray, IntArray]:
 
 
 @njit(cache=True, nogil=True)
-def _crossings(scaled, edges, low, start):  # type: ignore[no-untyped-def]
+def _crossings(
+    scaled: FloatArray, edges: IntArray, low: IntArray, start: IntArray
+) -> tuple[IntArray, IntArray, FloatArray]:
     edge = np.empty(start[-1], np.int64)
     level = np.empty(start[-1], np.int64)
     weights = np.empty(start[-1])
@@ -113,7 +115,9 @@ def _crossings(scaled, edges, low, start):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _chain(of_triangle, low, high, start):  # type: ignore[no-untyped-def]
+def _chain(
+    of_triangle: IntArray, low: IntArray, high: IntArray, start: IntArray
+) -> tuple[IntArray, IntArray]:
     """Curves as crossing numbers with offsets; open ones first end to end, then the closed."""
     count = start[-1]
     link = np.full((count, 2), -1)

@@ -31,7 +31,9 @@ def until_itself(line: FloatArray, start: FloatArray, width: float) -> FloatArra
 
 
 @njit(cache=True, nogil=True)
-def _own_way(line, seed, closed, width, free):  # type: ignore[no-untyped-def]
+def _own_way(
+    line: FloatArray, seed: int, closed: bool, width: float, free: float
+) -> tuple[int, int]:
     """First and last point that keep a distance from all others more than `free` mm of arc away."""
     count = len(line)
     along = np.zeros(count)
@@ -57,7 +59,7 @@ def _own_way(line, seed, closed, width, free):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _squared(line, p, q):  # type: ignore[no-untyped-def]
+def _squared(line: FloatArray, p: int, q: int) -> float:
     """Square of the distance of two points."""
     x, y = line[p, 0] - line[q, 0], line[p, 1] - line[q, 1]
     return x * x + y * y

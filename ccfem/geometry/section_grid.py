@@ -92,7 +92,7 @@ def section_grid(section: Region, margin: float) -> SectionGrid:
 
 
 @njit(cache=True, nogil=True)
-def _fill_places(grid):  # type: ignore[no-untyped-def]
+def _fill_places(grid: SectionGrid) -> None:
     nx, ny = grid.places.shape
     about, around = np.empty(nx + 1, np.int64), np.empty(nx + 1, np.int64)
     for j in range(ny):
@@ -115,7 +115,7 @@ def _fill_places(grid):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def place(grid, x, y):  # type: ignore[no-untyped-def]
+def place(grid: SectionGrid, x: float, y: float) -> int:
     """Place of a point: INSIDE the section, in a VOID within its outer rings, or OUTSIDE."""
     j = int(np.floor((y - grid.origin[1]) / grid.cell))
     if j < 0 or j >= grid.room.shape[1]:
@@ -132,13 +132,13 @@ def place(grid, x, y):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def contains(grid, x, y):  # type: ignore[no-untyped-def]
+def contains(grid: SectionGrid, x: float, y: float) -> bool:
     """Whether a point lies in the section."""
     return place(grid, x, y) == INSIDE
 
 
 @njit(cache=True, nogil=True)
-def _place_by_winding(about, around):  # type: ignore[no-untyped-def]
+def _place_by_winding(about: int, around: int) -> int:
     """Place from the winding numbers of all rings, and of the outer rings."""
     if about != 0:
         return INSIDE
@@ -146,7 +146,7 @@ def _place_by_winding(about, around):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def place_and_room(grid, x, y):  # type: ignore[no-untyped-def]
+def place_and_room(grid: SectionGrid, x: float, y: float) -> tuple[int, float]:
     """Place of a point, and the radius round it that is free of border; 0 close to the border.
 
     If the radius is 0, the place is that of the middle of the cell.

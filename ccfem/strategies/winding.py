@@ -556,9 +556,9 @@ def limit_bends(curve: FloatArray, largest: float, smoothing: float = 0.5) -> Fl
 
 
 @njit(cache=True, nogil=True)
-def _straightened(  # type: ignore[no-untyped-def]
-    points, largest, spread, rounds
-):  # pragma: no cover, compiled
+def _straightened(
+    points: FloatArray, largest: float, spread: FloatArray, rounds: int
+) -> FloatArray:  # pragma: no cover
     """Points of a closed curve after a number of rounds, or once its bends are small enough."""
     n, half = len(points), len(spread) // 2
     over, wide, step = np.zeros(n), np.zeros(n + 2 * half), np.zeros((n, 3))

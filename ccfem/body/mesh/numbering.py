@@ -33,7 +33,9 @@ def reverse_cuthill_mckee(start: IntArray, neighbour: IntArray) -> IntArray:
 
 
 @njit(cache=True, nogil=True)
-def _breadth_first(start, neighbour, degree, first):  # type: ignore[no-untyped-def]
+def _breadth_first(
+    start: IntArray, neighbour: IntArray, degree: IntArray, first: IntArray
+) -> IntArray:
     """Nodes in layers of neighbours; those that each node adds by rising degree."""
     order = np.empty(len(first), np.int64)
     seen = np.zeros(len(first), np.bool_)

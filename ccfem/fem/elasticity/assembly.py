@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 from numba import njit
 
-from ccfem.base.arrays import FloatArray, IntArray, freeze, seen_only
+from ccfem.base.arrays import FloatArray, Int32Array, IntArray, freeze, seen_only
 from ccfem.body.mesh.cell_mesh import CellMesh
 from ccfem.body.mesh.curved_cells import (
     CELL_POINTS,
@@ -68,7 +68,7 @@ def pattern(mesh: CellMesh) -> Pattern:
 
 
 @njit(cache=True)
-def _lowest_nodes(cells):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _lowest_nodes(cells: IntArray) -> Int32Array:  # pragma: no cover
     """Lowest node (m, 1) of each cell."""
     result = np.empty((len(cells), 1), np.int32)
     for i in range(len(cells)):
@@ -80,7 +80,7 @@ def _lowest_nodes(cells):  # type: ignore[no-untyped-def]  # pragma: no cover
 
 
 @njit(cache=True)
-def _grouped(values, start):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _grouped(values: Int32Array, start: Int32Array) -> Int32Array:  # pragma: no cover
     """Entries of (m, q) values, by value; `start` becomes the first entry of each value."""
     for i in range(values.shape[0]):
         for a in range(values.shape[1]):
@@ -98,7 +98,9 @@ def _grouped(values, start):  # type: ignore[no-untyped-def]  # pragma: no cover
 
 
 @njit(cache=True)
-def _node_neighbours(cells, start, touching, indptr):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _node_neighbours(
+    cells: Int32Array, start: Int32Array, touching: Int32Array, indptr: Int32Array
+) -> Int32Array:  # pragma: no cover
     """Nodes that share a cell with each node, ascending; `indptr` becomes where each begins."""
     q = cells.shape[1]
     seen = np.full(start.size - 1, -1, np.int32)
@@ -144,7 +146,7 @@ def cell_gradients(mesh: TetMesh) -> FloatArray:
 
 
 @njit(cache=True)
-def _gradients(points, cells, result, volume):  # type: ignore[no-untyped-def]
+def _gradients(points: FloatArray, cells: IntArray, result: FloatArray, volume: FloatArray) -> None:
     e = np.empty((3, 3))
     for cell in range(len(cells)):
         for a in range(3):
@@ -171,7 +173,7 @@ def _gradients(points, cells, result, volume):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _times_gradient(c, g, factor, t):  # type: ignore[no-untyped-def]
+def _times_gradient(c: FloatArray, g: FloatArray, factor: float, t: FloatArray) -> None:
     """Store ``factor * C B`` in t (6, 3), B the strain of displacements with gradient g."""
     x, y, z = factor * g[0], factor * g[1], factor * g[2]
     for k in range(6):
@@ -181,7 +183,7 @@ def _times_gradient(c, g, factor, t):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _against(t, p, x, y, z):  # type: ignore[no-untyped-def]
+def _against(t: FloatArray, p: int, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Row p of ``t.T B``, B the strain of displacements with gradient (x, y, z)."""
     return (
         t[0, p] * x + t[4, p] * z + t[5, p] * y,
@@ -191,14 +193,16 @@ def _against(t, p, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _mark(indptr, indices, i, slot):  # type: ignore[no-untyped-def]
+def _mark(indptr: Int32Array, indices: Int32Array, i: int, slot: Int32Array) -> None:
     """Store in `slot` the entry of the pattern of each column of row i."""
     for s in range(indptr[i], indptr[i + 1]):
         slot[indices[s]] = s
 
 
 @njit(cache=True)
-def _mirror(indptr, indices, i, diagonal, data):  # type: ignore[no-untyped-def]
+def _mirror(
+    indptr: Int32Array, indices: Int32Array, i: int, diagonal: Int32Array, data: FloatArray
+) -> None:
     """Copy the blocks left of the diagonal of row i from the rows above; note its diagonal.
 
     Rows are processed in order, so the wanted blocks of row j come in order too: `diagonal` holds
@@ -217,9 +221,15 @@ def _mirror(indptr, indices, i, diagonal, data):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _gather_linear(  # type: ignore[no-untyped-def]
-    where, cells, which, gradients, scale, stiffness, data
-):
+def _gather_linear(
+    where: tuple[Int32Array, Int32Array, Int32Array, Int32Array],
+    cells: IntArray,
+    which: Int32Array,
+    gradients: FloatArray,
+    scale: FloatArray,
+    stiffness: FloatArray,
+    data: FloatArray,
+) -> None:
     indptr, indices, start, touching = where
     slot = np.empty(indptr.size - 1, np.int32)
     diagonal = np.empty(indptr.size - 1, np.int32)
@@ -245,9 +255,16 @@ def _gather_linear(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _gather_quadratic(  # type: ignore[no-untyped-def]
-    where, cells, which, gradients, scale, stiffness, terms, data
-):
+def _gather_quadratic(
+    where: tuple[Int32Array, Int32Array, Int32Array, Int32Array],
+    cells: IntArray,
+    which: Int32Array,
+    gradients: FloatArray,
+    scale: FloatArray,
+    stiffness: FloatArray,
+    terms: tuple[IntArray, IntArray],
+    data: FloatArray,
+) -> None:
     (indptr, indices, start, touching), (first, second) = where, terms
     # Gradient of shape function a: sum of its terms phi_s g_s. A corner i has one term,
     # (4 L_i - 1) g_i; the edge (i, j) has two, 4 L_j g_i and 4 L_i g_j. Written with the corner
@@ -370,7 +387,9 @@ def _cell_matrices(nodes: FloatArray, stiffness: FloatArray) -> FloatArray:
 
 
 @njit(cache=True)
-def _scatter(indptr, indices, nodes, blocks, data):  # type: ignore[no-untyped-def]
+def _scatter(
+    indptr: Int32Array, indices: Int32Array, nodes: IntArray, blocks: FloatArray, data: FloatArray
+) -> None:
     q = nodes.shape[1]
     for e in range(nodes.shape[0]):
         for a in range(q):

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from numba import njit
 from scipy.sparse.linalg import SuperLU, splu
 
-from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.arrays import FloatArray, Int32Array, IntArray
 from ccfem.base.errors import SolveError
 
 Apply = Callable[[FloatArray], FloatArray]
@@ -191,7 +191,7 @@ def supernodes(factor: SuperLU) -> Supernodes | None:
 
 
 @njit(cache=True, nogil=True)
-def _first_columns(indptr, indices):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _first_columns(indptr: Int32Array, indices: Int32Array) -> IntArray:  # pragma: no cover
     """First columns of supernodes, and the number of columns."""
     n = len(indptr) - 1
     first, count = np.empty(n + 1, np.int64), 0
@@ -209,7 +209,9 @@ def _first_columns(indptr, indices):  # type: ignore[no-untyped-def]  # pragma: 
 
 
 @njit(cache=True, nogil=True)
-def _supernode_blocks(indptr, indices, data, first):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _supernode_blocks(
+    indptr: Int32Array, indices: Int32Array, data: FloatArray, first: IntArray
+) -> tuple[IntArray, IntArray, FloatArray, Int32Array]:  # pragma: no cover
     """Return where blocks and their rows begin, values and rows."""
     count = len(first) - 1
     starts, row_starts = np.zeros(count + 1, np.int64), np.zeros(count + 1, np.int64)
@@ -232,21 +234,28 @@ def _supernode_blocks(indptr, indices, data, first):  # type: ignore[no-untyped-
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
-def _subtract(total, column, factor):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _subtract(total: FloatArray, column: FloatArray, factor: float) -> None:  # pragma: no cover
     for i in range(len(total)):
         total[i] -= column[i] * factor
 
 
 # Four columns at a time: the vector they are added to is read and written once.
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
-def _add_four(total, a, b, c, d, factors):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _add_four(
+    total: FloatArray,
+    a: FloatArray,
+    b: FloatArray,
+    c: FloatArray,
+    d: FloatArray,
+    factors: FloatArray,
+) -> None:  # pragma: no cover
     p, q, r, s = factors[0], factors[1], factors[2], factors[3]
     for i in range(len(total)):
         total[i] += a[i] * p + b[i] * q + c[i] * r + d[i] * s
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
-def _product(column, other):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _product(column: FloatArray, other: FloatArray) -> float:  # pragma: no cover
     total = 0.0
     for i in range(len(other)):
         total += column[i] * other[i]
@@ -254,7 +263,9 @@ def _product(column, other):  # type: ignore[no-untyped-def]  # pragma: no cover
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
-def _four_products(a, b, c, d, other):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _four_products(
+    a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, other: FloatArray
+) -> tuple[float, float, float, float]:  # pragma: no cover
     p, q, r, s = 0.0, 0.0, 0.0, 0.0
     for i in range(len(other)):
         p += a[i] * other[i]
@@ -265,7 +276,15 @@ def _four_products(a, b, c, d, other):  # type: ignore[no-untyped-def]  # pragma
 
 
 @njit(cache=True, nogil=True)
-def _substitute_blocks(first, starts, row_starts, values, rows, pivots, x):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _substitute_blocks(
+    first: IntArray,
+    starts: IntArray,
+    row_starts: IntArray,
+    values: FloatArray,
+    rows: Int32Array,
+    pivots: FloatArray,
+    x: FloatArray,
+) -> None:  # pragma: no cover
     count, room = len(first) - 1, np.empty(len(x))
     # Forward: within the block of each supernode, then off what lies below it, all its columns at
     # once.

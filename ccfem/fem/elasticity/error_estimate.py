@@ -96,7 +96,16 @@ def estimate_error(
 
 
 @njit(cache=True)
-def _stress_at(cells, gradients, u, stiffness, free, edges, at, result):  # type: ignore[no-untyped-def]
+def _stress_at(
+    cells: IntArray,
+    gradients: FloatArray,
+    u: FloatArray,
+    stiffness: FloatArray,
+    free: FloatArray,
+    edges: IntArray,
+    at: FloatArray,
+    result: FloatArray,
+) -> None:
     """Stress, Voigt, of each cell at barycentric coordinates."""
     slope, strain = np.empty((3, 3)), np.empty(6)
     for cell in range(len(cells)):
@@ -157,7 +166,7 @@ def _curved_stress(
 
 
 @njit(cache=True)
-def _linear_energy(values, s):  # type: ignore[no-untyped-def]
+def _linear_energy(values: FloatArray, s: FloatArray) -> float:
     """Mean of ``v . S v`` over a cell for a field that is linear in it, from its corner values."""
     total, sums = 0.0, np.zeros(6)
     for a in range(4):
@@ -172,9 +181,16 @@ def _linear_energy(values, s):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _compare_linear(  # type: ignore[no-untyped-def]
-    points, corners, volumes, edges, polynomials, stress, compliance, result
-):
+def _compare_linear(
+    points: FloatArray,
+    corners: IntArray,
+    volumes: FloatArray,
+    edges: IntArray,
+    polynomials: tuple[IntArray, FloatArray, FloatArray, FloatArray],
+    stress: FloatArray,
+    compliance: FloatArray,
+    result: tuple[FloatArray, FloatArray],
+) -> None:
     """Energies of the difference from the recovered stress, and of the stress of the cells."""
     (of_corner, _, _, coefficients), (error, energy) = polynomials, result
     difference = np.empty((4, 6))
@@ -193,9 +209,16 @@ def _compare_linear(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _compare_quadratic(  # type: ignore[no-untyped-def]
-    points, corners, volumes, edges, polynomials, stress, compliance, result
-):
+def _compare_quadratic(
+    points: FloatArray,
+    corners: IntArray,
+    volumes: FloatArray,
+    edges: IntArray,
+    polynomials: tuple[IntArray, FloatArray, FloatArray, FloatArray],
+    stress: FloatArray,
+    compliance: FloatArray,
+    result: tuple[FloatArray, FloatArray],
+) -> None:
     """Do the same for quadratic cells: ten nodes determine the difference, which is quadratic.
 
     The integrals of the products of the shape functions are those of the quadratic tetrahedron,
@@ -326,7 +349,7 @@ def stress_patches(mesh: TetMesh, stress: FloatArray, stiffness: FloatArray) -> 
 
 
 @njit(cache=True)
-def _cells_round(of_corner, groups):  # type: ignore[no-untyped-def]
+def _cells_round(of_corner: IntArray, groups: int) -> tuple[IntArray, IntArray]:
     """Cells that have each polynomial at a corner: their starts, and the cells."""
     start = np.zeros(groups + 1, np.int64)
     for cell in range(len(of_corner)):
@@ -345,7 +368,7 @@ def _cells_round(of_corner, groups):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _terms(x, y, z, p):  # type: ignore[no-untyped-def]
+def _terms(x: float, y: float, z: float, p: FloatArray) -> None:
     """Store the terms of a polynomial at a place."""
     p[0], p[1], p[2], p[3] = 1.0, x, y, z
     if len(p) == 10:
@@ -353,7 +376,16 @@ def _terms(x, y, z, p):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _gather_patch(group, corners, of_corner, start, cells, least, stamp, gathered):  # type: ignore[no-untyped-def]
+def _gather_patch(
+    group: int,
+    corners: IntArray,
+    of_corner: IntArray,
+    start: IntArray,
+    cells: IntArray,
+    least: int,
+    stamp: IntArray,
+    gathered: IntArray,
+) -> int:
     """Store the cells of a patch and return their number: those at the node, more if too few."""
     count = 0
     for k in range(start[group], start[group + 1]):
@@ -377,7 +409,7 @@ def _gather_patch(group, corners, of_corner, start, cells, least, stamp, gathere
 
 
 @njit(cache=True)
-def _cholesky(matrix, right):  # type: ignore[no-untyped-def]
+def _cholesky(matrix: FloatArray, right: FloatArray) -> None:
     """Solve with a small positive definite matrix, in place."""
     n, m = right.shape
     for i in range(n):
@@ -400,9 +432,16 @@ def _cholesky(matrix, right):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _fit(  # type: ignore[no-untyped-def]
-    points, corners, groups, at, stress, least, ridge, result
-):
+def _fit(
+    points: FloatArray,
+    corners: IntArray,
+    groups: tuple[IntArray, IntArray, IntArray, IntArray],
+    at: FloatArray,
+    stress: FloatArray,
+    least: int,
+    ridge: FloatArray,
+    result: tuple[FloatArray, FloatArray],
+) -> None:
     (of_corner, nodes, start, cells), (size, coefficients) = groups, result
     terms = coefficients.shape[1]
     p = np.empty(terms)
@@ -455,7 +494,9 @@ def _fit(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def fitted(coefficients, x, y, z, p, out):  # type: ignore[no-untyped-def]
+def fitted(
+    coefficients: FloatArray, x: float, y: float, z: float, p: FloatArray, out: FloatArray
+) -> None:
     """Add the stress (6,) of a polynomial at a place to `out`, half of it."""
     _terms(x, y, z, p)
     for i in range(len(p)):

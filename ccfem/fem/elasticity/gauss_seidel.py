@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 from numba import njit
 
-from ccfem.base.arrays import FloatArray
+from ccfem.base.arrays import Float32Array, FloatArray, Int32Array
 
 _CONTRACT = {"contract"}
 """Products and sums may be fused."""
@@ -22,7 +22,15 @@ _SINGULAR = 1e-12
 
 
 @njit(cache=True)
-def _halve(indptr, indices, data, start, column, low, diagonal):  # type: ignore[no-untyped-def]
+def _halve(
+    indptr: Int32Array,
+    indices: Int32Array,
+    data: FloatArray,
+    start: Int32Array,
+    column: Int32Array,
+    low: FloatArray,
+    diagonal: FloatArray,
+) -> None:
     """Pick the blocks below the diagonal and on it."""
     d, place = data.shape[1], 0
     for i in range(indptr.size - 1):
@@ -42,7 +50,15 @@ def _halve(indptr, indices, data, start, column, low, diagonal):  # type: ignore
 
 
 @njit(cache=True, fastmath=_CONTRACT)
-def _three(start, column, low, inverse, rest, x, backward):  # type: ignore[no-untyped-def]
+def _three(
+    start: Int32Array,
+    column: Int32Array,
+    low: Float32Array,
+    inverse: FloatArray,
+    rest: FloatArray,
+    x: FloatArray,
+    backward: bool,
+) -> None:
     """Sweep over 3x3 blocks.
 
     Forward, from ``x = 0`` and ``rest = 0``, with the right-hand side in x: `rest` becomes the
@@ -75,7 +91,15 @@ def _three(start, column, low, inverse, rest, x, backward):  # type: ignore[no-u
 
 
 @njit(cache=True, fastmath=_CONTRACT)
-def _six(start, column, low, inverse, rest, x, backward):  # type: ignore[no-untyped-def]
+def _six(
+    start: Int32Array,
+    column: Int32Array,
+    low: FloatArray,
+    inverse: FloatArray,
+    rest: FloatArray,
+    x: FloatArray,
+    backward: bool,
+) -> None:
     """Do the same over 6x6 blocks."""
     n, f, u = start.size - 1, np.empty(6), np.empty(6)
     for row in range(n):

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from numba import njit
 
-from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.arrays import Float32Array, FloatArray, Int32Array, IntArray
 from ccfem.fem.elasticity.conjugate_gradient import highest_eigenvalue
 from ccfem.fem.elasticity.direct import Apply
 from ccfem.fem.elasticity.gauss_seidel import GaussSeidel
@@ -60,7 +60,9 @@ def aggregates(matrix: sp.bsr_array, near_kernel: FloatArray, strength: float) -
 
 
 @njit(cache=True)
-def _strong(indptr, indices, data, strength):  # type: ignore[no-untyped-def]
+def _strong(
+    indptr: Int32Array, indices: Int32Array, data: FloatArray, strength: float
+) -> tuple[Int32Array, Int32Array]:
     """Strong connections of each node with others."""
     n, d = indptr.size - 1, data.shape[1]
     # Squared size of the blocks. Strong: above the strength times the mean of both diagonals.
@@ -91,7 +93,7 @@ def _strong(indptr, indices, data, strength):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _grouped(start, column):  # type: ignore[no-untyped-def]
+def _grouped(start: Int32Array, column: Int32Array) -> tuple[Int32Array, int]:
     """Group of each node, and their number."""
     n, count = start.size - 1, 0
     result = np.full(n, -1, np.int32)
@@ -125,7 +127,9 @@ def _grouped(start, column):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _orthonormal(of_node, near_kernel, motions, coarse):  # type: ignore[no-untyped-def]
+def _orthonormal(
+    of_node: Int32Array, near_kernel: FloatArray, motions: FloatArray, coarse: FloatArray
+) -> None:
     """Factorise the near kernel of each group into orthonormal columns and a 6x6 triangle.
 
     By the modified method of Gram and Schmidt, twice.
@@ -166,7 +170,9 @@ def _orthonormal(of_node, near_kernel, motions, coarse):  # type: ignore[no-unty
 
 
 @njit(cache=True)
-def _product(motions, member, first, last, b, c):  # type: ignore[no-untyped-def]
+def _product(
+    motions: FloatArray, member: Int32Array, first: int, last: int, b: int, c: int
+) -> float:
     """Inner product of two columns over a group."""
     total = 0.0
     for e in range(first, last):
@@ -193,9 +199,9 @@ class Prolongation(NamedTuple):
         Used for both the prolongation and its transpose, so that they match exactly.
     """
 
-    indptr: IntArray
-    indices: IntArray
-    blocks: FloatArray
+    indptr: Int32Array
+    indices: Int32Array
+    blocks: Float32Array
     groups: int
 
     def restrict(self, forces: FloatArray) -> FloatArray:
@@ -229,7 +235,7 @@ def smoothed(
     of_node, motions = groups.of_node, groups.motions
     count = len(groups.near_kernel)
     indptr, indices = _neighbour_groups(matrix.indptr, matrix.indices, of_node, count)
-    blocks: FloatArray = np.empty((len(indices), motions.shape[1], 6), dtype=np.float32)
+    blocks = np.empty((len(indices), motions.shape[1], 6), dtype=np.float32)
     prolong = Prolongation(indptr, indices, blocks, count)
     rows = _Rows(matrix.indptr, matrix.indices, matrix.data)
     _smooth(rows, inverse, of_node, motions, float(damping), prolong)
@@ -255,13 +261,19 @@ def galerkin(matrix: sp.bsr_array, prolong: Prolongation) -> sp.bsr_array:
 class _Rows(NamedTuple):
     """A sparse matrix of blocks ``data[k]`` (k, d, d), row by row, for compiled functions."""
 
-    indptr: IntArray
-    indices: IntArray
+    indptr: Int32Array
+    indices: Int32Array
     data: FloatArray
 
 
 @njit(cache=True)
-def _restrict(indptr, indices, blocks, forces, result):  # type: ignore[no-untyped-def]
+def _restrict(
+    indptr: Int32Array,
+    indices: Int32Array,
+    blocks: Float32Array,
+    forces: FloatArray,
+    result: FloatArray,
+) -> None:
     d = blocks.shape[1]
     for i in range(indptr.size - 1):
         for s in range(indptr[i], indptr[i + 1]):
@@ -272,7 +284,13 @@ def _restrict(indptr, indices, blocks, forces, result):  # type: ignore[no-untyp
 
 
 @njit(cache=True, fastmath={"contract", "reassoc"})
-def _prolong(indptr, indices, blocks, motions, x):  # type: ignore[no-untyped-def]
+def _prolong(
+    indptr: Int32Array,
+    indices: Int32Array,
+    blocks: Float32Array,
+    motions: FloatArray,
+    x: FloatArray,
+) -> None:
     d = blocks.shape[1]
     for i in range(indptr.size - 1):
         for s in range(indptr[i], indptr[i + 1]):
@@ -285,7 +303,9 @@ def _prolong(indptr, indices, blocks, motions, x):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True)
-def _neighbour_groups(indptr, indices, of_node, count):  # type: ignore[no-untyped-def]
+def _neighbour_groups(
+    indptr: Int32Array, indices: Int32Array, of_node: Int32Array, count: int
+) -> tuple[Int32Array, Int32Array]:
     """Find the groups of the neighbours of each node."""
     n = indptr.size - 1
     seen = np.full(count, -1, np.int32)
@@ -343,14 +363,14 @@ def _smooth(
 
 
 @njit(cache=True)
-def _set_to_zero(values):  # type: ignore[no-untyped-def]
+def _set_to_zero(values: FloatArray) -> None:
     for p in range(values.shape[0]):
         for c in range(6):
             values[p, c] = 0.0
 
 
 @njit(cache=True, fastmath=_CONTRACT)
-def _add(a, b, total):  # type: ignore[no-untyped-def]
+def _add(a: FloatArray, b: FloatArray, total: FloatArray) -> None:
     """Add the product of a (r, d) and b (d, 6) to total (r, 6), a row at a time in registers."""
     for p in range(a.shape[0]):
         u, v, w = total[p, 0], total[p, 1], total[p, 2]
@@ -368,7 +388,9 @@ def _add(a, b, total):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _met(indptr, indices, start, column, count):  # type: ignore[no-untyped-def]
+def _met(
+    indptr: Int32Array, indices: Int32Array, start: Int32Array, column: Int32Array, count: int
+) -> tuple[Int32Array, Int32Array]:
     """Pattern of ``P^T A P``, ascending in its rows."""
     n = indptr.size - 1
     first = np.zeros(count + 1, np.int32)
@@ -461,7 +483,7 @@ def _project(rows: _Rows, prolong: Prolongation, coarse: _Rows) -> None:
 
 
 @njit(cache=True)
-def _reflect(first, other, result):  # type: ignore[no-untyped-def]
+def _reflect(first: Int32Array, other: Int32Array, result: FloatArray) -> None:
     """Copy what is below the diagonal to above it."""
     place = np.empty(first.size - 1, np.int32)
     for i in range(first.size - 1):

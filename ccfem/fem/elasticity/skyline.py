@@ -19,7 +19,9 @@ _TOGETHER = 4
 
 
 @njit(cache=True, fastmath=True)
-def _tile(a, b, c, d, x, y, n):  # type: ignore[no-untyped-def]
+def _tile(
+    a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, x: FloatArray, y: FloatArray, n: int
+) -> tuple[float, ...]:
     """Products of four rows with two, over their first n entries."""
     p = q = r = s = t = u = v = w = 0.0
     for k in range(n):
@@ -36,7 +38,7 @@ def _tile(a, b, c, d, x, y, n):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=True)
-def _factorise(first, start, values):  # type: ignore[no-untyped-def]
+def _factorise(first: IntArray, start: IntArray, values: FloatArray) -> int:
     """Factorise in place; return the first row without a positive pivot, or -1.
 
     Row i lies at ``values[start[i] + j]``, ``first[i] <= j <= i``. Its diagonal entry becomes the
@@ -85,7 +87,7 @@ def _factorise(first, start, values):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=True)
-def _substitute(first, start, values, x):  # type: ignore[no-untyped-def]
+def _substitute(first: IntArray, start: IntArray, values: FloatArray, x: FloatArray) -> None:
     """Solve in place with the factor of `_factorise`."""
     for i in range(first.size):
         row = values[start[i] + first[i] : start[i] + i + 1]
@@ -105,7 +107,14 @@ def _substitute(first, start, values, x):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _fill_profile(indptr, indices, place, start, data, values):  # type: ignore[no-untyped-def]
+def _fill_profile(
+    indptr: IntArray,
+    indices: IntArray,
+    place: IntArray,
+    start: IntArray,
+    data: FloatArray,
+    values: FloatArray,
+) -> None:
     """Put the lower triangle of a block matrix in its place."""
     d = data.shape[1]
     for block in range(indptr.size - 1):

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from ccfem.base.arrays import FloatArray, IntArray, freeze
+from ccfem.base.arrays import FloatArray, Int32Array, IntArray, freeze
 from ccfem.body.mesh.curved_cells import gradients_at
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.assembly import cell_gradients
@@ -44,7 +44,9 @@ def bar_stiffness(
 
 
 @njit(cache=True)
-def _add_bars(cell, weight, tangent, result):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _add_bars(
+    cell: IntArray, weight: FloatArray, tangent: FloatArray, result: FloatArray
+) -> None:  # pragma: no cover
     m = np.empty(6)
     for s in range(len(cell)):
         if weight[s] == 0.0:
@@ -110,7 +112,9 @@ def _seen(displacement: FloatArray) -> FloatArray:
 
 # One loop each, without slices, which would double the time.
 @njit(cache=True)
-def _strain(nodes, slope, tangent, u, result):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _strain(
+    nodes: Int32Array, slope: FloatArray, tangent: FloatArray, u: FloatArray, result: FloatArray
+) -> None:  # pragma: no cover
     for s in range(len(nodes)):
         x, y, z = tangent[s, 0], tangent[s, 1], tangent[s, 2]
         total = 0.0
@@ -121,7 +125,14 @@ def _strain(nodes, slope, tangent, u, result):  # type: ignore[no-untyped-def]  
 
 
 @njit(cache=True)
-def _bar_forces(nodes, slope, tangent, weight, u, result):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _bar_forces(
+    nodes: Int32Array,
+    slope: FloatArray,
+    tangent: FloatArray,
+    weight: FloatArray,
+    u: FloatArray,
+    result: FloatArray,
+) -> None:  # pragma: no cover
     for s in range(len(nodes)):
         if weight[s] == 0.0:
             continue

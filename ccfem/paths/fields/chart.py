@@ -236,7 +236,7 @@ def _rotations(surface: Surface, image: FloatArray) -> FloatArray:
 
 
 @njit(cache=True, nogil=True)
-def _nearest_rotations(gradients, triangles, image):  # type: ignore[no-untyped-def]
+def _nearest_rotations(gradients: FloatArray, triangles: IntArray, image: FloatArray) -> FloatArray:
     rotations = np.empty((len(triangles), 2, 2))
     for t in range(len(triangles)):
         cosine, sine = 0.0, 0.0

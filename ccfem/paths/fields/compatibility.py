@@ -51,7 +51,9 @@ def incompatible(
 
 
 @njit(cache=True)
-def _disagreeing(direction, cells, defined, cell_of, start):  # type: ignore[no-untyped-def]
+def _disagreeing(
+    direction: FloatArray, cells: IntArray, defined: BoolArray, cell_of: IntArray, start: IntArray
+) -> tuple[IntArray, IntArray]:
     count = len(cells)
     against = np.zeros(count, np.int64)
     asked = np.zeros(count, np.int64)

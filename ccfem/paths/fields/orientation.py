@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 
 
 def orient(
@@ -41,7 +41,7 @@ def orient(
 
 
 @njit(cache=True, nogil=True)
-def _signs(count, pairs, opposite):  # type: ignore[no-untyped-def]
+def _signs(count: int, pairs: IntArray, opposite: BoolArray) -> FloatArray:
     parent = np.arange(count)
     parity = np.zeros(count, np.bool_)  # relative to the parent
     root_of_pair = np.empty(2, np.int64)

@@ -132,7 +132,9 @@ def _usual_size(corners: FloatArray, plane_stress: FloatArray) -> float:
 
 
 @njit(cache=True, nogil=True)
-def direction_at(field, cell, x, y, sharpest, way):  # type: ignore[no-untyped-def]
+def direction_at(
+    field: LineField, cell: int, x: float, y: float, sharpest: float, way: FloatArray
+) -> tuple[float, float, int, bool]:
     """Return the unit direction at (x, y), the triangle there, and whether there is one.
 
     The triangle is found by walking from `cell`. `way` is the previous direction, which sets the
@@ -184,7 +186,9 @@ def direction_at(field, cell, x, y, sharpest, way):  # type: ignore[no-untyped-d
 
 
 @njit(cache=True, nogil=True)
-def streamline_step(field, cell, x, y, step, way):  # type: ignore[no-untyped-def]
+def streamline_step(
+    field: LineField, cell: int, x: float, y: float, step: float, way: FloatArray
+) -> tuple[float, float, int, bool]:
     """Point one step on, the triangle there, and whether there is one; updates `way`."""
     h = 0.5 * step
     ax, ay, cell, fine = direction_at(field, cell, x, y, _SHARPEST, way)
@@ -206,7 +210,9 @@ def streamline_step(field, cell, x, y, step, way):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True, nogil=True)
-def _follow_field(field, start, cell, step, most, sense):  # type: ignore[no-untyped-def]
+def _follow_field(
+    field: LineField, start: FloatArray, cell: int, step: float, most: int, sense: int
+) -> tuple[FloatArray, bool]:
     """Points (m, 2) from `start` in one sense, and whether they come back to it."""
     line = np.empty((most + 1, 2))
     x, y = start[0], start[1]

@@ -91,7 +91,7 @@ def stub_points(end: FloatArray, reach: float, step: float) -> FloatArray:
 
 
 @njit(cache=True, nogil=True)
-def _extended(end, reach):  # type: ignore[no-untyped-def]
+def _extended(end: FloatArray, reach: float) -> FloatArray:
     pose = end.copy()
     pose[0] += reach * np.cos(end[2])
     pose[1] += reach * np.sin(end[2])
@@ -99,14 +99,22 @@ def _extended(end, reach):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _reversed(pose):  # type: ignore[no-untyped-def]
+def _reversed(pose: FloatArray) -> FloatArray:
     back = pose.copy()
     back[2] += np.pi
     return back
 
 
 @njit(cache=True, nogil=True)
-def curve_cost(start, turns, sizes, radius, grid, weights, limit):  # type: ignore[no-untyped-def]
+def curve_cost(
+    start: FloatArray,
+    turns: IntArray,
+    sizes: FloatArray,
+    radius: float,
+    grid: SectionGrid,
+    weights: FloatArray,
+    limit: float,
+) -> float:
     """Length of a curve plus `weights` times its length in each place; inf above the limit."""
     cost = abs(sizes[0]) + abs(sizes[1]) + abs(sizes[2])
     x, y, heading = start[0], start[1], start[2]
@@ -132,7 +140,14 @@ def curve_cost(start, turns, sizes, radius, grid, weights, limit):  # type: igno
 
 
 @njit(cache=True, nogil=True)
-def _link_curves(ends, reach, radius, grid, weights, bound):  # type: ignore[no-untyped-def]
+def _link_curves(
+    ends: FloatArray,
+    reach: FloatArray,
+    radius: float,
+    grid: SectionGrid,
+    weights: FloatArray,
+    bound: FloatArray,
+) -> tuple[FloatArray, FloatArray, IntArray]:
     count, variants = reach.shape
     cost = np.full((count, count), np.inf)
     chosen = np.zeros((count, count))

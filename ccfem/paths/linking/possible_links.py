@@ -335,7 +335,14 @@ def _poses(line: FloatArray, side: int, cuts: FloatArray, width: float) -> Float
 
 
 @njit(cache=True, nogil=True)
-def _best(poses, pairs, cuts, room, radius, limit):  # type: ignore[no-untyped-def]
+def _best(
+    poses: FloatArray,
+    pairs: IntArray,
+    cuts: FloatArray,
+    room: FloatArray,
+    radius: float,
+    limit: float,
+) -> FloatArray:
     """Cost, turn and cuts of the cheapest link of each pair; infinite cost if there is none."""
     result = np.empty((len(pairs), 4))
     sizes = np.empty((6, 3))

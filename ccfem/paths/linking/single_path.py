@@ -126,7 +126,9 @@ def _filled(section: Region) -> Shapes:
 
 
 @njit(cache=True, nogil=True)
-def _leads(starts, goal, radius, grid, weights):  # type: ignore[no-untyped-def]
+def _leads(
+    starts: FloatArray, goal: FloatArray, radius: float, grid: SectionGrid, weights: FloatArray
+) -> tuple[FloatArray, IntArray]:
     count, _, variants, _ = goal.shape
     cost = np.full(goal.shape[:3], np.inf)
     word = np.zeros(goal.shape[:3], np.int64)
@@ -535,7 +537,7 @@ def costs_between_ends(links: FloatArray) -> FloatArray:
 
 
 @njit(cache=True, nogil=True)
-def _costs_of_sets(clusters):  # type: ignore[no-untyped-def]
+def _costs_of_sets(clusters: Clusters) -> FloatArray:
     """Least cost of having visited a set of clusters and left at one of its terminals, (2^p, t)."""
     links, visit, offsets, first, _ = clusters
     count, terminals = len(offsets) - 1, len(links)

@@ -113,7 +113,7 @@ _STEPS = NEIGHBOURS.copy()
 
 
 @njit(cache=True)
-def _crosses(following, width, i, j, k):  # type: ignore[no-untyped-def]
+def _crosses(following: IntArray, width: int, i: int, j: int, k: int) -> bool:
     """Whether a step from a pixel would cross a diagonal step of a path."""
     if k % 2 == 0:
         return False
@@ -122,7 +122,16 @@ def _crosses(following, width, i, j, k):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _next_sense(line, regions, linked, used, following, i, j, way):  # type: ignore[no-untyped-def]
+def _next_sense(
+    line: BoolArray,
+    regions: IntArray,
+    linked: BoolArray,
+    used: BoolArray,
+    following: IntArray,
+    i: int,
+    j: int,
+    way: int,
+) -> int:
     """Sense (0 to 7) of the way on from a pixel, as straight as can be; -1 where there is none."""
     best, least = -1, 99
     for k in range(8):
@@ -142,7 +151,15 @@ def _next_sense(line, regions, linked, used, following, i, j, way):  # type: ign
 
 
 @njit(cache=True)
-def _follow_pixels(line, regions, linked, used, following, start, chain):  # type: ignore[no-untyped-def]
+def _follow_pixels(
+    line: BoolArray,
+    regions: IntArray,
+    linked: BoolArray,
+    used: BoolArray,
+    following: IntArray,
+    start: int,
+    chain: IntArray,
+) -> int:
     """Follow a line both ways from a pixel into `chain`; the number of its pixels."""
     width = regions.shape[1]
     used[start // width, start % width] = True
@@ -172,7 +189,9 @@ def _follow_pixels(line, regions, linked, used, following, start, chain):  # typ
 
 
 @njit(cache=True)
-def _beside_on(line, regions, linked, i, j):  # type: ignore[no-untyped-def]
+def _beside_on(
+    line: BoolArray, regions: IntArray, linked: BoolArray, i: int, j: int
+) -> tuple[int, int]:
     """Count the neighbours of a pixel on its line, and give the sense of the last of them."""
     count, way = 0, -1
     for k in range(8):
@@ -183,7 +202,7 @@ def _beside_on(line, regions, linked, i, j):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def cut_spurs(line, regions, linked, least):  # type: ignore[no-untyped-def]
+def cut_spurs(line: BoolArray, regions: IntArray, linked: BoolArray, least: int) -> None:
     """Remove branches of fewer pixels than `least`, from a free end to a fork, from the lines."""
     width = regions.shape[1]
     chain = np.empty(least, dtype=np.int64)
@@ -209,7 +228,15 @@ def cut_spurs(line, regions, linked, least):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def walk(line, regions, linked, used, following, before, stub):  # type: ignore[no-untyped-def]
+def walk(
+    line: BoolArray,
+    regions: IntArray,
+    linked: BoolArray,
+    used: BoolArray,
+    following: IntArray,
+    before: IntArray,
+    stub: int,
+) -> int:
     """Follow all lines, from their ends first; the number of paths found.
 
     Chains of fewer pixels than `stub` beside an earlier path are dropped.
@@ -241,7 +268,9 @@ def walk(line, regions, linked, used, following, before, stub):  # type: ignore[
 
 
 @njit(cache=True)
-def _beside(chain, size, regions, linked, used):  # type: ignore[no-untyped-def]
+def _beside(
+    chain: IntArray, size: int, regions: IntArray, linked: BoolArray, used: BoolArray
+) -> bool:
     """Whether some pixel of a chain has a neighbour of its region that is on a path."""
     width = regions.shape[1]
     for m in range(size):
@@ -254,7 +283,9 @@ def _beside(chain, size, regions, linked, used):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def fill_corners(regions, linked, used, following, before):  # type: ignore[no-untyped-def]
+def fill_corners(
+    regions: IntArray, linked: BoolArray, used: BoolArray, following: IntArray, before: IntArray
+) -> None:
     """Replace diagonal steps of paths by two over an unused pixel beside both their ends."""
     height, width = regions.shape
     for i in range(1, height - 1):
@@ -280,7 +311,9 @@ def fill_corners(regions, linked, used, following, before):  # type: ignore[no-u
 
 
 @njit(cache=True)
-def extend_ends(regions, linked, used, following, before):  # type: ignore[no-untyped-def]
+def extend_ends(
+    regions: IntArray, linked: BoolArray, used: BoolArray, following: IntArray, before: IntArray
+) -> None:
     """Extend open paths over the unused pixels ahead of their ends."""
     width = regions.shape[1]
     for start in range(regions.size):
@@ -316,7 +349,9 @@ def extend_ends(regions, linked, used, following, before):  # type: ignore[no-un
 
 
 @njit(cache=True)
-def join_ends(regions, linked, used, following, before):  # type: ignore[no-untyped-def]
+def join_ends(
+    regions: IntArray, linked: BoolArray, used: BoolArray, following: IntArray, before: IntArray
+) -> None:
     """Join paths of one region whose ends are neighbours; close those that end at their start."""
     height, width = regions.shape
     for i in range(1, height - 1):
@@ -341,7 +376,7 @@ def join_ends(regions, linked, used, following, before):  # type: ignore[no-unty
 
 
 @njit(cache=True)
-def _join(following, before, here, there):  # type: ignore[no-untyped-def]
+def _join(following: IntArray, before: IntArray, here: int, there: int) -> None:
     """Join the paths that end at two pixels, or close the one path of more than three pixels."""
     size, at, back = 1, here, following[here] < 0
     while True:
@@ -374,7 +409,9 @@ def _join(following, before, here, there):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def chains(regions, used, following, before):  # type: ignore[no-untyped-def]
+def chains(
+    regions: IntArray, used: BoolArray, following: IntArray, before: IntArray
+) -> tuple[IntArray, IntArray, BoolArray]:
     """Pixels path by path, with offsets and which are closed."""
     width = regions.shape[1]
     pixels = np.empty((used.size, 2), dtype=np.int64)
@@ -401,7 +438,7 @@ def chains(regions, used, following, before):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def absorb(regions, linked, isolated, label):  # type: ignore[no-untyped-def]
+def absorb(regions: IntArray, linked: BoolArray, isolated: BoolArray, label: IntArray) -> None:
     """Label isolated pixels by a path beside them, best of their region and sharing a side."""
     height, width = regions.shape
     changed = True
@@ -508,7 +545,7 @@ def corners(pixels: IntArray, offsets: IntArray, stairs: bool = True) -> BoolArr
 
 
 @njit(cache=True)
-def _pixel_corners(pixels, offsets, stairs):  # type: ignore[no-untyped-def]
+def _pixel_corners(pixels: IntArray, offsets: IntArray, stairs: int) -> BoolArray:
     keep = np.ones(len(pixels), dtype=np.bool_)
     for path in range(len(offsets) - 1):
         first, last = offsets[path], offsets[path + 1] - 1
@@ -541,7 +578,7 @@ def _pixel_corners(pixels, offsets, stairs):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _stair(pixels, m):  # type: ignore[no-untyped-def]
+def _stair(pixels: IntArray, m: int) -> bool:
     """Whether the steps from point m and m + 1 go along sides, at a right angle."""
     ax, ay = pixels[m + 1, 0] - pixels[m, 0], pixels[m + 1, 1] - pixels[m, 1]
     bx, by = pixels[m + 2, 0] - pixels[m + 1, 0], pixels[m + 2, 1] - pixels[m + 1, 1]
@@ -550,7 +587,7 @@ def _stair(pixels, m):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _parallel(pixels, m):  # type: ignore[no-untyped-def]
+def _parallel(pixels: IntArray, m: int) -> bool:
     """Whether the step to point m and that from point m + 1 are the same."""
     for i in range(2):
         if pixels[m + 2, i] - pixels[m + 1, i] != pixels[m, i] - pixels[m - 1, i]:

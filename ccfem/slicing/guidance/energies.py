@@ -115,9 +115,14 @@ def _volumes(points: FloatArray, cells: IntArray) -> FloatArray:
 
 
 @njit(cache=True)
-def _jumps(  # type: ignore[no-untyped-def]
-    cells, gradients, first, second, normal, weight
-):
+def _jumps(
+    cells: IntArray,
+    gradients: FloatArray,
+    first: IntArray,
+    second: IntArray,
+    normal: FloatArray,
+    weight: FloatArray,
+) -> tuple[IntArray, FloatArray]:
     """Weighted jump of the gradient across each face as a form of its five nodes (f, 5).
 
     Both gradients are equal along the face, so the jump is normal to it.

@@ -141,7 +141,9 @@ def _agreeing(form: FloatArray) -> FloatArray:
 
 
 @njit(cache=True, nogil=True)
-def _jump_energy(parts, senses, one, other, area):  # type: ignore[no-untyped-def]
+def _jump_energy(
+    parts: FloatArray, senses: FloatArray, one: IntArray, other: IntArray, area: FloatArray
+) -> float:
     """Sum over faces of area times (1 - cosine)^2 of the mixed field, normalised."""
     count, m, _ = parts.shape
     unit = np.zeros((m, 3))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from ccfem.base.arrays import BoolArray, FloatArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 
 _BISECTIONS = 50
 
@@ -55,7 +55,9 @@ class Profile:
 
 
 @njit(cache=True)
-def _best_stretches(gain, least, cost, equal, keep):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _best_stretches(
+    gain: FloatArray, least: int, cost: float, equal: float, keep: BoolArray
+) -> float:  # pragma: no cover
     """Mark the pieces to keep and return their gain: dynamic programming over the pieces.
 
     `free[i]` is the largest gain of the first i pieces, `held[i]` the largest gain if piece i is
@@ -115,7 +117,9 @@ def least_price(
 
 
 @njit(cache=True)
-def _kept_length(value, ends, step, least, price, cost):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _kept_length(
+    value: FloatArray, ends: IntArray, step: FloatArray, least: IntArray, price: float, cost: float
+) -> float:  # pragma: no cover
     """Length that a price keeps of all profiles."""
     longest, begin = 0, 0
     for k in range(len(ends)):

@@ -325,7 +325,9 @@ def on_linear_cells(stress: StressField, backend: str = "auto") -> StressField:
 
 # One loop each, without slices, which would double the time.
 @njit(cache=True)
-def _strains(cells, slopes, plane, result):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _strains(
+    cells: IntArray, slopes: FloatArray, plane: FloatArray, result: FloatArray
+) -> None:  # pragma: no cover
     """Strain e11, e22 and twice e12 in the plane of each cell."""
     for c in range(len(cells)):
         e1, e2, e12 = 0.0, 0.0, 0.0
@@ -339,7 +341,9 @@ def _strains(cells, slopes, plane, result):  # type: ignore[no-untyped-def]  # p
 
 
 @njit(cache=True)
-def _forces(cells, slopes, packed, plane, result):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _forces(
+    cells: IntArray, slopes: FloatArray, packed: FloatArray, plane: FloatArray, result: FloatArray
+) -> None:  # pragma: no cover
     for c in range(len(cells)):
         e1, e2, e12 = 0.0, 0.0, 0.0
         for a in range(4):

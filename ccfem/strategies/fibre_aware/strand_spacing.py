@@ -201,7 +201,9 @@ def _solve(matrix: Any, right: FloatArray) -> FloatArray:
 
 
 @njit(cache=True)
-def _too_near(points, normals, pairs, least):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _too_near(
+    points: FloatArray, normals: FloatArray, pairs: IntArray, least: float
+) -> tuple[IntArray, FloatArray, FloatArray]:  # pragma: no cover
     """Pairs that are too near: their points, how slides part them, and how much is missing."""
     count = 0
     for write in range(2):
@@ -231,7 +233,9 @@ def _too_near(points, normals, pairs, least):  # type: ignore[no-untyped-def]  #
 
 
 @njit(cache=True)
-def _from_border(x, y, near, border, inward):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _from_border(
+    x: float, y: float, near: IntArray, border: FloatArray, inward: FloatArray
+) -> tuple[float, float, float]:  # pragma: no cover
     """Signed depth of a point in the section, and the unit vector that leads farther in."""
     best, gx, gy, nx, ny = np.inf, 0.0, 0.0, 0.0, 0.0
     for b in near:
@@ -252,7 +256,9 @@ def _from_border(x, y, near, border, inward):  # type: ignore[no-untyped-def]  #
 
 
 @njit(cache=True)
-def _depths(points, near, border, inward):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _depths(
+    points: FloatArray, near: IntArray, border: FloatArray, inward: FloatArray
+) -> FloatArray:  # pragma: no cover
     depth = np.empty(len(points))
     for p in range(len(points)):
         depth[p], _, _ = _from_border(points[p, 0], points[p, 1], near[p], border, inward)
@@ -260,7 +266,14 @@ def _depths(points, near, border, inward):  # type: ignore[no-untyped-def]  # pr
 
 
 @njit(cache=True)
-def _outside(points, near, border, inward, inset, normals):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _outside(
+    points: FloatArray,
+    near: IntArray,
+    border: FloatArray,
+    inward: FloatArray,
+    inset: FloatArray,
+    normals: FloatArray,
+) -> tuple[FloatArray, FloatArray]:  # pragma: no cover
     """How far in a unit slide leads, and how much farther in points should be; 0 if they are in."""
     off, missing = np.zeros(len(points)), np.zeros(len(points))
     for p in range(len(points)):
@@ -272,7 +285,9 @@ def _outside(points, near, border, inward, inset, normals):  # type: ignore[no-u
 
 
 @njit(cache=True)
-def _too_bent(points, normals, path, radius):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _too_bent(
+    points: FloatArray, normals: FloatArray, path: IntArray, radius: float
+) -> tuple[IntArray, FloatArray, FloatArray]:  # pragma: no cover
     """Bends that are too tight: their three points, the effect of slides, and what is missing."""
     count = 0
     for write in range(2):

@@ -248,7 +248,15 @@ def straighten(points: FloatArray, path: EdgePath, keep: float, sweeps: int = _S
 
 
 @njit(cache=True, nogil=True)
-def _sweep(points, start, end, edges, share, keep, sweeps):  # type: ignore[no-untyped-def]
+def _sweep(
+    points: FloatArray,
+    start: int,
+    end: int,
+    edges: IntArray,
+    share: FloatArray,
+    keep: float,
+    sweeps: int,
+) -> None:
     count = len(share)
     for sweep in range(sweeps):
         for step in range(count):
@@ -274,18 +282,22 @@ def _sweep(points, start, end, edges, share, keep, sweeps):  # type: ignore[no-u
 
 
 @njit(cache=True, nogil=True)
-def _before(points, start, edges, share, k, i):  # type: ignore[no-untyped-def]
+def _before(
+    points: FloatArray, start: int, edges: IntArray, share: FloatArray, k: int, i: int
+) -> float:
     """Coordinate i of the point before crossing k: the previous crossing, or the start."""
     return points[start, i] if k == 0 else _crossing(points, edges, share, k - 1, i)
 
 
 @njit(cache=True, nogil=True)
-def _behind(points, end, edges, share, k, i):  # type: ignore[no-untyped-def]
+def _behind(
+    points: FloatArray, end: int, edges: IntArray, share: FloatArray, k: int, i: int
+) -> float:
     """Coordinate i of the point after crossing k: the next crossing, or the end."""
     return points[end, i] if k == len(share) - 1 else _crossing(points, edges, share, k + 1, i)
 
 
 @njit(cache=True, nogil=True)
-def _crossing(points, edges, share, k, i):  # type: ignore[no-untyped-def]
+def _crossing(points: FloatArray, edges: IntArray, share: FloatArray, k: int, i: int) -> float:
     """Coordinate i of a crossing."""
     return points[edges[k, 0], i] * (1.0 - share[k]) + points[edges[k, 1], i] * share[k]
