@@ -129,6 +129,8 @@ def join_rings(
     """
     chains: list[list[FloatArray]] = []
     growing: list[list[FloatArray]] = []
+    # Each chain goes on to a ring of the next level that it has not been given; others begin
+    # chains.
     for depth, level in enumerate(levels):
         near = [ring for rung in levels[max(depth - 1, 0) : depth + 1] for ring in rung]
         walls = shapely.multilinestrings([shapely.linestrings(ring) for ring in near])

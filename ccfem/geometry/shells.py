@@ -157,6 +157,7 @@ def _middle_lines(
     tree = shapely.STRtree(shapely.linestrings(straight_pieces(shells)))
     lines = []
     for piece in pieces:
+        # Not where rings are nearer than strands may be.
         near, _ = tree.query(
             shapely.points(piece), predicate="dwithin", distance=(closest - 1e-3) * pitch
         )

@@ -464,6 +464,7 @@ def _joined_loops(line: _Loop, other: _Loop, spacing: float, start: FloatArray) 
     mine, theirs = (np.flatnonzero(~_gap_touches(loop.kept)) for loop in (line, other))
     if min(len(line.points), len(other.points)) < SAMPLES + 2 or not (len(mine) and len(theirs)):
         return None
+    # Of the nearest pairs of steps, the one with the shortest links, either way round.
     middles = _middles(line.points)[mine]
     off, near = KDTree(_middles(other.points)[theirs]).query(middles)
     late = _NEAR / spacing * np.linalg.norm(middles - start, axis=1)

@@ -129,10 +129,12 @@ def _wind(
     near = shapely.dwithin(strings[1], shapely.points(places), limit)
     if not near.any():
         return None
+    # Where the outermost ring is near the next one, at the least cost; inwards the seam follows.
     seam = shapely.points(places[near][np.argmin(cost(places[near]))])
     pieces = []
     for k, string in enumerate(strings):
         neighbour = strings[k + 1] if k + 1 < len(strings) else strings[k - 1]
+        # Open by two and a half times the distance to the next ring, so that the ramp is not steep.
         gap = 2.5 * float(shapely.distance(neighbour, seam))
         if gap > 2.5 * limit or gap > 0.5 * string.length:
             return None

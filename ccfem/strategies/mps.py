@@ -281,6 +281,7 @@ def clear_ends(lines: Sequence[FloatArray], distance: float, first: int = 0) -> 
         return cut
     back = np.linspace(0.0, _MOST * distance, _STEPS)
     places = np.stack([_points_before_end(lines[k], end, back) for k, end in tips])
+    # Room at places farther and farther back; the first with enough, between it and the one before.
     gap = _gaps(lines, places, np.array([k for k, _ in tips]), distance)
     far = gap >= _ENOUGH * distance
     for (k, end), reached, room in zip(tips, far, gap, strict=True):
@@ -581,9 +582,11 @@ def _first_hits(
         across = np.einsum("ij,ij->i", way[ray], side_way[:, ::-1] * [1.0, -1.0])
         offset = pieces[piece, 0] - start[ray]
         distance = np.einsum("ij,ij->i", offset, side_way[:, ::-1] * [1.0, -1.0])
+        # Distance along the ray: cross products with the piece; pieces along the ray have none.
         whole = np.abs(across) > 1e-9 * size
         ray, distance = ray[whole], (distance[whole] / across[whole])
         cosine = np.abs(across[whole]) / size[whole]
+        # The nearest piece of each ray, and how parallel it is: 0 from 45 degrees on.
         order = np.lexsort((distance, ray))
         _, first = np.unique(ray[order], return_index=True)
         chosen = order[first]

@@ -569,6 +569,8 @@ def walk(section: Region, stress: LayerStress, sampling: float) -> list[FloatArr
 
     paths = []
     while (left > 0).any():
+        # From ends that no path has used, the most stressed first; then from any point that is
+        # left.
         fresh_ends = (left == uses) & ends
         first = np.flatnonzero(fresh_ends if fresh_ends.any() else left > 0)
         start = int(first[np.argmax(size[first])])

@@ -490,6 +490,7 @@ def gradient_jumps(surface: Surface) -> sp.csr_array:
     """
     triangles, pairs, n = surface.triangles, surface.neighbours, len(surface.points)
     one, other = triangles[pairs[:, 0]], triangles[pairs[:, 1]]
+    # The two corners that both triangles have.
     shared = (one[:, :, None] == other[:, None, :]).any(axis=2)
     ends = one[shared].reshape(-1, 2)
     edge = surface.points[ends[:, 1]] - surface.points[ends[:, 0]]
@@ -501,6 +502,7 @@ def gradient_jumps(surface: Surface) -> sp.csr_array:
     gradients = np.einsum("tid,tdk->tik", surface.gradients, surface.frames)
     normal = np.cross(surface.frames[:, 0], surface.frames[:, 1])
     weight = np.sqrt(length / apart)[:, None]
+    # Slope normal to the edge in the plane of each triangle; the change is their difference.
     sides = [
         weight * np.einsum("fik,fk->fi", gradients[side], np.cross(edge, normal[side]))
         for side in pairs.T

@@ -358,6 +358,7 @@ def assemble(
         _gather_quadratic(*arguments, (_FIRST, _SECOND), data)
     n = 3 * len(mesh.points)
     matrix = sp.bsr_array((data, where.indices, where.indptr), shape=(n, n))
+    # Cells with curved sides: the difference from their straight ones, by quadrature.
     for start in range(0, len(mesh.curved), _BATCH):
         rows = mesh.curved[start : start + _BATCH]
         nodes = mesh.points[mesh.cells[rows]]

@@ -94,6 +94,7 @@ def find_contact(
         displacement = held.expand(solution.values)
         internal = (matrix @ displacement.reshape(-1)).reshape(forces.shape)
         following = held.following(displacement, internal - forces)
+        # The contact is found with a rough residual, then kept where it stays with the wanted one.
         if following is held and goal > tolerance:
             goal = tolerance
         elif following is held:

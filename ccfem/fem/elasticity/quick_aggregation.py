@@ -150,6 +150,7 @@ def _orthonormal(
             for p in range(d):
                 for c in range(6):
                     motions[i, p, c] = near_kernel[i, p, c]
+    # Gram and Schmidt, twice, which keeps columns orthogonal; what is left of a dependent one is 0.
     for k in range(count):
         first, last = start[k], start[k + 1]
         for c in range(6):

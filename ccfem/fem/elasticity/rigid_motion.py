@@ -185,6 +185,7 @@ def _constraints(
         starts = np.arange(0, 6 * len(body) + 1, 6)
         return sp.csr_array((factors.reshape(-1), columns.reshape(-1), starts), (len(body), size))
 
+    # A held node moves by the motion of its body: its component along the support must vanish.
     modes = rigid_modes(points[members.node]).reshape(-1, 3, 6)
     low = np.searchsorted(members.node, holds.nodes, side="left")
     count = np.searchsorted(members.node, holds.nodes, side="right") - low
@@ -195,6 +196,7 @@ def _constraints(
     centre_modes = rigid_modes(centres[holds.centre_of[moved]]).reshape(-1, 3, 6)
     shift = np.einsum("hk,hkj->hj", holds.along[moved], centre_modes)
     twist = np.pad(holds.about[turned], ((0, 0), (3, 0)))
+    # Bodies with a node in common move it alike.
     i, j = members.pairs()
     first = rows(np.repeat(members.owner[i], 3), modes[i].reshape(-1, 6))
     other = rows(np.repeat(members.owner[j], 3), modes[j].reshape(-1, 6))

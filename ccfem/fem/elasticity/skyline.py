@@ -200,12 +200,14 @@ def _factor(
     padded = -(-n // _TOGETHER) * _TOGETHER
     first = np.arange(padded)
     first[:n] = np.repeat(d * lowest, d)
+    # Rows that are eliminated together begin at one even column.
     first = np.repeat(first.reshape(-1, _TOGETHER).min(axis=1) // 2 * 2, _TOGETHER)
     length = np.arange(padded) - first + 1
     begin = np.cumsum(length) - length
     start = begin - first
     values = np.zeros(int(length.sum()))
     _fill_profile(matrix.indptr, matrix.indices, place, start, matrix.data, values)
+    # Rows that fill up the last tile are those of the identity.
     values[start[n:] + np.arange(n, padded)] = 1.0
     bad = _factorise(first, start, values)
     if bad >= 0:

@@ -389,6 +389,7 @@ def node_frames(
     for k, node in enumerate(turned):
         fixed = ~free[node]
         more = wanted.get(int(node), [])
+        # Axes of what is held, then of what presses, then any to complete the frame.
         rows = np.concatenate([np.eye(3)[fixed], *(d[None] for d, _ in more)])
         levels = np.concatenate([value[node, fixed], [v for _, v in more]])
         axes, at = _held_axes(rows, levels, node)
@@ -436,6 +437,8 @@ def _pressing_axes(
                 f"node {node} presses against a support while another one moves it: leave a gap "
                 "between their patches"
             )
+        # What is left of the direction beside those held and those that press already (Gram-
+        # Schmidt).
         rest = direction - held.T @ along
         for other in basis:
             rest = rest - (rest @ other) * other

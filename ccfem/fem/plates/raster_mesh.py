@@ -47,6 +47,7 @@ def raster_mesh(
     left, low = columns, height - 1 - rows
     x = left[:, None] + np.array([0, 1, 1, 0])
     y = low[:, None] + np.array([0, 0, 1, 1])
+    # Numbered along the shorter side first: a narrow band.
     number = x * (height + 1) + y if height <= width else y * (width + 1) + x
     used, cells = np.unique(number, return_inverse=True)
     divisor = height + 1 if height <= width else width + 1

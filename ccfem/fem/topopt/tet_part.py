@@ -97,6 +97,7 @@ def cut_mesh(mesh: TetMesh, values: FloatArray, level: float) -> CutMesh:
         At the nodes; some above the level.
     """
     n, inside = len(mesh.points), values > level
+    # Edges with one end above the level, each once, and where they are cut: not at their very ends.
     ends = np.sort(mesh.cells[:, mesh.edges].reshape(-1, 2), axis=1)
     ends = ends[inside[ends[:, 0]] != inside[ends[:, 1]]]
     keys = np.unique(ends[:, 0] * n + ends[:, 1])
@@ -130,6 +131,7 @@ def _cells(mesh: TetMesh, inside: BoolArray, keys: IntArray) -> IntArray:
     count = above.sum(axis=1)
     pieces = [mesh.cells[count == 4]]
     prisms = [np.zeros((0, 6), dtype=np.int64)]
+    # One corner above leaves a tetrahedron, three leave a prism; so do two, below.
     for order in _LONE:
         first = above[:, order[0]]
         a, b, c, d = mesh.cells[(count == 1) & first][:, order].T
@@ -141,6 +143,7 @@ def _cells(mesh: TetMesh, inside: BoolArray, keys: IntArray) -> IntArray:
         p, q, r, s = mesh.cells[(count == 2) & both][:, order].T
         prisms.append(np.stack([p, cut(p, r), cut(p, s), q, cut(q, r), cut(q, s)], axis=1))
     prism = np.concatenate(prisms)
+    # Diagonals of the quadrilateral sides start at their least node: neighbours agree.
     prism = np.take_along_axis(prism, _PRISMS[prism.argmin(axis=1)], axis=1)
     third = prism[:, [1, 5]].min(axis=1) > prism[:, [2, 4]].min(axis=1)
     rows = np.arange(len(prism))[:, None, None]

@@ -195,6 +195,7 @@ def _fit_rho(specimen: Specimen, toolpaths: Toolpaths, wanted: float, name: str)
         strand = Strand(rho=math.exp(logarithm))
         return math.log(virtual_test(strands, specimen, strand, TENSION, span=()).ratio / wanted)
 
+    # The ratio rises with rho: half of the range drops out by one test at the usual value.
     low, high = (math.log(rho) for rho in _RANGE)
     at = math.log(4.0)
     if excess(at) > 0.0:

@@ -541,6 +541,8 @@ def _inside(
             change -= slope
         else:
             a, slope = rest, change
+        # Barycentric coordinate at both ends: outside all along, on the face all along, or crossing
+        # it.
         b = a + slope
         if a < -_TOUCH and b < -_TOUCH:
             return 1.0, 0.0

@@ -168,11 +168,13 @@ def _flattened(layer: Layer) -> Chart:
         rotation[rows] = turned @ np.einsum("tkd,tld->tkl", piece.frames, surface.frames[rows])
         spin = _along_axes(piece, placed)
         placed, rotation[rows] = placed @ spin.T, spin @ rotation[rows]
+        # Pieces side by side.
         placed = placed - placed.min(axis=0) + [right, 0.0]
         right = float(placed[:, 0].max()) + _GAP
         image[nodes] = placed
     jacobian = np.einsum("tid,tik->tdk", image[layer.triangles], surface.gradients)
     stretches = np.linalg.svd(jacobian, compute_uv=False)
+    # Triangles that are turned over, or folded flat.
     over = np.linalg.det(jacobian) <= 0.0
     if surface.areas[over].sum() > _MOST_OVER * surface.areas.sum():
         raise InputError(

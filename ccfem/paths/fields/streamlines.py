@@ -229,6 +229,7 @@ def _follow_field(
             break
         line[count, 0], line[count, 1] = x, y
         count += 1
+        # Back at the start: closed, without a last point that lies on the first.
         gap = np.sqrt((x - start[0]) ** 2 + (y - start[1]) ** 2)
         if count > 6 and gap < 0.75 * step:
             if gap < 0.5 * step:

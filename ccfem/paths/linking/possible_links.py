@@ -186,6 +186,7 @@ def _boundary_links(
         if not len(met):
             continue
         end = near[met]
+        # Ends in their order round the ring: each with the next one.
         position = shapely.line_locate_point(ring, shapely.points(meeting))
         around = np.lexsort((end, position))
         for k, after in zip(around, np.roll(around, -1), strict=True):

@@ -175,6 +175,7 @@ def _shortened(toolpaths: Toolpaths, wanted: dict[int, float], minimum: float) -
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
         last = max(int(np.searchsorted(along, length - _SAME)), 1)
         share = min((length - along[last - 1]) / (along[last] - along[last - 1]), 1.0)
+        # A path does not end on a link: back to where it begins. Else at the exact length.
         if toolpaths.link[first + last - 1]:
             while last > 0 and toolpaths.link[first + last - 1]:
                 last -= 1

@@ -151,6 +151,7 @@ def _poisson(mesh: TetMesh) -> Callable[[FloatArray], HeightField]:
     fall = sp.csr_array(slope.T * np.repeat(volume, 3))
     matrix = gradient_energy(gradients, cells, volume, n)
     used = np.unique(cells)
+    # One node of each piece is held: the energy does not know the height of a piece.
     piece = connected_components(matrix, directed=False)[1]
     pinned = used[np.unique(piece[used], return_index=True)[1]]
     free = np.setdiff1d(used, pinned)
@@ -160,6 +161,7 @@ def _poisson(mesh: TetMesh) -> Callable[[FloatArray], HeightField]:
     def solve(direction: FloatArray) -> HeightField:
         values = np.zeros(n)
         values[free] = solve_free((fall @ direction.ravel())[free])
+        # Each piece stands at height 0.
         for component in pieces:
             values[component] -= values[component].min()
         gradient = (slope @ values).reshape(m, 3)

@@ -200,6 +200,7 @@ def _rough_cylinder(mesh: TetMesh, facets: IntArray) -> tuple[FloatArray, float]
     origin = points.mean(axis=0)
     plane = (points - origin) @ vectors[:, 1:]
     weight = np.ones(len(plane))
+    # Circle ``|x|^2 = 2 c . x + rest``, linear in its centre c and in rest = r^2 - |c|^2.
     for _ in range(_ROUNDS):
         root = np.sqrt(weight)[:, None]
         system = np.column_stack([2.0 * plane, np.ones(len(plane))])

@@ -93,6 +93,7 @@ def stress_regions(
     """
     values, axes = np.linalg.eigh(stress)
     largest, volume = values[:, 2], mesh.volumes
+    # Critical cells, with a direction of least stress that is distinct from the second one.
     critical = largest > share * _peak(largest, volume, quantile)
     distinct = values[:, 1] - values[:, 0] >= gap * np.abs(largest)
     cells = np.flatnonzero(critical & distinct & (largest > 0.0))
@@ -112,6 +113,7 @@ def stress_regions(
     kept = number >= 0
     cells, number, signed = cells[kept], number[kept], signed[kept]
     smooth = _smoothed_axes(mesh, cells, number, signed, smoothing)
+    # Regions rise along the build direction.
     rising = np.bincount(number, volume[cells] * (smooth @ build))
     smooth = smooth * np.where(rising < 0.0, -1.0, 1.0)[number, None]
     region = np.full(len(mesh.cells), -1)
@@ -144,6 +146,7 @@ def _grown_regions(
 
     Senses follow the spanning tree of the best-aligned pairs.
     """
+    # Neighbours, and theirs: directions jump from cell to cell of a coarse mesh.
     near = _face_adjacency(mesh)
     second = sp.csr_array(near + near @ near)[cells][:, cells].tocoo()
     one, other = second.row, second.col

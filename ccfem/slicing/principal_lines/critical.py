@@ -78,6 +78,7 @@ def critical_region(
     if len(joints) > _MOST_JOINTS:
         raise InputError(f"at most {_MOST_JOINTS} joints are possible; got {len(joints)}")
     touching = np.zeros(len(mesh.cells), dtype=np.int64)
+    # A bit a joint: cells at its wall.
     for k, nodes in enumerate(joints):
         on_wall = np.zeros(len(mesh.points), dtype=bool)
         on_wall[nodes] = True
@@ -90,6 +91,7 @@ def critical_region(
             f"no stress line joins two of the {len(joints)} joints: name others, or keep the lines "
             'that reach one of them (lines = "touching") or all (lines = "all")'
         )
+    # Cells matter as often as kept lines cross them, over the mean, without single high values.
     crossings = tracer.crossings(traced.seeds[kept])
     mean = crossings[crossings > 0].mean()
     return CriticalRegion(traced, kept, crossings, np.minimum(crossings / mean, _CLIP))

@@ -123,6 +123,7 @@ def layer_from_surface(
     used, triangles = np.unique(triangles[kept], return_inverse=True)
     points, triangles = points[used], triangles.reshape(-1, 3)
     holder, weights = holder[used], weights[used]
+    # The stress of a triangle is that of the cell that its middle lies in.
     middle = points[triangles].mean(axis=1)
     cell, _ = locate(mesh.points, mesh.corners, middle, tolerance)
     cell = np.where(cell < 0, holder[triangles[:, 0]], cell)

@@ -183,11 +183,13 @@ def _bridged(strip: FloatArray, gap: BoolArray) -> FloatArray:
         first = max(start, int(np.searchsorted(along, along[here] - _TANGENT[0])))
         end = int(gaps[k + 1]) if k + 1 < len(gaps) else len(middle) - 1
         reached = int(np.searchsorted(along, along[here + 1] + _TANGENT[0], side="right")) - 1
+        # Directions into the gap and out of it, over some length: those at its ends waver.
         into = _direction(a - middle[first], (b - a) / size)
         out = _direction(middle[min(end, reached)] - b, (b - a) / size)
         t = np.arange(1.0, round(size / STEP))[:, None] * (STEP / size)
         place, slope = _cubic(a, b, size * into, size * out, t)
         tangent = slope / np.maximum(np.linalg.norm(slope, axis=1), 1e-12)[:, None]
+        # The width goes over linearly, square to the cubic.
         wide = np.linalg.norm(strip[here : here + 2, 2:4], axis=1)
         normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
         half = ((1.0 - t) * wide[0] + t * wide[1]) * normal

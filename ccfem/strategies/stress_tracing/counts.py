@@ -76,6 +76,7 @@ def _places_between_ends(
     reach = 2 * round(_CLEAR / STEP) + 1
     joint = maximum_filter1d(band.free, reach, mode="constant", cval=1.0)[band.core] > 0.5
     joint = np.pad(joint, (band.core.start - first, last - band.core.stop))
+    # Tracks come and go in pairs, one on each side; on one side only where that is much better.
     even, even_cost = min(
         (_steady_numbers(inner, joint, first, 2) for first in (1, 2)),
         key=lambda candidate: candidate[1],

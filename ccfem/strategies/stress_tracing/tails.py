@@ -67,6 +67,8 @@ def tail_turns(
             for side, end in enumerate((path.members[0].ends[0], path.members[-1].ends[1])):
                 if end != FREE and len(points):
                     tree = cKDTree(points)
+                    # Tails in every turn that is tried: their cost against what lies there, and for
+                    # turning.
                     tails = _tails(strip, share, side)
                     costs = [
                         _cost(lines, tree, along, pitch, section) + _TURNING * len(lines) * abs(t)

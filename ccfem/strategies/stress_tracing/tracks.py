@@ -191,6 +191,8 @@ def _held(line: FloatArray, section: Region, inner: Region, closed: bool) -> Flo
         push[:] = 0.0
         if not len(out):
             break
+        # Pushed to the inner section; spread along the line, and twice as far, since spreading
+        # flattens.
         ways = shapely.shortest_line(inner, shapely.points(fine[out]))
         push[out] = shapely.get_coordinates(ways)[::2] - fine[out]
         spread = gaussian_filter1d(push, _SPREAD / step, axis=0, mode=mode)
