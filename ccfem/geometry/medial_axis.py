@@ -313,8 +313,8 @@ def _pruned(graph: _Graph, chains: list[list[int]], prune: float, step: float) -
             if not any(free):
                 continue
             length = line_length(graph.points[chain])
-            # A chain by itself is a speck below a step, or in a section much wider than it is long;
-            # a branch is short against the radius where it begins.
+            # A chain by itself is a speck below a step and a tenth of its radius; a branch is short
+            # against the radius where it begins.
             if all(free):
                 least = min(step, 0.1 * float(graph.radius[chain].max()))
             else:
