@@ -273,8 +273,9 @@ class Request:
         given = any(isinstance(strategy, GivenPaths) for strategy in self.strategies.values())
         if isinstance(self.amount, PerLayer | Stiffness) or given or self.curve:
             raise InputError(
-                "over several slicings there are no layers, fibre_per_layer, stiffness, given "
-                "paths or curve: drop them, and give fibre, the length in all"
+                f"over several slicings there are no {_options('layers', 'fibre_per_layer')}, "
+                f"{_options('stiffness', 'curve')} or given paths: drop them, and give "
+                f"{_options('fibre')}, the length in all"
             )
         if self.print_plans:
             raise InputError("prints are planned on one slicing: drop print_plans or slicings")
@@ -321,7 +322,8 @@ class Request:
         if slicings is not None:
             if layers is not None:
                 raise InputError(
-                    "over several slicings there are no layers: drop layers or slicings"
+                    f"over several slicings there are no {_options('layers')}: drop these or "
+                    f"{_options('slicings')}"
                 )
             return cls(case, strategies, named_slicings(slicings), amount, **more)
         given = [strategy for strategy in strategies.values() if isinstance(strategy, GivenPaths)]
@@ -345,6 +347,11 @@ class Request:
         return f"{strategy} on {slicing}" if slicing else strategy
 
 
+def _options(*names: str) -> str:
+    """Parameters as they are called in Python and on the command line."""
+    return ", ".join(f"{name} (--{name.replace('_', '-')})" for name in names)
+
+
 def _amount(
     fibre_per_layer: float | None, fibre: float | None, natural: bool, stiffness: str | None
 ) -> Amount:
@@ -359,7 +366,7 @@ def _amount(
     if len(names) > 1:
         raise InputError(
             "give one amount of fibre: a length per layer, one in all, the natural amount or a "
-            f"stiffness, not both {names[0]} and {names[1]}: drop one"
+            f"stiffness, not both {_options(names[0])} and {_options(names[1])}: drop one"
         )
     if fibre_per_layer is not None:
         return PerLayer(fibre_per_layer)

@@ -436,7 +436,10 @@ def test_bad_parts_end_in_one_line(ccfem, folder, text, message):
             "over several slicings there are no lay",
         ),
         (["bar", "--slicings", "planar:w"], "axis must be one of"),
-        (["bar", "--fibre", "9", "--fibre-per-layer", "9"], "per_layer and fibre: drop one"),
+        (
+            ["bar", "--fibre", "9", "--fibre-per-layer", "9"],
+            r"\(--fibre-per-layer\) and fibre \(--fibre\): drop one",
+        ),
         (["bar", "--fibre", "-3"], "fibre in all must be above 0 mm; got -3"),
         (
             ["part.toml", "--slicing", "planer"],

@@ -62,7 +62,10 @@ def test_the_number_of_layers_is_chosen_and_said():
         (["--stiffness", "nan"], "must be a finite number"),
         (["--stiffness", "1e9N/mm"], "no paths on 2 layers exceed"),
         (["--stiffness", "9"], "9 times the stiffness without fibre was asked for"),
-        (["--stiffness", "1.2", "--fibre-per-layer", "500"], "fibre_per_layer and stiffness: drop"),
+        (
+            ["--stiffness", "1.2", "--fibre-per-layer", "500"],
+            "(--fibre-per-layer) and stiffness (--stiffness): drop",
+        ),
         (["--stiffness", "1.2", "--no-virtual-test"], "drop --no-virtual-test"),
     ],
 )
