@@ -6,6 +6,7 @@ import shapely
 
 from ccfem.cases import create_case
 from ccfem.cases.bodies import arm_bracket_outlines, corner_bracket_outlines
+from ccfem.geometry.locate import locate
 from ccfem.slicing.slicers import LoadOriented
 
 
@@ -52,3 +53,17 @@ def test_corner_bracket_is_a_part_of_its_domain():
     for k in range(1, 5):
         area = mesh.facet_areas(mesh.patch(f"foot_{k}"))[0].sum()
         assert area >= 0.97 * 2.0 * np.pi * 2.75 * 6.0
+
+
+def test_the_rims_of_the_corner_bracket_are_as_wide_as_stated():
+    """Two millimetres round the holes stay solid, to a fraction of a cell of 1.5 mm."""
+    mesh = create_case("corner_bracket").problem.mesh
+    turn = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
+    ring, along = np.stack([np.cos(turn), np.sin(turn)], axis=1), np.ones(len(turn))
+    for x, y in ((-20.5, -20.5), (20.5, -20.5), (20.5, 20.5), (-20.5, 20.5)):
+        for z in (1.0, 3.0, 5.0):
+            place = np.column_stack([(x, y) + (2.75 + 1.5) * ring, z * along])
+            assert (locate(mesh.points, mesh.corners, place)[0] >= 0).mean() > 0.97
+    for x in (-3.0, 0.0, 3.0):  # the axle's rim ends 5 mm from the middle
+        place = np.column_stack([x * along, (0.0, 20.0) + (4.0 + 1.7) * ring])
+        assert (locate(mesh.points, mesh.corners, place)[0] >= 0).all()
