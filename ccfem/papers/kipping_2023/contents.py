@@ -107,7 +107,7 @@ def measured(name: str, bent: bool, **options: Any) -> Strand:
     if bent:
         x, y, _ = layer.points.T
         curved = np.stack([BEND * np.sin(x / BEND), y, BEND * np.cos(x / BEND)], axis=1)
-        layer = replace(layer, points=curved, flat=None)
+        layer = replace(layer, points=curved, flat=None, walls=())
         chart = chart_of(layer)
         flat = lay(chart.flat, no_stress, machine)
         region = chart.flat.plane.polygon

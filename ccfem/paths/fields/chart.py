@@ -21,6 +21,7 @@ from ccfem.paths.fields.layer_elements import Surface, positive_definite
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.plane import Plane, plane_frame
+from ccfem.slicing.layers.rounded_rings import charted_rings
 
 _ROUNDS = 30
 _STEP = 0.5
@@ -184,10 +185,14 @@ def _flattened(layer: Layer) -> Chart:
     turns = np.concatenate(
         [np.einsum("tij,tjd->tid", rotation, surface.frames), layer.normals[:, None]], axis=1
     )
+    maps = np.concatenate([jacobian @ surface.frames, layer.normals[:, None]], axis=1)
+    about = (layer.points, image, layer.triangles, maps, layer.loops, layer.walls)
     flat = replace(
         layer,
         points=np.column_stack([image, np.zeros(len(image))]),
         flat=Plane(np.eye(3), 0.0),
+        walls=(),
+        outline=charted_rings(*about),
         turns=turns,
         point_turns=_point_rotations(layer, turns),
     )

@@ -55,5 +55,6 @@ def _from_above(layer: Layer, up: FloatArray) -> Chart:
     if layer.flat is not None:
         return Chart(layer, layer, lengths)
     points = layer.points @ plane_frame(tuple(up.tolist())).T
-    flat = replace(layer, points=points * [1.0, 1.0, 0.0], flat=Plane(np.eye(3), 0.0))
+    seen = points * [1.0, 1.0, 0.0]
+    flat = replace(layer, points=seen, flat=Plane(np.eye(3), 0.0), walls=())
     return Chart(layer, flat, lengths)

@@ -54,7 +54,9 @@ class Layer(Shown):
     point_turns : (n, 3, 3) array, optional
         The same at the points.
     walls : tuple of RoundWall and (k, 2) int array
-        Round walls of a flat layer, and the boundary edges (point indices) that are chords of each.
+        Round walls, and the boundary edges (point indices) that are chords of each.
+    outline : tuple of (k, 2) arrays, mm, optional
+        For the flat view of a curved layer: its boundary loops along round walls, in the chart.
     """
 
     points: FloatArray
@@ -71,6 +73,7 @@ class Layer(Shown):
     turns: FloatArray | None = None
     point_turns: FloatArray | None = None
     walls: tuple[tuple[RoundWall, IntArray], ...] = ()
+    outline: tuple[FloatArray, ...] = ()
 
     def __post_init__(self) -> None:
         if self.local_thickness is None:
@@ -143,7 +146,8 @@ class Layer(Shown):
                 "what works on curved layers"
             )
         points = self.flat.project(self.points)
-        return FlatLayer(self.flat.frame, self.flat.height, points, self.loops, self.walls)
+        about = (points, self.loops, self.walls, self.outline)
+        return FlatLayer(self.flat.frame, self.flat.height, *about)
 
 
 @dataclass(frozen=True)
@@ -156,13 +160,14 @@ class FlatLayer(Plane):
         Plane coordinates of the layer's points.
     loops : tuple of (k,) int arrays
         Boundary loops of the layer.
-    walls : tuple of RoundWall and (k, 2) int array
+    walls, outline
         As of the layer.
     """
 
     points: FloatArray
     loops: tuple[IntArray, ...]
     walls: tuple[tuple[RoundWall, IntArray], ...] = ()
+    outline: tuple[FloatArray, ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -174,7 +179,7 @@ class FlatLayer(Plane):
 
         The first point is not repeated.
         """
-        return rounded_rings(self, self.points, self.loops, self.walls)
+        return self.outline or rounded_rings(self, self.points, self.loops, self.walls)
 
     @cached_property
     def polygon(self) -> Region:

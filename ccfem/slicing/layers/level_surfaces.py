@@ -1,5 +1,6 @@
 """Curved layers: level surfaces of a field on the mesh, cleaned, with a thickness at each point."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -10,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.threads import in_threads
+from ccfem.body.mesh.round_walls import RoundWall
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.assembly import cell_gradients
 from ccfem.slicing.layers.layer import Layer
@@ -19,6 +21,8 @@ _SNAP = 1e-5
 """Distance from the level, as a share of the step, below which nodes count as lying on it."""
 _SAG = 0.05
 """Largest distance, in shortest edges, by which cleaning may straighten the border."""
+_FACING = 0.3
+"""Least cosine between a wall's normal and a surface that ends at it: layers may meet it aslant."""
 _FEWEST = 4
 """Triangles of the smallest piece that is kept."""
 
@@ -75,6 +79,10 @@ def level_surfaces(
     gradient = np.einsum("eid,ei->ed", cell_gradients(mesh), values[mesh.corners])
     thickness = thickness_at_nodes(mesh, values, step)
     on_patch = {name: _edge_keys(facets, len(mesh.points)) for name, facets in mesh.patches.items()}
+    on_wall = [
+        _edge_keys(mesh.boundary[mesh.wall_of == k], len(mesh.points))
+        for k in range(len(mesh.round_walls))
+    ]
 
     in_cells = values[mesh.corners]
     low, high = in_cells.min(axis=1) - _SNAP * step, in_cells.max(axis=1) + _SNAP * step
@@ -83,7 +91,8 @@ def level_surfaces(
         signed = values - level
         signed[np.abs(signed) < _SNAP * step] = 0.0
         among = np.flatnonzero((low <= level) & (high >= level))
-        return _surface(mesh, signed, among, gradient, thickness, on_patch, shortest, least_area)
+        on = (on_patch, on_wall)
+        return _surface(mesh, signed, among, gradient, thickness, *on, shortest, least_area)
 
     cuts = in_threads(cut, levels.tolist(), most=None)
     kept = [surface for surface, _, _ in cuts if surface is not None]
@@ -120,6 +129,7 @@ def _surface(
     gradient: FloatArray,
     thickness: FloatArray,
     on_patch: dict[str, IntArray],
+    on_wall: list[IntArray],
     shortest: float,
     least_area: float,
 ) -> tuple[dict[str, Any] | None, int, int]:
@@ -161,9 +171,46 @@ def _surface(
         "loops": chain(border),
         "thickness": float(mean),
         "patches": patches,
+        "walls": tuple(_along_walls(mesh, keys[used], points[used], triangles, on_wall)),
         "local_thickness": local,
     }
     return surface, bubbles, specks
+
+
+def _along_walls(
+    mesh: TetMesh,
+    keys: IntArray,
+    points: FloatArray,
+    triangles: IntArray,
+    on_wall: list[IntArray],
+) -> Iterator[tuple[RoundWall, IntArray]]:
+    """Round walls, and the border edges (k, 2) that are chords of each: both ends lie on it.
+
+    Of a chord the surface ends at the wall, so that both look the same way.
+    """
+    border = border_edges(triangles, len(points))
+    opposite = _opposite(border, triangles)
+    along = points[border[:, 1]] - points[border[:, 0]]
+    inwards = points[opposite] - points[border[:, 0]]
+    square = np.maximum(np.einsum("ed,ed->e", along, along), 1e-300)
+    inwards -= (np.einsum("ed,ed->e", inwards, along) / square)[:, None] * along
+    inwards /= np.maximum(np.linalg.norm(inwards, axis=1), 1e-300)[:, None]
+    for wall, edges in zip(mesh.round_walls, on_wall, strict=True):
+        on = np.isin(keys, edges)[border].all(axis=1)
+        outwards = wall.normals_at(points[border[on]].mean(axis=1))
+        facing = np.einsum("ed,ed->e", outwards, -inwards[on]) > _FACING
+        if facing.any():
+            yield wall, border[on][facing]
+
+
+def _opposite(border: IntArray, triangles: IntArray) -> IntArray:
+    """Third point of the triangle at each directed border edge."""
+    sides = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    count = int(triangles.max()) + 1
+    known = sides[:, 0] * count + sides[:, 1]
+    order = np.argsort(known, kind="stable")
+    at = order[np.searchsorted(known[order], border[:, 0] * count + border[:, 1])]
+    return np.asarray(triangles[at // 3, (at + 2) % 3])
 
 
 def _areas(points: FloatArray, triangles: IntArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Borders of a flat section along the round walls that they cut, in place of the mesh's chords."""
+"""Borders of sections along the round walls that they cut, in place of the mesh's chords."""
 
 from collections.abc import Sequence
 
@@ -43,17 +43,86 @@ def rounded_rings(
         Plane coordinates of each loop, within 0.005 mm of its walls; the first point is not
         repeated. Their points turn with the part, and are equal for equal walls on all layers.
     """
-    of_edge = {
-        (start, end): k
-        for k, (_, edges) in enumerate(walls)
-        for start, end in np.concatenate([edges, edges[:, ::-1]]).tolist()
-    }
+    of_edge = _by_edge(walls)
     rings = []
     for loop in loops:
         sides = zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)
         wall = np.array([of_edge.get(side, -1) for side in sides])
         rings.append(points[loop] if (wall < 0).all() else _ring(plane, points[loop], wall, walls))
     return tuple(rings)
+
+
+def charted_rings(
+    points: FloatArray,
+    image: FloatArray,
+    triangles: IntArray,
+    turns: FloatArray,
+    loops: Sequence[IntArray],
+    walls: Sequence[tuple[RoundWall, IntArray]],
+) -> tuple[FloatArray, ...]:
+    """Boundary loops of a curved layer in its chart, along the round walls where they lie on some.
+
+    Places between the points of a chord are moved onto the wall within the triangle's plane, and
+    into the chart as the triangle is.
+
+    Parameters
+    ----------
+    points : (n, 3) array, mm
+        Of the layer.
+    image : (n, 2) array, mm
+        The same in the chart.
+    triangles : (t, 3) int array
+    turns : (t, 3, 3) array
+        First two rows: what the map of each triangle makes x and y of; last: its unit normal.
+    loops, walls
+        As of `rounded_rings`.
+
+    Returns
+    -------
+    tuple of (k, 2) arrays, mm
+        Each loop in the chart; the first point is not repeated.
+    """
+    sides = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    triangle_of = dict(zip(map(tuple, sides.tolist()), np.arange(len(sides)) // 3, strict=True))
+    round_walls = [wall for wall, _ in walls]
+    of_edge = _by_edge(walls)
+    rings = []
+    for loop in loops:
+        edges = list(zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True))
+        wall = np.array([of_edge.get(edge, -1) for edge in edges])
+        if (wall < 0).all():
+            rings.append(image[loop])
+            continue
+        turn = turns[[triangle_of[edge] for edge in edges]]
+        # Points with chords of one wall on both sides lie on mesh edges, which are chords too.
+        inner = (wall >= 0) & (wall == np.roll(wall, 1))
+        corners = points[loop].copy()
+        corners[inner] = moved_onto(round_walls, wall[inner], corners[inner], flat=turn[inner, 2])
+        following = np.roll(corners, -1, axis=0)
+        middle = 0.5 * (corners + following)
+        sagitta = np.linalg.norm(
+            moved_onto(round_walls, wall, middle, flat=turn[:, 2]) - middle, axis=1
+        )
+        count = np.where(wall < 0, 1, np.clip(np.ceil(np.sqrt(sagitta / _SAGITTA)), 1, _MOST))
+        first = np.repeat(np.arange(len(loop)), count.astype(int))
+        share = np.concatenate([np.arange(n) / n for n in count.astype(int)])[:, None]
+        places = (1.0 - share) * corners[first] + share * following[first]
+        between = share[:, 0] > 0.0
+        places[between] = moved_onto(
+            round_walls, wall[first[between]], places[between], flat=turn[first[between], 2]
+        )
+        away = places - points[loop[first]]
+        rings.append(image[loop[first]] + np.einsum("kij,kj->ki", turn[first, :2], away))
+    return tuple(rings)
+
+
+def _by_edge(walls: Sequence[tuple[RoundWall, IntArray]]) -> dict[tuple[int, int], int]:
+    """Return the number of the wall of each boundary edge, in both senses."""
+    return {
+        (start, end): k
+        for k, (_, edges) in enumerate(walls)
+        for start, end in np.concatenate([edges, edges[:, ::-1]]).tolist()
+    }
 
 
 def _ring(

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ccfem.base.arrays import BoolArray, FloatArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.level_cut import border_edges, chain
@@ -114,10 +114,11 @@ def _restricted(layer: Layer, wanted: BoolArray, least_area: float) -> Layer | N
     border = border_edges(triangles, len(used))
     place = np.full(len(layer.points), -1)
     place[used] = np.arange(len(used))
-    patches = {}
-    for name, edges in layer.patches.items():
+
+    def left(edges: IntArray) -> IntArray:
         kept = place[edges]
-        patches[name] = kept[(kept >= 0).all(axis=1)]
+        return np.asarray(kept[(kept >= 0).all(axis=1)])
+
     return replace(
         layer,
         points=layer.points[used],
@@ -126,6 +127,7 @@ def _restricted(layer: Layer, wanted: BoolArray, least_area: float) -> Layer | N
         nodes=layer.nodes[used],
         weights=layer.weights[used],
         loops=chain(border),
-        patches=patches,
+        patches={name: left(edges) for name, edges in layer.patches.items()},
+        walls=tuple((wall, left(edges)) for wall, edges in layer.walls),
         local_thickness=layer.local_thickness[used],
     )

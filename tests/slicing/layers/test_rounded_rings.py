@@ -10,6 +10,8 @@ import shapely.affinity
 from ccfem.body.mesh import TetMesh, box_mesh
 from ccfem.body.meshing import extrude
 from ccfem.geometry.sections import corners_only
+from ccfem.paths.fields.chart import flat_view
+from ccfem.slicing.layers.level_surfaces import level_surfaces
 from ccfem.slicing.slicers import Planar
 
 ANGLE = np.radians(37.0)
@@ -136,3 +138,39 @@ def test_what_is_not_round_keeps_its_corners():
         hole = shapely.Polygon(layer.plane.polygon.interiors[0])
         assert np.diff(hole.bounds[::2])[0] == pytest.approx(2.0 * 6.09, abs=0.02)
         assert np.diff(hole.bounds[1::2])[0] == pytest.approx(2.0 * 5.91, abs=0.02)
+
+
+CURVES = {
+    "flat": (lambda x, y: 0.0 * x, 1.0),
+    "aslant": (lambda x, y: 0.2 * (x - 20.0), np.sqrt(1.04)),  # an ellipse: longer by 1 / cos
+    "bent": (lambda x, y: 0.004 * (y - 18.0) ** 2, None),
+}
+
+
+@pytest.mark.parametrize(("fall", "longer"), CURVES.values(), ids=CURVES)
+@pytest.mark.parametrize("edge", [2.0, 3.0])
+def test_curved_layers_follow_the_wall_in_their_charts(fall, longer, edge):
+    """Of a ring: a bent layer has the area of its surface over the ring."""
+    inner, outer, middle = 4.0, 14.0, shapely.Point(20, 18)
+    ring = middle.buffer(outer, 32).difference(middle.buffer(inner, 32))
+    mesh = extrude(ring, 8.0, edge)
+    x, y, z = mesh.points.T
+    (layer,) = level_surfaces(mesh, z + fall(x, y), np.array([4.0]), 1.0, 0.5, 1.0).layers
+    assert layer.flat is None
+    section = flat_view(layer).plane.polygon
+    area = np.pi * (outer**2 - inner**2) * (longer or 1.0)
+    if longer is None:
+        side = np.linspace(-outer, outer, 1001)
+        place = np.stack(np.meshgrid(side, side), axis=-1)
+        radius = np.linalg.norm(place, axis=-1)
+        here = (radius > inner) & (radius < outer)
+        slope = 0.008 * place[..., 1]
+        area = np.sqrt(1.0 + slope**2)[here].sum() * (side[1] - side[0]) ** 2
+    assert section.is_valid
+    assert section.area == pytest.approx(area, rel=1e-3)
+    chords = shapely.Polygon(flat_view(layer).plane.points[layer.loops[0]]).area
+    chords -= sum(shapely.Polygon(flat_view(layer).plane.points[k]).area for k in layer.loops[1:])
+    assert abs(abs(chords) / area - 1.0) > 2.0 * abs(section.area / area - 1.0)
+    if longer == 1.0:
+        pin = 2.0 * shapely.Point(section.interiors[0].centroid).distance(section.interiors[0])
+        assert pin == pytest.approx(2.0 * inner, abs=0.012)
