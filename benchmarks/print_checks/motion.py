@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from benchmarks.print_checks.height_map import HeightMap, sampled
-from benchmarks.print_checks.job import Job, Lines
+from benchmarks.print_checks.job import PART, Job, Lines
 from benchmarks.print_checks.printer import Run, Step
 from ccfem.machine import Machine
 
@@ -182,19 +182,19 @@ def bed(job: Job, run: Run) -> list[str]:
 def in_air(machine: Machine, run: Run) -> float:
     """Share of the part's matrix, by volume, that is laid with nothing near below it.
 
-    A line is held by what lies no lower than its own height, and the fibre below it, within as much
-    to its sides.
+    A line is held by what is as high as the layer of matrix below its own, within the height of its
+    layer to its sides.
     """
     lines, area = Lines.of(run), HeightMap(machine.gcode.bed)
-    matrix = lines.lays & (lines.tool == 0) & lines.in_part
+    matrix = lines.lays & (lines.tool == 0) & np.isin(lines.kind, PART[:2])
     height = lines.end[:, 2].round(3)
-    free = 0.0
+    free, level = 0.0, 0.0
     for z in np.unique(height[lines.lays]).tolist():
         mine = np.flatnonzero(matrix & (height == z))
         if len(mine):
             place, move = sampled(lines.start[mine], lines.end[mine])
-            reach = lines.height[mine][move] + machine.strand_height + 0.05
-            held = area.highest(place, float(lines.height[mine].max())) >= z - reach
+            held = area.highest(place, z - level) >= level - 0.05
+            level = z
             share = np.bincount(move, ~held) / np.bincount(move)
             free += float(share @ lines.fed[mine])
         here = np.flatnonzero(lines.lays & (height == z))
