@@ -89,3 +89,16 @@ def test_without_room_above_strands_end_or_the_print_is_refused():
     assert said.startswith(f"{plan.ended:.0f} mm of fibre layer 0 are left out in ")
     laid = plan.paths.of_kind(FIBRE).lengths.sum()
     assert laid + plan.ended + plan.dropped == pytest.approx(80 * 100.0, abs=0.5)
+
+
+def test_no_piece_is_left_by_rounding():
+    """Strands that end in the stack: what was left beyond it had the length of a rounding error."""
+    pick = np.random.default_rng(1)
+    lines = []
+    for line in bundles(11):
+        ends = [0.0, 0.55 + 0.003 * pick.uniform()]
+        share = np.sort(np.append(pick.uniform(0.0, 0.55, 40), ends))[:, None]
+        lines.append(line[0] + share * (line[1] - line[0]))
+    found = ended_in_stacks(lines, SECTION, 1.2 * MACHINE.strand_height, MACHINE)
+    assert found.places > 0
+    assert min(stop - start for _, (start, stop) in found.pieces) >= MACHINE.minimum_length - 1e-6

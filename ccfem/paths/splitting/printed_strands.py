@@ -37,6 +37,9 @@ from ccfem.slicing.slicers.planar import Planar
 SHORT = 1e-6
 """Share of the cutter's distance by which a strand may be too short through rounding."""
 
+_NOTHING = 1e-6
+"""Length, mm, of a piece that is left by rounding alone."""
+
 Interval = tuple[float, float]
 """Arc lengths, mm, between which a piece of a strand lies; of a ring the second may exceed its
 length: the piece then goes on through the first point."""
@@ -114,6 +117,7 @@ def printed_strands(
     cut_off = float(fibre.lengths.sum()) - removed - _total(pieces)
     limit = machine.shortest_strand * (1.0 - SHORT)
     split = sorted((piece for those in pieces.values() for piece in those), key=lambda p: p.path)
+    split = [piece for piece in split if line_length(piece.line) > _NOTHING]
     long = [piece for piece in split if line_length(piece.line) >= limit]
     short = [piece for piece in split if line_length(piece.line) < limit]
     if short and process.short == "error":
@@ -474,4 +478,4 @@ def _without(piece: tuple[int, Interval], gap: Interval | None) -> list[tuple[in
     if gap is None:
         return [piece]
     left = ((start, start + gap[0]), (start + gap[1], end))
-    return [(line, part) for part in left if part[1] > part[0]]
+    return [(line, part) for part in left if part[1] > part[0] + _NOTHING]
