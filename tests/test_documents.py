@@ -43,7 +43,7 @@ def test_python_of_the_readme_runs(capsys, monkeypatch, tmp_path):
     for block in blocks(README, "python"):
         exec(compile(block, "README.md", "exec"), {})
     said = capsys.readouterr().out
-    assert "efficiency" in said
+    assert "stiffness ratio" in said
     assert "isocurve makes the stiffest part" in said
 
 

@@ -98,13 +98,14 @@ def compared(flow):
 def test_a_comparison_prints_as_a_short_table(compared):
     lines = str(compared).splitlines()
     assert lines[0].split("  ")[0] == "strategy"
-    for title in ("stiffness, N/mm", "first failure, N", "fibre, mm a layer"):
+    for title in ("stiffness ratio", "first failure, N", "fibre, mm a layer"):
         assert title in lines[0]
     assert [line.split()[0] for line in lines[1:3]] == [run.name for run in compared.ranking]
     for line, run in zip(lines[1:3], compared.ranking, strict=True):
         test = run.tested.bracket.tension
-        assert f" {test.stiffness:.4g} " in line
-        assert f" {run.tested.failure.load:.0f} {run.tested.failure.what} " in line
+        low, high = (f(ratio for _, ratio in test.span) for f in (min, max))
+        assert f" {test.ratio:.2f} ({low:.2f}–{high:.2f}) " in line
+        assert f" {run.tested.failure.load:.0f} ({run.tested.failure.what}) " in line
         assert f" {run.length_per_layer:.0f} " in line
         assert len(line) <= len(lines[0])
     assert lines[3:] == [compared.verdict]
@@ -134,7 +135,7 @@ def test_a_failed_strategy_keeps_its_row(compared):
 def test_a_comparison_is_a_table_in_a_notebook(compared):
     page = compared._repr_html_()
     assert page.count("<tr>") == 3
-    assert f"<td>{compared.ranking[0].tested.bracket.tension.stiffness:.4g}</td>" in page
+    assert f"<td>{compared.ranking[0].tested.bracket.tension.ratio:.2f} (" in page
     assert compared.verdict in page
 
 

@@ -18,20 +18,10 @@ from rich.table import Table
 from ccfem.base.checks import check_known
 from ccfem.base.tensor import von_mises
 from ccfem.cli.docstring import about, attributes
-from ccfem.comparison.headline import (
-    HEADLINE,
-    HEADLINE_OF_SLICINGS,
-    SHORT,
-    Headline,
-    cell_text,
-    headline_values,
-)
-from ccfem.comparison.ranking import best_values
-from ccfem.comparison.remarks import by_importance
 from ccfem.comparison.result import Comparison
-from ccfem.comparison.runs import Run
-from ccfem.comparison.said_of_cases import cases_rows
 from ccfem.comparison.shown import file_stem
+from ccfem.comparison.table import Cell, Row, load_cases_table
+from ccfem.comparison.table import Table as Values
 from ccfem.fem.elasticity.stress_field import StressField, about_cells
 from ccfem.judging.virtual_testing.stiffer import HONEST_PROMISE, IN_SHORT
 from ccfem.printing.export.gcode import clock
@@ -186,14 +176,16 @@ def print_comparison(
         least = 160 if comparison.over_slicings else _TITLES + _NUMBERS * len(runs)
         console.width = max(console.width, least)
     console.print(comparison.case.title, style="bold", markup=False)
-    best = best_values(comparison.runs, comparison.wanted)
+    table = comparison.table if details else comparison.table.first
     if comparison.over_slicings:
-        _print_over_slicings(console, comparison.ranking, best, details)
+        _print_rows(console, table)
     else:
-        _print_in_columns(console, runs, lambda some: _headline_table(some, best, details))
-    _print_load_cases(console, runs)
-    lines = [*_findings(comparison.case.findings, comparison.stress), *comparison.remarks]
-    shown = lines if details else by_importance(lines)[:_REMARKS]
+        _print_columns(console, table, "")
+    load_cases = load_cases_table(runs)
+    if load_cases is not None:
+        _print_columns(console, load_cases, "load cases")
+    lines = comparison.notes
+    shown = lines if details else lines[:_REMARKS]
     if details:
         console.print(about_cells(comparison.stress), style="dim", markup=False)
     for line in shown:
@@ -228,34 +220,50 @@ def _print_where(console: Console, where: Path, seconds: float) -> None:
     console.print(f"{shown}  ({seconds:.1f} s)", markup=False, soft_wrap=True)
 
 
-def _print_findings(
-    console: Console, of_mesh: Sequence[str], field: StressField, margin: str = ""
-) -> None:
-    """Print what was found in a mesh, then what is doubtful about the part and its solution."""
-    for line in _findings(of_mesh, field):
-        console.print(f"{margin}{line}", style="dim", markup=False, soft_wrap=bool(margin))
+def _print_columns(console: Console, values: Values, corner: str) -> None:
+    """Print a table with a column for each of its rows; one below the other where too wide."""
+    titles = [corner, *(head.title for head in values.heads)]
+    whole = max(map(len, titles)) <= console.width // 2
 
-
-def _findings(of_mesh: Sequence[str], field: StressField) -> list[str]:
-    """List what was found in a mesh, then what is doubtful about the part and its solution."""
-    kinds = {"mesh": of_mesh, "warning": field.findings}
-    return [f"{kind}: {line}" for kind, lines in kinds.items() for line in lines]
-
-
-def _print_load_cases(console: Console, runs: Sequence[Run]) -> None:
-    """Print what every run does under every load case, where there are several."""
-    heads, rows = cases_rows(runs)
-
-    def table_of(some: Sequence[tuple[str, Sequence[str]]]) -> Table:
+    def drawn(rows: Sequence[Row]) -> Table:
         table = Table(header_style="bold", box=box.SIMPLE_HEAD)
-        table.add_column("load cases", min_width=_longest_word(["load cases", *heads]))
-        for name, _ in some:
+        table.add_column(corner, no_wrap=whole, min_width=_longest_word(titles))
+        for name, *_ in rows:
             table.add_column(escape(name), justify="right", no_wrap=True)
-        for k, head in enumerate(heads):
-            table.add_row(escape(head), *(cells[k] for _, cells in some))
+        for k, head in enumerate(values.heads):
+            table.add_row(escape(head.title), *(_marked(cells[k]) for _, cells, _ in rows))
         return table
 
-    _print_in_columns(console, rows, table_of)
+    _print_in_columns(console, [row for row in values.rows if row[1]], drawn)
+
+
+def _print_rows(console: Console, values: Values) -> None:
+    """Print a table row by row, with as many columns as the screen is wide."""
+
+    def drawn(count: int) -> Table:
+        table = Table(header_style="bold", box=box.SIMPLE_HEAD)
+        table.add_column("", no_wrap=True)
+        for head in values.heads[:count]:
+            width = _longest_word([head.title])
+            table.add_column(escape(head.title), justify="right", min_width=width)
+        for name, cells, _ in values.rows:
+            texts = map(_marked, cells[:count]) if cells else ["failed"]
+            table.add_row(escape(name), *texts)
+        return table
+
+    count = len(values.heads)
+    while count > 1 and _is_cut(console, drawn(count)):
+        count -= 1
+    console.print(drawn(count))
+    if count < len(values.heads):
+        left = ", ".join(head.title for head in values.heads[count:])
+        console.print(f"in the report: {left}", style="dim", markup=False)
+
+
+def _marked(cell: Cell) -> str:
+    """Text of a cell, the best in green and what adds to it dim."""
+    text = f"[bold green]{escape(cell.text)}[/]" if cell.best else escape(cell.text)
+    return f"{text} [dim]({escape(cell.small)})[/]" if cell.small else text
 
 
 def _print_in_columns(
@@ -276,26 +284,6 @@ def _longest_word(texts: Iterable[str]) -> int:
     return max((len(word) for text in texts for word in text.split()), default=1)
 
 
-def _print_over_slicings(
-    console: Console, runs: Sequence[Run], best: Mapping[str, float], details: bool
-) -> None:
-    """Print the table over slicings: as many columns as the screen is wide."""
-    values = {run.name: headline_values(run) for run in runs}
-    known = {column for row in values.values() for column in row}
-    heads = [head for head in HEADLINE_OF_SLICINGS if head.column in known]
-    if not details:
-        heads = [head for head in heads if head.column in (*SHORT, "interlayer_load")]
-    shown = list(heads)
-    table = _slicings_table(runs, shown, values, best)
-    while len(shown) > 1 and _is_cut(console, table):
-        del shown[-1]
-        table = _slicings_table(runs, shown, values, best)
-    console.print(table)
-    if len(shown) < len(heads):
-        left = ", ".join(head.title for head in heads[len(shown) :])
-        console.print(f"in the report: {left}", style="dim", markup=False)
-
-
 def _is_cut(console: Console, table: Table) -> bool:
     """Whether a screen is so narrow that a word or a number of a table is broken or left out."""
     wide, here = (
@@ -311,32 +299,6 @@ def _printed(console: Console, table: Table) -> list[str]:
         console.print(table)
     rule = "\N{BOX DRAWINGS LIGHT HORIZONTAL}"
     return [word for word in capture.get().split() if word.strip(rule)]
-
-
-def _slicings_table(
-    runs: Sequence[Run],
-    heads: Sequence[Headline],
-    values: Mapping[str, Mapping[str, float]],
-    best: Mapping[str, float],
-) -> Table:
-    """Make the table over slicings and strategies: a row for each run, numbers in one piece."""
-    table = Table(header_style="bold", box=box.SIMPLE_HEAD)
-    table.add_column("", no_wrap=True)
-    for head in heads:
-        width = _longest_word([head.title])
-        table.add_column(head.title, justify="right", min_width=width)
-    for run in runs:
-        if run.evaluation is None:
-            table.add_row(run.name, "failed")
-            continue
-        cells = []
-        for head in heads:
-            text, extra = cell_text(run, head)
-            if run.printable and values[run.name].get(head.column) == best.get(head.column, np.nan):
-                text = f"[bold green]{text}[/]"
-            cells.append(f"{text} [dim]({extra})[/]" if extra else text)
-        table.add_row(run.name, *cells)
-    return table
 
 
 def print_solution(field: StressField, findings: Sequence[str], where: Path) -> None:
@@ -363,26 +325,7 @@ def print_solution(field: StressField, findings: Sequence[str], where: Path) -> 
     console.print(f"load case {field.case}", style="bold", markup=False)
     for line in lines:
         console.print(f"  {line}", markup=False, soft_wrap=True)
-    _print_findings(console, findings, field, "  ")
+    for kind, texts in {"mesh": findings, "warning": field.findings}.items():
+        for text in texts:
+            console.print(f"  {kind}: {text}", style="dim", markup=False, soft_wrap=True)
     console.print(f"  {where}", markup=False, soft_wrap=True)
-
-
-def _headline_table(runs: Sequence[Run], best: Mapping[str, float], details: bool) -> Table:
-    """One column a run, one row an index; indices that no run has are left out."""
-    table = Table(header_style="bold", box=box.SIMPLE_HEAD)
-    values = [headline_values(run) for run in runs]
-    heads = [head for head in HEADLINE if any(head.column in row for row in values)]
-    if not details:
-        heads = [dataclasses.replace(h, title=SHORT[h.column]) for h in heads if h.column in SHORT]
-    table.add_column("", min_width=_longest_word(head.title for head in heads))
-    for run in runs:
-        table.add_column(run.name, justify="right", no_wrap=True)
-    for head in heads:
-        cells = []
-        for run, row in zip(runs, values, strict=True):
-            text, extra = cell_text(run, head)
-            if run.printable and row.get(head.column) == best.get(head.column, np.nan):
-                text = f"[bold green]{text}[/]"
-            cells.append(f"{text} [dim]({extra})[/]" if extra else text)
-        table.add_row(head.title, *cells)
-    return table

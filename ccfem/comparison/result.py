@@ -1,9 +1,8 @@
 """The result of a request: one table of runs, and what is said and drawn of it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,15 +11,14 @@ from ccfem.base.checks import check_known
 from ccfem.base.errors import InputError
 from ccfem.cases.case import Case
 from ccfem.comparison.curve import Curve
-from ccfem.comparison.headline import Headline, cell_text, headline_values
 from ccfem.comparison.plot.scenes import View, show
 from ccfem.comparison.plot.values import image
 from ccfem.comparison.ranking import ranking
-from ccfem.comparison.remarks import open_remarks, remarks
+from ccfem.comparison.remarks import by_importance, open_remarks, remarks
 from ccfem.comparison.request import InAll, Request, Wanted
 from ccfem.comparison.runs import Run
 from ccfem.comparison.said_of_cases import cases_remarks, cases_verdict
-from ccfem.comparison.table import frame
+from ccfem.comparison.table import Table, frame, headline_table
 from ccfem.comparison.verdict import verdict
 from ccfem.comparison.views import front_picture, layer_view, paragraphs, shown_layer
 from ccfem.fem.elasticity.part_stress import GivenStress, PartStress
@@ -96,17 +94,21 @@ class Comparison:
             f", {failed} failed" if failed else ""
         )
 
+    @property
+    def table(self) -> Table:
+        """The indices that matter first, the best run first."""
+        return headline_table(self.ranking, self.wanted, self.over_slicings)
+
     def __str__(self) -> str:
-        return summary_text(self.ranking, " ".join(self.verdicts), self._columns)
+        said = " ".join(self.verdicts)
+        return "\n".join([*self.table.first.lines("strategy"), *filter(None, [said])])
 
     def _repr_html_(self) -> str:
-        page = summary_html(self.ranking, " ".join(self.verdicts), self._columns)
-        page += paragraphs(self.remarks)
+        said = " ".join(self.verdicts)
+        page = self.table.first.html("strategy") + paragraphs(
+            [*filter(None, [said]), *self.remarks]
+        )
         return page + image(self.plot()) if self.succeeded else page
-
-    @property
-    def _columns(self) -> tuple[Headline, ...]:
-        return SUMMARY_OF_SLICINGS if self.over_slicings else SUMMARY
 
     @property
     def case(self) -> Case:
@@ -289,6 +291,13 @@ class Comparison:
             )
         return lines
 
+    @property
+    def notes(self) -> list[str]:
+        """Findings on mesh, part and solution, and the remarks, the most important first."""
+        lines = [f"mesh: {line}" for line in self.case.findings]
+        lines += [f"warning: {line}" for line in self.stress.findings]
+        return by_importance([*lines, *self.remarks])
+
     def _count(self, slicing: str) -> str:
         """Say how many layers a slicing has, and how many of them hold fibre of any run."""
         runs = (run for run in self.succeeded if run.slicing == slicing)
@@ -306,80 +315,3 @@ class Comparison:
             table["strategy"] = [run.strategy_name for run in self.ranking]
             table.insert(1, "slicing", [run.slicing for run in self.ranking])
         return table
-
-
-# A comparison in a few lines: one row a strategy, for `print` and for notebooks.
-
-
-SUMMARY = (
-    Headline("printable", "printable", "", "{}"),
-    Headline("stiffness", "stiffness, N/mm", "high", "{:.4g}"),
-    Headline("stiffness_ratio_tension", "stiffness ratio", "high", "{:.2f}"),
-    Headline("first_failure_load", "first failure, N", "high", "{:.0f}"),
-    Headline("fibre_per_layer", "fibre, mm a layer", "", "{:.0f}"),
-    Headline("efficiency", "efficiency", "high", "{:.3f}"),
-)
-"""Columns of the summary; those that no run has are left out."""
-
-SUMMARY_OF_SLICINGS = (
-    *SUMMARY[:4],
-    Headline("interlayer_load", "delamination load, N", "high", "{:.0f}"),
-    Headline("fibre_length", "fibre, mm", "", "{:.0f}"),
-    Headline("joints_linked", "joints linked", "high", "{:.2f}"),
-)
-"""The columns of the summary over several slicings."""
-
-
-def summary_text(
-    ranking: Sequence[Run], verdict: str = "", columns: Sequence[Headline] = SUMMARY
-) -> str:
-    """Summary as plain text.
-
-    Parameters
-    ----------
-    ranking : sequence of Run
-        From the best to the worst.
-    verdict : str
-        A sentence to end with.
-    """
-    rows = _rows(ranking, columns)
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = []
-    for row, run in zip(rows, [None, *ranking], strict=True):
-        cells = [row[0].ljust(widths[0])]
-        if run is not None and run.failure:
-            cells.append(f"failed: {run.failure}")
-        else:
-            cells += [text.rjust(width) for text, width in zip(row[1:], widths[1:], strict=True)]
-        lines.append("  ".join(cells).rstrip())
-    return "\n".join([*lines, verdict] if verdict else lines)
-
-
-def summary_html(
-    ranking: Sequence[Run], verdict: str = "", columns: Sequence[Headline] = SUMMARY
-) -> str:
-    """Summary as an HTML table; parameters as of `summary_text`."""
-    head, *body = _rows(ranking, columns)
-    rows = ["".join(f"<th>{escape(text)}</th>" for text in head)]
-    for row, run in zip(body, ranking, strict=True):
-        cells = [f"<td>{escape(text)}</td>" for text in row]
-        if run.failure:
-            said = escape(f"failed: {run.failure}")
-            cells[1:] = [f'<td colspan="{len(row) - 1}">{said}</td>']
-        rows.append("".join(cells))
-    table = "".join(f"<tr>{row}</tr>" for row in rows)
-    return f"<table>{table}</table>" + (f"<p>{escape(verdict)}</p>" if verdict else "")
-
-
-def _rows(ranking: Sequence[Run], columns: Sequence[Headline]) -> list[list[str]]:
-    """Titles, and the cells of each run."""
-    row_values = [headline_values(run) for run in ranking]
-    heads = [head for head in columns if any(head.column in values for values in row_values)]
-    rows = [["strategy", *(head.title for head in heads)]]
-    for run in ranking:
-        cells = [cell_text(run, head) for head in heads]
-        # Additions in smaller letters: where the part fails. The rest is in the report.
-        rows.append(
-            [run.name, *(f"{text} {more}" if more.isalpha() else text for text, more in cells)]
-        )
-    return rows

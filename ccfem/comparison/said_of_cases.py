@@ -2,8 +2,6 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from ccfem.comparison.ranking import is_tested, merit, off_length, order_of, ranking
 from ccfem.comparison.remarks import why_above
 from ccfem.comparison.request import Wanted
@@ -105,42 +103,3 @@ def cases_remarks(
         f"possible for it alone: {tested[0].name} reaches {bound.shares(ratios).min():.0%}, "
         f"{where} that bound (fibres carrying tension only{loose}){why}",
     ]
-
-
-def cases_rows(runs: Sequence[Run]) -> tuple[list[str], list[tuple[str, list[str]]]]:
-    """Heads and rows of the table of load cases: every tested run, in the order given.
-
-    Returns
-    -------
-    list of str
-    list of (str, list of str)
-        Name of the run, and its cells.
-    """
-    tested = [
-        (run.name, run.tested.cases)
-        for run in runs
-        if run.tested is not None and run.tested.cases is not None
-    ]
-    if not tested:
-        return [], []
-    names = tested[0][1].names
-    heads = [f"stiffness ratio (of its bound), {name}" for name in names]
-    heads += ["worst of its bound", "above the bound of all", "first failure × load"]
-    rows = []
-    for name, test in tested:
-        values = test.values()
-        cells = []
-        for case in names:
-            share = values.get(f"share_of_bound[{case}]", np.nan)
-            share_text = f" ({share:.0%})" if np.isfinite(share) else ""
-            cells.append(f"{values[f'stiffness_ratio_tension[{case}]']:.2f}{share_text}")
-        cells.append(_percent(values.get("worst_share_of_bound", np.nan), 0))
-        cells.append(_percent(values.get("above_bound", np.nan), 1))
-        failure = test.failure
-        cells.append("–" if failure is None else f"{failure.factor:.2f} ({failure.case})")
-        rows.append((name, cells))
-    return heads, rows
-
-
-def _percent(value: float, digits: int) -> str:
-    return f"{value:.{digits}%}" if np.isfinite(value) else "–"

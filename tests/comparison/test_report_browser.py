@@ -105,6 +105,7 @@ def test_the_table_sorts(page):
         return [float(cell.get_attribute("data-value")) for cell in cells.all()
                 if cell.get_attribute("data-value")]  # fmt: skip
 
+    page.locator("#all-columns").check()
     head = page.locator(".headline th").nth(2)  # stiffness
     values = sorted(column(2))
     assert len(set(values)) == 2
@@ -116,6 +117,7 @@ def test_the_table_sorts(page):
     assert page.locator(".headline tbody tr").last.inner_text().startswith("late")
     head.hover()
     assert "load squared over its work" in page.inner_text("#tip")
+    page.locator("#all-columns").uncheck()
 
 
 def test_the_part_is_drawn_in_space(page):
@@ -139,6 +141,24 @@ def test_a_phone_cuts_nothing(page):
     assert page.evaluate(over) == []
     assert page.locator(".sorter select").is_visible()
     assert page.said == []
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (390, 844)])
+def test_verdict_and_table_are_on_the_first_screen(page, size):
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    page.evaluate("scrollTo(0, 0)")
+    for what in ("p.verdict >> nth=0", ".headline table"):
+        box = page.locator(what).bounding_box()
+        assert box["y"] + box["height"] <= size[1]
+    ratio = page.locator(".headline tbody td[data-title='stiffness ratio']").first
+    bonded = page.locator(".headline tbody td[data-title='stiffness ratio, bonded']").first
+    assert ratio.is_visible()
+    assert not bonded.is_visible()
+    page.locator("#all-columns").check()
+    try:
+        assert bonded.is_visible()
+    finally:
+        page.locator("#all-columns").uncheck()
 
 
 def test_words_stand_out_and_everything_has_a_name_and_a_place(page):
@@ -181,6 +201,10 @@ def test_paper_shows_the_views(page):
     page.emulate_media(media="print")
     try:
         assert page.locator(".scene:visible, .chart:visible, .controls:visible").count() == 0
+        # What is behind a click on the screen is there, for paper cannot be clicked.
+        folded = page.locator("details table, details dl, details pre")
+        assert folded.count() > 3
+        assert all(each.is_visible() for each in folded.all())
         for picture in range(page.locator("img.printed").count()):
             assert shades(page, f"img.printed >> nth={picture}") > 20
     finally:
