@@ -197,3 +197,50 @@ def test_adding_a_mesh_format_works_as_told(copy):
     )
     volume, cells, known = run("both_ways").split()
     assert (float(volume), int(cells), known) == (pytest.approx(24.0), 6, "True")
+
+
+def test_adding_a_law_of_failure_works_as_told(copy):
+    """One file: a bar without Poisson's effect, 4 x 4 mm, breaks at 30 MPa times its section."""
+    folder, run = copy
+    text, name, block = python_of("Add a law of failure")
+    (folder / name).write_text(block)
+    program = folder / "pulled.py"
+    program.write_text(
+        "from ccfem.body.mesh import box_mesh\n"
+        "from ccfem.fem.elasticity import Force, Problem, Support, solve\n"
+        "from ccfem.fem.materials import isotropic\n"
+        "from ccfem.judging.virtual_testing import Strand, virtual_test\n"
+        "from ccfem.judging.virtual_testing.strength import first_failure\n"
+        "from ccfem.paths.toolpaths import Toolpaths\n"
+        "from ccfem.slicing.slicers import Planar\n"
+        "mesh = box_mesh((20.0, 4.0, 4.0), (15, 3, 3))\n"
+        "mesh = mesh.with_patches({'corner': mesh.patch('x_min')[:1]})\n"
+        "supports = (Support('x_min', 'x'), Support('corner', 'yz'))\n"
+        "loads = {'pull': (Force('x_max', (80.0, 0.0, 0.0)),)}\n"
+        "material = isotropic(2000.0, 0.0, tensile_strength=30.0)\n"
+        "stress = solve(Problem(mesh, material, supports, loads))['pull']\n"
+        "(layer,) = Planar(count=1).cut(mesh)\n"
+        "line = Toolpaths.from_plane([[[1.0, 2.0], [19.0, 2.0]]], layer)\n"
+        "test = virtual_test(line, stress, Strand(rho=5e-10), span=())\n"
+        "print(*(first_failure(test).loads[law] for law in ('brittle_matrix', 'matrix')))\n"
+    )
+    assert [float(load) for load in run("pulled").split()] == pytest.approx([480.0] * 2, rel=1e-5)
+    (command,) = re.findall(r"^ +(ccfem compare .*)$", text, flags=re.M)
+    run(f"{command} --set-case element_size=4")
+    table = pd.read_csv(folder / "brittle/results.csv").set_index("layer").loc["total"]
+    assert 0.0 < table["first_failure_load"] <= table["brittle_matrix_load"]
+
+
+def test_adding_a_machine_works_as_told(copy):
+    """One file: it is listed, printed and used, and builds on the machine that it names."""
+    folder, run = copy
+    text = CONTRIBUTING.partition("## Add a machine\n")[2].partition("\n## ")[0]
+    (name,) = re.findall(r"`(ccfem/\S+\.toml)`:\n", text)
+    (block,) = blocks(text, "toml")
+    (folder / name).write_text(block)
+    listed, compared = re.findall(r"^ +(ccfem .*narrow.*)$", text, flags=re.M)
+    assert "fibre_width = 0.8\n" in run(listed)
+    assert "A head for narrow strands" in run("ccfem machines")
+    run(f"{compared} --set-case element_size=4")
+    machine = json.loads((folder / "narrow/results.json").read_text())["machine"]
+    assert (machine["fibre_width"], machine["minimum_length"]) == (0.8, 30.0)

@@ -160,6 +160,7 @@ MOVED = {
     "io.vtu_tensors": "fem.stress_files.vtu_tensors",
     "io.whole": "base.whole",
     "isolated": "body.isolated",
+    "judging.virtual_testing.interlayer": "judging.virtual_testing.failure_laws.interlayer",
     "layers": "slicing.layers",
     "layers.slicing": "slicing.slicers",
     "linking": "paths.linking",

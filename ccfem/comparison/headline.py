@@ -7,6 +7,7 @@ import numpy as np
 
 from ccfem.comparison.runs import Run, Tested
 from ccfem.judging.evaluation.column import Column
+from ccfem.judging.virtual_testing.failure_laws import named
 from ccfem.judging.virtual_testing.strength import FirstFailure
 
 _RATIO = "stiffness of the part with its fibres over that without"
@@ -34,6 +35,12 @@ def _of_bond(value: Callable[[FirstFailure], float]) -> Callable[[Tested], float
 def _opening_along(axis: int) -> Callable[[Tested], float | None]:
     """Coordinate of the place where layers first come apart."""
     return _of_bond(lambda failure: failure.interlayer_where[axis])
+
+
+def _of_law(law: str, column: Column) -> _Index:
+    """Load of a law of failure that has a column of its own."""
+    load = _of_failure(lambda failure, tested: failure.loads.get(law))
+    return _Index(column.name, column.unit, column.formula, column.range, load)
 
 
 def _under_alternative(index: _Index) -> _Index:
@@ -201,6 +208,7 @@ _TESTED = (
         ">= 0",
         _of_bond(lambda failure: failure.sliding),
     ),
+    *(_of_law(name, law.COLUMN) for name, law in named().items() if hasattr(law, "COLUMN")),
 )
 _WITH_ALTERNATIVE = (
     "stiffness_ratio_tension",

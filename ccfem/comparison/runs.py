@@ -168,7 +168,7 @@ class Run:
 
     @property
     def fails_in(self) -> str:
-        """What fails first, "matrix", "fibre" or "interlayer"; empty if that is not known."""
+        """What fails first, as "matrix", "fibre" or "interlayer"; empty if that is not known."""
         failure = None if self.tested is None else self.tested.failure
         return "" if failure is None else failure.what
 

@@ -9,11 +9,13 @@ import tomllib
 from collections.abc import Mapping
 from functools import cache
 from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
 from ccfem.base.checks import check_known
 from ccfem.base.errors import InputError, shown
+from ccfem.base.plugins import entries
 from ccfem.base.toml import from_table, read_toml
 from ccfem.machine.machine import Machine
 
@@ -21,17 +23,26 @@ _FOLDER = resources.files("ccfem.machine") / "built_in"
 
 
 @cache
+def _files() -> Mapping[str, Traversable]:
+    """File of each machine by name: those of the folder, and entry points of other packages."""
+    files = {
+        entry.name.removesuffix(".toml"): entry
+        for entry in _FOLDER.iterdir()
+        if entry.name.endswith(".toml")
+    }
+    return files | {entry.name: Path(entry.load()) for entry in entries("ccfem.machines")}
+
+
 def machine_names() -> tuple[str, ...]:
-    """Names of the machines that come with ccfem."""
-    files = (entry.name for entry in _FOLDER.iterdir())
-    return tuple(sorted(name.removesuffix(".toml") for name in files if name.endswith(".toml")))
+    """Names of the machines that come with ccfem, and with other packages."""
+    return tuple(sorted(_files()))
 
 
 def machine_about(name: str | Path) -> str:
-    """Comment at the head of a built-in machine's file; empty for other files."""
-    if str(name) not in machine_names():
+    """Comment at the head of the file of a machine that has a name; empty for other files."""
+    if str(name) not in _files():
         return ""
-    lines = (_FOLDER / f"{name}.toml").read_text(encoding="utf-8").splitlines()
+    lines = _files()[str(name)].read_text(encoding="utf-8").splitlines()
     return " ".join(line.removeprefix("#").strip() for line in lines[: lines.index("[machine]")])
 
 
@@ -41,7 +52,7 @@ def machine_table(name: str | Path) -> dict[str, Any]:
     Parameters
     ----------
     name : str or Path
-        Of a machine that comes with ccfem, or of a TOML file with a table ``[machine]``, as in part
+        Of a machine (`machine_names`), or of a TOML file with a table ``[machine]``, as in part
         files. A file that names its ``last_table`` must end with it; otherwise it is cut off.
 
     Raises
@@ -52,7 +63,7 @@ def machine_table(name: str | Path) -> dict[str, Any]:
     text = str(name)
     if not text.endswith(".toml") and not {"/", "\\"} & set(text):
         check_known("machine", text, machine_names(), "or name a file, .toml")
-        content = tomllib.loads((_FOLDER / f"{text}.toml").read_text(encoding="utf-8"))
+        content = tomllib.loads(_files()[text].read_text(encoding="utf-8"))
         return _whole_table(content["machine"])
     file = Path(text)
     content = read_toml(file, "machine file")

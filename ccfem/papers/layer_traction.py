@@ -7,7 +7,7 @@ import numpy as np
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.fem.elasticity.ball import BALL, ball_averages
 from ccfem.fem.elasticity.stress_field import StressField
-from ccfem.judging.virtual_testing.interlayer import layer_normals
+from ccfem.judging.virtual_testing.failure_laws.interlayer import layer_normals
 from ccfem.slicing.layers.layer import Layer
 
 

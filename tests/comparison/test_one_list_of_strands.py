@@ -103,6 +103,9 @@ def test_strands_time_and_mass_are_those_of_the_file(printed, tmp_path):
     write_table(results_rows(done), tmp_path / "results.csv")
     with (tmp_path / "results.csv").open() as file:
         totals = {row["strategy"]: row for row in csv.DictReader(file) if row["layer"] == "total"}
+    first = [head.title for head in done.table.first.heads]
+    assert len(first) <= 6
+    assert [title for title in first if title.endswith("min")] == ["whole print, min"]
     known = {run["name"]: run["total"] for run in record(done, "", {})["strategies"]}
     table = done.frame.set_index("strategy")
     for run in done.runs:

@@ -162,8 +162,7 @@ def test_files_hold_every_run_and_one_report(compared, tmp_path):
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_the_short_table_says_where_the_rest_is(compared, monkeypatch, capsys, count):
     lines = [f"remark {k}" for k in range(3 + count)]
-    monkeypatch.setattr(type(compared), "remarks", lines)
-    monkeypatch.setattr("ccfem.cli.screen._findings", lambda *_: [])
+    monkeypatch.setattr(type(compared), "notes", lines)
     print_comparison(compared, Path("somewhere"), 1.0)
     more = {0: "", 1: "1 more remark, ", 2: "2 more remarks, "}[count]
     assert f"--details or the report: {more}every index" in capsys.readouterr().out.splitlines()

@@ -16,6 +16,7 @@ from ccfem.machine import (
     machine_from,
     machine_names,
     machine_table,
+    named_machines,
     updated,
 )
 
@@ -162,3 +163,31 @@ def test_an_a4_is_spoken_to_as_its_own_slicer_does():
 def test_lines_that_no_nozzle_lays_are_refused(table, message):
     with pytest.raises(InputError, match=re.escape(message)):
         updated(Machine(**({"matrix_width": 1.2} if "matrix_nozzle" in table else {})), table)
+
+
+def test_a_machine_of_another_package_has_a_name_too(tmp_path, monkeypatch):
+    file = tmp_path / "ours.toml"
+    file.write_text(
+        '# Ours.\n[machine]\nprofile = "chen2021"\nfibre_width = 0.7\n', encoding="utf-8"
+    )
+
+    class Entry:
+        name = "ours"
+
+        @staticmethod
+        def load():
+            return str(file)
+
+    monkeypatch.setattr(
+        named_machines, "entries", lambda group: (Entry,) if group == "ccfem.machines" else ()
+    )
+    named_machines._files.cache_clear()
+    try:
+        assert "ours" in named_machines.machine_names()
+        assert named_machines.machine_about("ours") == "Ours."
+        made = named_machines.machine_from({"profile": "ours"})
+        assert made == replace(
+            named_machines.machine_from({"profile": "chen2021"}), fibre_width=0.7
+        )
+    finally:
+        named_machines._files.cache_clear()

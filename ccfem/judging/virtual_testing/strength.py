@@ -1,27 +1,24 @@
-"""The load at first failure of a part: of its matrix, its fibre or the bond between its layers.
+"""The load at first failure of a part: the least of all laws of failure.
 
 All limits scale with the load, since the solution does: also with fibres that carry tension only
 and supports that only press. Debonding of strands and damage after the first failure are not
 predicted.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ccfem.base.arrays import FloatArray, freeze, in_brief
-from ccfem.base.errors import InputError
-from ccfem.fem.elasticity.stress_field import StressField
-from ccfem.fem.elasticity.zone import ZONE, averaged_mises
-from ccfem.judging.virtual_testing.interlayer import Interlayer, interlayer
+from ccfem.judging.virtual_testing import failure_laws
+from ccfem.judging.virtual_testing.failure_laws.fibre import FIBRE_SHARE as FIBRE_SHARE
+from ccfem.judging.virtual_testing.failure_laws.fibre import fibre_peak as fibre_peak
+from ccfem.judging.virtual_testing.failure_laws.matrix import matrix_peak as matrix_peak
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.judging.virtual_testing.strengths import Limits
 from ccfem.judging.virtual_testing.virtual_test import VirtualTest
 from ccfem.slicing.layers import Layer
-
-FIBRE_SHARE = 0.99
-"""Share of the fibre length whose axial force stays below the fibre's index."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +30,8 @@ class FirstFailure:
     load : float, N
         Size of the load at first failure.
     what : str
-        "matrix", "fibre" or "interlayer".
+        Name of the law: "matrix", "fibre", "interlayer" or another
+        (`ccfem.judging.virtual_testing.failure_laws`).
     where : (3,) array, mm
         Middle of the cell, or of the piece of fibre, that decides.
     matrix_load, fibre_load : float, N
@@ -46,8 +44,8 @@ class FirstFailure:
         Load at which layers would come apart; infinite where nothing opens or slides, and where
         that was not judged.
     interlayer_index : float
-        f of `ccfem.judging.virtual_testing.interlayer` under the load of the test: 1 at failure;
-        NaN where not judged.
+        f of `failure_laws.interlayer` under the load of the test: 1 at failure; NaN where not
+        judged.
     interlayer_where : (3,) array, mm
         Middle of the cell that has it; NaN where not judged.
     opening, sliding : float, MPa
@@ -55,8 +53,10 @@ class FirstFailure:
     interlayer_zones : tuple of floats, N
         `interlayer_load` with cells judged from 3, from 1.5 and from 0 mm on from loads and
         supports; empty where not judged.
+    loads : mapping of str to float, N
+        Load of each law that judged the part.
     note : str
-        Why the bond between layers was not judged, or what is doubtful about it; else empty.
+        Why a law did not judge the part, or what is doubtful about it; else empty.
     """
 
     load: float
@@ -72,12 +72,13 @@ class FirstFailure:
     opening: float = np.nan
     sliding: float = np.nan
     interlayer_zones: tuple[float, ...] = ()
+    loads: Mapping[str, float] = field(default_factory=dict)
     note: str = ""
 
     __repr__ = in_brief
 
     def __post_init__(self) -> None:
-        freeze(self, where=float, interlayer_where=float)
+        freeze(self, where=float, interlayer_where=float, loads=dict)
 
 
 def first_failure(
@@ -86,7 +87,7 @@ def first_failure(
     matrix_strength: float | None = None,
     layers: Sequence[Layer] | None = None,
 ) -> FirstFailure:
-    """Load at which the matrix, the fibre or the bond between layers first fails.
+    """Load at which the matrix, the fibre or the bond between layers first fails, or any other law.
 
     Parameters
     ----------
@@ -105,68 +106,15 @@ def first_failure(
         When the strength of matrix or fibre is missing.
     """
     limits = Limits.of(test.solution.problem.material, strand, matrix_strength)
-    matrix_index, matrix_at = matrix_peak(test.solution)
-    fibre_index, fibre_at = fibre_peak(test)
-    matrix_load = test.force * limits.matrix / matrix_index
-    fibre_load = test.force * limits.fibre / fibre_index if fibre_index > 0.0 else np.inf
-    bond = _interlayer_result(test.solution, layers)
-    zones: tuple[float, ...] = ()
-    if isinstance(bond, Interlayer):
-        zones = tuple(test.force / f if f > 0.0 else np.inf for f in bond.zone_indices)
-    failures = [("matrix", matrix_load, matrix_at), ("fibre", fibre_load, fibre_at)]
-    failures += [("interlayer", zones[0], bond.where)] if isinstance(bond, Interlayer) else []
-    what, load, where = min(failures, key=lambda failure: failure[1])
-    first = FirstFailure(load, what, where, matrix_load, fibre_load, matrix_index, fibre_index)
-    if not isinstance(bond, Interlayer):
-        return replace(first, note=bond)
-    return replace(
-        first,
-        interlayer_load=zones[0],
-        interlayer_index=bond.index,
-        interlayer_where=bond.where,
-        opening=bond.opening,
-        sliding=bond.sliding,
-        interlayer_zones=zones,
-        note=bond.note,
+    failures = {name: law.fails(test, limits, layers) for name, law in failure_laws.named().items()}
+    judged = {name: failure for name, failure in failures.items() if not np.isnan(failure.load)}
+    what = min(judged, key=lambda name: judged[name].load)
+    values = {k: value for failure in failures.values() for k, value in failure.values.items()}
+    return FirstFailure(
+        load=judged[what].load,
+        what=what,
+        where=judged[what].where,
+        loads={name: failure.load for name, failure in judged.items()},
+        note="; ".join(failure.note for failure in failures.values() if failure.note),
+        **values,
     )
-
-
-def _interlayer_result(stress: StressField, layers: Sequence[Layer] | None) -> Interlayer | str:
-    """Return what `interlayer` finds, or why it finds nothing; empty without layers."""
-    if layers is None:
-        return ""
-    try:
-        return interlayer(stress, layers)
-    except InputError as error:
-        return f"bond between layers not judged: {error}"
-
-
-def fibre_peak(test: VirtualTest, share: float = FIBRE_SHARE) -> tuple[float, FloatArray]:
-    """Axial force, N, that `share` of the fibre length stays below, and a place (3,) of it."""
-    order = np.argsort(test.axial_force, kind="stable")
-    reached = np.cumsum((test.strands.length * test.strands.share)[order])
-    at = order[min(np.searchsorted(reached, share * reached[-1]), len(order) - 1)]
-    return float(test.axial_force[at]), test.strands.middle[at]
-
-
-def matrix_peak(stress: StressField) -> tuple[float, FloatArray]:
-    """Largest averaged von Mises stress of the matrix, MPa, and its place (3,).
-
-    The von Mises stress of the cells is averaged by volume over a ball of 2 mm radius. Cells whose
-    centroid is closer than 3 mm to a patch with a load or a support are left out, though they count
-    in the averages of others. A whole flat face that slides in its plane, as a plane of symmetry
-    does, is no such patch: no stress peaks there.
-
-    Raises
-    ------
-    InputError
-        When all cells are left out.
-    """
-    judged, average, centroid = averaged_mises(stress.problem, stress.case, stress.stress)
-    if not len(judged):
-        raise InputError(
-            f"no cell lies farther than {ZONE:g} mm from the patches of loads and supports, so "
-            "no matrix stress can be judged: the part is too small for this index"
-        )
-    peak = average.argmax()
-    return float(average[peak]), centroid[judged[peak]]

@@ -1,7 +1,12 @@
-"""Strengths of fibre, matrix and the bond between layers."""
+"""Strengths of fibre, matrix and the bond between layers, and what a law of failure returns."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
+import numpy as np
+
+from ccfem.base.arrays import FloatArray, freeze
 from ccfem.base.errors import InputError
 from ccfem.fem.materials import Material
 from ccfem.judging.virtual_testing.strand import Strand
@@ -52,3 +57,28 @@ class Limits:
         across, along = material.interlayer_tensile, material.interlayer_shear
         bond = None if across is None else (across, across if along is None else along)
         return cls(fibre, matrix, bond)
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Where a law of failure says that a part fails first, and at which load.
+
+    Attributes
+    ----------
+    load : float, N
+        Infinite where it never fails; NaN where that was not judged.
+    where : (3,) array, mm
+        NaN where it was not judged.
+    note : str
+        Why it was not judged, or what is doubtful about it; else empty.
+    values : mapping of str to value
+        Further fields of `FirstFailure` that the law sets.
+    """
+
+    load: float = np.nan
+    where: FloatArray = field(default_factory=lambda: np.full(3, np.nan))
+    note: str = ""
+    values: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        freeze(self, where=float, values=dict)

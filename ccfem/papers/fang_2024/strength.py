@@ -19,7 +19,7 @@ from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.fem.elasticity.support_kinds import AnySupport, PressingSupport
 from ccfem.fem.materials import isotropic
-from ccfem.judging.virtual_testing.interlayer import interlayer
+from ccfem.judging.virtual_testing.failure_laws.interlayer import interlayer
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strength import first_failure
 from ccfem.judging.virtual_testing.virtual_test import virtual_test

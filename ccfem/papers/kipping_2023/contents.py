@@ -17,7 +17,7 @@ from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.fem.elasticity.support_kinds import PressingSupport
 from ccfem.fem.materials import isotropic
-from ccfem.judging.virtual_testing.interlayer import interlayer
+from ccfem.judging.virtual_testing.failure_laws.interlayer import interlayer
 from ccfem.machine import Machine
 from ccfem.papers.contents import Contents, WhenAsked, table, write_claims
 from ccfem.papers.kipping_2023.chain import PAPER_SECONDS, PARTS, Chain, chain, table_1, table_2

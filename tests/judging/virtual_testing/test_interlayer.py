@@ -10,7 +10,7 @@ from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity.problem import Force, Problem, Support, Traction
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.materials import isotropic, named_material
-from ccfem.judging.virtual_testing.interlayer import interlayer, layer_normals
+from ccfem.judging.virtual_testing.failure_laws.interlayer import interlayer, layer_normals
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.judging.virtual_testing.strength import first_failure
 from ccfem.judging.virtual_testing.virtual_test import virtual_test
@@ -199,6 +199,9 @@ def test_what_is_not_judged_leaves_the_rest_as_it_is(bar):
     assert note.startswith("bond between layers not judged: material 'isotropic' has no strength")
     assert without.pop("note") == ""
     judged = vars(first_failure(test, layers=layers))
+    loads = judged.pop("loads")
+    assert loads == {**without.pop("loads"), "interlayer": judged["interlayer_load"]}
+    assert silent.pop("loads") == {name: loads[name] for name in ("fibre", "matrix")}
     for name, value in without.items():
         np.testing.assert_array_equal(silent[name], value, err_msg=name)
         if not name.startswith("interlayer") and name not in (

@@ -10,7 +10,7 @@ from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity import Force, Problem, Support, solve
 from ccfem.fem.elasticity.ball import ball_averages, ball_shares
 from ccfem.fem.materials import isotropic
-from ccfem.judging.virtual_testing.interlayer import interlayer
+from ccfem.judging.virtual_testing.failure_laws.interlayer import interlayer
 from ccfem.judging.virtual_testing.near_failure import (
     MatrixPeaks,
     Peak,

@@ -134,7 +134,7 @@ def test_no_stretched_fibre_never_breaks():
 
 
 def test_a_part_within_the_zones_is_refused(monkeypatch):
-    for module in ("fem.elasticity.zone", "judging.virtual_testing.strength"):
+    for module in ("fem.elasticity.zone", "judging.virtual_testing.failure_laws.matrix"):
         monkeypatch.setattr(f"ccfem.{module}.ZONE", 12.0)
     with pytest.raises(InputError, match=r"farther than 12 mm .* too small for this index"):
         matrix_peak(solve(clamped(BEND))["load"])

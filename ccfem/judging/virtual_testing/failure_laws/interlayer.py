@@ -22,6 +22,8 @@ from ccfem.fem.elasticity.ball import BALL, ball_averages
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.fem.elasticity.zone import ZONE, distance_from_patches
 from ccfem.fem.materials import Material
+from ccfem.judging.virtual_testing.strengths import Failure, Limits
+from ccfem.judging.virtual_testing.virtual_test import VirtualTest
 from ccfem.slicing.layers import Layer
 
 ZONES = (ZONE, 0.5 * ZONE, 0.0)
@@ -62,6 +64,26 @@ class Interlayer:
 
     def __post_init__(self) -> None:
         freeze(self, where=float)
+
+
+def fails(test: VirtualTest, _: Limits, layers: Sequence[Layer] | None) -> Failure:
+    """Load at which printed layers come apart; not judged without layers or strengths."""
+    if layers is None:
+        return Failure()
+    try:
+        bond = interlayer(test.solution, layers)
+    except InputError as error:
+        return Failure(note=f"bond between layers not judged: {error}")
+    zones = tuple(test.force / f if f > 0.0 else np.inf for f in bond.zone_indices)
+    values = {
+        "interlayer_load": zones[0],
+        "interlayer_index": bond.index,
+        "interlayer_where": bond.where,
+        "opening": bond.opening,
+        "sliding": bond.sliding,
+        "interlayer_zones": zones,
+    }
+    return Failure(zones[0], bond.where, bond.note, values)
 
 
 def interlayer(
