@@ -66,6 +66,7 @@ from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.before_solving import check_support
 from ccfem.printing.line_counts import check_strands
 from ccfem.printing.support import SupportLayers, slice_with_support
+from ccfem.slicing.layers.layer import curved_layers
 from ccfem.slicing.layers.slicer import Slicer, slicer_remarks
 from ccfem.strategies.fibre_aware.upper_bound import UpperBound, upper_bound
 
@@ -137,7 +138,7 @@ class Solved:
         else:
             layers = case.fibre_layers(stress, chosen)
         check_strands(layers, case.machine)
-        propped = support and all(layer.flat is not None for layer in layers)
+        propped = support and not curved_layers(layers)
         if propped:
             below = None
             check_support(stress.mesh, layers, case.machine)
@@ -488,7 +489,7 @@ def _bounds(
     if request.named and not several_lengths:
         return {}
     part = max(parts.values(), key=lambda part: len(part.layers))
-    curved = any(layer.flat is None for layer in part.layers)
+    curved = curved_layers(part.layers)
     if not request.bound or basis.tests is None or not equal or curved or presses(basis.cases):
         return {}
     several, strand = len(basis.cases) > 1, basis.tests.strand

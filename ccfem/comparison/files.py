@@ -24,6 +24,7 @@ from ccfem.comparison.runs import Run
 from ccfem.comparison.shown import file_stem
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import curved_layers
 
 if TYPE_CHECKING:
     from ccfem.comparison.pictures import Pictures
@@ -169,7 +170,7 @@ def _draw(comparison: Comparison, folder: Path, progress: Progress, left_out: li
     for k, (name, alone) in enumerate(comparison.slicings.items()):
         if name:
             progress(f"drawing {name}", k / len(comparison.slicings))
-        curved = any(layer.flat is None for layer in alone.layers)
+        curved = curved_layers(alone.layers)
         with spared(f"pictures of {name}" if name else "pictures in space", left_out):
             if comparison.over_slicings and alone.succeeded:
                 picture = folder / f"{file_stem(name)}_overview.png"
@@ -250,12 +251,12 @@ def _write_paths(comparison: Comparison, folder: Path) -> None:
     runs, machine = comparison.succeeded, comparison.case.machine
     for run in runs:
         layers, stem = comparison.stacks[run.slicing], _stem(run.slicing, run)
-        flat = all(layer.flat is not None for layer in layers)
-        if flat and not comparison.over_slicings:
+        curved = curved_layers(layers)
+        if not curved and not comparison.over_slicings:
             write_waypoints(folder / f"{stem}_waypoints.txt", run.toolpaths, layers)
         else:
             write_robot_waypoints(folder / f"{stem}_waypoints.csv", run.toolpaths, layers, machine)
-        if not flat and not comparison.over_slicings:
+        if curved and not comparison.over_slicings:
             _write_matrix(comparison, folder)
         if run.print_plan is not None and run.moves is not None:
             _write_print(folder, stem, run, comparison)

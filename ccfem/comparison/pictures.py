@@ -193,10 +193,8 @@ def _forces(
             s = test.strands
             middle, tangent, force = s.middle, s.tangent, test.axial_force
             length = s.length
-            if layer.flat is None:
-                middle, tangent, near = chart_of(layer).pieces(middle, tangent)
-                length, force = length[near], force[near]
-            view = flat_view(layer)
+            middle, tangent, near = chart_of(layer).pieces(middle, tangent)
+            length, force, view = length[near], force[near], flat_view(layer)
             coloured[run.name] = force_on_paths(middle, tangent, length, force, view)
     flat = flat_view(layer)
     end = max((lines.limits[1] for lines in coloured.values()), default=0.0)

@@ -15,6 +15,7 @@ from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.paths.planning.strategy import Strategy
 from ccfem.paths.planning.whole_part import full_length
 from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import curved_layers
 from ccfem.slicing.layers.slicer import Slicer
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies.fibre_aware.least_fibre import LeastFibre, for_every_case, least_fibre
@@ -33,7 +34,7 @@ def counts_to_try(case: Case, stress: PartStress) -> tuple[int, ...]:
         For curved layers.
     """
     layers = case.slicing(stress, case.build, case.machine)
-    if any(layer.flat is None for layer in layers):
+    if curved_layers(layers):
         raise InputError(
             f"a front is of flat layers, those of '{case.name}' are curved: give --layers"
         )
@@ -82,8 +83,7 @@ def plan_to_stiffness(
         ratio = _over_bare(ratio, part.cases)
     check_number("stiffness over that without fibre", ratio, above=1.0)
     candidates = [part]
-    flat = all(layer.flat is not None for layer in part.layers)
-    if request.slicings[""].slicer is None and flat:
+    if request.slicings[""].slicer is None and not curved_layers(part.layers):
         counts = counts_to_try(request.case, part.stress)
         candidates += [cut(Planar(count=count)) for count in counts[1:]]
     if part.several_cases:
@@ -166,7 +166,7 @@ def _least_of(
 def _check_within_bound(part: Part, length: float, ratio: float) -> None:
     """Refuse a ratio that no paths of a length, mm, on flat layers reach."""
     layers, cases, machine, strand = part.layers, part.cases, part.machine, part.strand
-    if any(layer.flat is None for layer in layers):
+    if curved_layers(layers):
         return
     several = part.several_cases
     wanted = f"{ratio:.4g} times the stiffness without fibre was asked for"

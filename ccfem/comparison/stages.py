@@ -46,6 +46,7 @@ from ccfem.printing.print_plan import plan_print
 from ccfem.printing.print_totals import print_totals
 from ccfem.printing.support import SupportLayers
 from ccfem.slicing.layers import Layer
+from ccfem.slicing.layers.layer import curved_layers
 from ccfem.strategies.fibre_aware.plan_cases import plan_cases, plan_cases_to_lengths
 
 Tell = Callable[[str], None]
@@ -340,9 +341,11 @@ def with_print(run: Run, part: Part, tell: Tell) -> Run:
         return run
     try:
         what = (run.strands, part.layers, part.stress.mesh, part.machine)
-        flat = all(layer.flat is not None for layer in part.layers)
         build = part.build or (0.0, 0.0, 1.0)
-        plan = plan_print(*what, part.propped) if flat else curved_plan(*what, build, part.support)
+        curved = curved_layers(part.layers)
+        plan = (
+            curved_plan(*what, build, part.support) if curved else plan_print(*what, part.propped)
+        )
         moves = part_moves(plan, part.machine)
     except InputError as error:
         reasons = dict.fromkeys([str(error), *filter(None, [run.why_not])])

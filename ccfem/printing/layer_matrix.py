@@ -41,4 +41,4 @@ def _rings(layer: Layer, machine: Machine) -> Toolpaths:
     levels = offset_rings(view.plane.polygon, _HALF_WIDTHS * width, width, width)
     paths = Toolpaths.from_plane([ring for level in levels for ring in level], view)
     paths = replace(paths, kind=np.full(len(paths), MATRIX, dtype=paths.kind.dtype))
-    return paths if view is layer else chart_of(layer).lifted(paths)
+    return chart_of(layer).lifted(paths)

@@ -141,9 +141,8 @@ def _curvature(paths: Toolpaths, width: float, line: IntArray, at: FloatArray) -
 
 def in_layer(points: FloatArray, layer: Layer) -> FloatArray:
     """Points (n, 3) of a layer in its plane, or in the chart of a curved one: (n, 2), mm."""
-    if layer.flat is not None:
-        return layer.plane.project(points)
-    return chart_of(layer).images(points)[:, :2]
+    chart = chart_of(layer)
+    return chart.flat.plane.project(chart.images(points))
 
 
 def angle_on_layer(plane: FloatArray, stress: LayerStress) -> FloatArray:

@@ -233,11 +233,8 @@ def _view(
     build: FloatArray,
 ) -> LayerPaths:
     """See the paths of one layer in every way that an index may need."""
-    seen, flat = toolpaths, layer
-    if layer.flat is None:
-        chart = chart_of(layer)
-        seen, flat = chart.flattened(toolpaths), chart.flat
-    paths = plane_paths(seen, flat)
+    chart = chart_of(layer)
+    flat, paths = chart.flat, plane_paths(chart.flattened(toolpaths), chart.flat)
     fibre = toolpaths.select(toolpaths.kind == FIBRE)
     inside = fibre if layer.flat is None else _in_space(paths.in_part)
     about = (layer, stress_on(flat, stress), stress, machine, below, late, stack, build)

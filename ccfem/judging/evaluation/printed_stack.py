@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
-from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer import Layer, curved_layers
 
 COARSE = 2.0
 """Distance, mm, between points that represent printed material, and between fibre samples."""
@@ -38,7 +38,7 @@ def printed(layers: Sequence[Layer], build: Sequence[float] | None = None) -> Pr
     build : sequence of 3 floats, optional
         Build direction; by default the mean normal of the layers.
     """
-    if all(layer.flat is not None for layer in layers):
+    if not curved_layers(layers):
         return None
     stack = sorted(layers, key=lambda layer: layer.index)
     points = [np.concatenate([k.points, k.points[k.triangles].mean(axis=1)]) for k in stack]

@@ -140,18 +140,16 @@ def strand_parts(
 
 def _section(layer: Layer) -> Region:
     """Section of a flat layer, or of the chart of a curved one."""
-    flat = layer if layer.flat is not None else chart_of(layer).flat
-    return flat.plane.polygon
+    return chart_of(layer).flat.plane.polygon
 
 
 def _in_plane(
     layer: Layer, middle: FloatArray, direction: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Parts of strands in the plane of their layer, or in its chart."""
-    if layer.flat is not None:
-        return layer.plane.project(middle), layer.plane.project(direction)
-    image, turned, _ = chart_of(layer).pieces(middle, direction, np.inf)
-    return image[:, :2], turned[:, :2]
+    chart = chart_of(layer)
+    image, turned, _ = chart.pieces(middle, direction, np.inf)
+    return chart.flat.plane.project(image), chart.flat.plane.project(turned)
 
 
 def _folded(folds: Folds, line: IntArray, arc: FloatArray) -> BoolArray:

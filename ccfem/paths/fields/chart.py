@@ -19,7 +19,7 @@ from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
 from ccfem.geometry.polylines import subdivide
 from ccfem.paths.fields.layer_elements import Surface, positive_definite
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer import Layer, curved_layers
 from ccfem.slicing.layers.plane import Plane, plane_frame
 from ccfem.slicing.layers.rounded_rings import charted_rings
 
@@ -124,8 +124,30 @@ class Chart:
         )
 
 
+class IdentityChart(Chart):
+    """The chart of a flat layer: the layer itself, and its paths as they are."""
+
+    def images(self, points: FloatArray) -> FloatArray:
+        """Return the points."""
+        return points
+
+    def flattened(self, paths: Toolpaths) -> Toolpaths:
+        """Return the paths."""
+        return paths
+
+    def pieces(
+        self, middle: FloatArray, tangent: FloatArray, most: float = _ON
+    ) -> tuple[FloatArray, FloatArray, BoolArray]:
+        """Return the pieces of fibre; no length is projected, so all lie on the layer."""
+        return middle, tangent, np.ones(len(middle), dtype=bool)
+
+    def lifted(self, paths: Toolpaths) -> Toolpaths:
+        """Return the paths."""
+        return paths
+
+
 def chart_of(layer: Layer) -> Chart:
-    """Lay a curved layer flat; the layer stores its chart, so that it is computed once.
+    """Lay a layer flat: a flat one as it is; a curved one stores its chart, computed once.
 
     Raises
     ------
@@ -133,6 +155,8 @@ def chart_of(layer: Layer) -> Chart:
         When more than 1 % of the area is inverted, since the layer is closed or doubly curved too
         strongly. Single slivers at the border may be.
     """
+    if layer.flat is not None:
+        return IdentityChart(layer, layer, np.ones((len(layer.triangles), 2)))
     known = vars(layer)
     if _CHART not in known:
         known[_CHART] = _flattened(layer)
@@ -142,17 +166,17 @@ def chart_of(layer: Layer) -> Chart:
 
 def flat_view(layer: Layer) -> Layer:
     """Return a flat layer itself, and the chart of a curved one."""
-    return layer if layer.flat is not None else chart_of(layer).flat
+    return chart_of(layer).flat
 
 
 def in_charts(paths: Toolpaths, layers: Sequence[Layer]) -> Toolpaths:
     """Paths, of which those on curved layers are laid flat."""
-    if all(layer.flat is not None for layer in layers):
+    if not curved_layers(layers):
         return paths
     parts = []
     for layer in layers:
         mine = paths.on_layer(layer.index)
-        parts.append(chart_of(layer).flattened(mine) if layer.flat is None and len(mine) else mine)
+        parts.append(chart_of(layer).flattened(mine) if len(mine) else mine)
     return Toolpaths.concatenate(parts)
 
 

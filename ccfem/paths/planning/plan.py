@@ -15,7 +15,7 @@ from ccfem.paths.fields.chart import chart_of, flat_view
 from ccfem.paths.planning.strategy import LayerPlanner, PartStrategy, Strategy
 from ccfem.paths.planning.unfolding import may_fold, unfolded_paths
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer import Layer, curved_layers
 from ccfem.slicing.layers.layer_stress import stress_on
 from ccfem.slicing.layers.pitch import check_pitch
 
@@ -101,7 +101,7 @@ def check_layers(strategy: Strategy, layers: Sequence[Layer], machine: Machine) 
         When the strategy plans on flat layers only and a layer is curved, and when layers are
         nearer than a strand is high.
     """
-    curved = [layer.index for layer in layers if layer.flat is None]
+    curved = [layer.index for layer in curved_layers(layers)]
     if curved and getattr(strategy, "flat_layers_only", False):
         raise InputError(
             f"{type(strategy).__name__} plans on flat layers only; {len(curved)} of {len(layers)} "

@@ -32,6 +32,7 @@ from ccfem.paths.splitting.slabs import LOW, Slab, slabs_of
 from ccfem.paths.splitting.strand_density import StrandDensity
 from ccfem.paths.toolpaths import FIBRE, MATRIX, Toolpaths
 from ccfem.slicing.layers import Layer
+from ccfem.slicing.layers.layer import curved_layers
 from ccfem.slicing.slicers.planar import Planar
 
 SHORT = 1e-6
@@ -99,7 +100,7 @@ def printed_strands(
     """
     fibre = toolpaths.of_kind(FIBRE)
     _check_fibre(fibre, layers, machine)
-    flat = all(layer.flat is not None for layer in layers)
+    flat = not curved_layers(layers)
     used = [layer for layer in layers if layer.index in fibre.layer]
     pieces = {layer.index: _whole(fibre, layer.index) for layer in used}
     process, removed, warnings = machine.process, 0.0, list[str]()

@@ -13,7 +13,7 @@ from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.machine.machine import Machine
 from ccfem.printing.support.column_mesh import ColumnMesh, column_mesh
 from ccfem.printing.support.support_field import SupportField, support_field
-from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer import Layer, curved_layers
 from ccfem.slicing.layers.slicer import Slicer, Vector
 from ccfem.slicing.layers.standing import standing
 from ccfem.slicing.layers.sublayers import layers_within
@@ -120,7 +120,7 @@ def support_layers(
     """
     if not layers:
         raise InputError("support is laid below layers; got none: cut the part into layers first")
-    flat = all(layer.flat is not None for layer in layers)
+    flat = not curved_layers(layers)
     if field is None:
         first = layers[0].flat
         if not flat or first is None:
@@ -200,6 +200,6 @@ def slice_with_support(
             "support carries them: raise load_oriented.blend, or leave it out"
         )
     layers, up = sliced.layers, standing(sliced.layers, build)
-    values = None if all(layer.flat is not None for layer in layers) else sliced.field.values
+    values = sliced.field.values if curved_layers(layers) else None
     step = None if values is None else sliced.step
     return layers, support_layers(stress.mesh, layers, up, values, step, angle, lift)

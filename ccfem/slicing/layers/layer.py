@@ -1,6 +1,6 @@
 """A layer: the triangulated surface on which a strategy plans its paths."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -148,6 +148,11 @@ class Layer(Shown):
         points = self.flat.project(self.points)
         about = (points, self.loops, self.walls, self.outline)
         return FlatLayer(self.flat.frame, self.flat.height, *about)
+
+
+def curved_layers(layers: Sequence[Layer]) -> tuple[Layer, ...]:
+    """Those of some layers that lie in no plane."""
+    return tuple(layer for layer in layers if layer.flat is None)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer import Layer, curved_layers
 from ccfem.slicing.layers.slicer import Vector
 
 _DOWN = 1e-3
@@ -27,7 +27,7 @@ def standing(layers: Sequence[Layer], build: Vector) -> Vector:
     up = np.asarray(build, dtype=np.float64) / np.linalg.norm(build)
     area = np.concatenate([layer.areas for layer in layers])
     normals = np.concatenate([layer.normals for layer in layers])
-    curved = any(layer.flat is None for layer in layers)
+    curved = curved_layers(layers)
     mean = area @ normals
     size = float(np.linalg.norm(mean))
     if curved and area[normals @ up < 0.0].sum() > _DOWN * area.sum() and size > 0.0:

@@ -26,7 +26,7 @@ from ccfem.paths.planning.short_pieces import about_short_pieces
 from ccfem.paths.planning.strategy import CasesStrategy, LengthStrategy, Strategy
 from ccfem.paths.planning.unfolding import may_fold
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer import Layer, curved_layers
 from ccfem.strategies.fibre_aware.heights import layers_by_case
 from ccfem.strategies.fibre_aware.judges import Goal
 from ccfem.strategies.fibre_aware.prune import prune
@@ -83,7 +83,7 @@ def plan_cases(
         return Planned(strategy, paths, length_per_layer(paths, layers))
     if isinstance(strategy, CasesStrategy) and wanted is not None:
         return _by_itself(strategy, layers, cases, machine, (wanted,))[0]
-    curved = [layer.index for layer in layers if layer.flat is None]
+    curved = [layer.index for layer in curved_layers(layers)]
     if curved:
         raise InputError(
             f"several load cases are planned for on flat layers only; layer {curved[0]} is curved: "

@@ -26,7 +26,7 @@ from ccfem.geometry.polylines import starts_segment
 from ccfem.judging.virtual_testing.near_failure import POWER
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
-from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer import Layer, curved_layers
 from ccfem.strategies.fibre_aware.judges import Judge, Judged
 from ccfem.strategies.fibre_aware.strain_worth import StrainWorth
 from ccfem.strategies.fibre_aware.strand_lines import StrandLines, strand_lines
@@ -96,7 +96,7 @@ def moved(
     """
     check_number("moves", moves, at_least=0)
     check_number("inset", inset, at_least=0.0, unit="fibre widths")
-    if any(layer.flat is None for layer in layers):
+    if curved_layers(layers):
         raise InputError("strands move on flat layers only; got a curved one: set moves to 0")
     fibre = toolpaths.of_kind(FIBRE)
     if not moves or not len(fibre):

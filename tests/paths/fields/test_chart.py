@@ -134,3 +134,16 @@ def test_a_closed_surface_is_refused_in_one_line():
     with pytest.raises(InputError, match="cannot be laid flat without a fold") as caught:
         chart_of(ball)
     assert "\n" not in str(caught.value)
+
+
+def test_the_chart_of_a_flat_layer_is_the_layer():
+    (layer,) = Planar(count=1).cut(box_mesh((20.0, 10.0, 2.0), (4, 2, 1)))
+    chart = chart_of(layer)
+    paths = Toolpaths.from_plane([[[1.0, 1.0], [19.0, 9.0]]], layer)
+    assert chart.flat is layer
+    assert chart.distortion == 0.0
+    assert chart.flattened(paths) is chart.lifted(paths) is paths
+    middle, tangent, near = chart.pieces(paths.points, paths.normals)
+    assert middle is paths.points
+    assert tangent is paths.normals
+    assert near.all()
