@@ -25,6 +25,9 @@ _FOLDED = {
     ),
     "cases.reading": "cases.named",
     "cases.shipped": "cases.bracket cases.t_bracket cases.two_load_plate",
+    "comparison.studies.study_result": (
+        "comparison.studies.study_fronts comparison.studies.study_table"
+    ),
     "papers.contents": "papers.verdicts",
     "body.mesh.check": "body.mesh.hanging",
     "body.meshing.meshed_body": "body.meshing.cache",

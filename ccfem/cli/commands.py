@@ -176,13 +176,13 @@ def _run(
     file: Path, out: Path | None, workers: int | None, scheduler: str | None, force: bool
 ) -> None:
     """Run a study file and print what came out."""
+    from ccfem.comparison.front import FRONTS
     from ccfem.comparison.studies import study
-    from ccfem.comparison.studies.study_fronts import COST
 
     with progress_bar() as progress:
         result = study(file, out, workers, scheduler, force, progress)
     print(result)
-    for cost in COST:
+    for cost in FRONTS:
         front = result.front(cost)
         if len(front):
             print(f"on the front of stiffness over {cost}: {len(front)} runs")

@@ -1,8 +1,34 @@
 """Fronts: runs that no other run beats in one quantity without being worse in another."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray
+from ccfem.base.errors import InputError
+
+
+class Cost(NamedTuple):
+    """What stiffness is drawn over: title of its axis, factor of its unit, which end is better."""
+
+    title: str
+    factor: float = 1.0
+    better: str = "low"
+
+
+FRONTS = {
+    "fibre_length": Cost("fibre, mm"),
+    "print_time_nearest": Cost("time to lay the fibre, min", 1.0 / 60.0),
+    "first_failure_load": Cost("first failure, N", better="high"),
+}
+"""Indices that fronts of stiffness are drawn over."""
+
+
+def cost_of(over: str) -> Cost:
+    """Return what a front over an index needs; raise `InputError` for another index."""
+    if over not in FRONTS:
+        raise InputError(f"fronts are drawn over {', '.join(FRONTS)}; got {over!r}: choose one")
+    return FRONTS[over]
 
 
 def on_front(across: FloatArray, up: FloatArray, better: str = "low") -> BoolArray:

@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 
-from ccfem.comparison.ranking import is_tested, merit, off_length, order_of, ranking
+from ccfem.comparison.ranking import is_tested, merit, off_length, ranking
 from ccfem.comparison.remarks import why_above
 from ccfem.comparison.request import Wanted
 from ccfem.comparison.runs import Run
-from ccfem.comparison.verdict import all_same, comparable, left_out
+from ccfem.comparison.verdict import all_same, comparable, left_out, not_behind
 from ccfem.fem.elasticity.weighted_cases import WeightedCases
-from ccfem.judging.virtual_testing.stiffer import FIRST, RESOLUTION
+from ccfem.judging.virtual_testing.stiffer import RESOLUTION
 from ccfem.strategies.fibre_aware.upper_bound import LEAST, LOOSE, UpperBound
 
 
@@ -23,23 +23,15 @@ def cases_verdict(runs: Sequence[Run], wanted: Wanted, bound: UpperBound | None)
     order = [run for run in comparable(runs, wanted) if is_tested(run)]
     if len(order) < 2:
         return ""
-    first, orders = order[0], [order_of(order[0], other) for other in order[1:]]
+    first, group = order[0], not_behind(order)
     of = (
         "of the upper bound for that case alone"
         if bound is not None
         else "the unreinforced stiffness"
     )
     reached = f"{merit(first):.0%} {of}" if bound is not None else f"{merit(first):.2f} times {of}"
-    group = [
-        first,
-        *(
-            run
-            for run, order_of_run in zip(order[1:], orders, strict=True)
-            if order_of_run != FIRST
-        ),
-    ]
     names = f"{first.name} and {', '.join(run.name for run in group[1:])}"
-    if all(order_of_run == FIRST for order_of_run in orders):
+    if len(group) == 1:
         said = (
             f"{first.name} serves all load cases best: the worst of them reaches {reached}, "
             f"{merit(first) / merit(order[1]):.2f} times {order[1].name} (predicted, fibres "

@@ -93,9 +93,8 @@ def _stiffer(run: Run, best: Run | None) -> bool:
 
 def _by_stiffness(order: Sequence[Run], wanted: Wanted) -> str:
     first, second = order[0], order[1]
-    orders = [order_of(first, run) for run in order[1:]]
-    both = all_have(order, ALTERNATIVES[0])
-    if all(order_of_run == FIRST for order_of_run in orders):
+    both, group = all_have(order, ALTERNATIVES[0]), not_behind(order)
+    if len(group) == 1:
         gain = stiffness_ratio(first) / stiffness_ratio(second)
         return (
             f"{first.name} makes the stiffest part, {_amount(wanted)}: "
@@ -103,14 +102,6 @@ def _by_stiffness(order: Sequence[Run], wanted: Wanted) -> str:
             f"{second.name} (predicted, fibres carrying tension only; no other is stiffer with "
             f"bonded fibres{', or under the alternative supports' if both else ''})."
         )
-    group = [
-        first,
-        *(
-            run
-            for run, order_of_run in zip(order[1:], orders, strict=True)
-            if order_of_run != FIRST
-        ),
-    ]
     if all_same(group):
         return (
             f"No difference between {_names(group)}, {_amount(wanted)}: "
@@ -122,6 +113,11 @@ def _by_stiffness(order: Sequence[Run], wanted: Wanted) -> str:
         f"{_ratios(group)} times the unreinforced stiffness where fibres carry tension only, "
         f"{_ratios(group, 'bonded')} where they are bonded{_under_other(group)}."
     )
+
+
+def not_behind(order: Sequence[Run]) -> list[Run]:
+    """First of the ranked runs, and all that it is not clearly ahead of."""
+    return [*order[:1], *(run for run in order[1:] if order_of(order[0], run) != FIRST)]
 
 
 def all_same(runs: Sequence[Run]) -> bool:

@@ -1,6 +1,6 @@
 """What a comparison shows of itself: the paths of a layer, fronts, and a page for notebooks."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from html import escape
 from typing import TYPE_CHECKING
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ccfem.base.errors import InputError
-from ccfem.comparison.front import on_front
+from ccfem.comparison.front import cost_of, on_front
 from ccfem.comparison.headline import headline_values
 from ccfem.comparison.runs import Run
 from ccfem.fem.elasticity.part_stress import PartStress
@@ -19,13 +19,6 @@ from ccfem.slicing.layers.layer_stress import stress_on
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-FRONTS: Mapping[str, tuple[str, str]] = {
-    "fibre_length": ("fibre, mm", "low"),
-    "print_time_nearest": ("time to lay the fibre, s", "low"),
-    "first_failure_load": ("first failure, N", "high"),
-}
-"""What stiffness is drawn over: its title, and which end of it is better."""
 
 
 def shown_layer(runs: Sequence[Run], layers: Sequence[Layer]) -> int:
@@ -81,8 +74,7 @@ def front_picture(runs: Sequence[Run], over: str) -> "Figure":
     """
     from ccfem.comparison.plot.fronts import FrontPoint, front_figure
 
-    if over not in FRONTS:
-        raise InputError(f"fronts are drawn over {', '.join(FRONTS)}; got {over!r}: choose one")
+    cost = cost_of(over)
     values = [headline_values(run) for run in runs]
     known = [
         (run, row)
@@ -91,14 +83,15 @@ def front_picture(runs: Sequence[Run], over: str) -> "Figure":
     ]
     if not known:
         raise InputError(f"no run has stiffness and {over}: compare with the virtual test")
-    title, better = FRONTS[over]
-    across = np.array([row[over] if run.printable else np.nan for run, row in known])
-    best = on_front(across, np.array([row["stiffness"] for _, row in known]), better)
-    points = [
-        FrontPoint(run.name, row[over], row["stiffness"], bool(chosen), run.printable, run.name)
-        for (run, row), chosen in zip(known, best, strict=True)
-    ]
-    return front_figure({"": points}, title, "stiffness, N/mm")
+    across = cost.factor * np.array([row[over] for _, row in known])
+    up = np.array([row["stiffness"] for _, row in known])
+    printable = np.array([run.printable for run, _ in known])
+    best = on_front(np.where(printable, across, np.nan), up, cost.better)
+    names = [run.name for run, _ in known]
+    points = map(
+        FrontPoint, names, across.tolist(), up.tolist(), best.tolist(), printable.tolist(), names
+    )
+    return front_figure({"": [*points]}, cost.title, "stiffness, N/mm")
 
 
 def paragraphs(remarks: Sequence[str]) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray
 from ccfem.comparison.curve import Curve
+from ccfem.comparison.front import FRONTS, Cost, on_front
 from ccfem.comparison.headline import headline_values
 from ccfem.comparison.ranking import stiffness_ratio
 from ccfem.comparison.runs import Run
@@ -18,12 +19,8 @@ _LEAST, _MOST = 0.01, 10.0
 """Ends, 1/mm, of the scale of curvature; what is straighter counts at its left end."""
 _QUANTILES = np.linspace(0.0, 1.0, 101)
 
-_COSTS = (
-    ("fibre_mass", 1.0, "fibre, g", "low"),
-    ("print_time_nearest", 1.0 / 60.0, "time to lay the fibre, min", "low"),
-    ("first_failure_load", 1.0, "first failure, N", "high"),
-)
-"""Against which indices stiffness is drawn: factor, title, and which end is better."""
+_COSTS = {"fibre_mass": Cost("fibre, g")} | {k: FRONTS[k] for k in FRONTS if k != "fibre_length"}
+"""Indices that stiffness is drawn over."""
 
 _LEAST_SPAN = 0.2
 """Length of an axis over its largest value, so that what hardly differs looks so."""
@@ -39,7 +36,7 @@ def fronts(runs: Sequence[Run], colours: Mapping[str, str]) -> list[dict[str, An
     """
     charts = []
     values = {run.name: headline_values(run) for run in runs}
-    for column, factor, title, better in _COSTS:
+    for column, (title, factor, better) in _COSTS.items():
         points = [
             (run, factor * values[run.name][column], values[run.name]["stiffness_ratio_tension"])
             for run in runs
@@ -109,12 +106,9 @@ def front(points: Sequence[tuple[float, float]], better: str) -> list[tuple[floa
     better : {"low", "high"}
         Which first numbers are better; of the second ones, high ones are.
     """
-    sign = 1.0 if better == "low" else -1.0
-    corners: list[tuple[float, float]] = []
-    for x, y in sorted(set(points), key=lambda p: (sign * p[0], -p[1])):
-        if not corners or y > corners[-1][1]:
-            corners.append((x, y))
-    return sorted(corners)
+    across, up = np.array(points, dtype=float).reshape(-1, 2).T
+    best = on_front(across, up, better)
+    return sorted({point for point, chosen in zip(points, best, strict=True) if chosen})
 
 
 def spreads(

@@ -26,12 +26,11 @@ from ccfem.base.errors import InputError, spared
 from ccfem.base.folder import Folder, private_folder, sweep
 from ccfem.base.progress import Progress, silent
 from ccfem.base.result_folder import refuse_foreign, whole_folder
+from ccfem.comparison.front import FRONTS
 from ccfem.comparison.plot.canvas import png
 from ccfem.comparison.studies.definition import Study, read_study
 from ccfem.comparison.studies.jobs import Job, Jobs, jobs_of
-from ccfem.comparison.studies.study_fronts import COST
-from ccfem.comparison.studies.study_result import StudyResult
-from ccfem.comparison.studies.study_table import shown_table
+from ccfem.comparison.studies.study_result import StudyResult, shown_table
 from ccfem.comparison.studies.transport import packed, unpacked
 from ccfem.comparison.studies.work import crashed, job_bytes, part_bytes, run_job, solve_part
 from ccfem.comparison.studies.worker import receive, send
@@ -206,7 +205,7 @@ def study_page(result: StudyResult) -> str:
     """Write the page."""
     parts = [f"<h1>{escape(result.name)}</h1><p>{escape(result.about)}</p>"]
     parts += [f'<p class="remark">{escape(line)}</p>' for line in result.remarks]
-    for cost in COST:
+    for cost in FRONTS:
         if not result.frame[f"front_{cost}"].any():
             continue
         picture = base64.b64encode(png(result.plot(cost))).decode()

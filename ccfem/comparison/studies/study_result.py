@@ -8,11 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ccfem.base.arrays import freeze
-from ccfem.base.errors import InputError
+from ccfem.comparison.front import FRONTS, cost_of, on_front
 from ccfem.comparison.plot.values import image
 from ccfem.comparison.studies.jobs import Job
-from ccfem.comparison.studies.study_fronts import COST, GAIN, with_fronts
-from ccfem.comparison.studies.study_table import shown_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,12 +20,8 @@ NOT_RUN = "not run yet: start the study again"
 
 _OWNERS = ("part", "load_case", "slicing", "study", "strategy")
 _SAID = ("printable", "why_not", "failure", "untested", "note", "fails_in", "empty_layers")
-_TITLES = {
-    "fibre_length": "fibre, mm",
-    "print_time_nearest": "time to lay the fibre, min",
-    "first_failure_load": "first failure, N",
-    GAIN: "stiffness, N/mm",
-}
+GAIN = "stiffness"
+"""What fronts are of."""
 _SHOWN = 12
 """Rows that a notebook shows."""
 
@@ -139,7 +133,8 @@ class StudyResult:
         ----------
         over : {"fibre_length", "print_time_nearest", "first_failure_load"}
         """
-        return self.frame[self.frame[f"front_{_known(over)}"]]
+        cost_of(over)
+        return self.frame[self.frame[f"front_{over}"]]
 
     def plot(self, over: str = "fibre_length") -> "Figure":
         """Draw stiffness over another index, a panel for each part and load case.
@@ -151,8 +146,7 @@ class StudyResult:
         from ccfem.comparison.plot.fronts import FrontPoint, front_figure
 
         panels: dict[str, list[FrontPoint]] = {}
-        frame, over = self.frame, _known(over)
-        scale = 1.0 / 60.0 if over == "print_time_nearest" else 1.0
+        frame, cost = self.frame, cost_of(over)
         geometry = [name for name in frame.columns if name.startswith("part.")]
         if GAIN in frame and over in frame:
             for row in frame[frame[GAIN].notna() & frame[over].notna()].to_dict("records"):
@@ -163,13 +157,13 @@ class StudyResult:
                 panels.setdefault(heading, []).append(
                     FrontPoint(
                         str(row["strategy"]),
-                        scale * float(row[over]),
+                        cost.factor * float(row[over]),
                         float(row[GAIN]),
                         bool(row[f"front_{over}"]),
                         bool(row["printable"]),
                     )
                 )
-        return front_figure(panels, _TITLES[over], _TITLES[GAIN])
+        return front_figure(panels, cost.title, "stiffness, N/mm")
 
     def _repr_html_(self) -> str:
         remarks = "".join(f"<p>{escape(line)}</p>" for line in self.remarks)
@@ -185,7 +179,68 @@ def _row(job: Job, labels: list[str]) -> dict[str, Any]:
     return {name: job.labels.get(name) for name in labels}
 
 
-def _known(over: str) -> str:
-    if over not in COST:
-        raise InputError(f"fronts are drawn over {', '.join(COST)}; got {over!r}: choose one")
-    return over
+def with_fronts(table: "pd.DataFrame") -> "pd.DataFrame":
+    """Table with a column for each front: whether a run is on it.
+
+    Fronts are those of the printable runs of one part under one load case.
+    """
+    marked = table.copy()
+    for cost, (_, _, better) in FRONTS.items():
+        name = f"front_{cost}"
+        marked[name] = False
+        if GAIN not in marked or cost not in marked:
+            continue
+        printable = marked[marked["printable"].astype(bool)]
+        for _, group in printable.groupby(["part", "load_case", *_geometry(marked)], dropna=False):
+            chosen = on_front(group[cost].to_numpy(), group[GAIN].to_numpy(), better)
+            marked.loc[group.index[chosen], name] = True
+    return marked
+
+
+def _geometry(table: "pd.DataFrame") -> list[str]:
+    """Columns that tell parts of one name apart."""
+    return [name for name in table.columns if name.startswith("part.")]
+
+
+# The table of a study in HTML.
+
+
+_COLUMNS = {
+    "printable": "printable",
+    "stiffness": "stiffness, N/mm",
+    "stiffness_ratio_tension": "stiffness ratio",
+    "first_failure_load": "first failure, N",
+    "fibre_length": "fibre, mm",
+    "print_time_nearest": "laying fibre, s",
+    "efficiency": "efficiency",
+}
+
+
+def shown_table(frame: "pd.DataFrame") -> str:
+    """HTML table of the columns that say most; why a run failed stands in place of its numbers."""
+    labels = [
+        name
+        for name in frame.columns
+        if name in ("part", "load_case", "slicing", "strategy") or "." in name
+    ]
+    labels = [name for name in labels if frame[name].nunique(dropna=False) > 1] or ["strategy"]
+    columns = [name for name in _COLUMNS if name in frame]
+    titles = [*(name.removeprefix("strategy.") for name in labels), *(_COLUMNS[c] for c in columns)]
+    rows = ["".join(f"<th>{escape(title)}</th>" for title in titles)]
+    for row in frame.to_dict("records"):
+        cells = "".join(f"<td>{escape(_text(row[name]))}</td>" for name in labels)
+        if row["failure"]:
+            said = escape(f"failed: {row['failure']}")
+            cells += f'<td class="failed" colspan="{max(len(columns), 1)}">{said}</td>'
+        else:
+            cells += "".join(f"<td>{escape(_text(row[name]))}</td>" for name in columns)
+        rows.append(cells)
+    return "<table>" + "".join(f"<tr>{row}</tr>" for row in rows) + "</table>"
+
+
+def _text(value: Any) -> str:
+    if value is None or value != value:
+        return ""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
