@@ -25,6 +25,7 @@ _FOLDED = {
     ),
     "cases.reading": "cases.named",
     "cases.shipped": "cases.bracket cases.t_bracket cases.two_load_plate",
+    "comparison.plot.curves": "comparison.plot.stiffness_curves",
     "comparison.studies.study_result": (
         "comparison.studies.study_fronts comparison.studies.study_table"
     ),

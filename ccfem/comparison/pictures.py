@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray
 from ccfem.base.progress import Progress, silent
 from ccfem.cases.inspection.part_check import check
 from ccfem.comparison.plot.canvas import png
 from ccfem.comparison.plot.colours import palette
-from ccfem.comparison.plot.curves import curvature_curves, matching_curves
-from ccfem.comparison.plot.fields import error_picture, tension_picture
+from ccfem.comparison.plot.curves import StiffnessPoint, stiffness_curves
+from ccfem.comparison.plot.fields import tension_picture
 from ccfem.comparison.plot.part_picture import part_page, part_picture
 from ccfem.comparison.plot.paths import (
     Coloured,
@@ -23,14 +22,10 @@ from ccfem.comparison.plot.paths import (
     mark_failure,
     tension_limit,
 )
-from ccfem.comparison.plot.stiffness_curves import StiffnessPoint, stiffness_curves
 from ccfem.comparison.ranking import stiffness_ratio
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.shown import caption, drawn_layers, middle_layer
-from ccfem.fem.elasticity.stress_field import StressField
-from ccfem.judging.evaluation.indices.matching import THRESHOLDS, along_fibre, matching_curve
-from ccfem.judging.evaluation.plane_paths import pool
 from ccfem.paths.fields.chart import chart_of, flat_view, in_charts
 from ccfem.slicing.layers import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress, stress_on
@@ -50,12 +45,8 @@ class Pictures:
         Force in the fibres of the middle layer, where there was a virtual test.
     tension : bytes
         Tension in the middle layer.
-    error : bytes
-        Estimated error of the cells in the middle layer.
     overview : bytes
         All strategies side by side on the middle layer.
-    matching, curvature : bytes
-        Curves of all strategies over all layers.
     part : bytes
         The part with its patches, loads and supports.
     part_page : str
@@ -69,10 +60,7 @@ class Pictures:
     paths: dict[tuple[str, int], bytes]
     forces: dict[str, bytes]
     tension: bytes
-    error: bytes
     overview: bytes
-    matching: bytes
-    curvature: bytes
     part: bytes
     part_page: str
     middle: int
@@ -92,17 +80,13 @@ def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictur
     limit = max(tension_limit(stress) for stress in stresses)
     colours = palette(run.name for run in comparison.runs)
     middle = next(each for each in stresses if each.layer.index == centre.index)
-    rates, bends = _curves(runs)
     heading = f"tension in layer {middle.layer.index}, load case {comparison.stress.case}"
     checked = check(comparison.case)
     return Pictures(
         _layers(runs, stresses, machine.fibre_width, limit, colours, progress),
         _forces(runs, centre, machine.fibre_width, colours),
         png(tension_picture(middle, heading, "size and direction", limit)),
-        png(_error(comparison.stress, middle.layer)),
         png(_overview(runs, middle, machine.fibre_width, limit)),
-        png(matching_curves(rates, THRESHOLDS, "fibre along the stress", colours)),
-        png(curvature_curves(bends, machine.minimum_radius, "curvature", colours)),
         png(part_picture(checked)),
         part_page(checked),
         middle.layer.index,
@@ -146,13 +130,6 @@ def _layers(
     return drawn
 
 
-def _error(stress: StressField, layer: Layer) -> "Figure":
-    """Estimated error of the cells in a layer."""
-    error = stress.error.densities(stress.mesh.volumes)
-    heading = f"estimated error of the cells in layer {layer.index}"
-    return error_picture(layer, error, heading, f"{stress.error.relative:.1%} of the whole part")
-
-
 def overview_picture(comparison: Comparison) -> "Figure":
     """Draw all strategies side by side on the layer that stands for all."""
     runs = [
@@ -168,18 +145,6 @@ def _overview(runs: Sequence[Run], stress: LayerStress, width: float, limit: flo
     paths = {run.name: run.toolpaths for run in runs}
     captions = {run.name: caption(run, stress.layer) for run in runs}
     return compare_layer(stress.layer, stress, paths, width, captions, limit)
-
-
-def _curves(runs: Sequence[Run]) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
-    """Join matching rates, and curvatures, 1/mm, of each run over all layers: all were sampled."""
-    rates, bends = {}, {}
-    for run in runs:
-        samples = run.evaluation.samples if run.evaluation is not None else ()
-        rates[run.name] = matching_curve(
-            along_fibre(pool([sample.alignment for sample in samples]))
-        )
-        bends[run.name] = np.concatenate([sample.curvature.curvature for sample in samples])
-    return rates, bends
 
 
 def _forces(

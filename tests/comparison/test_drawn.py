@@ -17,6 +17,7 @@ from ccfem.cases.case import Case
 from ccfem.comparison import pictures
 from ccfem.comparison.engine import compare
 from ccfem.comparison.files import write_results
+from ccfem.comparison.report import charts
 from ccfem.comparison.report import html_report as report
 from ccfem.fem.elasticity.problem import Force, Problem, Support
 from ccfem.fem.materials import isotropic
@@ -115,7 +116,7 @@ def test_a_file_that_cannot_be_written_is_no_picture_that_fails(result, monkeypa
         write_results(result, tmp_path)
 
 
-def test_curves_are_those_of_the_samples(result, monkeypatch):
+def test_curves_are_those_of_the_samples(result):
     """Half of the fibre at 20 degrees, half at 70; curvatures of 0.1, 0.2 and 0.4 per mm."""
     (run,) = result.runs
     (own,) = run.evaluation.samples
@@ -125,16 +126,9 @@ def test_curves_are_those_of_the_samples(result, monkeypatch):
     )
     curvature = replace(own.curvature, curvature=np.array([0.4, 0.1, 0.2]))
     evaluation = replace(run.evaluation, samples=(FibreSamples(curvature, alignment),))
-    drawn = {}
-    for name in ("matching_curves", "curvature_curves"):
-        real = getattr(pictures, name)
-
-        def spy(*arguments, real=real, name=name):
-            drawn[name] = arguments[0]
-            return real(*arguments)
-
-        monkeypatch.setattr(pictures, name, spy)
-    pictures.draw_pictures(replace(result, runs=(replace(run, evaluation=evaluation),)))
+    sampled = replace(run, evaluation=evaluation)
+    angles, bends = charts.spreads([sampled], {"zigzag": "#000000"}, 0.0)
     expected = np.where(THRESHOLDS >= 70.0, 1.0, np.where(THRESHOLDS >= 20.0, 0.5, 0.0))
-    np.testing.assert_allclose(drawn["matching_curves"]["zigzag"], expected)
-    np.testing.assert_array_equal(np.sort(drawn["curvature_curves"]["zigzag"]), [0.1, 0.2, 0.4])
+    np.testing.assert_allclose(angles["series"][1]["y"], 100.0 * expected)
+    np.testing.assert_allclose(np.array(bends["series"][0]["x"])[[0, 50, 100]], [0.1, 0.2, 0.4])
+    assert np.array(bends["series"][0]["y"])[[0, 50, 100]].tolist() == [0.0, 50.0, 100.0]

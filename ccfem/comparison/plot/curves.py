@@ -1,97 +1,63 @@
-"""Curves of several strategies on one pair of axes."""
+"""Curves of several strategies on one pair of axes: stiffness over the length of fibre."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
-from ccfem.base.arrays import FloatArray
-from ccfem.base.checks import check_number
-from ccfem.base.errors import InputError
 from ccfem.comparison.plot.colours import INK, OUTLINE, palette
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_LEAST, _MOST = 0.01, 10.0
-"""Ends, 1/mm, of the scale of curvature; what is straighter counts at its left end."""
+
+class StiffnessPoint(NamedTuple):
+    """One point of a curve.
+
+    Attributes
+    ----------
+    length : float, mm per layer
+        Of fibre.
+    ratio : float
+        Stiffness over that of the part without fibre.
+    printable : bool
+        Whether the paths can be printed as planned: others are drawn hollow.
+    """
+
+    length: float
+    ratio: float
+    printable: bool
 
 
-def matching_curves(
-    rates: Mapping[str, FloatArray],
-    thresholds: FloatArray,
+def stiffness_curves(
+    curves: Mapping[str, Sequence[StiffnessPoint]],
+    marked: Sequence[float] = (),
     heading: str = "",
     colours: Mapping[str, str] | None = None,
 ) -> "Figure":
-    """Draw matching rates over the angle, with the one that chance gives.
+    """Draw stiffness over the length of fibre.
 
     Parameters
     ----------
-    rates : mapping of name to (k,) array
-        As from `evaluation.matching.matching_curve`; NaN is left out.
-    thresholds : (k,) array, degrees
+    curves : mapping of name to sequence of StiffnessPoint
+        From the least fibre to the most.
+    marked : sequence of float, mm per layer
+        Lengths to mark: those that all curves have.
     colours : mapping of name to colour, optional
         Default `palette`.
     """
-    for name, rate in rates.items():
-        if len(rate) != len(thresholds):
-            raise InputError(
-                f"curve '{name}' has {len(rate)} values for {len(thresholds)} angles: give one each"
-            )
-    figure, axes = axes_below(heading, "angle, degrees", "share within that angle, %")
-    axes.plot([0.0, 90.0], [0.0, 100.0], color=OUTLINE, lw=0.8, ls=(0, (4, 3)), zorder=1.0)
-    axes.text(67.0, 66.0, "chance", size=7, color=OUTLINE)
-    chosen = palette(rates) if colours is None else colours
-    for name, rate in rates.items():
-        axes.plot(thresholds, 100.0 * rate, color=chosen[name], lw=1.6, marker="o", ms=2.5)
-    axes.set_xlim(0.0, 90.0)
-    axes.set_xticks(np.arange(0, 91, 15))
-    legend_below(axes, chosen, list(rates))
-    return figure
-
-
-def curvature_curves(
-    curvatures: Mapping[str, FloatArray],
-    radius: float,
-    heading: str = "",
-    colours: Mapping[str, str] | None = None,
-) -> "Figure":
-    """Draw the share of samples below each curvature.
-
-    Parameters
-    ----------
-    curvatures : mapping of name to (s,) array, 1/mm
-        Samples that count equally, as `evaluation.curvature.sample_curvature` takes them.
-    radius : float, mm
-        Tightest that the machine allows (`Machine.minimum_radius`): its curvature is marked, unless
-        it is 0.
-    heading, colours
-        As in `matching_curves`.
-    """
-    check_number("the tightest radius", radius, at_least=0.0, unit="mm")
-    figure, axes = axes_below(heading, "curvature, 1/mm", "share below it, %")
-    if radius > 0.0:
-        axes.axvline(1.0 / radius, color=OUTLINE, lw=0.8, ls=(0, (4, 3)), zorder=1.0)
-        axes.text(
-            1.06 / radius, 2.0, f"radius {radius:.3g} mm", size=7, color=OUTLINE, clip_on=True
-        )
-    chosen = palette(curvatures) if colours is None else colours
-    for name, samples in curvatures.items():
-        if not len(samples):
-            continue
-        order = np.clip(np.sort(samples), _LEAST, _MOST)
-        share = 100.0 * np.arange(1, len(order) + 1) / len(order)
-        axes.step(
-            np.concatenate([[_LEAST], order, [_MOST]]),
-            np.concatenate([[0.0], share, [100.0]]),
-            where="post",
-            color=chosen[name],
-            lw=1.6,
-        )
-    axes.set_xscale("log")
-    axes.set_xlim(_LEAST, _MOST)
-    axes.set_xticks([0.01, 0.1, 1.0, 10.0], ["≤ 0.01", "0.1", "1", "10"])
-    legend_below(axes, chosen, list(curvatures))
+    figure, axes = axes_below(heading, "fibre, mm a layer", "stiffness ratio")
+    chosen = palette(curves) if colours is None else colours
+    for length in marked:
+        axes.axvline(length, color=OUTLINE, lw=0.8, ls=(0, (4, 3)), zorder=1.0)
+    for name, points in curves.items():
+        colour = chosen[name]
+        axes.plot([p.length for p in points], [p.ratio for p in points], color=colour, lw=1.6)
+        for p in points:
+            face = colour if p.printable else "white"
+            axes.plot([p.length], [p.ratio], "o", ms=4.0, color=colour, mfc=face)
+    most = max((p.ratio for points in curves.values() for p in points), default=1.0)
+    axes.set_ylim(1.0, 1.0 + 1.08 * max(most - 1.0, 0.01))
+    axes.set_xlim(left=0.0)
+    legend_below(axes, chosen, list(curves))
     return figure
 
 

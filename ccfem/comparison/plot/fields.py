@@ -7,7 +7,7 @@ import numpy as np
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.tensor import in_plane, largest_in_plane
 from ccfem.comparison.plot.canvas import colour_bar, extents_of, new_figure, scale_bar, title
-from ccfem.comparison.plot.colours import INK, scale
+from ccfem.comparison.plot.colours import INK
 from ccfem.comparison.plot.paths import draw_section, draw_stress, tension_limit
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.layer_stress import LayerStress
@@ -38,36 +38,6 @@ def tension_picture(
         axes, layer, np.stack([np.cos(angle), np.sin(angle)], axis=1), largest > 0.02 * end
     )
     colour_bar(axes, colours, (0.0, end), "MPa tension")
-    scale_bar(axes)
-    title(axes, heading, caption)
-    return figure
-
-
-def error_picture(
-    layer: Layer, error: FloatArray, heading: str = "", caption: str = ""
-) -> "Figure":
-    """Picture of the estimated error of the cells that a layer cuts.
-
-    Parameters
-    ----------
-    error : (m,) array
-        Of each cell of the mesh, as `ErrorEstimate.densities` gives it.
-    """
-    figure, (axes,) = new_figure(extents_of(layer.plane.points))
-    values, colours = error[layer.cell], scale("stress")
-    end = max(float(np.quantile(values, 0.98)), 1e-12) if len(values) else 1.0
-    axes.tripcolor(
-        *layer.plane.points.T,
-        layer.triangles,
-        facecolors=values,
-        cmap=colours,
-        vmin=0.0,
-        vmax=end,
-        rasterized=True,
-        zorder=1.0,
-    )
-    draw_section(axes, layer, filled=False)
-    colour_bar(axes, colours, (0.0, end), "error over mean stress")
     scale_bar(axes)
     title(axes, heading, caption)
     return figure
