@@ -15,19 +15,19 @@ def front_table(fibre_front: "FibreFront") -> list[str]:
     which no paths bring the worst case, the stiffness ratio of each case with its bound, and the
     least multiple of its load at which one fails.
     """
-    cases = fibre_front.points[0].cases
-    if cases is None:
+    names = fibre_front.cases
+    if not names:
         heads = ["stiffness ratio", "bound"]
         bare = ["1.000 ", "1.000", _newtons(fibre_front.bare)]
     else:
-        heads = ["worst of bound", "at most", *(f"{name} (bound)" for name in cases.names)]
-        none = [_ratio(1.0, 1.0) for _ in cases.names]
+        heads = ["worst of bound", "at most", *(f"{name} (bound)" for name in names)]
+        none = [_ratio(1.0, 1.0) for _ in names]
         bare = ["100.0% ", "100.0%", *none, _times(fibre_front.bare)]
     rows = [["layers", "strength", "fibre, m", *heads, "first failure"]]
     rows.append(["-", "-", "0.00", *bare])
     marks = zip(fibre_front.stiffest.tolist(), fibre_front.strongest.tolist(), strict=True)
     for point, (stiffest, strongest) in zip(fibre_front.points, marks, strict=True):
-        cells = _row(point) if point.cases is None else _row_of_cases(point.cases)
+        cells = _row_of_cases(point.cases) if point.cases else _row(point)
         cells[0] += "*" if stiffest else " "
         cells[-1] += "*" if strongest else ""
         cells[-1] += f"  not printable: {point.why_not}" if point.why_not else ""

@@ -533,9 +533,11 @@ def _bounded(run: Run, bounds: Mapping[float, UpperBound], wanted: Wanted) -> Ru
     if not enough or run.tested is None or off_length(run, wanted):
         return run
     bound = bounds[min(enough)]
-    if run.tested.cases is None:
-        return replace(run, tested=replace(run.tested, most=bound.ratio))
-    return replace(run, tested=replace(run.tested, cases=replace(run.tested.cases, bound=bound)))
+    if run.cases:
+        tested = replace(run.tested, cases=replace(run.cases, bound=bound))
+    else:
+        tested = replace(run.tested, most=bound.ratio)
+    return replace(run, tested=tested)
 
 
 def compare(

@@ -205,11 +205,11 @@ def _point(run: Run, comparison: Comparison) -> FrontPoint:
     assert tested is not None
     assert run.asked is not None
     failure, ratio, bound, cases = tested.failure, tested.bracket.tension.ratio, tested.most, None
-    if tested.cases is not None and tested.cases.bound is not None:
-        cases = PointCases.of(tested.cases, tested.cases.bound)
+    if run.cases and run.cases.bound:
+        cases = PointCases.of(run.cases, run.cases.bound)
         ratio = float(cases.ratios[cases.worst])
-        bound = float(tested.cases.bound.singles[cases.worst])
-        every = tested.cases.failure
+        bound = float(run.cases.bound.singles[cases.worst])
+        every = run.cases.failure
         failure = None if every is None else every.each[int(np.argmin(every.factors))]
     return FrontPoint(
         layers=_counts(comparison.request)[run.slicing],

@@ -297,8 +297,7 @@ def results_rows(comparison: Comparison) -> list[dict[str, Any]]:
         tested = (column.name for column in TEST_COLUMNS)
         rows[-1] |= {name: extra[name] for name in tested if name in extra} | print_values(run)
         rows[-1] |= {"printable": run.printable, "why_not": run.why_not, "fails_in": run.fails_in}
-        if run.tested is not None and run.tested.cases is not None:
-            rows[-1] |= run.tested.cases.values()
+        rows[-1] |= run.cases.values() if run.cases else {}
     return rows
 
 
@@ -440,7 +439,7 @@ def _run_record(run: Run) -> dict[str, Any]:
         "seconds": run.seconds,
         "untested": run.untested,
         "total": headline_values(run),
-        "load_cases": run.tested.cases.values() if run.tested and run.tested.cases else None,
+        "load_cases": run.cases.values() if run.cases else None,
         "first_failure": vars(run.tested.failure) if run.tested and run.tested.failure else None,
         "first_failure_alternative": _alternative_failure(run),
     }

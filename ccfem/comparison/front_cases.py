@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +15,49 @@ WORST = "worst case, share of its bound"
 """What counts of several load cases, on an axis."""
 
 Curves = dict[str, list[tuple[float, float]]]
+
+
+@dataclass(frozen=True)
+class PointCase:
+    """Stiffness and first failure of one plan in its only load case: as `PointCases` of several.
+
+    Attributes
+    ----------
+    ratio, bound : float
+        Stiffness over that of the part without fibre, and what no paths of this length exceed.
+    failure : float, N
+        Load at first failure; NaN where that is not known.
+    """
+
+    ratio: float
+    bound: float
+    failure: float
+
+    drawn: ClassVar[tuple[float, str]] = (1e-3, "first failure, kN")
+    """Factor and title of the failure in pictures."""
+
+    @property
+    def ratios(self) -> FloatArray:
+        """The ratio, (1,)."""
+        return np.array([self.ratio])
+
+    @property
+    def share(self) -> float:
+        """The ratio: one case is measured by the part without fibre."""
+        return self.ratio
+
+    def share_of(self, ratios: ArrayLike) -> float:
+        """Return the same of other paths."""
+        return float(np.min(ratios))
+
+    def columns(self) -> dict[str, float | str]:
+        """Columns of the table: what a plan reaches."""
+        return {
+            "stiffness_ratio_tension": self.ratio,
+            "bound": self.bound,
+            "share_of_gain": (self.ratio - 1.0) / (self.bound - 1.0),
+            "first_failure_load": self.failure,
+        }
 
 
 @dataclass(frozen=True)
@@ -35,6 +79,8 @@ class PointCases:
     ratios: FloatArray
     factors: FloatArray
     bound: UpperBound
+
+    drawn: ClassVar[tuple[float, str]] = (1.0, "first failure, times the load")
 
     def __post_init__(self) -> None:
         freeze(self, names=tuple, ratios=float, factors=float)
@@ -65,6 +111,19 @@ class PointCases:
         """Case that fails at the least multiple of its load; empty where that is not known."""
         unknown = np.isnan(self.factors).any()
         return "" if unknown else self.names[int(np.argmin(self.factors))]
+
+    @property
+    def failure(self) -> float:
+        """Least load at first failure over the load of its case; NaN where one is not known."""
+        return float(self.factors.min())
+
+    def columns(self) -> dict[str, float | str]:
+        """Columns of the table: what a plan reaches."""
+        failure: dict[str, float | str] = {
+            "first_failure_factor": self.failure,
+            "fails_first": self.fails_first,
+        }
+        return {**self.values(), **failure}
 
     def values(self) -> dict[str, float]:
         """Values by column, as `TestedCases.values` names them, with the bound of each case."""

@@ -9,7 +9,7 @@ import numpy as np
 from ccfem.base.arrays import BoolArray, freeze
 from ccfem.base.errors import InputError
 from ccfem.comparison.front import on_front
-from ccfem.comparison.front_cases import WORST, PointCases, stiffness_panels
+from ccfem.comparison.front_cases import WORST, PointCase, PointCases, stiffness_panels
 from ccfem.comparison.plot.amount_curves import AmountPoint, TradePoint, amount_curves, trade_curves
 from ccfem.paths.planning.equal_fibre import TOLERANCE
 from ccfem.paths.toolpaths import Toolpaths
@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-_STIFFNESS, _FAILURE = "stiffness ratio", "first failure, kN"
-_FACTOR = "first failure, times the load"
+_STIFFNESS = "stiffness ratio"
 
 
 def _layers(count: int) -> str:
@@ -94,9 +93,20 @@ class FrontPoint:
         return f"{name}, strength {self.strength:g}" if self.strength else name
 
     @property
+    def measure(self) -> PointCase | PointCases:
+        """What counts of it, under its load case or under all."""
+        return PointCase(self.ratio, self.bound, self.failure) if self.cases is None else self.cases
+
+    @property
+    def traded(self) -> TradePoint:
+        """Point of what strength costs in stiffness."""
+        failure = self.measure.drawn[0] * self.measure.failure
+        return TradePoint(self.measure.share, failure, self.strength, not self.why_not)
+
+    @property
     def least_ratio(self) -> float:
         """The ratio, or the least of all load cases."""
-        return self.ratio if self.cases is None else float(self.cases.ratios.min())
+        return float(self.measure.ratios.min())
 
 
 @dataclass(frozen=True)
@@ -137,14 +147,19 @@ class FibreFront:
         freeze(self, refused=dict)
 
     def __repr__(self) -> str:
-        cases = self.points[0].cases
-        best = max(self.points, key=lambda point: point.least_ratio)
-        said = "" if cases is None else f" in every one of {len(cases.names)} load cases"
+        best, cases = max(self.points, key=lambda point: point.least_ratio), self.cases
+        said = f" in every one of {len(cases)} load cases" if cases else ""
         return (
             f"FibreFront of '{self.case}' by {self.strategy}: {len(self.points)} plans, up to "
             f"{best.least_ratio:.3g} times as stiff{said} with {best.length / 1000.0:.4g} m on "
             f"{best.layers} layers"
         )
+
+    @property
+    def cases(self) -> tuple[str, ...]:
+        """Names of the load cases that are planned for together; empty for one alone."""
+        measure = self.points[0].measure
+        return measure.names if isinstance(measure, PointCases) else ()
 
     @property
     def stiffest(self) -> BoolArray:
@@ -153,19 +168,16 @@ class FibreFront:
         With several load cases every plan is measured by what no paths of its own length exceed in
         each: no plan with as little fibre reaches a larger share of that in its worst case.
         """
-        cases = [point.cases for point in self.points if point.cases is not None]
-        if not cases:
-            return self._front(1.0, [point.ratio for point in self.points])
-        marks = []
-        for k, ratios in enumerate(cases):
-            shares = [ratios.share_of(other.ratios) for other in cases]
-            marks.append(self._front(ratios.share_of(np.ones(len(ratios.names))), shares)[k])
+        measures, marks = [point.measure for point in self.points], []
+        for k, own in enumerate(measures):
+            shares = [own.share_of(other.ratios) for other in measures]
+            marks.append(self._front(own.share_of(np.ones(len(own.ratios))), shares)[k])
         return np.array(marks)
 
     @property
     def strongest(self) -> BoolArray:
         """Printable plans that nothing with as little fibre, or none, exceeds in first failure."""
-        return self._front(self.bare, [_failure(point) for point in self.points])
+        return self._front(self.bare, [point.measure.failure for point in self.points])
 
     def _front(self, bare: float, values: Sequence[float]) -> BoolArray:
         # Plans to one length differ by what the shortest strand leaves: these count as equal.
@@ -191,8 +203,9 @@ class FibreFront:
             values = {_STIFFNESS: [point.ratio for point in self.points]}
             bounds, together = {_STIFFNESS: [(0.0, 1.0), *self.bounds]}, {}
         panels = {label: self._curves(some, stiffest) for label, some in values.items()}
-        scale, label = (1.0, _FACTOR) if cases else (1e-3, _FAILURE)
-        panels[label] = self._curves([scale * _failure(point) for point in self.points], strongest)
+        scale, label = self.points[0].measure.drawn
+        failures = [scale * point.measure.failure for point in self.points]
+        panels[label] = self._curves(failures, strongest)
         return amount_curves(
             panels,
             _in_metres(bounds),
@@ -231,14 +244,13 @@ class FibreFront:
         on = f", {_layers(*counts)}" if alike else ""
         named = {
             f"{1e-3 * some[0].length:.3g} m" + ("" if alike else f", {_layers(some[0].layers)}"): [
-                _traded(point) for point in some
+                point.traded for point in some
             ]
             for some in several
         }
         heading = f"{self.case}, {self.strategy}{on}: what strength costs"
-        one_case = self.points[0].cases is None
-        labels = (_STIFFNESS, _FAILURE) if one_case else (WORST, _FACTOR)
-        return trade_curves(named, heading, *labels)
+        _, failure = self.points[0].measure.drawn
+        return trade_curves(named, heading, WORST if self.cases else _STIFFNESS, failure)
 
     def to_frame(self) -> "pd.DataFrame":
         """One row a plan."""
@@ -250,7 +262,7 @@ class FibreFront:
                 "strength": point.strength,
                 "fibre": point.length,
                 "fibre_per_layer": point.asked,
-                **_columns(point),
+                **point.measure.columns(),
                 "fails_in": point.fails_in,
                 "printable": not point.why_not,
                 "why_not": point.why_not,
@@ -268,33 +280,3 @@ def _in_metres(
     curves: Mapping[str, Sequence[tuple[float, float]]],
 ) -> dict[str, list[tuple[float, float]]]:
     return {label: [(1e-3 * x, y) for x, y in curve] for label, curve in curves.items()}
-
-
-def _failure(point: FrontPoint) -> float:
-    """Load at first failure, N, or the least multiple of several."""
-    return point.failure if point.cases is None else float(point.cases.factors.min())
-
-
-def _traded(point: FrontPoint) -> TradePoint:
-    """Point of what strength costs in stiffness."""
-    printable = not point.why_not
-    if point.cases is None:
-        return TradePoint(point.ratio, 1e-3 * point.failure, point.strength, printable)
-    return TradePoint(point.cases.share, _failure(point), point.strength, printable)
-
-
-def _columns(point: FrontPoint) -> dict[str, float | str]:
-    """Columns of the table: what a plan reaches."""
-    if point.cases is not None:
-        factor = _failure(point)
-        return {
-            **point.cases.values(),
-            "first_failure_factor": factor,
-            "fails_first": point.cases.fails_first,
-        }
-    return {
-        "stiffness_ratio_tension": point.ratio,
-        "bound": point.bound,
-        "share_of_gain": (point.ratio - 1.0) / (point.bound - 1.0),
-        "first_failure_load": point.failure,
-    }

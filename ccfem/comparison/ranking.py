@@ -135,8 +135,8 @@ def merit(run: Run, mode: str = "tension") -> float:
     Modes are "tension", "bonded" and, under alternative supports, "tension_alternative" and
     "bonded_alternative", which several load cases do not have.
     """
-    if mode in _MODES and run.tested is not None and run.tested.cases is not None:
-        return run.tested.cases.merit(mode)
+    if mode in _MODES and run.cases:
+        return run.cases.merit(mode)
     return stiffness_ratio(run, mode)
 
 

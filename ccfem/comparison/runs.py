@@ -167,6 +167,11 @@ class Run:
         return self.evaluation is not None and not self.why_not
 
     @property
+    def cases(self) -> TestedCases | None:
+        """Tests under all load cases, where paths are planned for several."""
+        return None if self.tested is None else self.tested.cases
+
+    @property
     def fails_in(self) -> str:
         """What fails first, as "matrix", "fibre" or "interlayer"; empty if that is not known."""
         failure = None if self.tested is None else self.tested.failure

@@ -81,9 +81,9 @@ def cases_remarks(
     tested = [
         run for run in ranking(runs, wanted) if is_tested(run) and not off_length(run, wanted)
     ]
-    if bound is None or not tested or tested[0].tested is None or tested[0].tested.cases is None:
+    if bound is None or not tested or not tested[0].cases:
         return texts
-    ratios = tested[0].tested.cases.tension.ratios
+    ratios = tested[0].cases.tension.ratios
     gap = bound.duality_gap
     loose = f"; the bound may be loose by {gap:.1%}" if gap > LOOSE else ""
     away = bound.gap(ratios)

@@ -192,11 +192,7 @@ def against_each_other(ranking: Sequence[Run]) -> Table | None:
 
 def load_cases_table(ranking: Sequence[Run]) -> Table | None:
     """Table of every load case; None where no run was tested in several."""
-    tested = [
-        (run.name, run.tested.cases)
-        for run in ranking
-        if run.tested is not None and run.tested.cases is not None
-    ]
+    tested = [(run.name, run.cases) for run in ranking if run.cases]
     if not tested:
         return None
     names = tested[0][1].names

@@ -85,7 +85,7 @@ def _stiffer(run: Run, best: Run | None) -> bool:
     """Whether a run that does not count is stiffer than the best, in tension only."""
     if best is None or run.tested is None or best.tested is None:
         return False
-    cases = [case.tested.cases for case in (run, best) if case.tested is not None]
+    cases = [compared.cases for compared in (run, best)]
     if len({case is None or case.bound is None for case in cases}) > 1:
         return False  # a share of the bound, which another length has none of, against a ratio
     return merit(run) > merit(best)
