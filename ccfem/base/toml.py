@@ -110,6 +110,10 @@ def from_table(make: Callable[..., T], table: object, where: str, infinite: bool
         raise InputError(*(f"{where}: {line}" for line in error.mistakes)) from None
 
 
+TomlTable = Mapping[str, Any]
+"""A table as TOML holds it: texts, numbers, lists and tables by key."""
+
+
 def read_toml(path: str | os.PathLike[str], what: str) -> dict[str, Any]:
     """Read a TOML file.
 

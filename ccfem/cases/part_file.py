@@ -18,7 +18,7 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError, Mistakes, shown
-from ccfem.base.toml import from_table, read_toml
+from ccfem.base.toml import TomlTable, from_table, read_toml
 from ccfem.body.files.surface import Surface
 from ccfem.body.mesh.cell_mesh import CellMesh
 from ccfem.body.mesh.cell_rules import CellBox, CellCylinder, CellRule
@@ -90,7 +90,7 @@ def faces_of_part(path: str | os.PathLike[str], angle: float = FEATURE_ANGLE) ->
     The feature angle is in degrees.
     """
 
-    def faces(content: Mapping[str, Any], path: Path) -> BodyFaces:
+    def faces(content: TomlTable, path: Path) -> BodyFaces:
         return _readable(content, Mistakes())[0].faces(path.parent, angle)
 
     return _of_file(path, faces)
@@ -108,7 +108,7 @@ def _of_file(path: str | os.PathLike[str], take: Callable[[Mapping[str, Any], Pa
         ) from None
 
 
-def part_case(content: Mapping[str, Any], path: Path, mesh: TetMesh | None = None) -> Case:
+def part_case(content: TomlTable, path: Path, mesh: TetMesh | None = None) -> Case:
     """Case of a part file's content; all mistakes come at once, if possible before meshing.
 
     A mesh that is given takes the place of the one that the file names.
@@ -237,7 +237,7 @@ class _Values:
     fibre: FibrePlaces | None = None
 
 
-def _readable(content: Mapping[str, Any], mistakes: Mistakes) -> tuple[Part, set[str]]:
+def _readable(content: TomlTable, mistakes: Mistakes) -> tuple[Part, set[str]]:
     """Take of a part file what reads; the rest is noted, and named."""
     good = {}
     for key, value in content.items():
@@ -270,9 +270,7 @@ REGIONS: dict[str, Callable[..., CellRule]] = {"box": CellBox, "cylinder": CellC
 """Rules that choose cells."""
 
 
-def region_rules_of(
-    tables: Mapping[str, Any], mistakes: Mistakes
-) -> dict[str, tuple[Material, CellRule]]:
+def region_rules_of(tables: TomlTable, mistakes: Mistakes) -> dict[str, tuple[Material, CellRule]]:
     """Materials and rules of the tables [regions.NAME]; what is wrong is noted."""
     rules = {}
     for name, table in tables.items():

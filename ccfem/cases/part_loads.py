@@ -1,11 +1,10 @@
 """The supports, loads and combinations of a part file: tables to values."""
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError, Mistakes, known_names, shown
-from ccfem.base.toml import cure_of, from_table
+from ccfem.base.toml import TomlTable, cure_of, from_table
 from ccfem.cases.part_tables import named_table
 from ccfem.fem.elasticity.load_kinds import (
     Bearing,
@@ -63,7 +62,7 @@ SUPPORTS: dict[str, Callable[..., AnySupport]] = {
 
 
 def supports_of(
-    tables: tuple[dict[str, Any], ...], cases: Mapping[str, Any], mistakes: Mistakes
+    tables: tuple[TomlTable, ...], cases: TomlTable, mistakes: Mistakes
 ) -> tuple[tuple[AnySupport, ...], dict[str, tuple[AnySupport, ...]]]:
     """Supports of the tables [[supports]]: those of all load cases, and those of each alone.
 
@@ -86,7 +85,7 @@ def supports_of(
     return tuple(always), in_case
 
 
-def _cases_of(table: Mapping[str, Any], cases: Mapping[str, Any], where: str) -> tuple[str, ...]:
+def _cases_of(table: TomlTable, cases: TomlTable, where: str) -> tuple[str, ...]:
     """Load cases that a support holds in; none where it holds in all."""
     if _CASE not in table:
         return ()
@@ -106,7 +105,7 @@ def _cases_of(table: Mapping[str, Any], cases: Mapping[str, Any], where: str) ->
 
 
 def alternative_supports_of(
-    tables: tuple[dict[str, Any], ...], mistakes: Mistakes
+    tables: tuple[TomlTable, ...], mistakes: Mistakes
 ) -> tuple[AnySupport, ...]:
     """Supports of the tables [[alternative_supports]], if any; what is wrong is noted."""
     supports: list[AnySupport] = []
@@ -116,12 +115,12 @@ def alternative_supports_of(
     return tuple(supports)
 
 
-def _support(table: Mapping[str, Any], where: str) -> AnySupport:
+def _support(table: TomlTable, where: str) -> AnySupport:
     kind, rest = named_table({"kind": _HELD, **table}, "kind", SUPPORTS, where)
     return from_table(SUPPORTS[kind], rest, where)
 
 
-def loads_of(cases: Mapping[str, Any], mistakes: Mistakes) -> dict[str, tuple[Load, ...]]:
+def loads_of(cases: TomlTable, mistakes: Mistakes) -> dict[str, tuple[Load, ...]]:
     """Read the loads of every load case, of the tables [[loads.NAME]]; what is wrong is noted."""
     if not cases:
         mistakes.lines.append("a part needs a load: add [[loads.NAME]] with its kind")
@@ -143,7 +142,7 @@ def loads_of(cases: Mapping[str, Any], mistakes: Mistakes) -> dict[str, tuple[Lo
 
 
 def combinations_of(
-    tables: Mapping[str, Any], cases: Mapping[str, Any], mistakes: Mistakes
+    tables: TomlTable, cases: TomlTable, mistakes: Mistakes
 ) -> dict[str, dict[str, float]]:
     """Factors of load cases, of the tables [combinations.NAME]; what is wrong is noted."""
     combinations = {}
@@ -153,7 +152,7 @@ def combinations_of(
     return combinations
 
 
-def _factors(name: str, table: object, cases: Mapping[str, Any]) -> dict[str, float]:
+def _factors(name: str, table: object, cases: TomlTable) -> dict[str, float]:
     """Factors of the load cases in one combination."""
     where = f"combinations.{name}"
     if not isinstance(table, Mapping) or not table:
@@ -177,9 +176,7 @@ def _factors(name: str, table: object, cases: Mapping[str, Any]) -> dict[str, fl
     return {case: float(factor) for case, factor in table.items()}
 
 
-def weights_of(
-    table: Mapping[str, Any], cases: Mapping[str, Any], mistakes: Mistakes
-) -> dict[str, float]:
+def weights_of(table: TomlTable, cases: TomlTable, mistakes: Mistakes) -> dict[str, float]:
     """Weights of load cases and combinations, of the table [weights]; what is wrong is noted."""
     weights = {}
     for name, weight in table.items():

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ccfem.base.errors import InputError, Mistakes, shown
-from ccfem.base.toml import from_table
+from ccfem.base.toml import TomlTable, from_table
 from ccfem.body.mesh.face_rules import Faces, Holes
 from ccfem.body.mesh.patches import Box, Cylinder, Group, Nearest, PatchRule, Plane
 from ccfem.fem.materials import (
@@ -27,7 +27,7 @@ RULES: dict[str, Callable[..., PatchRule]] = {
 """Rules of patches by their name."""
 
 
-def rules_of(tables: Mapping[str, Any], mistakes: Mistakes) -> dict[str, PatchRule]:
+def rules_of(tables: TomlTable, mistakes: Mistakes) -> dict[str, PatchRule]:
     """Rules of the tables [patches.NAME]; what is wrong is noted."""
     rules = {}
     for name, table in tables.items():
@@ -42,7 +42,7 @@ def rules_of(tables: Mapping[str, Any], mistakes: Mistakes) -> dict[str, PatchRu
 
 
 def named_table(
-    table: object, key: str, known: Mapping[str, Any], where: str
+    table: object, key: str, known: TomlTable, where: str
 ) -> tuple[str, dict[str, Any]]:
     """Split a table into the name under a key, which must be known, and the rest."""
     name = table.get(key) if isinstance(table, Mapping) else None
@@ -67,7 +67,7 @@ def material_of(given: str | dict[str, Any] | None, where: str = "material") -> 
     return from_table(make, given, where)
 
 
-def check_strategies(tables: Mapping[str, Any], mistakes: Mistakes) -> None:
+def check_strategies(tables: TomlTable, mistakes: Mistakes) -> None:
     """Note unknown strategies, and parameters that they do not take."""
     if not tables:
         return

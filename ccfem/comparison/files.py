@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from ccfem.slicing.layers.layer import curved_layers
 
 if TYPE_CHECKING:
     from ccfem.comparison.pictures import Pictures
+    from ccfem.comparison.report.html_report import Record
 
 RESULT_FILES = (
     *("results.csv", "results.json", "report.html", "paths.vtp", "curve.csv", "curve.png"),
@@ -128,13 +129,12 @@ def write_results(
         _draw(comparison, folder, lambda what, share: progress(what, 0.2 + 0.6 * share), left_out)
         spent["pictures"] = time.perf_counter() - start
     progress("writing the report", 0.8)
-    about = {**record(comparison, command, spent), "left_out": left_out}
+    about = record(comparison, command, spent)
+    about["left_out"] = left_out
     _write_report(comparison, about, folder, part_file)
 
 
-def _write_report(
-    comparison: Comparison, about: dict[str, Any], folder: Path, part_file: str
-) -> None:
+def _write_report(comparison: Comparison, about: "Record", folder: Path, part_file: str) -> None:
     """Write ``report.html``, and ``results.json`` whatever becomes of the report."""
     from ccfem.comparison.report.html_report import report_html
 
@@ -316,7 +316,7 @@ def write_table(rows: Sequence[Mapping[str, Any]], file: Path) -> None:
     write_csv(file, columns, ([row.get(name) for name in columns] for row in rows))
 
 
-def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -> dict[str, Any]:
+def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -> "Record":
     """Everything that it takes to judge and repeat a comparison, ready for JSON.
 
     Parameters
@@ -359,9 +359,9 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
         "seconds": {**seconds, **comparison.seconds},
     }
     if comparison.over_slicings:
-        return _plain(about | _of_slicings(comparison))
+        return cast("Record", _plain(about | _of_slicings(comparison)))
     about["case"] |= _of_layers(comparison)
-    return _plain(about | _of_strategies(comparison) | _of_bound(comparison))
+    return cast("Record", _plain(about | _of_strategies(comparison) | _of_bound(comparison)))
 
 
 def _of_layers(comparison: Comparison) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from typing import Any
 from ccfem.base.checks import check_known
 from ccfem.base.errors import InputError, shown
 from ccfem.base.plugins import entries
-from ccfem.base.toml import from_table, read_toml
+from ccfem.base.toml import TomlTable, from_table, read_toml
 from ccfem.machine.machine import Machine
 
 _FOLDER = resources.files("ccfem.machine") / "built_in"
@@ -80,7 +80,7 @@ def machine_table(name: str | Path) -> dict[str, Any]:
         raise InputError(*(f"{file}: {line}" for line in error.mistakes)) from None
 
 
-def _whole_table(table: Mapping[str, Any]) -> dict[str, Any]:
+def _whole_table(table: TomlTable) -> dict[str, Any]:
     """Merge a table over the built-in machine that it names as its profile."""
     rest = {key: value for key, value in table.items() if key != "profile"}
     if "profile" not in table:
@@ -106,7 +106,7 @@ def machine_from(table: object, where: str = "machine") -> Machine:
     return from_table(Machine, whole, where)
 
 
-def updated(machine: Machine, *tables: Mapping[str, Any], where: str = "machine") -> Machine:
+def updated(machine: Machine, *tables: TomlTable, where: str = "machine") -> Machine:
     """Merge tables over a machine, one after the other.
 
     Parameters
@@ -127,7 +127,7 @@ def updated(machine: Machine, *tables: Mapping[str, Any], where: str = "machine"
     return from_table(Machine, merged, where)
 
 
-def _merged(under: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+def _merged(under: TomlTable, over: TomlTable) -> dict[str, Any]:
     """Merge two tables; the second one wins, and tables in both are merged in turn."""
     merged = dict(under)
     for key, value in over.items():

@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,9 +33,35 @@ from ccfem.judging.evaluation import COLUMNS
 from ccfem.judging.virtual_testing.stiffer import HONEST_PROMISE
 
 
+class CaseRecord(TypedDict, total=False):
+    """What ``results.json`` says of the part."""
+
+    layers: int
+    load_case: str
+    load: list[float] | None
+    material: str
+    cells: int
+    order: int
+
+
+class Record(TypedDict, total=False):
+    """What the report takes from ``results.json``."""
+
+    ccfem: str
+    command: str
+    made: str
+    versions: Mapping[str, str]
+    case: CaseRecord
+    solver: Mapping[str, Any]
+    strain_energy: float
+    seconds: dict[str, float]
+    left_out: list[str]
+    files: list[str]
+
+
 def report_html(
     comparison: Comparison,
-    record: Mapping[str, Any],
+    record: Record,
     part_file: str = "",
 ) -> str:
     """Return the report as one HTML text that needs no other file and no network.
@@ -53,7 +79,7 @@ def report_html(
     ranked = [run for run in comparison.ranking if run.evaluation is not None]
     checked = check(comparison.case)
     radius = comparison.case.machine.minimum_radius
-    left_out: list[str] = record["left_out"]
+    left_out = record["left_out"]
     charts: dict[str, Any] = {"curve": [], "fronts": [], "spreads": []}
     data: dict[str, Any] = {"part": None, "layers": {"stacks": []}, "charts": charts}
     with spared("view of the part", left_out):
@@ -102,7 +128,7 @@ def report_html(
     return filled_page(context, data)
 
 
-def _facts(comparison: Comparison, record: Mapping[str, Any]) -> list[str]:
+def _facts(comparison: Comparison, record: Record) -> list[str]:
     """Say in few words what was compared."""
     about = record["case"]
     if comparison.over_slicings:
@@ -127,7 +153,7 @@ def _facts(comparison: Comparison, record: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _load_text(record: Mapping[str, Any]) -> str:
+def _load_text(record: Record) -> str:
     load = record["case"]["load"]
     return "" if load is None else f", in all ({', '.join(f'{x:.4g}' for x in load)}) N"
 
@@ -173,7 +199,7 @@ def _short(value: Any) -> str:
     return str(value)
 
 
-def _computation(comparison: Comparison, record: Mapping[str, Any]) -> list[str]:
+def _computation(comparison: Comparison, record: Record) -> list[str]:
     """Say what was computed how."""
     solver = record["solver"]
     return [

@@ -1,10 +1,10 @@
 """The runs of a study, one by one, each with the hash that it is stored under."""
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypedDict
 
 from ccfem.base.checks import check_known, member_name
 from ccfem.base.errors import InputError, Mistakes, shown
@@ -137,6 +137,25 @@ class Part:
 
     case: Case
     load_cases: tuple[str, ...]
+
+
+class Outcome(TypedDict, total=False):
+    """What became of a run, as its file holds it; of one that crashed the reason alone."""
+
+    ccfem: str
+    failure: str
+    crashed: bool
+    traceback: str
+    printable: bool
+    why_not: str
+    untested: str
+    note: str
+    findings: Sequence[str]
+    fails_in: str
+    empty_layers: int
+    values: Mapping[str, float | str]
+    title: str
+    seconds: Mapping[str, float]
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from ccfem.base.result_folder import refuse_foreign, whole_folder
 from ccfem.comparison.front import FRONTS
 from ccfem.comparison.plot.canvas import png
 from ccfem.comparison.studies.definition import Study, read_study
-from ccfem.comparison.studies.jobs import Job, Jobs, jobs_of
+from ccfem.comparison.studies.jobs import Job, Jobs, Outcome, jobs_of
 from ccfem.comparison.studies.study_result import StudyResult, shown_table
 from ccfem.comparison.studies.transport import packed, unpacked
 from ccfem.comparison.studies.work import crashed, job_bytes, part_bytes, run_job, solve_part
@@ -111,7 +111,7 @@ def _made(
     missing: list[Job],
     workers: int,
     address: str | None,
-) -> Generator[tuple[Job, dict[str, Any]], None, None]:
+) -> Generator[tuple[Job, Outcome], None, None]:
     """Make runs, wherever that is."""
     if not missing:
         return
@@ -133,7 +133,7 @@ def _made(
 
 def _here(
     parts: Mapping[int, bytes], jobs: list[Job]
-) -> Generator[tuple[Job, dict[str, Any]], None, None]:
+) -> Generator[tuple[Job, Outcome], None, None]:
     """Make runs in this process."""
     for number, task in parts.items():
         stress, name = solve_part(task), uuid4().hex
@@ -174,7 +174,7 @@ class _Teller:
         if done:
             progress(f"{done} of {total} runs were already done", done / total)
 
-    def __call__(self, job: Job, outcome: dict[str, Any]) -> None:
+    def __call__(self, job: Job, outcome: Outcome) -> None:
         self._done += 1
         self._failed += bool(outcome["failure"])
         seconds = (time.monotonic() - self._start) / (self._done - self._first)
@@ -251,7 +251,7 @@ _PATIENCE = 30.0
 
 def on_cluster(
     parts: Mapping[int, bytes], jobs: Sequence[Job], address: str
-) -> Iterator[tuple[Job, dict[str, Any]]]:
+) -> Iterator[tuple[Job, Outcome]]:
     """Run jobs, each part solved once, and yield each with its outcome as soon as it is there.
 
     Workers need no files in common: stress goes to them, and outcomes come back, by the cluster.
@@ -342,7 +342,7 @@ class Store:
     def __init__(self, folder: Folder, force: bool = False) -> None:
         self._folder, self._force = folder, force
 
-    def __getitem__(self, key: str) -> dict[str, Any] | None:
+    def __getitem__(self, key: str) -> Outcome | None:
         """Outcome of a run; None where it is not there.
 
         Raises
@@ -369,7 +369,7 @@ class Store:
                 "folder with --out"
             )
 
-    def __setitem__(self, key: str, outcome: Mapping[str, Any]) -> None:
+    def __setitem__(self, key: str, outcome: Outcome) -> None:
         text = json.dumps(outcome, indent=1, ensure_ascii=False, allow_nan=False)
         with self._folder.inner(_RUNS) as runs:
             runs.write(f"{key}.json", (text + "\n").encode())
@@ -464,7 +464,7 @@ _Done = queue.SimpleQueue[tuple["_Worker", bytes | None]]
 
 def in_processes(
     parts: Mapping[int, bytes], jobs: Sequence[Job], workers: int, folder: Path
-) -> Iterator[tuple[Job, dict[str, Any]]]:
+) -> Iterator[tuple[Job, Outcome]]:
     """Run jobs, each part solved once, and yield each with its outcome as soon as it is there.
 
     Parameters

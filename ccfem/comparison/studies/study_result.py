@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ccfem.base.arrays import freeze
 from ccfem.comparison.front import FRONTS, cost_of, on_front
 from ccfem.comparison.plot.values import image
-from ccfem.comparison.studies.jobs import Job
+from ccfem.comparison.studies.jobs import Job, Outcome
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,7 +46,7 @@ class StudyResult:
     name: str
     folder: Path
     jobs: tuple[Job, ...]
-    outcomes: Mapping[str, Mapping[str, Any]]
+    outcomes: Mapping[str, Outcome]
     repeated: int = 0
     computed: int = 0
 
@@ -70,7 +70,7 @@ class StudyResult:
             f"computed now, {failed} failed"
         )
 
-    def outcome(self, job: Job) -> Mapping[str, Any]:
+    def outcome(self, job: Job) -> Outcome:
         """Say what became of a run."""
         return self.outcomes.get(job.key, {"failure": NOT_RUN})
 

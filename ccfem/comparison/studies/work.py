@@ -15,7 +15,7 @@ from ccfem.comparison.runs import Run
 from ccfem.comparison.stages import Part as CutPart
 from ccfem.comparison.stages import Tests, timed
 from ccfem.comparison.studies.fingerprint import fingerprint
-from ccfem.comparison.studies.jobs import Job, Part
+from ccfem.comparison.studies.jobs import Job, Outcome, Part
 from ccfem.comparison.studies.transport import Parted, packed, parted, unpacked
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.stress_field import StressField
@@ -108,7 +108,7 @@ class _Bench:
 _BENCHES: dict[str, _Bench] = {}
 
 
-def run_job(stress: Any, name: str, task: bytes) -> dict[str, Any]:
+def run_job(stress: Any, name: str, task: bytes) -> Outcome:
     """Plan, evaluate and test one strategy.
 
     Parameters
@@ -138,7 +138,7 @@ def run_job(stress: Any, name: str, task: bytes) -> dict[str, Any]:
             return crashed(said, traceback.format_exc())
 
 
-def crashed(why: str, details: str = "") -> dict[str, Any]:
+def crashed(why: str, details: str = "") -> Outcome:
     """Outcome of a run that ended in an error that is none of its input: it is tried again."""
     return {"ccfem": version("ccfem"), "failure": why, "crashed": True, "traceback": details}
 
@@ -149,7 +149,7 @@ def _run(
     slicer: Slicer,
     strategy: Strategy,
     wanted: float | None,
-) -> dict[str, Any]:
+) -> Outcome:
     """Outcome of one run."""
     stress, case = bench.stress, bench.stress.part.case
     bench.seconds = {}
