@@ -5,10 +5,10 @@ from typing import Any
 
 from ccfem.base.errors import InputError
 from ccfem.base.whole import check_writable
+from ccfem.body.files import surface
 from ccfem.body.files.mesh_file import check_mesh_name, write_mesh
-from ccfem.body.files.surface import is_surface
 from ccfem.body.mesh.in_metres import in_metres
-from ccfem.body.meshing.cad import is_cad
+from ccfem.body.meshing import cad
 from ccfem.body.meshing.meshed_body import mesh_body
 
 
@@ -16,11 +16,10 @@ def mesh_file(body: Path, size: float, out: Path, scale: float, mesher: Any) -> 
     """Mesh a file, write the mesh, and say what it is."""
     check_mesh_name(out)
     check_writable(out)
-    if not is_surface(body) and not is_cad(body):
-        raise InputError(
-            f"cannot mesh {body}: its name must end in .stl, .obj, .ply, .step, .stp, .iges, .igs "
-            "or .brep"
-        )
+    if not surface.is_surface(body) and not cad.is_cad(body):
+        *others, last = (*surface.SUFFIXES, *cad.SUFFIXES)
+        names = f"{', '.join(others)} or {last}"
+        raise InputError(f"cannot mesh {body}: its name must end in {names}")
     mesh, findings = mesh_body(body, size, scale, mesher)
     write_mesh(mesh, out)
     for line in findings:

@@ -103,8 +103,8 @@ class Part:
     @cached_property
     def why_not_printable(self) -> tuple[str, ...]:
         """What keeps it from being printed, whatever is planned."""
-        flat = all(layer.flat is not None for layer in self.layers)
-        build, layers = self.build or (0.0, 0.0, 1.0), self.layers if flat else ()
+        build = self.build or (0.0, 0.0, 1.0)
+        layers = () if curved_layers(self.layers) else self.layers
         return why_not_printable(self.stress.mesh, build, self.machine, layers, self.propped)
 
     @property

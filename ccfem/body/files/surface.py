@@ -13,7 +13,7 @@ from ccfem.base.whole import existing_file
 from ccfem.body.isolated.limited import read_isolated
 from ccfem.body.isolated.process import ChildError
 
-_SUFFIXES = (".obj", ".ply", ".stl")
+SUFFIXES = (".obj", ".ply", ".stl")
 _NOTHING = 1e-12
 """Volume over area and diagonal that counts as none."""
 
@@ -70,7 +70,7 @@ class Surface:
 
 def is_surface(path: str | os.PathLike[str]) -> bool:
     """Whether the name of a file is that of a surface."""
-    return Path(path).suffix.lower() in _SUFFIXES
+    return Path(path).suffix.lower() in SUFFIXES
 
 
 def read_surface(path: str | os.PathLike[str], scale: float = 1.0) -> Surface:
@@ -93,7 +93,7 @@ def read_surface(path: str | os.PathLike[str], scale: float = 1.0) -> Surface:
     if not is_surface(path):
         raise InputError(
             f"cannot tell the format of surface file {path}: its name must end in "
-            f"{', '.join(_SUFFIXES)}"
+            f"{', '.join(SUFFIXES)}"
         )
     check_number("surface scale", scale, above=0.0)
     try:

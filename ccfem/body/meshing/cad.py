@@ -21,7 +21,7 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.body.meshing.fidelity import fidelity
 from ccfem.body.meshing.volume import check_edge_length
 
-_SUFFIXES = (".brep", ".iges", ".igs", ".step", ".stp")
+SUFFIXES = (".brep", ".iges", ".igs", ".step", ".stp")
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class CadSurface:
 
 def is_cad(path: str | os.PathLike[str]) -> bool:
     """Whether the name of a file is that of a CAD file."""
-    return Path(path).suffix.lower() in _SUFFIXES
+    return Path(path).suffix.lower() in SUFFIXES
 
 
 def read_cad(path: str | os.PathLike[str], scale: float = 1.0, size: float = 0.0) -> CadSurface:
@@ -109,8 +109,7 @@ def _made(function: str, path: str | os.PathLike[str], size: float, scale: float
     path = existing_file(path, "CAD file")
     if not is_cad(path):
         raise InputError(
-            f"cannot tell the format of CAD file {path}: its name must end in "
-            f"{', '.join(_SUFFIXES)}"
+            f"cannot tell the format of CAD file {path}: its name must end in {', '.join(SUFFIXES)}"
         )
     check_number("CAD scale", scale, above=0.0)
     check_number("edge length", size, at_least=0.0, unit="mm")

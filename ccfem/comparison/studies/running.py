@@ -361,7 +361,7 @@ class Store:
             except (OSError, ValueError, RecursionError):
                 outcome = None
             if _is_outcome(outcome):
-                return dict(outcome)
+                return cast(Outcome, outcome)
             if self._force and not runs.is_folder(name):
                 return None
             raise InputError(
