@@ -9,6 +9,7 @@ import shapely
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.machine import Machine, Process
+from ccfem.paths.planning.unfolding import part_of_line
 from ccfem.paths.splitting.printed_strands import ended_in_stacks, height_over
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.printing.print_plan import plan_print
@@ -102,3 +103,12 @@ def test_no_piece_is_left_by_rounding():
     found = ended_in_stacks(lines, SECTION, 1.2 * MACHINE.strand_height, MACHINE)
     assert found.places > 0
     assert min(stop - start for _, (start, stop) in found.pieces) >= MACHINE.minimum_length - 1e-6
+
+
+def test_a_part_that_ends_behind_the_last_point_by_rounding_ends_there():
+    """It ended at the first point: a strand of `bracket` by svt ran right across the part."""
+    line = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 7.0]])
+    along, link = np.array([0.0, 10.0, 17.0]), np.zeros(3, dtype=bool)
+    for stop in (17.0, np.nextafter(17.0, 18.0), 17.0 + 1e-12):
+        points, _ = part_of_line(line, along, link, 4.0, stop)
+        np.testing.assert_allclose(points, [[4.0, 0.0], [10.0, 0.0], [10.0, 7.0]], atol=1e-9)

@@ -175,7 +175,8 @@ def part_of_line(
     place = np.concatenate([[start], inner, [stop]])
     place = place[np.append(True, np.diff(place) > 1e-9)]
     middle = 0.5 * (place[1:] + place[:-1])
-    place = np.where(place > size, place - size, place)
+    # An end that rounding puts behind the last point is that point: a line need not be closed.
+    place = np.where(place > size + 1e-9, place - size, np.minimum(place, size))
     step = np.searchsorted(along, np.where(middle > size, middle - size, middle), "right") - 1
     marks = np.append(link[np.clip(step, 0, len(link) - 2)], False)
     return points_along(line, along, place), marks
