@@ -21,7 +21,7 @@ from ccfem.comparison.plot.part_picture import part_picture
 from ccfem.comparison.plot.paths import layer_picture
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning import plan
-from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.layers.layer import stress_on
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create, named
 

@@ -15,7 +15,7 @@ from ccfem.cases import create_case
 from ccfem.comparison.plot.paths import layer_picture
 from ccfem.fem.elasticity import solve
 from ccfem.paths.planning import plan
-from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.layers.layer import stress_on
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
 

@@ -28,7 +28,7 @@ from ccfem.slicing.slicers import Planar, Spatial
 from ccfem.paths.planning import plan
 from ccfem.strategies import create
 from ccfem.judging.virtual_testing import virtual_test
-from ccfem.strategies.winding_curves.joint_loops import joint_loops
+from ccfem.strategies.winding_curves.piece import joint_loops
 
 case = create_case("lifting_eye", order=1)
 stress = solve(case.problem)["lift"]

@@ -20,10 +20,10 @@
 import numpy as np
 
 from ccfem.papers.plocher_2022.plates import single_hole
-from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.layers.layer import stress_on
 from ccfem.judging.evaluation import evaluate
-from ccfem.papers.plocher_2022.fibre_map import fibre_map
-from ccfem.judging.evaluation.plane_paths import plane_paths
+from ccfem.papers.plocher_2022.plane_study import fibre_map
+from ccfem.judging.evaluation.layer_paths import plane_paths
 from ccfem.papers.plocher_2022.plane_study import benchmark, laid_plate, print_seconds, reduced_stiffness
 from ccfem.judging.evaluation.sensitivity import OffAxis
 from ccfem.machine import Machine

@@ -20,14 +20,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.layers.layer import stress_on
 from ccfem.cases import create_case
 from ccfem.cases.designed import PLATES
 from ccfem.fem.elasticity import solve
 from ccfem.fem.plates import solve_plane
 from ccfem.judging.evaluation import evaluate
 from ccfem.judging.evaluation.indices.matching import THRESHOLDS, matching_rate
-from ccfem.judging.evaluation.plane_paths import plane_paths
+from ccfem.judging.evaluation.layer_paths import plane_paths
 from ccfem.judging.virtual_testing.equilibrium import BONDED
 from ccfem.judging.virtual_testing.strand import RHO, Strand
 from ccfem.judging.virtual_testing.virtual_test import virtual_test

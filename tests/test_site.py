@@ -17,7 +17,7 @@ from ccfem.cases.part_loads import LOADS, SUPPORTS
 from ccfem.cases.part_tables import RULES
 from ccfem.cli.commands import app
 from ccfem.judging.evaluation import COLUMNS
-from ccfem.judging.virtual_testing.force_displacement import read_curve
+from ccfem.judging.virtual_testing.calibration import read_curve
 from ccfem.machine import Machine, machine_from
 from ccfem.papers.reproduce import named_papers
 

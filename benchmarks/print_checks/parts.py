@@ -13,15 +13,14 @@ from ccfem.cases import Case, create_case
 from ccfem.cases.inspection.beginning import examples
 from ccfem.cases.part_file import read_part
 from ccfem.fem.elasticity import solve
-from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.fem.elasticity.stress_field import PartStress
 from ccfem.machine import machine_table, updated
 from ccfem.paths.planning import plan
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.export.gcode import gcode
 from ccfem.printing.print_plan import plan_print
 from ccfem.printing.support.overhang import overhang
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.plane import plane_frame
+from ccfem.slicing.layers.layer import Layer, plane_frame
 from ccfem.strategies import create
 
 __all__ = ["PARTS", "Part", "job_of", "on_bed"]

@@ -11,8 +11,7 @@ from time import perf_counter, process_time
 
 import numpy as np
 import ufl
-from dolfinx import fem
-from dolfinx import mesh as meshes
+from dolfinx import fem, mesh as meshes
 from dolfinx.fem import petsc
 from mpi4py import MPI
 from petsc4py import PETSc

@@ -92,7 +92,7 @@ def supernodes() -> Rivals:
 
 def skyline() -> Rivals:
     """Factorise, and solve, a matrix with the pattern of 100 x 40 cells of a plate."""
-    from ccfem.fem.elasticity.skyline import skyline as ours
+    from ccfem.fem.elasticity.direct import skyline as ours
 
     along, up = (
         sp.diags_array([1.0, 4.0, 1.0], offsets=[-1, 0, 1], shape=(n, n)) for n in (101, 41)
@@ -169,7 +169,7 @@ def find_crossings() -> Rivals:
 
 def orient() -> Rivals:
     """Give the directions of 10,000 triangles like senses along a minimum spanning tree."""
-    from ccfem.paths.fields.orientation import orient as ours
+    from ccfem.paths.fields.tensile import orient as ours
 
     points, _, _ = triangulation(2, 5000)
     beside = Delaunay(points).neighbors

@@ -15,7 +15,7 @@ from typing import Any
 
 import ccfem
 from benchmarks.studies.strand_losses import MOVES, posed
-from ccfem.paths.planning.whole_part import full_length
+from ccfem.paths.planning.strategy import full_length
 from ccfem.strategies.fibre_aware.judges import stiffness_judge
 from ccfem.strategies.fibre_aware.prune import prune
 from ccfem.strategies.fibre_aware.strand_moves import moved

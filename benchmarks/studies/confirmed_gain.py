@@ -29,7 +29,7 @@ from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.equal_fibre import plan_to_length
-from ccfem.paths.planning.whole_part import full_length
+from ccfem.paths.planning.strategy import full_length
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
 from ccfem.strategies.fibre_aware.upper_bound import upper_bound

@@ -27,8 +27,7 @@ from ccfem.fem.elasticity import solve
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.paths.planning.equal_fibre import TOLERANCE, extremes, plan_to_length
 from ccfem.paths.planning.mixing import layer_lengths
-from ccfem.paths.planning.planned import Planned
-from ccfem.paths.planning.strategy import LengthStrategy
+from ccfem.paths.planning.strategy import LengthStrategy, Planned
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create, named

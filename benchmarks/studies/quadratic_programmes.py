@@ -39,7 +39,6 @@ from ccfem.fem.elasticity import (
     Problem,
     Spring,
     Support,
-    contact,
     prepare,
     solve,
 )
@@ -247,9 +246,9 @@ def contact_by_osqp(matrix, held, cases):
 
 def pressed(*divisions):
     def own():
-        solver, answers = system.factorise(matrix, "auto", contact.EXPECTED * len(cases)), []
+        solver, answers = system.factorise(matrix, "auto", solve.EXPECTED * len(cases)), []
         for forces in cases:
-            reached = contact.find_contact(matrix, held, forces, solver, 1e-8)
+            reached = solve.find_contact(matrix, held, forces, solver, 1e-8)
             solver = reached.solver
             answers.append(reached.held.expand(reached.solution.values))
         return answers
@@ -266,7 +265,7 @@ def pressed(*divisions):
     system = prepare(Problem(mesh, isotropic(100.0, 0.3), supports, loads, order=1))
     matrix, held, cases = system.assemble(), system.held, list(system.forces.values())
     solvers = {
-        "own": (own, contact.find_contact, Held.following),
+        "own": (own, solve.find_contact, Held.following),
         "OSQP": (lambda: contact_by_osqp(matrix, held, cases), contact_by_osqp),
     }
     return cases, held.unknowns, solvers, rated

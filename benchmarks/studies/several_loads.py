@@ -19,10 +19,10 @@ import numpy as np
 from benchmarks.studies.table import print_table
 from ccfem.cases import create_case
 from ccfem.fem.elasticity.solve import solve
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.judging.virtual_testing.several_cases import cases_failure, virtual_tests
 from ccfem.paths.planning.equal_fibre import plan_to_length
-from ccfem.paths.planning.whole_part import full_length
+from ccfem.paths.planning.strategy import full_length
 from ccfem.strategies.fibre_aware.plan_cases import plan_cases
 from ccfem.strategies.fibre_aware.upper_bound import upper_bound
 from ccfem.strategies.isocurve import Isocurve

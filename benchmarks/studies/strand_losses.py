@@ -25,9 +25,8 @@ from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine.machine import Machine
 from ccfem.papers.chen_2021.loop import authors_loop
 from ccfem.paths.fields.tensile import Tension
-from ccfem.paths.linking.clearance import trim_to_clearance
-from ccfem.paths.linking.finishing import keep_off_border
-from ccfem.paths.planning.whole_part import full_length
+from ccfem.paths.linking.finishing import keep_off_border, trim_to_clearance
+from ccfem.paths.planning.strategy import full_length
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.planar import Planar

@@ -56,7 +56,6 @@ def freeze(value: object, **kinds: DTypeLike) -> None:
 
     Parameters
     ----------
-    value : dataclass
     **kinds : data type, `tuple` or `dict`
         What each field becomes, by its name: an array of a data type, a tuple, or a read-only
         mapping. A mapping whose kind is not `dict` becomes a read-only mapping of such values. None

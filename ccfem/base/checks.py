@@ -31,7 +31,6 @@ def check_number(
     ----------
     what : str
         Name of the value in the message.
-    value : number
     at_least, above, at_most, below : float, optional
         Bounds; the value may equal `at_least` and `at_most`, not `above` and `below`.
     unit : str, optional
@@ -158,7 +157,6 @@ def check_fields(value: object, *names: str, **bounds: Any) -> None:
 
     Parameters
     ----------
-    value : dataclass
     *names : str
         The fields.
     **bounds
@@ -209,7 +207,6 @@ class KnownNames(dict[str, V]):
     ----------
     kind : str
         What a name stands for in the message, as "load case".
-    values : mapping
 
     Examples
     --------

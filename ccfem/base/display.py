@@ -35,17 +35,13 @@ class Shown:
     __slots__ = ()
 
     def plot(self, **options: Any) -> Any:
-        """Draw the value in the plane.
+        """Draw the value in the plane, as a figure of matplotlib.
 
         Parameters
         ----------
         **options
             Of the function in `ccfem.comparison.plot.values` that draws such a value, as
             ``layer=3`` of paths.
-
-        Returns
-        -------
-        matplotlib Figure
         """
         return _drawing().figure(self, **options)
 

@@ -16,6 +16,14 @@ _INDICES = (
 )
 
 _FOLDED = {
+    "body.isolated.process": "body.isolated.limited",
+    "body.mesh.check": "body.mesh.hanging body.mesh.in_metres",
+    "body.mesh.face_rules": "body.mesh.cell_rules",
+    "body.mesh.patches": "body.mesh.face_names",
+    "body.mesh.tet_mesh": "body.mesh.cell_mesh body.mesh.flaws body.mesh.pairing",
+    "body.meshing.meshed_body": "body.meshing.cache body.meshing.face_groups",
+    "body.meshing.planform": "body.meshing.prisms",
+    "body.meshing.volume": "body.meshing.fidelity",
     "cases.bodies": (
         "cases.arm_bracket cases.bar cases.corner_bracket cases.crossed cases.lifting_eye "
         "cases.twist_bar cases.two_angle_bracket cases.two_pull_loop"
@@ -23,20 +31,14 @@ _FOLDED = {
     "cases.inspection.part_check": (
         "cases.inspection.cost cases.inspection.load_row cases.inspection.patch_row"
     ),
-    "cases.reading": "cases.named",
-    "cases.shipped": "cases.bracket cases.t_bracket cases.two_load_plate",
-    "comparison.plot.curves": "comparison.plot.stiffness_curves",
-    "comparison.studies.study_result": (
-        "comparison.studies.study_fronts comparison.studies.study_table"
-    ),
-    "papers.contents": "papers.verdicts",
-    "body.mesh.check": "body.mesh.hanging",
-    "body.meshing.meshed_body": "body.meshing.cache",
     "cases.optimised": "cases.passive",
     "cases.part_file": "cases.before_meshing cases.part_regions cases.part_slicing",
     "cases.part_keys": "cases.part_body",
+    "cases.reading": "cases.named",
+    "cases.shipped": "cases.bracket cases.t_bracket cases.two_load_plate",
     "cli.commands": "cli.in_python cli.papers_again cli.study_file cli.supporting",
     "comparison.files": "comparison.record",
+    "comparison.plot.curves": "comparison.plot.stiffness_curves",
     "comparison.report.html_report": (
         "comparison.report.filling comparison.report.part_view comparison.report.report_tables"
     ),
@@ -47,63 +49,126 @@ _FOLDED = {
         "comparison.studies.cluster comparison.studies.page comparison.studies.processes "
         "comparison.studies.store"
     ),
-    "fem.elasticity.direct": "fem.elasticity.supernodes",
+    "comparison.studies.study_result": (
+        "comparison.studies.study_fronts comparison.studies.study_table"
+    ),
+    "fem.elasticity.conjugate_gradient": "fem.elasticity.solution",
+    "fem.elasticity.direct": "fem.elasticity.skyline fem.elasticity.supernodes",
     "fem.elasticity.error_estimate": "fem.elasticity.patch_recovery",
+    "fem.elasticity.held": "fem.elasticity.ties",
+    "fem.elasticity.loads": "fem.elasticity.volume_loads",
+    "fem.elasticity.nodes": "fem.elasticity.body",
+    "fem.elasticity.plausibility": "fem.elasticity.conditioning fem.elasticity.order",
     "fem.elasticity.quick_aggregation": "fem.elasticity.aggregation fem.elasticity.galerkin",
-    "fem.elasticity.stress_field": "fem.elasticity.probe",
-    "fem.elasticity.supports": "fem.elasticity.frames",
-    "fem.plates.solve": "fem.plates.assembly",
-    "fem.stress_files.stress_file": "fem.stress_files.frd fem.stress_files.stress_table",
-    "fem.topopt.compliance": "fem.topopt.equations",
-    "fem.topopt.iteration": "fem.topopt.optimality_criteria",
+    "fem.elasticity.solve": (
+        "fem.elasticity.contact fem.elasticity.refinement fem.elasticity.support_sets"
+    ),
+    "fem.elasticity.stress_field": (
+        "fem.elasticity.part_stress fem.elasticity.probe fem.elasticity.weighted_cases"
+    ),
+    "fem.elasticity.supports": "fem.elasticity.frames fem.elasticity.springs",
+    "fem.elasticity.zone": "fem.elasticity.ball",
+    "fem.plates.mesh": "fem.plates.raster_mesh",
+    "fem.plates.problem": "fem.plates.stiffness",
+    "fem.plates.solve": "fem.plates.assembly fem.plates.field",
+    "fem.stress_files.stress_file": (
+        "fem.stress_files.frd fem.stress_files.stress_data fem.stress_files.stress_table "
+        "fem.stress_files.vtu_tensors"
+    ),
+    "fem.topopt.compliance": "fem.topopt.equations fem.topopt.groups",
+    "fem.topopt.design": "fem.topopt.material_axes",
+    "fem.topopt.parametrisation": "fem.topopt.filters fem.topopt.parameters",
     "fem.topopt.part": "fem.topopt.plate_part fem.topopt.walls",
     "fem.topopt.sheet_part": "fem.topopt.sheet_mesh fem.topopt.short_edges",
+    "fem.topopt.simp": (
+        "fem.topopt.iteration fem.topopt.optimality_criteria fem.topopt.solid_design"
+    ),
     "fem.topopt.somp": "fem.topopt.oriented_compliance",
     "fem.topopt.tet_part": "fem.topopt.cut fem.topopt.cut_smoothing",
     "geometry.beads": "geometry.band_overlap",
+    "geometry.facets": "geometry.measures",
+    "geometry.locate": "geometry.buckets geometry.nearest_on_triangles",
     "geometry.parallel_strands": "geometry.free_ends",
+    "geometry.polylines": "geometry.curvature_samples geometry.own_way",
+    "geometry.shapes": "geometry.places geometry.sections",
+    "judging.evaluation.layer_paths": (
+        "judging.evaluation.column judging.evaluation.plane_paths judging.evaluation.printed_stack"
+    ),
+    "judging.evaluation.strand_rules": "judging.evaluation.printable",
+    "judging.virtual_testing.calibration": "judging.virtual_testing.force_displacement",
+    "judging.virtual_testing.equilibrium": (
+        "judging.virtual_testing.bars judging.virtual_testing.reinforced"
+    ),
+    "judging.virtual_testing.strand": "judging.virtual_testing.strengths",
     "judging.virtual_testing.strands": "judging.virtual_testing.cut_steps",
+    "judging.virtual_testing.virtual_test": "judging.virtual_testing.stiffer",
+    "machine.speeds": "machine.speed_table",
     "papers.chen_2021.contents": (
         "papers.chen_2021.claims papers.chen_2021.figures papers.chen_2021.tables "
         "papers.chen_2021.whole"
     ),
+    "papers.chen_2021.study": "papers.chen_2021.large_displacement",
     "papers.chen_2021.virtual_test": "papers.chen_2021.oriented",
+    "papers.contents": "papers.verdicts",
     "papers.fang_2024.contents": (
         "papers.fang_2024.claims papers.fang_2024.field_study papers.fang_2024.targets "
         "papers.fang_2024.where_layers_open papers.fang_2024.whole"
     ),
+    "papers.kipping_2023.chain": "papers.kipping_2023.thickness",
     "papers.kipping_2023.contents": (
-        "papers.kipping_2023.claims papers.kipping_2023.fiso_shapes "
-        "papers.kipping_2023.strength papers.kipping_2023.trade papers.kipping_2023.whole"
+        "papers.kipping_2023.claims papers.kipping_2023.fiso_shapes papers.kipping_2023.strength "
+        "papers.kipping_2023.trade papers.kipping_2023.whole"
     ),
     "papers.plocher_2022.contents": (
         "papers.plocher_2022.claims papers.plocher_2022.tables papers.plocher_2022.variants "
         "papers.plocher_2022.whole"
     ),
     "papers.plocher_2022.figures": (
-        "papers.plocher_2022.benchmark_figures papers.plocher_2022.drawing"
+        "papers.plocher_2022.benchmark_figures papers.plocher_2022.drawing "
+        "papers.plocher_2022.radar"
+    ),
+    "papers.plocher_2022.plane_study": (
+        "papers.plocher_2022.fibre_map papers.plocher_2022.sensitivity"
     ),
     "papers.plocher_2022.plates": "papers.plocher_2022.three_point_bending",
     "papers.wang_2021.contents": (
         "papers.wang_2021.claims papers.wang_2021.tables papers.wang_2021.variants "
         "papers.wang_2021.whole"
     ),
-    "paths.fields.directed": "paths.fields.crease",
+    "papers.wang_2021.figures": "papers.wang_2021.panels",
+    "paths.fields.directed": "paths.fields.crease paths.fields.fill",
+    "paths.fields.scalar": "paths.fields.levels",
+    "paths.fields.tensile": (
+        "paths.fields.compatibility paths.fields.layer_tension paths.fields.orientation"
+    ),
+    "paths.linking.finishing": "paths.linking.clearance paths.linking.conformal",
     "paths.linking.possible_links": "paths.linking.smooth_links",
+    "paths.linking.print_order": "paths.linking.print_speed",
     "paths.linking.single_path": "paths.linking.ordering paths.linking.ring_routes",
-    "paths.placement.fibre_places": "paths.placement.cut_layer",
+    "paths.placement.fibre_places": "paths.placement.cut_layer paths.placement.region_shapes",
     "paths.planning.equal_fibre": "paths.planning.dial",
-    "paths.planning.infill": "paths.linking.cut_turns",
+    "paths.planning.infill": "paths.linking.cut_turns paths.planning.short_pieces",
     "paths.planning.mixing": "paths.planning.cutting",
     "paths.planning.plan": "paths.planning.steps",
+    "paths.planning.strategy": "paths.planning.planned paths.planning.whole_part",
+    "paths.raster.bitmap": "paths.raster.bands",
     "paths.raster.raster_plan": "paths.raster.simplify paths.raster.tracing paths.raster.walking",
+    "paths.raster.skeleton": "paths.raster.thinning",
+    "paths.splitting.slabs": "paths.splitting.strand_density",
     "printing.curved_plan": "printing.curved_layers printing.head_lean",
     "printing.export.gcode": "printing.export.gcode_head",
     "printing.matrix_lines": "printing.gap_lines",
     "printing.part_moves": "printing.preheating printing.strand_speed printing.tools",
     "printing.print_plan": "printing.pads printing.stacks printing.turns",
-    "slicing.guidance.guidance_field": "slicing.guidance.equal_values",
+    "slicing.guidance.guidance_field": "slicing.guidance.equal_values slicing.guidance.quality",
+    "slicing.guidance.joints": "slicing.guidance.joint_lines",
+    "slicing.layers.layer": (
+        "slicing.layers.holes slicing.layers.layer_stress slicing.layers.plane "
+        "slicing.layers.rounded_rings"
+    ),
     "slicing.layers.level_surfaces": "slicing.layers.cleaning",
+    "slicing.layers.slicer": "slicing.layers.pitch slicing.layers.standing",
+    "slicing.principal_lines.critical": "slicing.principal_lines.strongest",
     "slicing.principal_lines.trace": "slicing.principal_lines.cell_walk",
     "slicing.slicers.load_oriented": "slicing.guidance.across",
     "slicing.slicers.surfaces": "slicing.layers.foreign",
@@ -118,6 +183,7 @@ _FOLDED = {
         "strategies.fibre_aware.design_lengths strategies.fibre_aware.stream_start"
     ),
     "strategies.streamline": "paths.fields.evenly_spaced",
+    "strategies.stress_tracing.stress_lines": "strategies.stress_tracing.criterion",
     "strategies.stress_tracing.tracks": "strategies.stress_tracing.turning",
     "strategies.svt": (
         "strategies.stress_tracing.alike strategies.stress_tracing.blobs "
@@ -128,12 +194,13 @@ _FOLDED = {
         "strategies.winding_curves.even_levels strategies.winding_curves.paper_field"
     ),
     "strategies.winding_curves.joining_curves": "strategies.winding_curves.straighten",
+    "strategies.winding_curves.piece": "strategies.winding_curves.joint_loops",
 }
 """Modules that became sections of another one, by that one."""
 
 MOVED = {
     "printing.slabs": "paths.splitting.slabs",
-    "printing.strand_density": "paths.splitting.strand_density",
+    "printing.strand_density": "paths.splitting.slabs",
     **{part: whole for whole, parts in _FOLDED.items() for part in parts.split()},
     "arrays": "base.arrays",
     "checks": "base.checks",
@@ -157,11 +224,11 @@ MOVED = {
     "io.folder": "base.folder",
     "io.frd": "fem.stress_files.stress_file",
     "io.result_folder": "base.result_folder",
-    "io.stress_data": "fem.stress_files.stress_data",
+    "io.stress_data": "fem.stress_files.stress_file",
     "io.stress_file": "fem.stress_files.stress_file",
     "io.stress_table": "fem.stress_files.stress_file",
     "io.toml": "base.toml",
-    "io.vtu_tensors": "fem.stress_files.vtu_tensors",
+    "io.vtu_tensors": "fem.stress_files.stress_file",
     "io.whole": "base.whole",
     "isolated": "body.isolated",
     "judging.virtual_testing.interlayer": "judging.virtual_testing.failure_laws.interlayer",
@@ -171,7 +238,7 @@ MOVED = {
     "materials": "fem.materials",
     "mesh": "body.mesh",
     "mesh.facets": "geometry.facets",
-    "mesh.measures": "geometry.measures",
+    "mesh.measures": "geometry.facets",
     "meshing": "body.meshing",
     "placement": "paths.placement",
     "planning": "paths.planning",
@@ -190,7 +257,7 @@ MOVED = {
     "toolpaths": "paths.toolpaths",
     "topopt": "fem.topopt",
     "virtual_testing": "judging.virtual_testing",
-    "virtual_testing.ball": "fem.elasticity.ball",
+    "virtual_testing.ball": "fem.elasticity.zone",
     "virtual_testing.zone": "fem.elasticity.zone",
     "winding": "strategies.winding_curves",
 }

@@ -23,7 +23,7 @@ from ccfem.body.meshing import extrude
 from ccfem.fem.elasticity.problem import Bearing, Force, Problem, Support
 from ccfem.fem.materials import printed_pla
 from ccfem.fem.topopt import Design, as_problem
-from ccfem.fem.topopt.solid_design import solid_design
+from ccfem.fem.topopt.simp import solid_design
 
 Point = tuple[float, float]
 

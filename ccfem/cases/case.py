@@ -10,8 +10,8 @@ from ccfem.base.checks import check_known, check_number
 from ccfem.base.display import Shown
 from ccfem.base.errors import Mistakes, shown
 from ccfem.body.mesh.face_places import BodyFaces
-from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.fem.elasticity.problem import Problem
+from ccfem.fem.elasticity.stress_field import PartStress
 from ccfem.fem.elasticity.support_kinds import AnySupport
 from ccfem.machine.machine import Machine
 from ccfem.paths.placement.fibre_places import FibrePlaces

@@ -27,7 +27,7 @@ from ccfem.fem.materials import plane_stress, printed_pla
 from ccfem.fem.plates import PlaneMesh, PlaneProblem, raster_mesh
 from ccfem.fem.topopt import Design, Somp, part_shape
 from ccfem.machine.machine import Machine
-from ccfem.machine.speed_table import SpeedTable
+from ccfem.machine.speeds import SpeedTable
 from ccfem.slicing.slicers.planar import Planar
 
 NEAR = 1e-6

@@ -4,8 +4,7 @@ from collections.abc import Mapping
 
 from ccfem.base.errors import InputError
 from ccfem.cases.case import Case
-from ccfem.fem.elasticity.stress_field import StressField
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.fem.elasticity.stress_field import StressField, WeightedCases
 
 ALL_CASES = "all"
 """Text that asks for all load cases instead of one."""

@@ -10,8 +10,15 @@ from ccfem.base.toml import from_table
 from ccfem.base.whole import existing_file
 from ccfem.body.files.surface import read_surface
 from ccfem.cases.part_tables import named_table
-from ccfem.paths.placement.fibre_places import FibrePlaces, FibreRegion
-from ccfem.paths.placement.region_shapes import InBody, InBox, InCylinder, NearPatch, Shape
+from ccfem.paths.placement.fibre_places import (
+    FibrePlaces,
+    FibreRegion,
+    InBody,
+    InBox,
+    InCylinder,
+    NearPatch,
+    Shape,
+)
 
 FIBRE_REGIONS: dict[str, Callable[..., Shape]] = {
     "patch": NearPatch,

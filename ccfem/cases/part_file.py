@@ -20,16 +20,22 @@ from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError, Mistakes, shown
 from ccfem.base.toml import TomlTable, from_table, read_toml
 from ccfem.body.files.surface import Surface
-from ccfem.body.mesh.cell_mesh import CellMesh
-from ccfem.body.mesh.cell_rules import CellBox, CellCylinder, CellRule
-from ccfem.body.mesh.face_names import face_name
 from ccfem.body.mesh.face_places import BodyFaces
-from ccfem.body.mesh.face_rules import Faces, Holes, OnBody, numbered_faces, without_faces
+from ccfem.body.mesh.face_rules import (
+    CellBox,
+    CellCylinder,
+    CellRule,
+    Faces,
+    Holes,
+    OnBody,
+    numbered_faces,
+    without_faces,
+)
 from ccfem.body.mesh.patch_findings import about_patches
-from ccfem.body.mesh.patches import PatchRule, patches_from_rules, unit_vector
+from ccfem.body.mesh.patches import PatchRule, face_name, patches_from_rules, unit_vector
 from ccfem.body.mesh.shell import Shell, refined
 from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE, smooth_faces
-from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.mesh.tet_mesh import CellMesh, TetMesh
 from ccfem.body.meshing.cad import is_cad
 from ccfem.body.meshing.volume import check_edge_length
 from ccfem.cases.case import Case, check_name
@@ -43,9 +49,9 @@ from ccfem.cases.part_loads import (
     weights_of,
 )
 from ccfem.cases.part_tables import check_strategies, material_of, named_table, rules_of
-from ccfem.fem.elasticity.body import LoadedBody
 from ccfem.fem.elasticity.load_kinds import Load, PointForce, SurfaceLoad, patches_in_use
 from ccfem.fem.elasticity.loads import nodal_forces
+from ccfem.fem.elasticity.nodes import LoadedBody
 from ccfem.fem.elasticity.problem import Problem, Region
 from ccfem.fem.elasticity.support_kinds import AnySupport
 from ccfem.fem.elasticity.supports import held

@@ -108,7 +108,7 @@ def support(
     from ccfem.fem.elasticity.solve import solve
     from ccfem.printing.export.vtk import write_paths
     from ccfem.printing.support import slice_with_support, support_paths
-    from ccfem.slicing.layers.plane import plane_frame
+    from ccfem.slicing.layers.layer import plane_frame
     from ccfem.slicing.slicers import as_slicer
 
     if out is not None:
@@ -209,8 +209,7 @@ def reproduce(
 ) -> None:
     """Make the figures, tables and claims of a paper again, ours beside theirs."""
     from ccfem.base.progress import progress_bar
-    from ccfem.papers.reproduce import KEPT, named_papers
-    from ccfem.papers.reproduce import reproduce as make
+    from ccfem.papers.reproduce import KEPT, named_papers, reproduce as make
 
     if paper is None:
         for name, contents in named_papers().items():

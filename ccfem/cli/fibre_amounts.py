@@ -10,16 +10,7 @@ import typer
 from ccfem.cli.arguments import numbers_of, parameters_by_strategy
 from ccfem.cli.fibre_choice import SetFibre
 from ccfem.cli.machines import MachineName, SetMachine
-from ccfem.cli.options import (
-    Backend,
-    CasePath,
-    Force,
-    LoadCase,
-    Out,
-    SetCase,
-    SetOfOne,
-    Strategy,
-)
+from ccfem.cli.options import Backend, CasePath, Force, LoadCase, Out, SetCase, SetOfOne, Strategy
 
 if TYPE_CHECKING:
     from ccfem.comparison.front_points import FibreFront

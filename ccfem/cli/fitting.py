@@ -10,8 +10,7 @@ from ccfem.cases.case import Case
 from ccfem.comparison.engine import compare
 from ccfem.comparison.request import named_strategies
 from ccfem.fem.elasticity.plausibility import about_problem
-from ccfem.judging.virtual_testing.calibration import calibrate
-from ccfem.judging.virtual_testing.force_displacement import read_curve
+from ccfem.judging.virtual_testing.calibration import calibrate, read_curve
 
 
 def fit_material(

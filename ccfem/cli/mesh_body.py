@@ -7,7 +7,7 @@ from ccfem.base.errors import InputError
 from ccfem.base.whole import check_writable
 from ccfem.body.files import surface
 from ccfem.body.files.mesh_file import check_mesh_name, write_mesh
-from ccfem.body.mesh.in_metres import in_metres
+from ccfem.body.mesh.check import in_metres
 from ccfem.body.meshing import cad
 from ccfem.body.meshing.meshed_body import mesh_body
 

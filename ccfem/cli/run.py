@@ -92,7 +92,7 @@ def _refuse_body(name: str) -> None:
 
 def _refined(case: "Case") -> "Case":
     """Case on cells that are fine enough by the estimated error; a finding says how many."""
-    from ccfem.fem.elasticity.refinement import refine
+    from ccfem.fem.elasticity.solve import refine
 
     problem = refine(case.problem)
     before, after = (len(solved.mesh.cells) for solved in (case.problem, problem))
@@ -238,7 +238,7 @@ def with_given_paths(
         return strategies
     from ccfem.paths.planning.given_paths import GivenPaths
     from ccfem.printing.export.path_table import read_paths
-    from ccfem.slicing.layers.plane import plane_frame
+    from ccfem.slicing.layers.layer import plane_frame
 
     named = dict(strategies)
     for file in files:

@@ -20,10 +20,9 @@ from ccfem.base.tensor import von_mises
 from ccfem.cli.docstring import about, attributes
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.shown import file_stem
-from ccfem.comparison.table import Cell, Row, load_cases_table
-from ccfem.comparison.table import Table as Values
+from ccfem.comparison.table import Cell, Row, Table as Values, load_cases_table
 from ccfem.fem.elasticity.stress_field import StressField, about_cells
-from ccfem.judging.virtual_testing.stiffer import HONEST_PROMISE, IN_SHORT
+from ccfem.judging.virtual_testing.virtual_test import HONEST_PROMISE, IN_SHORT
 from ccfem.printing.export.gcode import clock
 from ccfem.printing.print_totals import PrintTotals
 

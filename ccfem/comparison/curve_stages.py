@@ -13,8 +13,7 @@ from ccfem.comparison.stages import Part, Tell, attempted, evaluated, planned_to
 from ccfem.judging.evaluation.strand_rules import StrandVerdict
 from ccfem.paths.planning.equal_fibre import extremes
 from ccfem.paths.planning.given_paths import GivenPaths
-from ccfem.paths.planning.planned import Planned
-from ccfem.paths.planning.strategy import LengthStrategy
+from ccfem.paths.planning.strategy import LengthStrategy, Planned
 
 _COMMON = 3
 """Number of lengths that all strategies are held to."""

@@ -51,17 +51,14 @@ from ccfem.comparison.stages import (
     to_length,
     with_print,
 )
-from ccfem.fem.elasticity.part_stress import GivenStress, PartStress
 from ccfem.fem.elasticity.solve import solve
-from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.elasticity.stress_field import GivenStress, PartStress, StressField, WeightedCases
 from ccfem.fem.elasticity.support_kinds import PressingSupport
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
 from ccfem.fem.stress_files.stress_file import read_stress
 from ccfem.judging.virtual_testing.several_cases import specimens
 from ccfem.judging.virtual_testing.strand import RHO_SPAN, Strand
 from ccfem.paths.planning.given_paths import GivenPaths
-from ccfem.paths.planning.strategy import Strategy
-from ccfem.paths.planning.whole_part import full_length
+from ccfem.paths.planning.strategy import Strategy, full_length
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.before_solving import check_support
 from ccfem.printing.line_counts import check_strands

@@ -18,8 +18,7 @@ from ccfem.comparison.request import Request, Slicing, Spread
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.stages import Tests
-from ccfem.fem.elasticity.stress_field import StressField
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.fem.elasticity.stress_field import StressField, WeightedCases
 from ccfem.judging.virtual_testing.several_cases import specimens
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import Strand

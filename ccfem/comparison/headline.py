@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ccfem.comparison.runs import Run, Tested
-from ccfem.judging.evaluation.column import Column
+from ccfem.judging.evaluation.layer_paths import Column
 from ccfem.judging.virtual_testing.failure_laws import named
 from ccfem.judging.virtual_testing.strength import FirstFailure
 

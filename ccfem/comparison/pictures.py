@@ -28,7 +28,7 @@ from ccfem.comparison.runs import Run
 from ccfem.comparison.shown import caption, drawn_layers, middle_layer
 from ccfem.paths.fields.chart import chart_of, flat_view, in_charts
 from ccfem.slicing.layers import Layer
-from ccfem.slicing.layers.layer_stress import LayerStress, stress_on
+from ccfem.slicing.layers.layer import LayerStress, stress_on
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

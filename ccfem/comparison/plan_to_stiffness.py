@@ -9,11 +9,9 @@ from ccfem.cases.case import Case
 from ccfem.comparison.request import Request, Stiffness
 from ccfem.comparison.runs import Run
 from ccfem.comparison.stages import Part, Tell, timed, with_plan
-from ccfem.fem.elasticity.part_stress import PartStress
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.fem.elasticity.stress_field import PartStress, WeightedCases
 from ccfem.judging.virtual_testing.specimen import Specimen
-from ccfem.paths.planning.strategy import Strategy
-from ccfem.paths.planning.whole_part import full_length
+from ccfem.paths.planning.strategy import Strategy, full_length
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import curved_layers
 from ccfem.slicing.layers.slicer import Slicer

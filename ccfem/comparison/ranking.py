@@ -7,7 +7,7 @@ import numpy as np
 from ccfem.comparison.headline import HEADLINE, cell_text, headline_values
 from ccfem.comparison.request import InAll, Wanted
 from ccfem.comparison.runs import Run
-from ccfem.judging.virtual_testing.stiffer import FIRST, RESOLUTION, SAME, SECOND, UNDECIDED
+from ccfem.judging.virtual_testing.virtual_test import FIRST, RESOLUTION, SAME, SECOND, UNDECIDED
 from ccfem.paths.planning.equal_fibre import TOLERANCE
 
 _SAME = TOLERANCE * (1.0 + 1e-9)

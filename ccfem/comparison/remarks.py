@@ -16,9 +16,9 @@ from ccfem.comparison.ranking import (
 from ccfem.comparison.request import Wanted
 from ccfem.comparison.runs import Run
 from ccfem.judging.evaluation.evaluation import Evaluation
+from ccfem.judging.evaluation.layer_paths import plane_paths
 from ccfem.judging.evaluation.open_places import open_places
-from ccfem.judging.evaluation.plane_paths import plane_paths
-from ccfem.judging.virtual_testing.stiffer import RESOLUTION, SAME, UNDECIDED
+from ccfem.judging.virtual_testing.virtual_test import RESOLUTION, SAME, UNDECIDED
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.upper_bound import LOOSE, UpperBound
 

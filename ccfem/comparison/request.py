@@ -21,7 +21,7 @@ from ccfem.paths.planning.equal_fibre import check_wanted
 from ccfem.paths.planning.given_paths import GivenPaths
 from ccfem.paths.planning.strategy import Strategy
 from ccfem.printing.before_solving import check_print, check_support
-from ccfem.slicing.layers.plane import plane_frame
+from ccfem.slicing.layers.layer import plane_frame
 from ccfem.slicing.layers.slicer import Slicer
 from ccfem.slicing.slicers import as_slicer, from_text
 from ccfem.slicing.slicers.planar import Planar

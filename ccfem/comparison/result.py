@@ -21,9 +21,7 @@ from ccfem.comparison.said_of_cases import cases_remarks, cases_verdict
 from ccfem.comparison.table import Table, frame, headline_table
 from ccfem.comparison.verdict import verdict
 from ccfem.comparison.views import front_picture, layer_view, paragraphs, shown_layer
-from ccfem.fem.elasticity.part_stress import GivenStress, PartStress
-from ccfem.fem.elasticity.stress_field import StressField
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.fem.elasticity.stress_field import GivenStress, PartStress, StressField, WeightedCases
 from ccfem.slicing.layers import Layer
 from ccfem.strategies.fibre_aware.upper_bound import UpperBound
 

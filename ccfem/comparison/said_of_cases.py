@@ -7,8 +7,8 @@ from ccfem.comparison.remarks import why_above
 from ccfem.comparison.request import Wanted
 from ccfem.comparison.runs import Run
 from ccfem.comparison.verdict import all_same, comparable, left_out, not_behind
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
-from ccfem.judging.virtual_testing.stiffer import RESOLUTION
+from ccfem.fem.elasticity.stress_field import WeightedCases
+from ccfem.judging.virtual_testing.virtual_test import RESOLUTION
 from ccfem.strategies.fibre_aware.upper_bound import LEAST, LOOSE, UpperBound
 
 

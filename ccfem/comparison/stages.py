@@ -12,12 +12,9 @@ from ccfem.base.errors import InputError, SolveError
 from ccfem.base.progress import Progress
 from ccfem.comparison.runs import Run, Tested
 from ccfem.comparison.tested_cases import in_all_cases
-from ccfem.fem.elasticity.part_stress import PartStress
-from ccfem.fem.elasticity.stress_field import StressField
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.fem.elasticity.stress_field import PartStress, StressField, WeightedCases
 from ccfem.judging.evaluation import evaluate
-from ccfem.judging.evaluation.printable import why_not
-from ccfem.judging.evaluation.strand_rules import StrandVerdict, strand_verdict
+from ccfem.judging.evaluation.strand_rules import StrandVerdict, strand_verdict, why_not
 from ccfem.judging.virtual_testing.equilibrium import BONDED, TENSION
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import RHO_SPAN, Strand
@@ -34,8 +31,7 @@ from ccfem.paths.planning.equal_fibre import (
 )
 from ccfem.paths.planning.given_paths import GivenPaths
 from ccfem.paths.planning.plan import plan
-from ccfem.paths.planning.planned import Planned
-from ccfem.paths.planning.strategy import LengthStrategy
+from ccfem.paths.planning.strategy import LengthStrategy, Planned
 from ccfem.paths.planning.unfolding import may_fold
 from ccfem.paths.splitting.printed_strands import printed_strands
 from ccfem.paths.toolpaths import Toolpaths

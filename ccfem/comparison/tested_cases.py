@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from ccfem.base.arrays import FloatArray, in_brief
 from ccfem.base.errors import InputError
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.judging.virtual_testing.equilibrium import BONDED
 from ccfem.judging.virtual_testing.several_cases import (
     CasesFailure,

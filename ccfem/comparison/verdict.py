@@ -18,7 +18,7 @@ from ccfem.comparison.ranking import (
 )
 from ccfem.comparison.request import InAll, Wanted
 from ccfem.comparison.runs import Run
-from ccfem.judging.virtual_testing.stiffer import FIRST, RESOLUTION, SAME
+from ccfem.judging.virtual_testing.virtual_test import FIRST, RESOLUTION, SAME
 
 
 def verdict(runs: Sequence[Run], wanted: Wanted) -> str:

@@ -11,11 +11,11 @@ from ccfem.base.errors import InputError
 from ccfem.comparison.front import cost_of, on_front
 from ccfem.comparison.headline import headline_values
 from ccfem.comparison.runs import Run
-from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.fem.elasticity.stress_field import PartStress
 from ccfem.machine.machine import Machine
 from ccfem.paths.fields.chart import flat_view, in_charts
 from ccfem.slicing.layers import Layer
-from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.layers.layer import stress_on
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -22,7 +22,7 @@ import numpy as np
 from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
-from ccfem.geometry.buckets import Buckets, bucket
+from ccfem.geometry.locate import Buckets, bucket
 from ccfem.geometry.polylines import lengths, resample, starts_segment
 
 SAME_DIRECTION = np.radians(30.0)

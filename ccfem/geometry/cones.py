@@ -19,7 +19,7 @@ def groups_in_cones(
     half_angle: float,
     length: float,
 ) -> BoolArray:
-    """Whether a point of a group lies in a cone.
+    """Mask (n, g) of the cones that a point of each group lies in.
 
     Parameters
     ----------
@@ -32,10 +32,6 @@ def groups_in_cones(
         Below 90.
     length : float, mm
         Height of the cones.
-
-    Returns
-    -------
-    (n, g) bool array
     """
     count = int(group.max(initial=-1)) + 1
     every = np.full(len(tips), count)

@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
-from ccfem.geometry.buckets import bucket
+from ccfem.geometry.locate import bucket
 from ccfem.geometry.polylines import lengths, starts_segment, subdivide
 
 _TOUCH = 1e-9

@@ -6,8 +6,8 @@ import numpy as np
 from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray, repeated
-from ccfem.geometry.buckets import Buckets, bucket
 from ccfem.geometry.facets import unique_edges
+from ccfem.geometry.locate import Buckets, bucket
 from ccfem.geometry.polylines import starts_segment
 
 

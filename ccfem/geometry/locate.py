@@ -1,12 +1,99 @@
 """Find the triangle or tetrahedron that holds a point, with a uniform grid of buckets."""
 
+from dataclasses import dataclass
 from functools import reduce
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray
-from ccfem.geometry.buckets import Buckets, bucket
+from ccfem.base.errors import InputError
+
+# A uniform grid of buckets for boxes, to find neighbours and containing boxes.
+
+
+_MOST_CELLS = 4_000_000
+
+
+class Buckets(NamedTuple):
+    """Boxes by the cells of a uniform grid.
+
+    Attributes
+    ----------
+    origin : (d,) array, mm
+        Lowest corner of the grid; d is 2 or 3.
+    cell : float, mm
+        Size of a cell.
+    shape : (3,) int array
+        Cells along each axis; 1 along a third axis of a plane grid.
+    starts, items : int arrays
+        Cell (i, j, k) holds the boxes ``items[starts[c]:starts[c + 1]]`` with
+        ``c = (i * shape[1] + j) * shape[2] + k``.
+    """
+
+    origin: FloatArray
+    cell: float
+    shape: IntArray
+    starts: IntArray
+    items: IntArray
+
+
+def bucket(low: FloatArray, high: FloatArray, cell: float | None = None) -> Buckets:
+    """Put boxes into the cells of a grid that they overlap.
+
+    Parameters
+    ----------
+    low, high : (n, d) arrays, mm
+        Corners of at least one box, d = 2 or 3.
+    cell : float, mm, optional
+        Size of a cell; by default about one box a cell. It is increased if the grid would have more
+        than four million cells.
+    """
+    origin = low.min(axis=0)
+    extent = np.maximum(high.max(axis=0) - origin, 1e-12)
+    dimension = len(origin)
+    if cell is None:
+        spread = float((np.prod(extent) / len(low)) ** (1.0 / dimension))
+        cell = max(spread, float(np.mean(high - low)))
+    while np.prod(np.floor(extent / cell) + 1.0) > _MOST_CELLS:
+        cell *= 1.5
+    shape = np.ones(3, dtype=np.int64)
+    shape[:dimension] = np.floor(extent / cell).astype(np.int64) + 1
+    first = np.zeros((len(low), 3), dtype=np.int64)
+    last = np.zeros((len(low), 3), dtype=np.int64)
+    first[:, :dimension] = np.floor((low - origin) / cell)
+    last[:, :dimension] = np.floor((high - origin) / cell)
+    starts, items = _boxes_by_cell(first, np.minimum(last, shape - 1), shape)
+    return Buckets(origin, cell, shape, starts, items)
+
+
+@njit(cache=True, nogil=True)
+def _boxes_by_cell(first: IntArray, last: IntArray, shape: IntArray) -> tuple[IntArray, IntArray]:
+    """Items of each grid cell: boxes of cells from `first` to `last`, counted, then written."""
+    starts = np.zeros(shape[0] * shape[1] * shape[2] + 1, np.int64)
+    items = np.empty(0, np.int64)
+    for writing in range(2):
+        if writing:
+            total = 0
+            for c in range(len(starts)):
+                size = starts[c]
+                starts[c] = total
+                total += size
+            items = np.empty(total, np.int64)
+        for box in range(len(first)):
+            for i in range(first[box, 0], last[box, 0] + 1):
+                for j in range(first[box, 1], last[box, 1] + 1):
+                    for k in range(first[box, 2], last[box, 2] + 1):
+                        c = (i * shape[1] + j) * shape[2] + k
+                        if writing:
+                            items[starts[c]] = box
+                        starts[c] += 1
+    # Writing has moved the start of every cell to that of the next one.
+    for c in range(len(starts) - 1, 0, -1):
+        starts[c] = starts[c - 1]
+    starts[0] = 0
+    return starts, items
 
 
 def locate(
@@ -124,3 +211,82 @@ def _search(
                 if depth >= 0.0:
                     break
     return triangle, weights
+
+
+# Nearest points on a triangulated surface.
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """Points of a surface that are nearest to others.
+
+    Attributes
+    ----------
+    triangle : (q,) int array
+    weights : (q, 3) array
+        Barycentric coordinates in it, in [0, 1].
+    points : (q, 3) array, mm
+    distance : (q,) array, mm
+    """
+
+    triangle: IntArray
+    weights: FloatArray
+    points: FloatArray
+    distance: FloatArray
+
+
+def nearest_on_triangles(points: FloatArray, triangles: IntArray, queries: FloatArray) -> Nearest:
+    """Find the points of a surface that are nearest to given ones.
+
+    Triangles may be of any size; those without area are passed over. Of several triangles at the
+    same distance any may be returned.
+
+    Parameters
+    ----------
+    points : (n, 3) array, mm
+    triangles : (t, 3) int array
+    queries : (q, 3) array, mm
+
+    Raises
+    ------
+    InputError
+        For queries that are not finite, and for a surface without area.
+    """
+    import pyvista as pv
+    from vtkmodules.vtkCommonCore import reference
+    from vtkmodules.vtkCommonDataModel import vtkStaticCellLocator
+
+    if not np.isfinite(queries).all():
+        raise InputError("expected finite points to find the nearest ones of; got NaN or infinity")
+    points = np.asarray(points, dtype=np.float64)
+    triangle, foot = np.full(len(queries), -1), np.zeros((len(queries), 3))
+    locator: Any = vtkStaticCellLocator()
+    if len(triangles):
+        locator.SetDataSet(pv.PolyData.from_regular_faces(points, triangles))
+        locator.BuildLocator()
+        at, part, square = [0.0, 0.0, 0.0], reference(0), reference(0.0)
+        cell: Any = reference(-1)
+        for k, query in enumerate(queries.tolist()):
+            cell.set(-1)  # stays where no triangle is at a finite distance
+            locator.FindClosestPoint(query, at, cell, part, square)
+            triangle[k], foot[k] = cell.get(), at
+    if (triangle < 0).any():
+        raise InputError(
+            "expected a surface with area at a finite distance; got "
+            f"{len(triangles)} triangles without"
+        )
+    weights = _barycentric(points[triangles[triangle]], foot)
+    nearest = np.einsum("qk,qkd->qd", weights, points[triangles[triangle]])
+    return Nearest(triangle, weights, nearest, np.linalg.norm(nearest - queries, axis=1))
+
+
+def _barycentric(corners: FloatArray, points: FloatArray) -> FloatArray:
+    """Coordinates (q, 3) of points (q, 3) of triangles with the given corners (q, 3, 3)."""
+    sides = corners[:, [1, 2]] - corners[:, :1]
+    normal = np.cross(sides[:, 0], sides[:, 1])
+    square = np.maximum(np.einsum("qd,qd->q", normal, normal), np.finfo(float).tiny)
+    # Twice the areas that the point spans with two sides, as shares of the triangle's.
+    across = np.cross(points[:, None] - corners[:, :1], sides[:, ::-1]) * [[[1.0], [-1.0]]]
+    weights = np.clip(np.einsum("qkd,qd->qk", across, normal) / square[:, None], 0.0, 1.0)
+    weights = np.column_stack([1.0 - weights.sum(axis=1), weights])
+    return np.maximum(weights, 0.0) / np.maximum(weights, 0.0).sum(axis=1, keepdims=True)

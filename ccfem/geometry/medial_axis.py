@@ -16,8 +16,7 @@ from scipy.spatial import QhullError, Voronoi, cKDTree
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, repeated
 from ccfem.base.checks import check_number
-from ccfem.geometry.facets import facet_keys
-from ccfem.geometry.measures import connected
+from ccfem.geometry.facets import connected, facet_keys
 from ccfem.geometry.offsets import rings
 from ccfem.geometry.polylines import is_closed, line_length
 from ccfem.geometry.shapes import Region
@@ -75,7 +74,6 @@ class MedialAxis:
         Ends, junctions, and the centres of parts whose axis is a point (discs).
     radius : (k,) array, mm
         Distance of each node to the border.
-    segments : tuple of MedialSegment
     """
 
     nodes: FloatArray

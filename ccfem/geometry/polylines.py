@@ -8,6 +8,7 @@ first point at its end.
 from collections.abc import Sequence
 
 import numpy as np
+from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, repeated
 
@@ -294,3 +295,93 @@ def between(line: FloatArray, start: float, end: float) -> FloatArray:
     along = arc_lengths(line, np.array([0, len(line)]))
     inside = (along > start) & (along < end)
     return np.concatenate([[point_at(line, start)], line[inside], [point_at(line, end)]])
+
+
+# Curvature of polylines by arc length.
+
+
+def curvature_samples(
+    points: FloatArray, offsets: IntArray, closed: BoolArray, step: float
+) -> FloatArray:
+    """Curvature of polylines at points equally far apart, (s,), 1/mm.
+
+    Parameters
+    ----------
+    points, offsets
+        The polylines, in 2 or 3 dimensions, mm.
+    closed : (K,) bool array
+        Closed ones are also sampled where they close; the ends of open ones have no curvature.
+    step : float, mm
+        Wanted distance h of the samples; a polyline of length L gets ``max(1, round(L / h))`` equal
+        steps. The curvature is the angle between the chords before and behind a point, over h.
+    """
+    if not len(points):
+        return np.zeros(0)
+    samples, ends = resample(points, offsets, step)
+    count = np.diff(ends)
+    angle = turning_angles(samples, ends, closed)
+    size = np.repeat(lengths(points, offsets) / np.maximum(count - 1, 1), count)
+    inner = inner_points(ends, closed) & (size > 0.0)
+    return np.asarray(angle[inner] / size[inner])
+
+
+# Lines, cut where they come near themselves.
+
+
+_OWN = 3.0
+"""Length along the seed line, in fibre widths, within which it may be near itself."""
+
+
+def until_itself(line: FloatArray, start: FloatArray, width: float) -> FloatArray:
+    """Cut a line (n, 2), from a point on it ahead and back, where it comes near itself.
+
+    Streamlines may circle a hole many times, slightly displaced each time. A closed line stays
+    closed if only its ends meet.
+
+    Parameters
+    ----------
+    line : (n, 2) array, mm
+    start : (2,) array, mm
+        The point of the line nearest to this is kept.
+    width : float, mm
+    """
+    if len(line) < 2:
+        return line
+    seed = int(np.argmin(((line - start) ** 2).sum(axis=1)))
+    first, last = _own_way(line, seed, is_closed(line), width, _OWN * width)
+    return line[first : last + 1]
+
+
+@njit(cache=True, nogil=True)
+def _own_way(
+    line: FloatArray, seed: int, closed: bool, width: float, free: float
+) -> tuple[int, int]:
+    """First and last point that keep a distance from all others more than `free` mm of arc away."""
+    count = len(line)
+    along = np.zeros(count)
+    for p in range(1, count):
+        along[p] = along[p - 1] + np.sqrt(_squared(line, p, p - 1))
+    # Ahead and back from the seed, until a point is too near to one of those that are kept.
+    first = last = seed
+    for sense in (1, -1):
+        p = seed + sense
+        while 0 <= p < count:
+            for q in range(first, last + 1):
+                arc = abs(along[p] - along[q])
+                if closed:
+                    arc = min(arc, along[-1] - arc)
+                if arc > free and _squared(line, p, q) < width * width:
+                    break
+            else:
+                first, last = min(first, p), max(last, p)
+                p += sense
+                continue
+            break
+    return first, last
+
+
+@njit(cache=True, nogil=True)
+def _squared(line: FloatArray, p: int, q: int) -> float:
+    """Square of the distance of two points."""
+    x, y = line[p, 0] - line[q, 0], line[p, 1] - line[q, 1]
+    return x * x + y * y

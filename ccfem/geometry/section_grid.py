@@ -8,8 +8,7 @@ from numba import njit
 from scipy.ndimage import distance_transform_edt
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, repeated
-from ccfem.geometry.places import INSIDE, OUTSIDE, VOID
-from ccfem.geometry.shapes import Region
+from ccfem.geometry.shapes import INSIDE, OUTSIDE, VOID, Region
 
 _CELL = 0.5
 """Minimum size of a cell, mm."""

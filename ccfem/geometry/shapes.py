@@ -1,15 +1,16 @@
-"""Shapely geometry: types, and conversion from and to polylines."""
+"""Shapely geometry: types, lines from and to polylines, sections reduced to their corners."""
 
 from collections.abc import Sequence
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ccfem.base.arrays import FloatArray
+from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.geometry.polylines import pack
 
-Region = shapely.Polygon | shapely.MultiPolygon
+Region: TypeAlias = shapely.Polygon | shapely.MultiPolygon
 """An area in a plane, mm: the section of a layer or a part of it; it may be empty."""
 
 Shapes = NDArray[np.object_]
@@ -33,3 +34,135 @@ def open_lines(shapes: shapely.Geometry | Shapes) -> list[FloatArray]:
             if part.geom_type == "LineString" and part.length > 0.0
         ]
     return lines
+
+
+# Sections reduced to their corners, so that equal layers of a part are exactly equal.
+
+
+_STRAIGHT = 1e-6
+"""Turn of the border, radians, below which a point lies on a straight side."""
+_DECIMALS = 11
+"""Decimals of coordinates, mm: above the errors of slicing, below what any pattern resolves."""
+
+
+def corners_only(section: Region) -> Region:
+    """Section without the points on its straight sides, which slicing leaves where edges cross.
+
+    Layers of an extruded part become equal, so that everything that depends only on the section can
+    be planned once for all of them.
+
+    Parameters
+    ----------
+    section : shapely (Multi)Polygon, mm
+
+    Returns
+    -------
+    shapely (Multi)Polygon, mm
+        Each ring starts at its lowest corner in x, then y; coordinates are rounded to 1e-11 mm.
+    """
+    parts = []
+    for part in shapely.get_parts(section):
+        rings = [_ring_corners(shapely.get_coordinates(ring)) for ring in shapely.get_rings(part)]
+        if rings and len(rings[0]) > 2:
+            inner = sorted((ring for ring in rings[1:] if len(ring) > 2), key=lambda x: tuple(x[0]))
+            parts.append(shapely.Polygon(rings[0], inner))
+    parts.sort(key=lambda part: part.bounds)
+    return parts[0] if len(parts) == 1 else shapely.MultiPolygon(parts)
+
+
+def _ring_corners(ring: FloatArray) -> FloatArray:
+    """Points of a closed ring where it turns, the first one not repeated."""
+    points = ring[:-1]
+    while len(points) > 2:
+        before = points - np.roll(points, 1, axis=0)
+        after = np.roll(before, -1, axis=0)
+        cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+        along = np.einsum("ij,ij->i", before, after)
+        turns = np.abs(cross) > _STRAIGHT * np.abs(along)
+        turns |= along < 0.0
+        if turns.all():
+            break
+        points = points[turns]
+    points = np.round(points, _DECIMALS) + 0.0
+    return np.roll(points, -np.lexsort(points.T[::-1])[0], axis=0) if len(points) else points
+
+
+# Where points and steps lie: in a section, over a void of it, or outside.
+
+
+INSIDE, VOID, OUTSIDE = range(3)
+"""In the section; in a hole of it, or anywhere else within its outer rings; beyond those."""
+
+TOLERANCE = 1e-4
+"""Distance, mm, from the section up to which points count as inside, for rounded coordinates."""
+
+
+class Pieces(NamedTuple):
+    """Steps cut where they cross the boundary of a section, in their order.
+
+    Attributes
+    ----------
+    step : (q,) int array
+        Step that each piece belongs to.
+    begin, end : (q,) arrays in [0, 1]
+        Shares of the step at which the piece begins and ends; the pieces of a step fill it.
+    place : (q,) int array
+        INSIDE, VOID or OUTSIDE.
+    """
+
+    step: IntArray
+    begin: FloatArray
+    end: FloatArray
+    place: IntArray
+
+
+def section_places(points: FloatArray, section: Region) -> IntArray:
+    """Places of points relative to a section; points up to `TOLERANCE` from it are inside.
+
+    INSIDE, VOID or OUTSIDE for each of the points (n, 2), mm: an (n,) int array.
+    """
+    return _places(points, shapely.buffer(section, TOLERANCE, quad_segs=2))
+
+
+def _places(points: FloatArray, section: Region) -> IntArray:
+    rings = shapely.get_exterior_ring(shapely.get_parts(section))
+    filled = shapely.union_all(shapely.polygons(rings))
+    shapely.prepare([section, filled])
+    x, y = np.ascontiguousarray(points.T)
+    around = np.where(shapely.intersects_xy(filled, x, y), VOID, OUTSIDE)
+    return np.where(shapely.intersects_xy(section, x, y), INSIDE, around)
+
+
+def cut_at_section(
+    starts: FloatArray, ends: FloatArray, section: Region, tolerance: float = TOLERANCE
+) -> Pieces:
+    """Cut straight steps at the boundary of a section.
+
+    Parameters
+    ----------
+    starts, ends : (s, 2) arrays, mm
+    section, tolerance
+        As in `section_places`.
+    """
+    grown = shapely.buffer(section, tolerance, quad_segs=2)
+    boundary = shapely.boundary(grown)
+    shapely.prepare(boundary)
+    lines = shapely.linestrings(np.stack([starts, ends], axis=1))
+    met = np.flatnonzero(shapely.intersects(boundary, lines))
+    # If a step runs along the boundary, the ends of that stretch.
+    at, number = shapely.get_coordinates(
+        shapely.intersection(lines[met], boundary), return_index=True
+    )
+    number = met[number]
+    along = ends - starts
+    square = np.maximum(np.einsum("ij,ij->i", along, along), 1e-300)
+    share = np.einsum("ij,ij->i", at - starts[number], along[number]) / square[number]
+    every = np.arange(len(starts))
+    step = np.concatenate([every, every, number])
+    share = np.concatenate([0.0 * every, 0.0 * every + 1.0, np.clip(share, 0.0, 1.0)])
+    order = np.lexsort((share, step))
+    step, share = step[order], share[order]
+    piece = np.flatnonzero((step[1:] == step[:-1]) & (share[1:] > share[:-1]))
+    step, begin, end = step[piece], share[piece], share[piece + 1]
+    middle = starts[step] + 0.5 * (begin + end)[:, None] * along[step]
+    return Pieces(step, begin, end, _places(middle, grown))

@@ -7,8 +7,7 @@ from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.geometry.medial_axis import MedialAxis, medial_axis
 from ccfem.geometry.offsets import inset, rings
 from ccfem.geometry.polylines import is_closed, line_length, runs, straight_pieces
-from ccfem.geometry.sections import corners_only
-from ccfem.geometry.shapes import Region
+from ccfem.geometry.shapes import Region, corners_only
 
 _LEAST_GAP = 0.5
 """Narrowest strip, in pitches, that gets a strand, which then overlaps its neighbours: the sum of

@@ -7,7 +7,7 @@ from ccfem.machine.limits import Limits
 from ccfem.machine.machine import Machine
 from ccfem.machine.named_machines import machine_from, machine_names, machine_table, updated
 from ccfem.machine.print_process import Process
-from ccfem.machine.speed_table import SpeedTable
+from ccfem.machine.speeds import SpeedTable
 
 __all__ = [
     "FeedAxes",

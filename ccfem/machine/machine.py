@@ -9,7 +9,7 @@ from ccfem.machine.kinematics import Kinematics
 from ccfem.machine.limits import Limits
 from ccfem.machine.print_process import Process
 from ccfem.machine.ranges import check_ranges
-from ccfem.machine.speed_table import SpeedTable
+from ccfem.machine.speeds import SpeedTable
 
 _CUTTER_DISTANCE = 42.0
 """Chen et al. 2021, section 5.2, mm."""

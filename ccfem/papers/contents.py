@@ -23,7 +23,6 @@ class WhenAsked(Mapping[K, V]):
 
     Parameters
     ----------
-    keys : sequence
     compute : callable
         Makes the piece of a key.
     progress : callable, optional

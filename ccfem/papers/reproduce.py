@@ -53,7 +53,6 @@ def reproduce(
         A table or figure, as ``"table2"`` or ``"figure8"``, or ``"claims"``.
     folder : path, default ``results/PAPER``
         Where the files go; those of the same names are replaced.
-    progress : callable, optional
 
     Returns
     -------

@@ -104,20 +104,16 @@ class Toolpaths(Shown):
         keep = [k for k, line in enumerate(lines) if len(line) >= 2]
         if not keep:
             return cls.empty()
-        if closed is None:
-            closed = [len(line) > 0 and np.array_equal(line[0], line[-1]) for line in lines]
-        sizes = [len(lines[k]) for k in keep]
         points = layer.plane.to_space(np.concatenate([lines[k] for k in keep]))
+        ends = [np.array_equal(lines[k][0], lines[k][-1]) for k in keep]
         return cls(
             points=points,
             normals=np.broadcast_to(layer.plane.frame[2], points.shape),
-            offsets=np.concatenate([[0], np.cumsum(sizes)]),
+            offsets=np.concatenate([[0], np.cumsum([len(lines[k]) for k in keep])]),
             layer=np.full(len(keep), layer.index),
             kind=np.full(len(keep), FIBRE),
-            closed=np.array([closed[k] for k in keep]),
-            link=np.zeros(len(points), dtype=bool)
-            if link is None
-            else np.concatenate([link[k] for k in keep]),
+            closed=np.array(ends if closed is None else [closed[k] for k in keep]),
+            link=np.concatenate([link[k] if link else np.zeros(len(lines[k]), bool) for k in keep]),
         )
 
     @classmethod

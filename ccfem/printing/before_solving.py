@@ -13,8 +13,7 @@ from ccfem.printing.line_counts import check_matrix_lines
 from ccfem.printing.part_moves import part_moves
 from ccfem.printing.print_plan import PrintPlan, check_bed, check_machine
 from ccfem.printing.support.overhang import overhang
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.plane import plane_frame
+from ccfem.slicing.layers.layer import Layer, plane_frame
 
 _UP = np.array([0.0, 0.0, 1.0])
 

@@ -9,7 +9,7 @@ from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.cones import earlier_in_cones
-from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
+from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.geometry.polylines import along_line, is_closed, pack, starts_segment
 from ccfem.machine.machine import Machine
 from ccfem.paths.linking.print_order import nearest_end_order
@@ -21,10 +21,8 @@ from ccfem.printing.layer_matrix import layer_matrix
 from ccfem.printing.poses import poses, under_bed
 from ccfem.printing.print_plan import PrintPlan
 from ccfem.printing.support import SupportLayers, support_paths
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.plane import plane_frame
-from ccfem.slicing.layers.slicer import Vector
-from ccfem.slicing.layers.standing import standing
+from ccfem.slicing.layers.layer import Layer, plane_frame
+from ccfem.slicing.layers.slicer import Vector, standing
 
 # Matrix and fibre on each curved layer, of the part or of its support.
 

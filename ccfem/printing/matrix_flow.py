@@ -21,7 +21,7 @@ from ccfem.base.errors import InputError
 from ccfem.geometry.polylines import starts_segment, subdivide
 from ccfem.geometry.shapes import Region, strings
 from ccfem.machine.machine import Machine
-from ccfem.paths.splitting.strand_density import StrandDensity
+from ccfem.paths.splitting.slabs import StrandDensity
 from ccfem.paths.toolpaths import Toolpaths
 
 _PIECE = 2.0

@@ -24,13 +24,7 @@ from ccfem.paths.splitting.printed_strands import (
 )
 from ccfem.paths.splitting.slabs import Slab, check_cover, slabs_of
 from ccfem.paths.toolpaths import FIBRE, MATRIX, Toolpaths
-from ccfem.printing.laid_layer import (
-    COORDINATE_DIGITS,
-    Below,
-    LaidLayer,
-    fibre_layer,
-    matrix_layer,
-)
+from ccfem.printing.laid_layer import COORDINATE_DIGITS, Below, LaidLayer, fibre_layer, matrix_layer
 from ccfem.printing.matrix_lines import MatrixFill, matrix_fills
 from ccfem.printing.support.overhang import overhang
 from ccfem.slicing.layers import Layer

@@ -15,8 +15,7 @@ from ccfem.machine.machine import Machine
 from ccfem.paths.planning.infill import Infill, Turns
 from ccfem.paths.raster.bitmap import Bitmap
 from ccfem.paths.raster.patterns import Regions, concentric_regions
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.layers.layer import Layer, LayerStress
 
 _CLOSEST = 0.6
 """Least distance between filled rings, in spacings [Plocher et al. 2022]."""

@@ -15,16 +15,14 @@ import shapely
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
 from ccfem.base.tensor import in_plane, strongest_in_plane
-from ccfem.geometry.own_way import until_itself
-from ccfem.geometry.polylines import along_line, between, line_length, points_along
+from ccfem.geometry.polylines import along_line, between, line_length, points_along, until_itself
 from ccfem.geometry.shapes import Region, open_lines
 from ccfem.machine.machine import Machine
 from ccfem.paths.fields.streamlines import streamlines
+from ccfem.paths.planning import Amount
 from ccfem.paths.planning.infill import SPACING, check_fill, long_enough
-from ccfem.paths.planning.strategy import Amount
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.layers.layer import Layer, LayerStress
 from ccfem.strategies.stress_tracing.stress_lines import misalignment, plane_stress_at, stress_lines
 
 _STEP = 0.25

@@ -21,11 +21,10 @@ from ccfem.geometry.offsets import ring_from, rings
 from ccfem.geometry.polylines import line_length, resample
 from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
+from ccfem.paths.planning import Amount
 from ccfem.paths.planning.infill import SPACING, Turns, check_fill, long_enough, with_turns
-from ccfem.paths.planning.strategy import Amount
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.layers.layer import Layer, LayerStress
 
 # Contours of the distance to the border of a section, and the tree of which lie side by side.
 #

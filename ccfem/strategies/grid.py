@@ -19,12 +19,11 @@ from ccfem.geometry.hatch import hatch
 from ccfem.geometry.shapes import Region
 from ccfem.geometry.shells import shells
 from ccfem.machine.machine import Machine
+from ccfem.paths.planning import Amount
 from ccfem.paths.planning.infill import SPACING, Infill, Turns, check_shells
-from ccfem.paths.planning.strategy import Amount
 from ccfem.paths.raster.bitmap import Bitmap
 from ccfem.paths.raster.patterns import Regions, grid_regions
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.layers.layer import Layer, LayerStress
 
 
 @dataclass(frozen=True)

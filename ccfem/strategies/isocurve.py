@@ -18,30 +18,36 @@ from scipy.spatial import cKDTree
 from ccfem.base.arrays import FloatArray
 from ccfem.base.checks import check_choices, check_fields
 from ccfem.base.errors import InputError
-from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.isocontours import Isocontours
 from ccfem.geometry.polylines import is_closed, middle_of_longest_run
 from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
-from ccfem.paths.fields.compatibility import Incompatible
 from ccfem.paths.fields.directed import Directed, directed
 from ccfem.paths.fields.layer_elements import Surface
-from ccfem.paths.fields.layer_tension import layer_tension, mesh_tension
-from ccfem.paths.fields.levels import extract_levels, unit_levels
-from ccfem.paths.fields.scalar import fit_cone, fit_constrained, fit_literal, fit_weighted
-from ccfem.paths.fields.tensile import Tension
-from ccfem.paths.linking.clearance import trim_to_clearance
-from ccfem.paths.linking.conformal import lead_into, parallel_curve
-from ccfem.paths.linking.finishing import keep_off_border, linked_paths
+from ccfem.paths.fields.scalar import (
+    extract_levels,
+    fit_cone,
+    fit_constrained,
+    fit_literal,
+    fit_weighted,
+    unit_levels,
+)
+from ccfem.paths.fields.tensile import Incompatible, Tension, layer_tension, mesh_tension
+from ccfem.paths.linking.finishing import (
+    keep_off_border,
+    lead_into,
+    linked_paths,
+    parallel_curve,
+    trim_to_clearance,
+)
 from ccfem.paths.linking.joining import Joined
 from ccfem.paths.linking.possible_links import ring_arc
 from ccfem.paths.planning.infill import Turns, with_turns
 from ccfem.paths.planning.strategy import Amount, LayerPlanner
 from ccfem.paths.planning.unfolding import unfolded
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.holes import holes_on
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import LayerStress, stress_on
+from ccfem.slicing.layers.layer import Layer, LayerStress, holes_on, stress_on
 
 # Nested closed strands joined to one spiral, so that the fibre is cut once instead of for each.
 

@@ -20,8 +20,7 @@ from ccfem.machine.machine import Machine
 from ccfem.paths.planning.infill import Infill, Turns, check_shells
 from ccfem.paths.raster.bitmap import Bitmap
 from ccfem.paths.raster.patterns import Regions, medial_regions
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.layers.layer import Layer, LayerStress
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,6 @@ from ccfem.base.errors import InputError
 from ccfem.base.tensor import in_plane
 from ccfem.geometry.medial_axis import medial_axis
 from ccfem.geometry.offsets import rings
-from ccfem.geometry.own_way import until_itself
 from ccfem.geometry.parallel_strands import grow, lengthened
 from ccfem.geometry.polylines import (
     along_line,
@@ -28,6 +27,7 @@ from ccfem.geometry.polylines import (
     points_along,
     sample_midpoints,
     straight_pieces,
+    until_itself,
 )
 from ccfem.geometry.shapes import Region, open_lines
 from ccfem.geometry.shells import shells
@@ -35,13 +35,10 @@ from ccfem.machine.machine import Machine
 from ccfem.paths.fields.streamlines import streamlines
 from ccfem.paths.linking.joining import Joined, link_ends
 from ccfem.paths.planning.infill import Infill, Turns, check_shells, with_turns
-from ccfem.paths.raster.bands import depth
-from ccfem.paths.raster.bitmap import Bitmap
+from ccfem.paths.raster.bitmap import Bitmap, depth
 from ccfem.paths.raster.patterns import Regions, inside_shells, stress_regions
-from ccfem.paths.raster.skeleton import segments, skeleton
-from ccfem.paths.raster.thinning import thin
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.paths.raster.skeleton import segments, skeleton, thin
+from ccfem.slicing.layers.layer import Layer, LayerStress
 
 _STEP = 0.5
 _APART = 2.0

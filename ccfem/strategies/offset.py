@@ -15,11 +15,10 @@ from ccfem.base.arrays import FloatArray
 from ccfem.geometry.offsets import rings
 from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
+from ccfem.paths.planning import Amount
 from ccfem.paths.planning.infill import SPACING, Turns, check_fill, long_enough, with_turns
-from ccfem.paths.planning.strategy import Amount
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.layers.layer import Layer, LayerStress
 
 _QUARTER = 16
 """Segments per quarter turn round a re-entrant corner."""

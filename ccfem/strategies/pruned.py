@@ -11,15 +11,12 @@ from typing import Any, ClassVar, Literal
 from ccfem.base.arrays import freeze
 from ccfem.base.checks import check_choices, check_fields
 from ccfem.base.errors import InputError
-from ccfem.fem.elasticity.part_stress import PartStress
-from ccfem.fem.elasticity.stress_field import solved
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
-from ccfem.judging.virtual_testing.several_cases import specimens
-from ccfem.judging.virtual_testing.strand import RHO, Strand
+from ccfem.fem.elasticity import PartStress
+from ccfem.fem.elasticity.stress_field import WeightedCases, solved
+from ccfem.judging.virtual_testing import RHO, Strand, specimens
 from ccfem.machine.machine import Machine
-from ccfem.paths.planning.strategy import Amount, LayerPlanner, Strategy
+from ccfem.paths.planning.strategy import Amount, LayerPlanner, Strategy, WholePart, full_length
 from ccfem.paths.planning.unfolding import may_fold, without_folds
-from ccfem.paths.planning.whole_part import WholePart, full_length
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies import create
 from ccfem.strategies.fibre_aware.cut_and_move import prune_and_move

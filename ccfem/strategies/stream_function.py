@@ -16,22 +16,16 @@ from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.checks import check_choices, check_fields
 from ccfem.base.errors import InputError
 from ccfem.base.tensor import largest_in_plane
-from ccfem.fem.elasticity.part_stress import PartStress
-from ccfem.fem.elasticity.stress_field import StressField, solved
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
-from ccfem.judging.virtual_testing.several_cases import specimens
-from ccfem.judging.virtual_testing.strand import RHO, Strand
+from ccfem.fem.elasticity import PartStress, StressField
+from ccfem.fem.elasticity.stress_field import WeightedCases, solved
+from ccfem.judging.virtual_testing import RHO, Strand, specimens
 from ccfem.machine.machine import Machine
-from ccfem.paths.fields.fill import fill_screened
+from ccfem.paths.fields.directed import fill_screened
 from ccfem.paths.fields.layer_elements import Surface, positive_definite
-from ccfem.paths.fields.layer_tension import layer_tension
-from ccfem.paths.fields.orientation import orient
-from ccfem.paths.fields.tensile import Tension
-from ccfem.paths.planning.strategy import Amount, LayerPlanner
-from ccfem.paths.planning.whole_part import WholePart, full_length
+from ccfem.paths.fields.tensile import Tension, layer_tension, orient
+from ccfem.paths.planning.strategy import Amount, LayerPlanner, WholePart, full_length
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.layers.layer import Layer, stress_on
 from ccfem.strategies.fibre_aware.cut_and_move import prune_and_move
 from ccfem.strategies.fibre_aware.heights import (
     alike_share,
@@ -437,7 +431,6 @@ def designed_to_lengths(
 
     Parameters
     ----------
-    strategy : StreamFunction
     lengths : sequence of float, mm per layer
         Lengths that need more than the largest coverage are reduced to that coverage.
     cut : callable

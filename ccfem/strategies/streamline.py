@@ -22,11 +22,10 @@ from ccfem.geometry.section_grid import SectionGrid, contains, section_grid
 from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
 from ccfem.paths.fields.streamlines import LineField, direction_at, line_field, streamline_step
+from ccfem.paths.planning import Amount
 from ccfem.paths.planning.infill import SPACING, check_fill, long_enough
-from ccfem.paths.planning.strategy import Amount
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.layers.layer import Layer, LayerStress
 
 _LEAST = 0.995
 """Least distance between lines, in fibre widths. At exactly one width rounding would end lines that

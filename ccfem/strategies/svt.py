@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.checks import check_fields
-from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.medial_axis import medial_axis
 from ccfem.geometry.offsets import join_rings, offset_rings, rings
 from ccfem.geometry.polylines import (
@@ -35,14 +35,17 @@ from ccfem.paths.linking.single_path import link_tracks
 from ccfem.paths.planning.infill import SPACING, Turns, check_fill, long_enough, with_turns
 from ccfem.paths.planning.strategy import Amount, LayerPlanner
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import LayerStress, stress_on
+from ccfem.slicing.layers.layer import Layer, LayerStress, stress_on
 from ccfem.strategies.stress_tracing.band import band
-from ccfem.strategies.stress_tracing.criterion import Criterion
 from ccfem.strategies.stress_tracing.frame import ARC_CHORD, frame
 from ccfem.strategies.stress_tracing.main_paths import main_paths
 from ccfem.strategies.stress_tracing.stems import with_shared_stems
-from ccfem.strategies.stress_tracing.stress_lines import misalignment, plane_stress_at, stress_lines
+from ccfem.strategies.stress_tracing.stress_lines import (
+    Criterion,
+    misalignment,
+    plane_stress_at,
+    stress_lines,
+)
 from ccfem.strategies.stress_tracing.tails import tail_turns
 from ccfem.strategies.stress_tracing.tracks import tracks
 

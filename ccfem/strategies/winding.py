@@ -20,21 +20,18 @@ from scipy.ndimage import gaussian_filter1d
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.checks import check_choices, check_fields
 from ccfem.base.errors import InputError
-from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.isocontours import isocontours
-from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
+from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.geometry.polylines import resample
 from ccfem.machine.machine import Machine
 from ccfem.paths.fields.layer_elements import Surface, positive_definite
 from ccfem.paths.planning.infill import SPACING, Turns, check_fill, long_enough, with_turns
 from ccfem.paths.planning.strategy import Amount, LayerPlanner
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.guidance.joint_lines import joint_lines
-from ccfem.slicing.guidance.joints import joints_of
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import LayerStress
-from ccfem.slicing.principal_lines.critical import Keep
-from ccfem.slicing.principal_lines.strongest import strongest_stress
+from ccfem.slicing.guidance.joints import joint_lines, joints_of
+from ccfem.slicing.layers.layer import Layer, LayerStress
+from ccfem.slicing.principal_lines.critical import Keep, strongest_stress
 from ccfem.strategies.winding_curves.joining_curves import border_tree
 from ccfem.strategies.winding_curves.piece import Piece, pieces_with_joints
 from ccfem.strategies.winding_curves.spaced import CLOSEST, kept_apart
@@ -131,7 +128,7 @@ _BINS = 40
 
 
 def evened(surface: Surface, field: FloatArray) -> FloatArray:
-    """Rescale a field in [0, 1] so that the mean distance between any two levels is the same.
+    """Rescale a field in [0, 1] so that the mean distance between any two levels is the same: (n,).
 
     The mean distance between two levels is the area between them over the mean length of the levels
     there, which is the integral of the gradient's size over that area (coarea formula). Values
@@ -140,10 +137,6 @@ def evened(surface: Surface, field: FloatArray) -> FloatArray:
     Parameters
     ----------
     field : (n,) array
-
-    Returns
-    -------
-    (n,) array
     """
     size = np.linalg.norm(surface.gradient(field), axis=1)
     corners = field[surface.triangles]
@@ -442,7 +435,7 @@ def annulus_field(
     fixed: IntArray,
     values: FloatArray,
 ) -> FloatArray:
-    """Solve for the field whose level lines run along the tension, round the holes.
+    """Solve for the field whose level lines run along the tension, round the holes: (n,).
 
     Minimises ``sum_f A_f [grad s . (T_f + isotropy) grad s] + smoothness J(s)`` with given values
     on the holes, on the curves that join them and on the outer border; J is `gradient_jumps`. No
@@ -461,10 +454,6 @@ def annulus_field(
     fixed : (k,) int array
         Points whose values are given.
     values : (k,) array
-
-    Returns
-    -------
-    (n,) array
     """
     frames = surface.frames
     metric = np.einsum("tki,tij,tlj->tkl", frames, tension, frames) + isotropy * np.eye(2)

@@ -9,11 +9,10 @@ import numpy as np
 from ccfem.base.checks import check_fields
 from ccfem.geometry.hatch import zigzag
 from ccfem.machine.machine import Machine
+from ccfem.paths.planning import Amount
 from ccfem.paths.planning.infill import SPACING, Turns, check_fill, long_enough, with_turns
-from ccfem.paths.planning.strategy import Amount
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.layers.layer import Layer, LayerStress
 
 
 @dataclass(frozen=True)

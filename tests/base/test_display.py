@@ -13,7 +13,7 @@ from PIL import Image
 import ccfem
 from ccfem.base.errors import InputError
 from ccfem.comparison.plot.scenes import add
-from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.layers.layer import stress_on
 
 
 @pytest.fixture(scope="module")

@@ -17,8 +17,7 @@ from ccfem.cases.case import Case
 from ccfem.comparison import pictures
 from ccfem.comparison.engine import compare
 from ccfem.comparison.files import write_results
-from ccfem.comparison.report import charts
-from ccfem.comparison.report import html_report as report
+from ccfem.comparison.report import charts, html_report as report
 from ccfem.fem.elasticity.problem import Force, Problem, Support
 from ccfem.fem.materials import isotropic
 from ccfem.judging.evaluation import FibreSamples

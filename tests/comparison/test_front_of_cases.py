@@ -13,8 +13,8 @@ from ccfem.comparison.fibre_front import fibre_front
 from ccfem.comparison.front_cases import PointCases
 from ccfem.comparison.front_points import FibreFront, FrontPoint
 from ccfem.fem.elasticity import Force, Problem, Support, solve
+from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.fem.elasticity.support_kinds import PressingSupport
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
 from ccfem.fem.materials import printed_pla
 from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine

@@ -20,9 +20,8 @@ from ccfem.comparison.report.layer_view import (
 from ccfem.comparison.runs import Run
 from ccfem.judging.evaluation.strand_rules import BrokenRule, StrandVerdict
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer_stress import LayerStress
-from ccfem.slicing.slicers import Planar
-from ccfem.slicing.slicers import named as slicers
+from ccfem.slicing.layers.layer import LayerStress
+from ccfem.slicing.slicers import Planar, named as slicers
 from ccfem.strategies import Zigzag, named
 
 (LAYER,) = Planar(count=1).cut(box_mesh((80.0, 60.0, 4.0), (8, 6, 1)))

@@ -5,8 +5,7 @@ import tracemalloc
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from ccfem.geometry.intersections import find_crossings
 from ccfem.geometry.polylines import pack

@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.spatial import Delaunay
 from shapely import LineString
 
 from ccfem.geometry.isocontours import isocontours, least_distance
 from ccfem.paths.fields.layer_elements import Surface
-from ccfem.paths.fields.levels import extract_levels, levels_at, start_count
+from ccfem.paths.fields.scalar import extract_levels, levels_at, start_count
 
 
 def square(count: int = 25, side: float = 20.0, seed: int = 0) -> Surface:

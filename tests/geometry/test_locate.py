@@ -9,8 +9,7 @@ from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity.problem import Problem, Support
 from ccfem.fem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.fem.materials import isotropic
-from ccfem.geometry.buckets import bucket
-from ccfem.geometry.locate import locate
+from ccfem.geometry.locate import bucket, locate
 
 RNG = np.random.default_rng(3)
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import Delaunay, cKDTree
 
 from ccfem.base.errors import InputError
-from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
+from ccfem.geometry.locate import nearest_on_triangles
 
 
 def wavy(count=400):

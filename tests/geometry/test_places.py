@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.geometry.places import INSIDE, OUTSIDE, VOID, cut_at_section, section_places
+from ccfem.geometry.shapes import INSIDE, OUTSIDE, VOID, cut_at_section, section_places
 
 FRAME = shapely.box(0.0, 0.0, 60.0, 40.0).difference(shapely.box(20.0, 15.0, 40.0, 25.0))
 

@@ -5,7 +5,7 @@ import shapely
 from shapely import affinity
 
 from ccfem.cases import create_case
-from ccfem.geometry.sections import corners_only
+from ccfem.geometry.shapes import corners_only
 from ccfem.slicing.slicers.planar import Planar
 
 L_SHAPE = shapely.Polygon([(0, 0), (30, 0), (30, 10), (10, 10), (10, 30), (0, 30)])

@@ -14,7 +14,7 @@ from ccfem.body.mesh.patches import Cylinder, patches_from_rules
 from ccfem.body.meshing import extrude
 from ccfem.fem.elasticity import Force, Problem, Support, solve
 from ccfem.fem.materials import isotropic
-from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
+from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.judging.evaluation import evaluate
 from ccfem.machine import Machine
 from ccfem.paths.fields.chart import chart_of

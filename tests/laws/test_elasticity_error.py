@@ -19,7 +19,7 @@ from ccfem.fem.elasticity import Force, Problem, Support, solve
 from ccfem.fem.elasticity.assembly import cell_gradients
 from ccfem.fem.elasticity.error_estimate import estimate_error
 from ccfem.fem.elasticity.held import Held
-from ccfem.fem.elasticity.order import LARGEST_ERROR
+from ccfem.fem.elasticity.plausibility import LARGEST_ERROR
 from ccfem.fem.elasticity.system import System
 from ccfem.fem.materials import isotropic
 

@@ -12,7 +12,7 @@ from ccfem.machine.kinematics import Kinematics
 from ccfem.machine.limits import Limits
 from ccfem.machine.print_process import Process
 from ccfem.machine.ranges import RANGES
-from ccfem.machine.speed_table import SpeedTable
+from ccfem.machine.speeds import SpeedTable
 
 TABLES = {
     "machine": Machine,

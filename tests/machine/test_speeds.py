@@ -12,11 +12,11 @@ from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.part_file import read_part
 from ccfem.geometry.polylines import pack
 from ccfem.judging.evaluation.indices.manufacture import manufacture_indices, sample_manufacture
-from ccfem.judging.evaluation.plane_paths import plane_paths
+from ccfem.judging.evaluation.layer_paths import plane_paths
 from ccfem.machine import Machine, SpeedTable
 from ccfem.machine.gcode_profile import GcodeProfile
 from ccfem.machine.speeds import table_speeds
-from ccfem.paths.linking.print_speed import step_speeds
+from ccfem.paths.linking.print_order import step_speeds
 from ccfem.paths.toolpaths import MATRIX, TRAVEL, Toolpaths
 from ccfem.slicing.slicers.planar import Planar
 

@@ -9,9 +9,8 @@ from ccfem.body.mesh import box_mesh
 from ccfem.fem.elasticity import Force, Problem, Support
 from ccfem.fem.materials import isotropic
 from ccfem.papers.chen_2021.contents import EXPECTED, quantities, write
-from ccfem.papers.chen_2021.large_displacement import turned_by, turns_at
-from ccfem.papers.chen_2021.study import run_study
-from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.papers.chen_2021.study import run_study, turned_by, turns_at
+from ccfem.slicing.layers.layer import stress_on
 from ccfem.strategies.isocurve import Isocurve
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from ccfem.body.mesh import box_mesh
 from ccfem.papers.contents import claim_table, judged
+from ccfem.papers.kipping_2023.chain import distances_below
 from ccfem.papers.kipping_2023.contents import EXPECTED, measured
-from ccfem.papers.kipping_2023.thickness import distances_below
 from ccfem.slicing.slicers import Planar
 
 

@@ -10,19 +10,20 @@ from ccfem.fem.elasticity.problem import Force, Support
 from ccfem.fem.materials import isotropic, named_material, plane_stress
 from ccfem.fem.plates import PlaneProblem, raster_mesh, solve_plane
 from ccfem.geometry.polylines import pack
-from ccfem.judging.evaluation.plane_paths import PlanePaths
+from ccfem.judging.evaluation.layer_paths import PlanePaths
 from ccfem.judging.evaluation.sensitivity import OffAxis
-from ccfem.papers.plocher_2022.fibre_map import FibreMap, fibre_map
 from ccfem.papers.plocher_2022.plane_study import (
+    ANGLES,
+    FibreMap,
     bead_area,
     benchmark,
+    fibre_map,
     laid_plate,
     mixed_stiffness,
     print_seconds,
     reduced_stiffness,
     turned_energies,
 )
-from ccfem.papers.plocher_2022.sensitivity import ANGLES
 from ccfem.paths.linking.print_order import nearest_end_order
 
 TABLE_5 = {

@@ -6,7 +6,7 @@ import pytest
 from ccfem.base.errors import InputError
 from ccfem.base.tensor import in_plane
 from ccfem.papers.plocher_2022.plates import five_holes, optimised_beam, plates, single_hole
-from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.layers.layer import stress_on
 
 
 @pytest.fixture(scope="module", params=["I", "II", "III"])

@@ -7,8 +7,7 @@ from ccfem.base.errors import InputError
 from ccfem.fem.materials import named_material
 from ccfem.judging.evaluation.sensitivity import OffAxis
 from ccfem.papers.plocher_2022.figures import layup_moduli
-from ccfem.papers.plocher_2022.plane_study import reduced_stiffness
-from ccfem.papers.plocher_2022.sensitivity import ANGLES, Sensitivity
+from ccfem.papers.plocher_2022.plane_study import ANGLES, Sensitivity, reduced_stiffness
 
 
 def test_fit_through_the_eleven_angles_stays_near_the_curve():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ccfem.cases import create_case
-from ccfem.judging.evaluation.plane_paths import PlanePaths
+from ccfem.judging.evaluation.layer_paths import PlanePaths
 from ccfem.papers.contents import claim_table, judged, write_figures
 from ccfem.papers.wang_2021.contents import (
     EXPECTED,

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
-from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
+from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.machine import Kinematics, Machine
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.printing.curved_plan import curved_plan

@@ -19,7 +19,7 @@ from ccfem.printing.curved_plan import curved_plan
 from ccfem.printing.export.gcode import gcode
 from ccfem.printing.support import support_layers
 from ccfem.slicing.layers.level_surfaces import level_surfaces
-from ccfem.slicing.layers.standing import standing
+from ccfem.slicing.layers.slicer import standing
 from ccfem.slicing.slicers import Planar
 
 CENTRE = (150.0, 150.0, -30.0)

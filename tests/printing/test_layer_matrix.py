@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ccfem.body.mesh.box import box_mesh
-from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
+from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.machine import Machine
 from ccfem.paths.toolpaths import MATRIX
 from ccfem.printing.export.robot_waypoints import write_robot_waypoints

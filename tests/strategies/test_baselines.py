@@ -4,8 +4,7 @@ import shapely
 
 from ccfem.base.errors import InputError
 from ccfem.machine import Machine
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.plane import Plane
+from ccfem.slicing.layers.layer import Layer, Plane
 from ccfem.strategies.concentric import Concentric
 from ccfem.strategies.contour_zigzag import ContourZigzag
 from ccfem.strategies.zigzag import Zigzag

@@ -10,7 +10,7 @@ from ccfem.body.meshing import extrude
 from ccfem.cases import create_case
 from ccfem.fem.elasticity import Force, Problem, Support, solve
 from ccfem.fem.materials import isotropic
-from ccfem.geometry.own_way import until_itself
+from ccfem.geometry.polylines import until_itself
 from ccfem.judging.evaluation import evaluate
 from ccfem.machine import Machine
 from ccfem.paths.planning import plan

@@ -18,7 +18,7 @@ from ccfem.fem.elasticity.problem import Problem, Support, Traction
 from ccfem.fem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.fem.materials import isotropic
 from ccfem.judging.evaluation import evaluate
-from ccfem.judging.evaluation.printable import why_not
+from ccfem.judging.evaluation.strand_rules import why_not
 from ccfem.machine import Machine
 from ccfem.paths.planning import plan
 from ccfem.paths.toolpaths import Toolpaths

@@ -4,18 +4,16 @@ from functools import partial
 import numpy as np
 import pytest
 import shapely
+from section_layer import layer_of
 from shapely import affinity
 
 from ccfem.base.errors import InputError
-from ccfem.body.meshing import triangulate
 from ccfem.cases import create_case
 from ccfem.fem.elasticity import solve
 from ccfem.judging.evaluation import evaluate
 from ccfem.machine import Machine
 from ccfem.paths.planning import plan as plan_part
 from ccfem.slicing.layers import LayerStress
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.plane import Plane
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
 from ccfem.strategies.concentric import Concentric
@@ -33,37 +31,6 @@ PATTERNS = {
 }
 BAR = shapely.box(0, 0, 60, 20)
 HOLE = shapely.Point(30, 10).buffer(3, quad_segs=16)
-
-
-def layer_of(section, edge_length=1.5):
-    """Triangulated layer of a section, which may have several parts."""
-    points, triangles, loops, start = [], [], [], 0
-    for part in shapely.get_parts(section):
-        plane, corners = triangulate(part, edge_length)
-        sides = np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        directed = corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-        _, index, count = np.unique(sides, axis=0, return_index=True, return_counts=True)
-        following = dict(directed[index[count == 1]].tolist())
-        while following:
-            loop = [next(iter(following))]
-            while loop[-1] in following:
-                loop.append(following.pop(loop[-1]))
-            loops.append(start + np.array(loop[:-1]))
-        points.append(plane)
-        triangles.append(start + corners)
-        start += len(plane)
-    plane, triangles = np.concatenate(points), np.concatenate(triangles)
-    return Layer(
-        points=np.column_stack([plane, np.zeros(start)]),
-        triangles=triangles,
-        cell=np.zeros(len(triangles)),
-        nodes=np.zeros((start, 2)),
-        weights=np.zeros(start),
-        loops=tuple(loops),
-        flat=Plane(np.eye(3), 0.0),
-        index=0,
-        thickness=1.0,
-    )
 
 
 def stress_of(layer, tensor):

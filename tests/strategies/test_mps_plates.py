@@ -8,11 +8,11 @@ import shapely
 
 from ccfem.base.tensor import strongest_in_plane
 from ccfem.judging.evaluation.indices.stiffness_alignment import agreement
-from ccfem.judging.evaluation.plane_paths import plane_paths
+from ccfem.judging.evaluation.layer_paths import plane_paths
 from ccfem.machine import Machine
 from ccfem.papers.plocher_2022.plane_study import bead_area
 from ccfem.papers.plocher_2022.plates import plates
-from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.layers.layer import stress_on
 from ccfem.strategies.mps import Mps
 
 SHARES = {"I": 95.0, "II": 87.0, "III": 90.0}

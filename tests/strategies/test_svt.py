@@ -18,7 +18,7 @@ from ccfem.judging.evaluation import evaluate
 from ccfem.judging.evaluation.indices.matching import matching_rate
 from ccfem.machine import Machine
 from ccfem.paths.planning import plan
-from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.layers.layer import stress_on
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
 

@@ -22,7 +22,7 @@ from ccfem.printing.export.robot_waypoints import read_layer_waypoints
 from ccfem.slicing.slicers import Planar
 from ccfem.slicing.slicers.surfaces import Surfaces
 from ccfem.strategies import create
-from ccfem.strategies.winding_curves.joint_loops import joint_loops
+from ccfem.strategies.winding_curves.piece import joint_loops
 
 HOLES = np.array([[20.0, 15.0], [60.0, 15.0]])
 MACHINE = Machine()

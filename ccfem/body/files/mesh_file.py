@@ -10,8 +10,7 @@ from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
 from ccfem.base.whole import existing_file, whole_file
 from ccfem.body.files.formats import format_of, suffixes
-from ccfem.body.mesh.check import check_mesh
-from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.mesh import TetMesh, check_mesh
 
 _SURFACES = (".stl", ".obj", ".ply")
 

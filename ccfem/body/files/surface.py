@@ -10,8 +10,7 @@ from ccfem.base.arrays import FloatArray, IntArray, freeze, read_only
 from ccfem.base.checks import FARTHEST, check_number
 from ccfem.base.errors import InputError
 from ccfem.base.whole import existing_file
-from ccfem.body.isolated.limited import read_isolated
-from ccfem.body.isolated.process import ChildError
+from ccfem.body.isolated.process import ChildError, read_isolated
 
 SUFFIXES = (".obj", ".ply", ".stl")
 _NOTHING = 1e-12

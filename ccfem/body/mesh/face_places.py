@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.base.errors import InputError
-from ccfem.body.mesh.in_metres import in_metres
+from ccfem.body.mesh.check import in_metres
 from ccfem.body.mesh.smooth_faces import Face, direction_text, place_text
 
 if TYPE_CHECKING:
@@ -37,7 +37,6 @@ class BodyFaces:
     points : (n, 3) array, mm
     triangles : (t, 3) int array
         Oriented outwards.
-    faces : tuple of Face
     names : tuple of str
         Names of the faces of a CAD file, if it has any.
     numbers : tuple of int

@@ -4,6 +4,7 @@ A rule is a value; called with a mesh it returns the boundary facets that it cho
 chooses nothing is an error that names the nearest candidate.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol, Self, TypeVar
@@ -14,7 +15,6 @@ from numpy.typing import ArrayLike
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.checks import FARTHEST, check_fields, check_number
 from ccfem.base.errors import InputError
-from ccfem.body.mesh.face_names import check_free
 from ccfem.geometry.facets import are_among
 
 Vector = tuple[float, float, float]
@@ -271,7 +271,6 @@ def patches_from_rules(mesh: BoundedT, rules: Mapping[str, PatchRule]) -> Bounde
 
     Parameters
     ----------
-    mesh : TetMesh
     rules : mapping of patch name to rule
 
     Returns
@@ -391,3 +390,29 @@ def _choose(
         f"{missed[nearest]:.3g} mm, its centre at ({centre}) mm; groups in the mesh: "
         f"{_groups(mesh)}: move the rule or widen it"
     )
+
+
+# Names of the groups that hold the numbered faces of the surface that a mesh was made from.
+
+
+_NAME = re.compile("face_([0-9]+)")
+
+
+def face_name(number: int) -> str:
+    """Name of the group of a face: ``face_1``, ``face_2``, ..."""
+    return f"face_{number}"
+
+
+def number_of_face(name: str) -> int | None:
+    """Return the number of the face whose group has this name; None for another name."""
+    match = _NAME.fullmatch(name)
+    return None if match is None else int(match[1])
+
+
+def check_free(name: str) -> None:
+    """Raise for a patch that would have the name of a numbered face, and be taken for it."""
+    if number_of_face(name) is not None:
+        raise InputError(
+            f"patch '{name}' has a name that is kept for the numbered faces of a surface: choose "
+            "another"
+        )

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ccfem.base.arrays import FloatArray, IntArray, read_only
-from ccfem.body.mesh.cell_mesh import CellMesh
+from ccfem.body.mesh.tet_mesh import CellMesh
 
 _MOST = 400_000
 """Triangles at which a surface is fine enough."""

@@ -1,29 +1,152 @@
 """Tetrahedral meshes with named patches."""
 
-from dataclasses import dataclass
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from types import MappingProxyType
+from typing import ClassVar, Self
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray, IntArray, read_only
+from ccfem.base.arrays import FloatArray, IntArray, freeze, read_only
+from ccfem.base.checks import check_known
 from ccfem.base.display import Shown
 from ccfem.base.errors import InputError
-from ccfem.body.mesh.cell_mesh import CellMesh
 from ccfem.body.mesh.curved_cells import (
+    CELL_POINTS,
     EDGES,
+    NODES,
     STRAIGHT,
     barycentric,
     curved_cells,
     curved_volumes,
+    jacobians,
     side_middles,
     unfolded,
 )
-from ccfem.body.mesh.flaws import first_flaw
-from ccfem.body.mesh.pairing import FREE, pair_facets
 from ccfem.body.mesh.round_walls import RoundWall, walls_of_facets
 from ccfem.body.mesh.smooth_faces import guessed_walls
-from ccfem.geometry.facets import positions, unique_edges
-from ccfem.geometry.measures import signed_volumes
+from ccfem.geometry.facets import facet_keys, paired, positions, signed_volumes, unique_edges
+
+# What meshes in space and in the plane share: nodes, cells, their facets, and named patches.
+
+
+_NONE: Mapping[str, FloatArray] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class CellMesh(ABC):
+    """A mesh of d-dimensional cells, d = 2 or 3, with named patches of facets.
+
+    Attributes
+    ----------
+    points : (n, d) array, mm
+    cells : (m, q) int array
+        Nodes of each cell.
+    patches : mapping of name to int arrays
+        Boundary facets by their corners.
+    axes : mapping of name to (3,) arrays
+        Axes of round patches where the rule of the patch states one: a rough wall does not show it.
+    """
+
+    points: FloatArray
+    cells: IntArray
+    patches: Mapping[str, IntArray] = field(default_factory=dict)
+    axes: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    dimension: ClassVar[int]
+    sizes: ClassVar[tuple[int, ...]]
+    """Numbers of nodes that a cell may have."""
+    kinds: ClassVar[str]
+    """What such cells are called."""
+
+    def __post_init__(self) -> None:
+        freeze(self, points=float, cells=int, patches=int, axes=float)
+        d, known = self.dimension, " or ".join(f"(m, {size})" for size in self.sizes)
+        if self.points.ndim != 2 or self.points.shape[1] != d:
+            raise InputError(
+                f"mesh points must have shape (n, {d}); got {self.points.shape}: give "
+                f"{', '.join('xyz'[:d])} a node"
+            )
+        if self.cells.ndim != 2 or self.cells.shape[1] not in self.sizes or not len(self.cells):
+            raise InputError(
+                f"mesh cells must have shape {known} with m >= 1; got {self.cells.shape}: give "
+                f"{self.kinds}"
+            )
+        if self.cells.min() < 0 or self.cells.max() >= len(self.points):
+            raise InputError(
+                f"mesh cells must name nodes 0 to {len(self.points) - 1}; got "
+                f"{self.cells.min()} to {self.cells.max()}: check the numbering of the file"
+            )
+
+    def __repr__(self) -> str:
+        size = " x ".join(f"{side:.4g}" for side in np.ptp(self.bounds, axis=0))
+        return (
+            f"{type(self).__name__}: {len(self.points):,} nodes, {len(self.cells):,} cells of "
+            f"{self.cells.shape[1]}, {size} mm, patches {', '.join(sorted(self.patches)) or 'none'}"
+        )
+
+    @property
+    @abstractmethod
+    def facets(self) -> IntArray:
+        """Corners of the facets of all cells, cell by cell, outward."""
+
+    @property
+    def corners(self) -> IntArray:
+        """Corner nodes of each cell."""
+        return self.cells
+
+    @cached_property
+    def _pairing(self) -> tuple[IntArray, IntArray]:
+        return paired(self.facets)
+
+    @property
+    def _facets_a_cell(self) -> int:
+        return len(self.facets) // len(self.cells)
+
+    @cached_property
+    def boundary(self) -> IntArray:
+        """Corners of the boundary facets, outward: the part is on their inner side."""
+        return read_only(self.facets[self._pairing[1]], int)
+
+    @cached_property
+    def boundary_cells(self) -> IntArray:
+        """Cell of each boundary facet, (b,)."""
+        return read_only(self._pairing[1] // self._facets_a_cell, int)
+
+    @cached_property
+    def neighbours(self) -> IntArray:
+        """Pairs of cells that share a facet, (f, 2)."""
+        return read_only(self._pairing[0] // self._facets_a_cell, int)
+
+    @cached_property
+    def bounds(self) -> FloatArray:
+        """Smallest and largest coordinates, (2, d), mm."""
+        return read_only(np.stack([self.points.min(axis=0), self.points.max(axis=0)]))
+
+    def facet_nodes(self, facets: IntArray) -> IntArray:
+        """All nodes of facets: of linear cells their corners."""
+        return facets
+
+    def with_patches(
+        self, patches: Mapping[str, IntArray], axes: Mapping[str, FloatArray] = _NONE
+    ) -> Self:
+        """Return the same mesh with more named patches, and the axes of some of them."""
+        kept = {name: axis for name, axis in self.axes.items() if name not in patches}
+        return replace(self, patches={**self.patches, **patches}, axes={**kept, **axes})
+
+    def patch(self, name: str) -> IntArray:
+        """Facets of a named patch.
+
+        Raises
+        ------
+        InputError
+            When there is no patch of that name; the known ones are listed.
+        """
+        check_known("patch", name, sorted(self.patches))
+        return self.patches[name]
+
 
 _FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 """Corner nodes of the face opposite to each corner, outward for a positive cell."""
@@ -251,3 +374,95 @@ class TetMesh(CellMesh, Shown):
         number[kept] = np.arange(len(kept))
         patches = {name: number[facets] for name, facets in self.patches.items()}
         return TetMesh(self.points[kept], cells.reshape(-1, 4), patches, self.axes, self.walls)
+
+
+# What keeps a mesh from being solved on: one line with its cure.
+
+
+def first_flaw(
+    points: FloatArray,
+    cells: IntArray,
+    volumes: FloatArray,
+    partners: IntArray,
+) -> str:
+    """Say what is wrong with a mesh of tetrahedra; empty for a sound one.
+
+    Parameters
+    ----------
+    points : (n, 3) array, mm
+        Finite.
+    cells : (m, 4) or (m, 10) int array
+    volumes : (m,) array, mm^3
+    partners : (4 m,) int array
+        From `ccfem.body.mesh.tet_mesh.pair_facets`.
+    """
+    if not volumes.min() > 0.0:
+        return (
+            f"cell {volumes.argmin()} of the mesh has volume {volumes.min():.3g} mm^3: repair flat "
+            "and inverted cells first (ccfem.body.mesh.check_mesh)"
+        )
+    wrong = np.flatnonzero((partners == CROWDED) | (partners == FOLDED))
+    if len(wrong):
+        cell = wrong[0] // 4
+        at = ", ".join(f"{x:.4g}" for x in points[cells[cell, :4]].mean(axis=0))
+        return (
+            f"cells of the mesh overlap or come twice ({len(wrong)} of their faces belong to cells "
+            f"on one side, or to more than two; the first at ({at}) mm): mend it with "
+            "ccfem.body.mesh.check_mesh, or mesh the part again"
+        )
+    return "" if cells.shape[1] == 4 else _folded(points, cells)
+
+
+def _folded(points: FloatArray, cells: IntArray) -> str:
+    """Say which quadratic cell its curved sides turn inside out."""
+    curved = curved_cells(points, cells)
+    nodes = points[cells[curved]]
+    least = np.min([jacobians(nodes, at) for at in (*NODES, *CELL_POINTS)], axis=0)
+    folded = curved[least <= 0.0]
+    if not len(folded):
+        return ""
+    at = ", ".join(f"{x:.4g}" for x in points[cells[folded[0], :4]].mean(axis=0))
+    return (
+        f"{len(folded)} quadratic cells are turned inside out by their curved sides, the first at "
+        f"({at}) mm: straighten them with ccfem.body.mesh.check_mesh, or use a finer mesh there"
+    )
+
+
+# Which facets of which tetrahedra lie on each other.
+
+
+FREE, CROWDED, FOLDED = -1, -2, -3
+"""A facet without a partner; one that more than two cells have; one with both cells on one side."""
+
+
+def pair_facets(corners: IntArray, faces: IntArray) -> IntArray:
+    """Partner of every facet: the facet of the neighbouring cell that has the same nodes.
+
+    Parameters
+    ----------
+    corners : (m, 4) int array
+        Positively oriented cells.
+    faces : (4, 3) int array
+        Corners of the facet opposite to each corner, outward.
+
+    Returns
+    -------
+    (4 m,) int array
+        ``4 * cell + facet`` of the partner; `FREE` on the boundary; `CROWDED` where more than two
+        cells have the facet; `FOLDED` where two cells that have it lie on the same side of it.
+    """
+    facets = corners[:, faces].reshape(-1, 3)
+    (key,) = facet_keys(facets)
+    order = np.argsort(key, kind="stable")
+    alike = np.diff(key[order]) == 0
+    one, other = order[:-1][alike], order[1:][alike]
+    # Cells on either side of a facet list its nodes in opposite senses.
+    a, b, c = facets.T
+    odd = (a > b) ^ (b > c) ^ (a > c)
+    folded = odd[one] == odd[other]
+    partner = np.full(len(facets), FREE)
+    partner[one] = np.where(folded, FOLDED, other)
+    partner[other] = np.where(folded, FOLDED, one)
+    crowd = np.flatnonzero(alike[:-1] & alike[1:])
+    partner[order[crowd[:, None] + np.arange(3)]] = CROWDED
+    return partner

@@ -1,10 +1,8 @@
 """Surfaces, CAD files and planforms to tetrahedral meshes."""
 
 from ccfem.body.meshing.cad import read_cad
-from ccfem.body.meshing.face_groups import faces_of_body, with_faces_of
-from ccfem.body.meshing.meshed_body import mesh_body
-from ccfem.body.meshing.planform import triangulate
-from ccfem.body.meshing.prisms import extrude
+from ccfem.body.meshing.meshed_body import faces_of_body, mesh_body, with_faces_of
+from ccfem.body.meshing.planform import extrude, triangulate
 from ccfem.body.meshing.volume import tetrahedralise
 
 __all__ = [

@@ -13,13 +13,10 @@ from ccfem.base.errors import InputError
 from ccfem.base.whole import existing_file
 from ccfem.body.files.surface import Surface
 from ccfem.body.isolated.process import ChildError, in_own_process
-from ccfem.body.mesh.check import check_mesh
-from ccfem.body.mesh.face_names import face_name
-from ccfem.body.mesh.patches import match_boundary
+from ccfem.body.mesh import TetMesh, check_mesh
+from ccfem.body.mesh.patches import face_name, match_boundary
 from ccfem.body.mesh.smooth_faces import given_faces, round_walls
-from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.body.meshing.fidelity import fidelity
-from ccfem.body.meshing.volume import check_edge_length
+from ccfem.body.meshing.volume import check_edge_length, fidelity
 
 SUFFIXES = (".brep", ".iges", ".igs", ".step", ".stp")
 

@@ -26,16 +26,13 @@ from ccfem.fem.elasticity.load_kinds import (
     kind_of,
     patches_of,
 )
-from ccfem.fem.elasticity.loads import load_case, nodal_forces
-from ccfem.fem.elasticity.order import MOST_CELLS
-from ccfem.fem.elasticity.plausibility import about_problem, held_share
+from ccfem.fem.elasticity.loads import load_case, nodal_forces, volume_forces
+from ccfem.fem.elasticity.plausibility import MOST_CELLS, about_problem, held_share
 from ccfem.fem.elasticity.problem import Problem
-from ccfem.fem.elasticity.support_sets import support_sets
+from ccfem.fem.elasticity.solve import support_sets
 from ccfem.fem.elasticity.supports import held
 from ccfem.fem.elasticity.system import prepare
-from ccfem.fem.elasticity.volume_loads import volume_forces
-from ccfem.geometry.facets import facet_keys
-from ccfem.geometry.measures import connected
+from ccfem.geometry.facets import connected, facet_keys
 from ccfem.printing.before_solving import why_not_printable
 from ccfem.slicing.layers.layer import Layer
 

@@ -9,8 +9,7 @@ from ccfem.base.tensor import in_plane, largest_in_plane
 from ccfem.comparison.plot.canvas import colour_bar, extents_of, new_figure, scale_bar, title
 from ccfem.comparison.plot.colours import INK
 from ccfem.comparison.plot.paths import draw_section, draw_stress, tension_limit
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.layers.layer import Layer, LayerStress
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -20,8 +20,7 @@ from ccfem.comparison.plot.canvas import (
 )
 from ccfem.comparison.plot.colours import INK, LINK, OUTLINE, SECTION, palette, scale
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.layers.layer import Layer, LayerStress
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

@@ -30,8 +30,7 @@ from ccfem.judging.evaluation.evaluation import Evaluation
 from ccfem.judging.virtual_testing.virtual_test import VirtualTest
 from ccfem.paths.fields.chart import flat_view
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.layers.layer import Layer, LayerStress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -18,8 +18,7 @@ from ccfem.geometry.locate import locate
 from ccfem.geometry.polylines import arc_lengths, resample, subdivide, turning_angles
 from ccfem.paths.fields.chart import chart_of, flat_view
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import LayerStress, stress_on
+from ccfem.slicing.layers.layer import Layer, LayerStress, stress_on
 
 # Fibre paths as the report draws them: fewer points, and values on the pieces between these.
 

@@ -12,14 +12,12 @@ from ccfem.comparison.engine import Solved, answer, otherwise_held
 from ccfem.comparison.headline import headline_values
 from ccfem.comparison.request import Natural, PerLayer, Request, Slicing
 from ccfem.comparison.runs import Run
-from ccfem.comparison.stages import Part as CutPart
-from ccfem.comparison.stages import Tests, timed
+from ccfem.comparison.stages import Part as CutPart, Tests, timed
 from ccfem.comparison.studies.fingerprint import fingerprint
 from ccfem.comparison.studies.jobs import Job, Outcome, Part
 from ccfem.comparison.studies.transport import Parted, packed, parted, unpacked
 from ccfem.fem.elasticity.solve import solve
-from ccfem.fem.elasticity.stress_field import StressField
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.fem.elasticity.stress_field import StressField, WeightedCases
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.paths.planning.strategy import Strategy
 from ccfem.paths.toolpaths import Toolpaths

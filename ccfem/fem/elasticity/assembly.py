@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from numba import njit
 
 from ccfem.base.arrays import FloatArray, Int32Array, IntArray, freeze, seen_only
-from ccfem.body.mesh.cell_mesh import CellMesh
+from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.curved_cells import (
     CELL_POINTS,
     CELL_WEIGHTS,
@@ -22,7 +22,7 @@ from ccfem.body.mesh.curved_cells import (
     jacobians,
     straightened,
 )
-from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.mesh.tet_mesh import CellMesh
 
 
 @dataclass(frozen=True)

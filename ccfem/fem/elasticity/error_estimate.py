@@ -12,8 +12,8 @@ import numpy as np
 from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray, read_only, seen_only
+from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.curved_cells import gradients_at
-from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.assembly import cell_gradients
 from ccfem.fem.elasticity.recovery import times, voigt_strain
 

@@ -1,16 +1,76 @@
-"""Nodes of patches, of the edges where they meet, and nearest to points."""
+"""What loads and supports act on: nodes of patches, of edges where they meet, near points."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Protocol
 
 import numpy as np
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError
-from ccfem.body.mesh.cell_mesh import CellMesh
+from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE, smooth_faces
-from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.fem.elasticity.body import LoadedBody
+from ccfem.body.mesh.tet_mesh import CellMesh
+from ccfem.fem.elasticity.load_kinds import Load
+from ccfem.fem.elasticity.support_kinds import AnySupport
 from ccfem.geometry.facets import positions
+
+# Protocols of the bodies and problems that loads and supports act on, in space or in the plane.
+
+
+class LoadedBody(Protocol):
+    """A mesh whose boundary facets have areas and outward normals, so that loads act on it."""
+
+    @property
+    def points(self) -> FloatArray:
+        """Nodes, (n, d), mm."""
+        ...
+
+    @property
+    def cells(self) -> IntArray:
+        """Nodes of each cell, (m, q)."""
+        ...
+
+    def patch(self, name: str) -> IntArray:
+        """Facets of a named patch that can carry a load."""
+        ...
+
+    def facet_nodes(self, facets: IntArray) -> IntArray:
+        """All nodes of facets: their corners, and the middles of their sides."""
+        ...
+
+    @property
+    def boundary(self) -> IntArray:
+        """Boundary facets by their corners, the part on their inner side."""
+        ...
+
+    def facet_areas(self, facets: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Areas, mm^2, and unit normals of facets."""
+        ...
+
+
+class SupportedProblem(Protocol):
+    """A problem as seen by supports and loads."""
+
+    @property
+    def mesh(self) -> CellMesh:
+        """The mesh that supports act on."""
+        ...
+
+    @property
+    def body(self) -> LoadedBody:
+        """The body that loads act on."""
+        ...
+
+    @property
+    def supports(self) -> tuple[AnySupport, ...]:
+        """The supports."""
+        ...
+
+    @property
+    def loads(self) -> Mapping[str, tuple[Load, ...]]:
+        """Loads of each load case by its name."""
+        ...
+
 
 _COARSE = 50.0
 """Feature angle, degrees, at which a bore of 8 facets is a round wall, and a hexagon is none."""

@@ -14,14 +14,15 @@ material. What is improbable is said in a line, each with its cure; what cannot 
 """
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.checks import BED, SPRING
 from ccfem.base.errors import InputError, SolveError
-from ccfem.body.mesh.in_metres import about_size
-from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.mesh import TetMesh
+from ccfem.body.mesh.check import about_size, about_slivers
 from ccfem.body.mesh.wall_cells import coarse_wall
 from ccfem.fem.elasticity.held import Held, rigid_modes
 from ccfem.fem.elasticity.load_kinds import (
@@ -34,7 +35,6 @@ from ccfem.fem.elasticity.load_kinds import (
     sizes_of,
 )
 from ccfem.fem.elasticity.loads import nodal_forces
-from ccfem.fem.elasticity.order import LARGEST_ERROR, about_error, linear_locks
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.support_kinds import (
     AnySupport,
@@ -426,4 +426,113 @@ def _about_strength(problem: Problem, case: str, stress: FloatArray) -> str:
     return (
         f"the part strains by {strain[worst]:.3g} at ({at}) mm, and linear theory holds to about "
         f"{_LINEAR:g}: check the units of loads and moduli (N, mm, MPa)"
+    )
+
+
+# Choice of linear or quadratic cells for a solve on a mesh of linear ones.
+#
+# Linear tetrahedra lock in bending, and where the material is nearly incompressible: one layer of
+# them through a plate shows a tenth of its deflection. The error they leave is estimated with every
+# solve. If it is too large, the part is solved again on quadratic cells.
+
+
+LARGEST_ERROR = 0.1
+"""Estimated error, in energy norm, up to which cells are fine enough: 1 % of the displacement."""
+
+_LOCKS = 2.0 * 1.45 / (3.0 * (1.0 - 2.0 * 0.45))
+"""Bulk over shear modulus above which linear cells lock: Poisson's ratio 0.45."""
+
+MOST_CELLS = 300_000
+"""Number of cells up to which quadratic ones are chosen automatically: about 4 GB, minutes
+(measured)."""
+
+
+def linear_locks(problem: Problem) -> bool:
+    """Whether linear cells are known to be poor under any load: nu above 0.45."""
+    if problem.stiffness is not None:
+        count = len(problem.stiffness)
+        sample = problem.stiffness[:: max(1, count // 1000)]
+        return incompressibility(sample) > _LOCKS
+    return any(incompressibility(m.stiffness) > _LOCKS for m, _ in problem.materials)
+
+
+def about_error(error: float, problem: Problem) -> str:
+    """Say what to do about an estimated error; empty if it is small enough.
+
+    Parameters
+    ----------
+    error : float
+        Energy norm of the error over that of the solution.
+    problem : Problem
+        The problem as it was solved.
+    """
+    if not error > LARGEST_ERROR:
+        return ""
+    cure = "use smaller cells"
+    if problem.mesh.order == 1:
+        cure = "use quadratic cells (order = 2), or smaller cells"
+    return (
+        f"the cells leave an estimated error of {error:.0%} in energy norm, about {error**2:.0%} "
+        f"of the displacement: {cure}"
+    )
+
+
+def on_quadratic(problem: Problem) -> Problem:
+    """Return the same problem on quadratic cells."""
+    return replace(problem, mesh=problem.mesh.quadratic(), order=2)
+
+
+# Causes of ill-conditioned equations of a part, and their cures.
+
+
+_NEARLY_INCOMPRESSIBLE = 500.0
+"""Bulk over shear modulus above which there is a remark: Poisson's ratio 0.499."""
+_CONTRAST = 1e5
+"""Largest over least stiffness of the cells above which there is a remark."""
+
+
+def incompressibility(stiffness: FloatArray) -> float:
+    """Bulk modulus over the least shear modulus, as the maximum over all cells.
+
+    Parameters
+    ----------
+    stiffness : (6, 6) or (m, 6, 6) array, MPa
+
+    Returns
+    -------
+    float
+        ``2 (1 + nu) / (3 (1 - 2 nu))`` of an isotropic material: 2.2 at nu 0.3, 9.7 at 0.45.
+    """
+    compliance = np.linalg.inv(stiffness.reshape(-1, 6, 6))
+    bulk = 1.0 / compliance[:, :3, :3].sum(axis=(1, 2))
+    shear = 1.0 / np.linalg.eigvalsh(compliance)[:, -1]  # of the softest change of shape
+    return float((bulk / shear).max())
+
+
+def stiffness_contrast(stiffness: FloatArray, density: FloatArray | None) -> float:
+    """Largest over least stiffness of the cells."""
+    size = np.trace(stiffness.reshape(-1, 6, 6), axis1=1, axis2=2)
+    size = size if density is None else size * density
+    return float(size.max() / size.min())
+
+
+def about_conditioning(problem: Problem) -> str:
+    """Say what makes the equations of a problem ill-conditioned, each with its cure."""
+    warnings, stiffness = [about_slivers(problem.mesh)], problem.cell_stiffness
+    bulk = incompressibility(stiffness)
+    if bulk > _NEARLY_INCOMPRESSIBLE:
+        warnings.append(
+            f"the material is nearly incompressible, {bulk:.2g} times as stiff in volume as in "
+            "shape: take a Poisson's ratio of 0.49 or less, or a direct backend"
+        )
+    contrast = stiffness_contrast(stiffness, problem.density)
+    if contrast > _CONTRAST:
+        warnings.append(
+            f"the stiffest cell is {contrast:.2g} times as stiff as the softest: raise the least "
+            "density or stiffness"
+        )
+    warnings = [text for text in warnings if text]
+    return "; ".join(warnings) or (
+        "no single cell is to blame: the part is slender, or held at very little; hold it wider, "
+        "or take a direct backend"
     )

@@ -11,29 +11,18 @@ from ccfem.base.checks import check_known
 from ccfem.base.display import Shown
 from ccfem.base.errors import InputError
 from ccfem.base.tensor import rotate_stiffness
-from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity.load_kinds import (
     Bearing as Bearing,
-)
-from ccfem.fem.elasticity.load_kinds import (
     Force as Force,
-)
-from ccfem.fem.elasticity.load_kinds import (
     Load,
+    PointForce as PointForce,
+    Pressure as Pressure,
+    Traction as Traction,
     patches_in_use,
     patches_of,
 )
-from ccfem.fem.elasticity.load_kinds import (
-    PointForce as PointForce,
-)
-from ccfem.fem.elasticity.load_kinds import (
-    Pressure as Pressure,
-)
-from ccfem.fem.elasticity.load_kinds import (
-    Traction as Traction,
-)
-from ccfem.fem.elasticity.support_kinds import AnySupport
-from ccfem.fem.elasticity.support_kinds import Support as Support
+from ccfem.fem.elasticity.support_kinds import AnySupport, Support as Support
 from ccfem.fem.materials import Material
 
 Order = Literal["auto", 1, 2]
@@ -85,10 +74,10 @@ class Problem(Shown):
         supports that only press, displacements do not add up.
     order : "auto", 1 or 2, default "auto"
         Order of the displacement that `solve` takes on a mesh of linear cells: see
-        `ccfem.fem.elasticity.order`. Quadratic cells stay.
+        `ccfem.fem.elasticity.plausibility`. Quadratic cells stay.
     case_supports : mapping of load case name to tuple of supports
         Supports that hold in that load case only, besides `supports`. Each set of supports is
-        solved separately: see `ccfem.fem.elasticity.support_sets`.
+        solved separately: see `ccfem.fem.elasticity.solve`.
 
     Raises
     ------

@@ -5,8 +5,8 @@ import scipy.sparse as sp
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.tensor import from_voigt
+from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.curved_cells import NODES, gradients_at
-from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.assembly import cell_gradients
 
 
@@ -72,7 +72,7 @@ def cell_stress(
     stiffness: FloatArray,
     free: FloatArray | None = None,
 ) -> FloatArray:
-    """Stress of each cell, at its centroid.
+    """Stress of each cell, at its centroid: (m, 3, 3) MPa.
 
     Parameters
     ----------
@@ -80,10 +80,6 @@ def cell_stress(
     stiffness : (6, 6) or (m, 6, 6) array, MPa
     free : (m, 6) array, optional
         Stress-free strain of each cell, Voigt, such as thermal strain.
-
-    Returns
-    -------
-    (m, 3, 3) array, MPa
     """
     strain = cell_strain(mesh, displacement)
     return from_voigt(times(stiffness, strain if free is None else strain - free))

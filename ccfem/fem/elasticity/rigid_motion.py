@@ -14,9 +14,9 @@ from scipy.sparse.linalg import eigsh
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.errors import InputError
-from ccfem.body.mesh.cell_mesh import CellMesh
+from ccfem.body.mesh.tet_mesh import CellMesh
 from ccfem.fem.elasticity.held import rigid_modes
-from ccfem.geometry.measures import connected
+from ccfem.geometry.facets import connected
 
 _DENSE = 100
 """Number of bodies up to which motions are found by a dense eigenvalue problem."""
@@ -64,7 +64,6 @@ def check_motion(mesh: CellMesh, points: FloatArray, holds: Holds) -> None:
 
     Parameters
     ----------
-    mesh : TetMesh, or mesh of a plate
     points : (n, 3) array, mm
         Of its nodes, in space.
 

@@ -1,7 +1,7 @@
 """The solve: from a problem to the stress field of every load case."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from time import perf_counter
 from typing import Protocol, TypeVar
@@ -9,19 +9,146 @@ from typing import Protocol, TypeVar
 import numpy as np
 import scipy.sparse as sp
 
-from ccfem.base.arrays import FloatArray
-from ccfem.base.checks import KnownNames
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.checks import KnownNames, check_number
 from ccfem.base.errors import InputError, SolveError
-from ccfem.fem.elasticity.conditioning import about_conditioning
-from ccfem.fem.elasticity.contact import EXPECTED, Contact, find_contact
+from ccfem.body.mesh import TetMesh
+from ccfem.body.mesh.bisection import bisected
+from ccfem.fem.elasticity.conjugate_gradient import Solution
 from ccfem.fem.elasticity.held import Held
-from ccfem.fem.elasticity.order import LARGEST_ERROR, MOST_CELLS, linear_locks, on_quadratic
-from ccfem.fem.elasticity.plausibility import check_size_of_motion
+from ccfem.fem.elasticity.plausibility import (
+    LARGEST_ERROR,
+    MOST_CELLS,
+    about_conditioning,
+    check_size_of_motion,
+    linear_locks,
+    on_quadratic,
+)
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.solvers import LARGEST_DIRECT, Solver, direct_backend
 from ccfem.fem.elasticity.stress_field import SolveRecord, StressField
-from ccfem.fem.elasticity.support_sets import support_sets
+from ccfem.fem.elasticity.support_kinds import AnySupport
 from ccfem.fem.elasticity.system import prepare
+
+# Equilibrium of a part on supports that only press, with the contact that results.
+
+
+EXPECTED = 8
+"""Number of solves expected until a contact has converged."""
+
+_ROUGH = 1e-4
+"""Relative residual of the solves until the contact has converged."""
+
+_ROUNDS = 200
+"""Largest number of changes of the contact: a slender part lifts off cell by cell."""
+
+_SLOW = 40
+"""Iterations above which a factorisation with the present contact pays off."""
+
+_CARRIED = 1e-4
+"""Share of the load that may be carried by what keeps a loose part in place."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Solution on supports that only press.
+
+    Attributes
+    ----------
+    held : Held
+        The supports with the converged contact.
+    solver : Solver
+        For the matrix with this contact, for further load cases.
+    right : (n,) array
+        Right-hand side.
+    iterations : int
+        Of conjugate gradients, over all rounds.
+    """
+
+    held: Held
+    solver: Solver
+    right: FloatArray
+    solution: Solution
+    iterations: int
+
+
+def find_contact(
+    matrix: sp.bsr_array,
+    held: Held,
+    forces: FloatArray,
+    solver: Solver,
+    tolerance: float,
+) -> Contact:
+    """Solve, release components that pull and hold those that sink in, until nothing changes.
+
+    The first round is solved with all components in contact. A direct backend then renews its
+    factorisation with the same ordering. With multigrid, the following rounds use conjugate
+    gradients with the preconditioner of the first round, which is renewed where they are slow.
+
+    Parameters
+    ----------
+    matrix : bsr_array (3n, 3n), N/mm
+    held : Held
+        With all components in contact.
+    forces : (n, 3) array, N
+    solver : Solver
+        For the matrix with these supports, in any contact; it may be invalidated.
+    tolerance : float
+        Relative residual of the solution.
+
+    Raises
+    ------
+    InputError
+        Where the load lifts the part off its supports.
+    SolveError
+        Where a solve fails, or the contact does not converge.
+    """
+    start, slow, total, goal = None, False, 0, max(tolerance, _ROUGH)
+    for _ in range(_ROUNDS):
+        rhs = held.right_hand_side(matrix, forces)
+        reduced = held.reduce(matrix)
+        if not np.array_equal(reduced.data, solver.matrix.data):
+            renewed = slow or solver.exact
+            solver = solver.refactorise(reduced) if renewed else replace(solver, matrix=reduced)
+        solution = solver.solve(rhs, start, goal)
+        total += solution.iterations
+        slow = solution.iterations > _SLOW
+        displacement = held.expand(solution.values)
+        internal = (matrix @ displacement.reshape(-1)).reshape(forces.shape)
+        following = held.following(displacement, internal - forces)
+        # The contact is found with a rough residual, then kept where it stays with the wanted one.
+        if following is held and goal > tolerance:
+            goal = tolerance
+        elif following is held:
+            check_pressed(held, internal - forces, forces)
+            return Contact(held, solver, rhs, solution, total)
+        held = following
+        start = held.restrict(displacement)
+    raise SolveError(
+        f"contact did not converge in {_ROUNDS} iterations; the part barely touches its pressing "
+        "supports: add a support, or use a finer mesh"
+    )
+
+
+def check_pressed(held: Held, reactions: FloatArray, forces: FloatArray) -> None:
+    """Refuse a part that the load lifts off its supports.
+
+    Parameters
+    ----------
+    reactions : (n, 3) array, N
+        Reactions of all supports, and of what keeps a loose part in place.
+    forces : (n, 3) array, N
+        Of the load.
+    """
+    if held.presses is None:
+        return
+    carried = float(np.abs(held.along_pressing(reactions)[~held.contact]).sum())
+    if carried > _CARRIED * float(np.linalg.norm(forces, axis=1).sum()):
+        raise InputError(
+            "the load lifts the part off its supports that only press, so nothing holds it: hold "
+            "it by another support, or turn the load round"
+        )
+
 
 FieldT = TypeVar("FieldT", covariant=True)
 
@@ -39,17 +166,17 @@ def solve(
     ----------
     problem : Problem
         With ``order = "auto"`` a mesh of linear cells is solved on quadratic ones if linear ones
-        lock or leave too large an error: see `ccfem.fem.elasticity.order`. The nodes of the mesh
-        then stay the first ones, and the cells keep their order. The problem of each field is the
-        one that was solved.
+        lock or leave too large an error (`ccfem.fem.elasticity.plausibility`). The nodes of the
+        mesh then stay the first ones, and the cells keep their order. The problem of each field is
+        the one that was solved.
     backend : str, default "auto"
         One of `ccfem.fem.elasticity.BACKENDS`. "auto" chooses by size and by what is installed, and
         falls back to a direct backend if an iterative one fails. The record names the backend that
         solved.
     tolerance : float, default 1e-8
         Relative residual at which iterations stop. A solution is accepted if its residual is below
-        this, or its backward error is rounding (`ccfem.fem.elasticity.solution`), and if the energy
-        of its error is below 1e-4 of that of the displacement.
+        this, or its backward error is rounding (`ccfem.fem.elasticity.conjugate_gradient`), and if
+        the energy of its error is below 1e-4 of that of the displacement.
 
     Returns
     -------
@@ -225,3 +352,126 @@ def _solution(
             f"{contact.solution.residual:.1e}"
         )
     return contact, energy
+
+
+# Problems whose load cases have different supports, split by set of supports.
+
+
+def support_sets(problem: Problem) -> tuple[Problem, ...]:
+    """Split a problem into problems of one set of supports each, which share out its load cases.
+
+    Returns
+    -------
+    tuple of Problem
+        Only the given problem if its cases share all supports. Otherwise one problem for each set,
+        in the order of the load cases, with supports of cases turned into supports of the problem.
+    """
+    if not problem.case_supports:
+        return (problem,)
+    sets: list[tuple[tuple[AnySupport, ...], list[str]]] = []
+    for case in problem.loads:
+        own = problem.supports_of(case)
+        known = next((cases for supports, cases in sets if supports == own), None)
+        if known is None:
+            sets.append((own, [case]))
+        else:
+            known.append(case)
+    return tuple(
+        replace(
+            problem,
+            supports=supports,
+            case_supports={},
+            loads={case: problem.loads[case] for case in cases},
+            combinations={
+                name: factors
+                for name, factors in problem.combinations.items()
+                if next(iter(factors)) in cases
+            },
+        )
+        for supports, cases in sets
+    )
+
+
+# Refinement of the cells where the estimated error of a solution is large.
+
+
+_SHARE = 0.7
+"""Share of the squared error in the cells that a round refines (Doerfler 1996)."""
+
+_HALVINGS = 3
+"""Largest number of times that a cell is halved in a round: its edges are then half as long."""
+
+_REFINEMENT_ROUNDS = 8
+"""Largest number of rounds."""
+
+
+def refine(
+    problem: Problem, error: float = LARGEST_ERROR, most_cells: int = MOST_CELLS // 3
+) -> Problem:
+    """Refine the cells of a problem until their estimated error is small enough.
+
+    In every round the cells with most of the error (Doerfler, SIAM J. Numer. Anal. 33, 1996,
+    1106-1124) are halved up to three times. The surface does not change: a curved wall gets more
+    facets but is no rounder.
+
+    Parameters
+    ----------
+    problem : Problem
+        On quadratic cells, the corners are refined and the cells made quadratic again.
+    error : float, default 0.1
+        Estimated error, in energy norm, of the worst load case.
+    most_cells : int, default 100,000
+        Limit that no round exceeds. The error may then stay above what was asked for, and every
+        solve says so.
+
+    Returns
+    -------
+    Problem
+        The same part, supports, loads and materials on the finer mesh.
+    """
+    check_number("error to refine to", error, above=0.0, below=1.0)
+    if problem.mesh.order == 2:
+        order = 2 if problem.order == "auto" else problem.order
+        problem = replace(problem, mesh=problem.mesh.linear(), order=order)
+    for _ in range(_REFINEMENT_ROUNDS):
+        fields = solve(problem)
+        worst = max(fields.values(), key=lambda field: field.record.error)
+        if worst.record.error <= error:
+            break
+        # The error scales with edge length to the power of the order; three halvings halve an edge.
+        wanted = 3.0 * np.log2(worst.record.error / error) / worst.mesh.order
+        finer, chosen = problem, _worst(fields, error)
+        for _ in range(int(np.clip(np.ceil(wanted), 1, _HALVINGS))):
+            mesh, parent = bisected(finer.mesh, chosen)
+            finer, chosen = _on(finer, mesh, parent), chosen[parent]
+            if len(mesh.cells) > most_cells:
+                return problem
+        problem = finer
+    return problem
+
+
+def _worst(fields: dict[str, StressField], error: float) -> BoolArray:
+    """Cells (m,) with most of the error of any load case whose error is above the wanted one."""
+    chosen = np.zeros(len(next(iter(fields.values())).mesh.cells), dtype=bool)
+    for field in fields.values():
+        if field.record.error <= error:
+            continue
+        cells = field.error.cells
+        order = np.argsort(-cells, kind="stable")
+        held = np.cumsum(cells[order])
+        chosen[order[: 1 + int(np.searchsorted(held, _SHARE * held[-1]))]] = True
+    return chosen
+
+
+def _on(problem: Problem, mesh: TetMesh, parent: IntArray) -> Problem:
+    """Return a problem on finer cells, each of which is a piece of a previous one."""
+    arrays = {
+        name: value[parent]
+        for name in ("axes", "density", "stiffness")
+        if (value := getattr(problem, name)) is not None
+    }
+    regions = tuple(
+        replace(region, cells=np.flatnonzero(np.isin(parent, region.cells)))
+        for region in problem.regions
+    )
+    return replace(problem, mesh=mesh, regions=regions, **arrays)

@@ -13,9 +13,15 @@ from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.checks import check_known
 from ccfem.base.errors import InputError
 from ccfem.fem.elasticity import direct, multigrid
-from ccfem.fem.elasticity.conjugate_gradient import conjugate_gradient
-from ccfem.fem.elasticity.skyline import skyline, skyline_operations
-from ccfem.fem.elasticity.solution import Solution, checked, judged, product, reached
+from ccfem.fem.elasticity.conjugate_gradient import (
+    Solution,
+    checked,
+    conjugate_gradient,
+    judged,
+    product,
+    reached,
+)
+from ccfem.fem.elasticity.direct import skyline, skyline_operations
 
 DIRECT = ("pypardiso", "cholmod", "superlu", "skyline")
 BACKENDS = (*DIRECT, "amg", "two-level")

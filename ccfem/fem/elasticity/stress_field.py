@@ -1,22 +1,23 @@
-"""The result of a solve: displacement, stress, reactions, and the record of the solve."""
+"""The result of a solve, stress from elsewhere in its place, and weighted load cases."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
 from ccfem.base.arrays import FloatArray, IntArray, freeze, in_brief, read_only
-from ccfem.base.checks import check_number
+from ccfem.base.checks import check_known, check_number
 from ccfem.base.display import Shown
 from ccfem.base.errors import InputError
 from ccfem.base.tensor import strain_from_voigt, to_voigt
+from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.curved_cells import shape_values
-from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.error_estimate import ErrorEstimate, estimate_error
 from ccfem.fem.elasticity.load_kinds import patches_in_use
+from ccfem.fem.elasticity.loads import free_strain
 from ccfem.fem.elasticity.nodes import edge_nodes, nearest_node, patch_nodes
-from ccfem.fem.elasticity.part_stress import PartStress
 from ccfem.fem.elasticity.plausibility import about_problem, about_solution
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.recovery import cell_strain, nodal_stress
@@ -28,9 +29,109 @@ from ccfem.fem.elasticity.support_kinds import (
     RigidPatch,
 )
 from ccfem.fem.elasticity.supports import held
-from ccfem.fem.elasticity.volume_loads import free_strain
 from ccfem.fem.materials import Material
 from ccfem.geometry.locate import locate
+
+# Stress of a whole part for planning and evaluation, whatever its source.
+
+
+LARGEST_STRESS = 1e7
+"""Largest stress that is taken for meant, MPa: ten times the modulus of diamond."""
+
+
+def impossible_stress(stress: FloatArray) -> tuple[int, ...] | None:
+    """Index of the first entry that is NaN, infinite or beyond `LARGEST_STRESS`; None without."""
+    wrong = np.argwhere(~(np.abs(stress) <= LARGEST_STRESS))
+    return tuple(wrong[0].tolist()) if len(wrong) else None
+
+
+class PartStress(Protocol):
+    """Stress on a tetrahedral mesh; a `StressField` is one, and so is a `GivenStress`."""
+
+    @property
+    def mesh(self) -> TetMesh:
+        """The mesh."""
+        ...
+
+    @property
+    def stress(self) -> FloatArray:
+        """Stress of each cell, (m, 3, 3), MPa."""
+        ...
+
+    @property
+    def nodal(self) -> FloatArray:
+        """Stress at the nodes, (n, 3, 3), MPa."""
+        ...
+
+    @property
+    def held_or_loaded(self) -> tuple[str, ...]:
+        """Names of the patches that carry a support or a load."""
+        ...
+
+    @property
+    def loaded(self) -> tuple[str, ...]:
+        """Those of them that carry a load."""
+        ...
+
+    @property
+    def material(self) -> Material | None:
+        """Material of the part; None where only its stress is known."""
+        ...
+
+
+@dataclass(frozen=True)
+class GivenStress:
+    """Stress on a mesh from another program or a formula.
+
+    Attributes
+    ----------
+    stress : (m, 3, 3) array, MPa
+        Per cell.
+    nodal : (n, 3, 3) array, MPa
+        At the nodes.
+    held_or_loaded : tuple of str, default none
+        Names of the patches that carry a support or a load.
+    loaded : tuple of str, default none
+        Those of them that carry a load.
+    material : Material, optional
+        Of the part, where it is known.
+    assumed : str, default none
+        What was assumed when it was read from a file; said with the results.
+
+    Raises
+    ------
+    InputError
+        For arrays of the wrong shape, and stress that is not finite or beyond `LARGEST_STRESS`.
+    """
+
+    mesh: TetMesh
+    stress: FloatArray
+    nodal: FloatArray
+    held_or_loaded: tuple[str, ...] = ()
+    loaded: tuple[str, ...] = ()
+    material: Material | None = None
+    assumed: str = ""
+
+    def __repr__(self) -> str:
+        return f"GivenStress on {self.mesh!r}"
+
+    def __post_init__(self) -> None:
+        freeze(self, stress=float, nodal=float)
+        for name, count in (("stress", len(self.mesh.cells)), ("nodal", len(self.mesh.points))):
+            value = getattr(self, name)
+            if value.shape != (count, 3, 3):
+                raise InputError(
+                    f"{name} must have shape ({count}, 3, 3), one tensor for each "
+                    f"{'cell' if name == 'stress' else 'node'}; got {value.shape}: use "
+                    "tensor.from_voigt for six components"
+                )
+            at = impossible_stress(value)
+            if at is not None:
+                raise InputError(
+                    f"stress must be finite and within {LARGEST_STRESS:g} MPa; got "
+                    f"{value[at]:g} at {name}[{', '.join(map(str, at))}]: correct it, or its unit"
+                )
+
 
 # Displacement, strain and stress at points, along lines and on patches; forces of supports.
 
@@ -351,3 +452,114 @@ def solved(stress: PartStress, purpose: str) -> StressField:
             "the part with ccfem.solve, or choose another strategy"
         )
     return stress
+
+
+# Load cases of one part with weights, as the basis of planning for all of them.
+
+
+@dataclass(frozen=True)
+class WeightedCases:
+    """Solutions of one part without fibre under one or several load cases, and their weights.
+
+    The cases may belong to one problem or to several, such as with other supports, on one mesh.
+
+    Attributes
+    ----------
+    fields : tuple of StressField
+        One for each case, with different names.
+    weights : (n,) array
+        Of the cases: positive, scaled so that their sum is 1.
+
+    Raises
+    ------
+    InputError
+        For no case, duplicate names, different meshes, and weights that are not positive numbers.
+    """
+
+    fields: tuple[StressField, ...]
+    weights: FloatArray
+
+    def __post_init__(self) -> None:
+        freeze(self, fields=tuple, weights=float)
+        if not self.fields or self.weights.shape != (len(self.fields),):
+            raise InputError(
+                f"expected load cases with a weight each; got {len(self.fields)} cases and "
+                f"{self.weights.size} weights: give one a case"
+            )
+        for name, weight in zip(self.names, self.weights, strict=True):
+            _check_weight(name, float(weight))
+        repeated = {name for name in self.names if self.names.count(name) > 1}
+        if repeated:
+            raise InputError(f"two load cases are named '{min(repeated)}': rename one of them")
+        for field in self.fields:
+            self._check_case(field)
+        object.__setattr__(self, "weights", read_only(self.weights / self.weights.sum()))
+
+    def _check_case(self, field: StressField) -> None:
+        first, mesh = self.fields[0].mesh, field.mesh
+        same = mesh is first or (
+            np.array_equal(mesh.cells, first.cells) and np.array_equal(mesh.points, first.points)
+        )
+        if not same:
+            raise InputError(
+                f"load case '{field.case}' is solved on another mesh than '{self.names[0]}': "
+                "solve all cases on one"
+            )
+
+    @classmethod
+    def of(
+        cls,
+        fields: "StressField | WeightedCases | Mapping[str, StressField]",
+        weights: Mapping[str, float] | None = None,
+    ) -> "WeightedCases":
+        """Cases by name, as `ccfem.solve` returns them, with weights; one case is a list of one.
+
+        Parameters
+        ----------
+        fields : StressField, WeightedCases, or mapping of name to StressField
+            Weighted cases without other weights are returned as they are.
+        weights : mapping of name to float, optional
+            Positive; cases that are not named do not count. Default: all count equally.
+
+        Raises
+        ------
+        InputError
+            For weights of unknown cases, and as the class.
+        """
+        if isinstance(fields, WeightedCases):
+            if weights is None:
+                return fields
+            fields = dict(zip(fields.names, fields.fields, strict=True))
+        if isinstance(fields, StressField):
+            fields = {fields.case: fields}
+        chosen = weights or dict.fromkeys(fields, 1.0)
+        for name, weight in chosen.items():
+            check_known("load case", name, fields)
+            _check_weight(name, weight)
+        return cls(tuple(fields[name] for name in chosen), np.array(list(chosen.values()), float))
+
+    def __len__(self) -> int:
+        return len(self.fields)
+
+    def __repr__(self) -> str:
+        said = (f"{n} {w:.3g}" for n, w in zip(self.names, self.weights, strict=True))
+        return f"WeightedCases({', '.join(said)})"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the cases."""
+        return tuple(field.case for field in self.fields)
+
+    @property
+    def heaviest(self) -> StressField:
+        """Case of the largest weight, the first one of several."""
+        return self.fields[int(np.argmax(self.weights))]
+
+    @property
+    def mesh(self) -> TetMesh:
+        """Mesh of all cases."""
+        return self.fields[0].mesh
+
+
+def _check_weight(name: str, weight: float) -> None:
+    check_number(f"weight of load case '{name}'", weight, above=0.0)

@@ -10,19 +10,17 @@ import scipy.sparse as sp
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError
-from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity.assembly import Pattern, assemble, pattern
 from ccfem.fem.elasticity.held import Held
-from ccfem.fem.elasticity.loads import load_cases
+from ccfem.fem.elasticity.loads import free_strain, load_cases, strain_forces
 from ccfem.fem.elasticity.multigrid import Coarse
 from ccfem.fem.elasticity.plausibility import check_balance, check_effect
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.recovery import cell_stress, nodal_stress, times
 from ccfem.fem.elasticity.solvers import Solver, factorise
-from ccfem.fem.elasticity.springs import add_springs, soft_supports, spring_forces
 from ccfem.fem.elasticity.stress_field import SolveRecord, StressField
-from ccfem.fem.elasticity.supports import held, held_in
-from ccfem.fem.elasticity.volume_loads import free_strain, strain_forces
+from ccfem.fem.elasticity.supports import add_springs, held, held_in, soft_supports, spring_forces
 
 
 @dataclass(frozen=True)

@@ -4,21 +4,89 @@ import csv
 import math
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.arrays import FloatArray, IntArray, freeze
 from ccfem.base.errors import InputError, shown
-from ccfem.base.tensor import from_voigt
+from ccfem.base.tensor import from_voigt, to_voigt
 from ccfem.base.whole import existing_file, text_of
-from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.fem.elasticity.part_stress import LARGEST_STRESS, GivenStress, impossible_stress
-from ccfem.fem.stress_files.stress_data import COMPONENTS, StressData, component_of, component_order
-from ccfem.fem.stress_files.vtu_tensors import vtu_stress
+from ccfem.body.files.formats.vtu import Grid, read_grid
+from ccfem.body.mesh import TetMesh
+from ccfem.fem.elasticity.stress_field import LARGEST_STRESS, GivenStress, impossible_stress
 from ccfem.geometry.facets import positions
+
+# Stress as a file holds it, before it is mapped to a mesh.
+
+
+COMPONENTS = ("xx", "yy", "zz", "yz", "xz", "xy")
+"""Voigt components in their order."""
+
+
+@dataclass(frozen=True)
+class StressData:
+    """Stress at nodes, in cells, or both.
+
+    Attributes
+    ----------
+    points : (n, 3) array, or None
+        Nodes, mm; None where the file has numbers only, and these are those of the mesh.
+    corners : (c, 4) int array, or None
+        Corner nodes of the cells.
+    nodal : (n, 6) array, or None
+        Voigt.
+    cell : (c, 6) array, or None
+        Voigt.
+    unit : str
+        Of the stress, as the file says; empty where it does not.
+    nodes, cells : (n,) and (c,) int array, or None
+        Numbers by which the file calls its nodes and cells; None where it counts them from 0.
+    """
+
+    points: FloatArray | None
+    corners: IntArray | None
+    nodal: FloatArray | None
+    cell: FloatArray | None
+    unit: str = ""
+    nodes: IntArray | None = None
+    cells: IntArray | None = None
+
+    def __post_init__(self) -> None:
+        freeze(self, points=float, corners=int, nodal=float, cell=float, nodes=int, cells=int)
+
+
+def component_of(name: str) -> int:
+    """Voigt component that a name like xx, Sxx, sigma_xz, S11 or SZX means; -1 for none."""
+    letters = re.sub(r"[^a-z0-9]", "", name.lower())
+    match = re.fullmatch(r"(?:s|sig|sigma|stress|t)?([xyz123]{2})", letters)
+    if match is None:
+        return -1
+    pair = "".join(sorted(match[1].translate(str.maketrans("123", "xyz"))))
+    return COMPONENTS.index(pair)
+
+
+def component_order(names: Sequence[str], what: str) -> list[int]:
+    """Column of each Voigt component by the names of the columns.
+
+    Raises
+    ------
+    InputError
+        Where a component is missing or comes twice.
+    """
+    components = [component_of(name) for name in names]
+    if sorted(k for k in components if k >= 0) != list(range(6)):
+        given = ", ".join(repr(name) for name in names)
+        raise InputError(
+            f"{what} must name the components xx, yy, zz, yz, xz and xy, each once (as Sxx or S11 "
+            f"too); got {given}: name them"
+        )
+    return [components.index(k) for k in range(6)]
+
 
 _MPA = {"pa": 1e-6, "kpa": 1e-3, "mpa": 1.0, "n/mm^2": 1.0, "n/mm2": 1.0, "gpa": 1e3}
 _SAME = 1e-5
@@ -420,3 +488,67 @@ def _mapped(
         None,
         nodes=np.array(list(points)),
     )
+
+
+# Stress tensors in VTK unstructured grids, with names of their components and their unit.
+
+
+UNIT = "unit of stress"
+"""Field data that holds the unit."""
+VTK_COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
+"""Components of VTK's symmetric tensors in their order."""
+
+
+def vtk_tensors(tensors: FloatArray) -> FloatArray:
+    """Symmetric tensors (k, 3, 3) as the six components (k, 6) of `VTK_COMPONENTS`."""
+    return to_voigt(tensors)[:, [COMPONENTS.index(component) for component in VTK_COMPONENTS]]
+
+
+def vtu_stress(path: Path, array: str) -> StressData:
+    """Stress at the nodes and in the cells of a grid, as far as it has an array of that name.
+
+    Arrays of nine components are full tensors, row by row; those of six must name their components
+    (xx, yy, zz, yz, xz, xy in any order, as xx, Sxx or S11).
+    """
+    grid = read_grid(path)
+    nodal, cell = (_tensors(grid, where, array, path) for where in ("point", "cell"))
+    if nodal is None and cell is None:
+        known = sorted({*grid.point, *grid.cell})
+        raise InputError(
+            f"{path} has no array '{array}'; there are: {', '.join(known) or 'none'}: name the "
+            "one that holds the stress"
+        )
+    tetrahedra = [nodes for kind, nodes in grid.cells.items() if kind in (10, 24)]
+    if len(tetrahedra) != 1 or len(tetrahedra[0]) != len(grid.types):
+        raise InputError(f"{path}: expected tetrahedra of one kind only; mesh the part with those")
+    unit = _text(grid.field.get(UNIT, np.array([])))
+    corners = np.asarray(tetrahedra[0], dtype=np.int64)[:, :4]
+    return StressData(grid.points, corners, nodal, cell, unit)
+
+
+def _text(values: NDArray[np.generic]) -> str:
+    """Text of field data: bytes of its UTF-8, or strings, of which the first counts."""
+    if values.dtype == np.uint8:
+        return values.tobytes().decode(errors="replace")
+    return str(values.flat[0]) if values.size else ""
+
+
+def _tensors(grid: Grid, where: str, name: str, path: Path) -> FloatArray | None:
+    """Voigt components (k, 6) of an array; None where there is no such array."""
+    data = grid.point if where == "point" else grid.cell
+    if name not in data:
+        return None
+    if data[name].dtype.kind not in "fiu":
+        raise InputError(f"{path}: array '{name}' must hold numbers; got {data[name].dtype}")
+    values = np.asarray(data[name], dtype=np.float64)
+    if values.ndim == 3 and values.shape[1:] == (3, 3):
+        values = values.reshape(-1, 9)
+    if values.ndim != 2 or values.shape[1] not in (6, 9):
+        raise InputError(
+            f"{path}: array '{name}' must have six or nine components; got shape {values.shape}"
+        )
+    if values.shape[1] == 9:
+        full = values.reshape(-1, 3, 3)
+        return to_voigt(0.5 * full + 0.5 * full.swapaxes(1, 2))
+    names = grid.components.get((where, name), [""] * 6)
+    return values[:, component_order(names, f"{path}: array '{name}'")]

@@ -1,15 +1,17 @@
 """The result of a topology optimisation."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ccfem.base.arrays import BoolArray, FloatArray, freeze, in_brief
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, in_brief
 from ccfem.base.checks import check_number
-from ccfem.fem.elasticity.problem import Order, Problem
-from ccfem.fem.plates.problem import PlaneProblem
-from ccfem.fem.topopt.material_axes import axes_about_z
+from ccfem.base.errors import InputError
+from ccfem.base.tensor import rotate_stiffness
+from ccfem.fem.elasticity.problem import Order, PointForce, Problem
+from ccfem.fem.plates.problem import PlaneProblem, fitted_harmonics, rotate_plane, turned_by
 
 _APART = "falls apart between its loads and supports"
 _CURE = "raise the volume fraction or the filter radius"
@@ -123,3 +125,77 @@ class Design:
         result = np.zeros(len(order), dtype=bool)
         result[order[: max(count, 1)]] = True
         return result
+
+
+# Stiffness of a material whose axis turns about z.
+
+
+def sheet(plane: FloatArray) -> FloatArray:
+    """Stiffness (6, 6) of a solid that is strained in its plane as a thin sheet, MPa.
+
+    Parameters
+    ----------
+    plane : (3, 3) array, MPa
+        Plane stress stiffness of the sheet.
+
+    Returns
+    -------
+    (6, 6) array, MPa
+        Stress and strain along z are uncoupled from those in the plane; the shears across it are
+        as stiff as the one in it. For tetrahedra that are held along z at every node.
+    """
+    solid = np.diag([0.0, 0.0, 0.5 * (plane[0, 0] + plane[1, 1]), plane[2, 2], plane[2, 2], 0.0])
+    solid[np.ix_([0, 1, 5], [0, 1, 5])] = plane
+    return solid
+
+
+def axes_about_z(angle: FloatArray) -> FloatArray:
+    """Axes (m, 3, 3) as columns, turned about z by angles (m,), radians."""
+    axes = np.zeros((len(angle), 3, 3))
+    axes[:, 0, 0] = axes[:, 1, 1] = np.cos(angle)
+    axes[:, 1, 0], axes[:, 0, 1], axes[:, 2, 2] = np.sin(angle), -np.sin(angle), 1.0
+    return axes
+
+
+def harmonics(material: FloatArray) -> FloatArray:
+    """Five matrices (5, k, k) that give the stiffness turned about z, as `turned_by` combines them.
+
+    Constant, cos 2a, sin 2a, cos 4a, sin 4a; for an orthotropic sheet the invariants U1 to U5 of
+    Tsai and Pagano (1968).
+
+    Parameters
+    ----------
+    material : (3, 3) or (6, 6) array, MPa
+        In material axes.
+
+    Raises
+    ------
+    InputError
+        For a solid that is not symmetric about the x-y plane.
+    """
+    if material.shape == (3, 3):
+        return fitted_harmonics(lambda angle: rotate_plane(material, angle))
+
+    def turned(angle: FloatArray) -> FloatArray:
+        return rotate_stiffness(material, axes_about_z(angle))
+
+    fitted = fitted_harmonics(turned)
+    other = np.array([0.3, 1.9])
+    missed = turned(other) - np.tensordot(turned_by(other), fitted, axes=1)
+    if np.abs(missed).max() > 1e-9 * np.abs(material).max():
+        raise InputError(
+            "a material whose axis turns about z must be symmetric about the x-y plane: "
+            "give one with an axis of symmetry along z"
+        )
+    return fitted
+
+
+def anchors(problem: PlaneProblem | Problem, without: Sequence[str] = ()) -> list[IntArray]:
+    """Nodes of each held or loaded patch, and of each point force: what a part has to join."""
+    mesh, used = problem.mesh, np.unique(problem.mesh.cells)
+    nodes = [np.unique(mesh.patch(k)) for k in problem.held_or_loaded if k not in without]
+    for load in (load for case in problem.loads.values() for load in case):
+        if isinstance(load, PointForce):
+            away = mesh.points[used] - load.point[: mesh.points.shape[1]]
+            nodes.append(used[[np.linalg.norm(away, axis=1).argmin()]])
+    return nodes

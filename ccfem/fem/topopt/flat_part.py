@@ -9,7 +9,7 @@ import shapely
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.base.errors import InputError
-from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.mesh import TetMesh
 from ccfem.geometry.facets import unique_edges
 
 _ON = 1e-6

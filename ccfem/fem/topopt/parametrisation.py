@@ -2,15 +2,116 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import BoolArray, FloatArray
+from ccfem.base.checks import check_choices, check_fields
 from ccfem.base.errors import InputError
-from ccfem.fem.topopt.compliance import Compliance
-from ccfem.fem.topopt.filters import ConeFilter
-from ccfem.fem.topopt.groups import CellGroups
-from ccfem.fem.topopt.parameters import Parameters
+from ccfem.fem.topopt.compliance import CellGroups, Compliance
+
+# Filters against checkerboards and mesh dependence: of densities, or of sensitivities.
+
+
+@dataclass(frozen=True)
+class ConeFilter:
+    """Averages over the cells round each one, with weights that fall linearly to zero.
+
+    Attributes
+    ----------
+    weights : csr_array (m, m)
+        ``max(0, radius - distance)`` between the centres, times the volume of the column's cell.
+    volumes : (m,) array, mm^3
+    """
+
+    weights: sp.csr_array
+    volumes: FloatArray
+
+    @classmethod
+    def of_cells(cls, centres: FloatArray, volumes: FloatArray, radius: float) -> "ConeFilter":
+        """Filter of cells with given centres (m, d), mm, and volumes (m,).
+
+        Parameters
+        ----------
+        radius : float, mm
+            Above 0; below the distance of the centres, nothing is averaged.
+
+        Raises
+        ------
+        InputError
+            For a radius so large that it reaches too many cells.
+        """
+        m = len(centres)
+        tree = cKDTree(centres)
+        sample = centres[:: max(1, m // 100)]
+        around = np.mean([len(neighbours) for neighbours in tree.query_ball_point(sample, radius)])
+        if around * m > 1e8:
+            raise InputError(
+                f"filter radius {radius} mm reaches {around:.0f} cells round each of {m}: give a "
+                "smaller one"
+            )
+        first, second = tree.query_pairs(radius, output_type="ndarray").T
+        near = radius - np.linalg.norm(centres[first] - centres[second], axis=1)
+        cells = np.arange(m)
+        row, column = np.concatenate([first, second, cells]), np.concatenate([second, first, cells])
+        weight = np.concatenate([near, near, np.full(m, radius)])
+        matrix = sp.csr_array((weight * volumes[column], (row, column)), shape=(m, m))
+        return cls(matrix, volumes)
+
+    @cached_property
+    def _total(self) -> FloatArray:
+        return np.asarray(self.weights.sum(axis=1)).reshape(-1)
+
+    def average(self, values: FloatArray) -> FloatArray:
+        """Weighted mean (m, ...) of values (m, ...) round each cell."""
+        total = self._total.reshape(-1, *[1] * (values.ndim - 1))
+        return np.asarray(self.weights @ values) / total
+
+    def transposed(self, gradient: FloatArray) -> FloatArray:
+        """Gradient (m,) by the values, of the gradient by their averages: the chain rule."""
+        return np.asarray(self.weights.T @ (gradient / self._total))
+
+    def sensitivities(self, density: FloatArray, gradient: FloatArray) -> FloatArray:
+        """Sigmund's filtered sensitivities (Struct. Multidisc. Optim. 21 (2001) 120, eq. 5).
+
+        Parameters
+        ----------
+        density : (m,) array
+        gradient : (m,) array
+            Of the objective by the density of each cell.
+        """
+        mean = np.asarray(self.weights @ (density * gradient / self.volumes)) / self._total
+        return self.volumes * mean / np.maximum(density, 1e-3)
+
+
+# The parameters that SIMP and SOMP share.
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """What is optimised for, and when the iterations stop: see `Simp` for each of them."""
+
+    volume_fraction: float
+    penalty: float = 3.0
+    radius: float = 2.5
+    filter: Literal["sensitivity", "density"] = "sensitivity"
+    minimum_stiffness: float = 1e-9
+    move: float = 0.2
+    tolerance: float = 0.01
+    objective_tolerance: float = 1e-4
+    max_iterations: int = 200
+    backend: str = "auto"
+
+    def __post_init__(self) -> None:
+        check_fields(self, "volume_fraction", "minimum_stiffness", above=0.0, below=1.0)
+        check_fields(self, "penalty", "max_iterations", at_least=1)
+        check_fields(self, "radius", above=0.0, unit="mm")
+        check_fields(self, "move", above=0.0, at_most=1.0)
+        check_fields(self, "tolerance", "objective_tolerance", at_least=0.0)
+        check_choices(self)
 
 
 @dataclass(frozen=True)

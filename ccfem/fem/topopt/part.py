@@ -9,16 +9,15 @@ import shapely
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.errors import InputError
 from ccfem.body.files.surface import Surface
+from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.patches import Plane
-from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.body.meshing import extrude
-from ccfem.fem.elasticity.load_kinds import Load
-from ccfem.fem.elasticity.problem import Force, PointForce, Problem, Support
+from ccfem.fem.elasticity import Load, Problem
+from ccfem.fem.elasticity.problem import Force, PointForce, Support
 from ccfem.fem.materials import Material
-from ccfem.fem.plates.mesh import PlaneMesh
+from ccfem.fem.plates.mesh import PlaneMesh, raster_image
 from ccfem.fem.plates.problem import PlaneProblem
-from ccfem.fem.plates.raster_mesh import raster_image
-from ccfem.fem.topopt.design import Design
+from ccfem.fem.topopt.design import Design, anchors
 from ccfem.fem.topopt.outline import outline
 from ccfem.fem.topopt.tet_part import part_mesh
 from ccfem.geometry.facets import are_among
@@ -150,23 +149,17 @@ def plate_outline(
         threshold,
         domain,
         raster.inside,
-        _anchors(plate, design.density) - raster.origin,
+        _densest(plate, design.density) - raster.origin,
         apart=design.apart,
     )
     return shapely.transform(shape, lambda points: points + raster.origin)
 
 
-def _anchors(plate: PlaneProblem, density: FloatArray) -> FloatArray:
-    """Densest node of every loaded and held patch, and the points of point forces: (k, 2), mm."""
-    mesh = plate.mesh
-    dense = np.zeros(len(mesh.points))
-    np.maximum.at(dense, mesh.cells, density[:, None])
-    patches = [np.unique(mesh.patch(name)) for name in plate.held_or_loaded]
-    nodes = [nodes_of_patch[dense[nodes_of_patch].argmax()] for nodes_of_patch in patches]
-    for load in (load for case in plate.loads.values() for load in case):
-        if isinstance(load, PointForce):
-            nodes.append(mesh.nearest_nodes(load.point[:2])[0])
-    return mesh.points[nodes]
+def _densest(plate: PlaneProblem, density: FloatArray) -> FloatArray:
+    """Densest node of every loaded and held patch, and those of point forces: (k, 2), mm."""
+    dense = np.zeros(len(plate.mesh.points))
+    np.maximum.at(dense, plate.mesh.cells, density[:, None])
+    return plate.mesh.points[[nodes[dense[nodes].argmax()] for nodes in anchors(plate)]]
 
 
 def plate_part(

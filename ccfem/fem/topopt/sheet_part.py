@@ -10,16 +10,15 @@ from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError
+from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.patches import Plane
-from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.body.meshing.planform import triangulate
-from ccfem.body.meshing.prisms import extrude
-from ccfem.fem.elasticity.load_kinds import Load, patches_in_use, patches_of
-from ccfem.fem.elasticity.problem import PointForce, Problem, Support
+from ccfem.body.meshing.planform import extrude, triangulate
+from ccfem.fem.elasticity import Load, Problem
+from ccfem.fem.elasticity.load_kinds import patches_in_use, patches_of
+from ccfem.fem.elasticity.problem import Support
 from ccfem.fem.elasticity.support_kinds import AnySupport
-from ccfem.fem.topopt.design import Design
+from ccfem.fem.topopt.design import Design, anchors, sheet
 from ccfem.fem.topopt.flat_part import FlatPart
-from ccfem.fem.topopt.material_axes import sheet
 from ccfem.fem.topopt.outline import outline
 from ccfem.geometry.symmetry import mirror_image, mirrors_of
 
@@ -147,7 +146,7 @@ def sheet_outline(design: Design, flat: FlatPart, edge_length: float, solid: Any
             image = 0.5 * (image + other)
     domain = shapely.difference(flat.planform, void)
     shift = shapely.transform(domain, lambda points: points - origin)
-    keep = [node for anchor in _anchors(problem) for node in anchor[[dense[anchor].argmax()]]]
+    keep = [nodes[dense[nodes].argmax()] for nodes in anchors(problem, _FACES)]
     region = outline(
         np.where(inside, image, 0.0),
         edge_length,
@@ -181,18 +180,6 @@ def _at_nodes(design: Design) -> FloatArray:
     both = total + np.roll(total, len(total) // 2)
     weight = np.bincount(nodes, np.repeat(volume, 4), len(mesh.points))
     return np.asarray(both / (weight + np.roll(weight, len(weight) // 2)))
-
-
-def _anchors(problem: Problem) -> list[IntArray]:
-    """Nodes of every loaded and held patch, and at the points of point forces."""
-    mesh = problem.mesh
-    used = set(patches_in_use(problem.supports, problem.loads)) - set(_FACES)
-    nodes = [np.unique(mesh.patch(name)) for name in sorted(used)]
-    for load in (load for case in problem.loads.values() for load in case):
-        if isinstance(load, PointForce):
-            away = np.linalg.norm(mesh.points - np.array(load.point), axis=1)
-            nodes.append(np.array([away.argmin()]))
-    return nodes
 
 
 def sheet_part(problem: Problem, flat: FlatPart, planform: Any, edge_length: float) -> Problem:

@@ -12,16 +12,12 @@ from ccfem.base.checks import check_fields
 from ccfem.base.errors import InputError
 from ccfem.base.progress import Progress, silent
 from ccfem.base.tensor import strongest_in_plane
-from ccfem.fem.elasticity.problem import Problem
-from ccfem.fem.plates.problem import PlaneProblem
-from ccfem.fem.plates.stiffness import turned_by
+from ccfem.fem.elasticity import Problem
+from ccfem.fem.plates.problem import PlaneProblem, turned_by
 from ccfem.fem.topopt.compliance import Compliance, Response
-from ccfem.fem.topopt.design import Design
-from ccfem.fem.topopt.filters import ConeFilter
-from ccfem.fem.topopt.iteration import iterate
-from ccfem.fem.topopt.material_axes import harmonics, sheet
-from ccfem.fem.topopt.parameters import Parameters
-from ccfem.fem.topopt.parametrisation import Parametrisation
+from ccfem.fem.topopt.design import Design, harmonics, sheet
+from ccfem.fem.topopt.parametrisation import ConeFilter, Parameters, Parametrisation
+from ccfem.fem.topopt.simp import iterate
 
 # Cells whose material axis turns: their compliance, and where to turn the axes.
 
@@ -37,7 +33,7 @@ class OrientedCompliance:
     Attributes
     ----------
     harmonics : (5, k, k) array, MPa
-        Of the material: see `ccfem.fem.topopt.material_axes.harmonics`.
+        Of the material: see `ccfem.fem.topopt.design.harmonics`.
     angle : (g,) array, radians
         From global axis x to the material axis.
     """

@@ -4,16 +4,14 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
-from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.fem.elasticity.problem import PointForce, Problem
-from ccfem.fem.topopt.design import Design
-from ccfem.geometry.facets import are_among, positions, unique_edges
-from ccfem.geometry.measures import connected, signed_volumes
+from ccfem.body.mesh import TetMesh
+from ccfem.fem.elasticity.problem import Problem
+from ccfem.fem.topopt.design import Design, anchors
+from ccfem.geometry.facets import are_among, connected, positions, signed_volumes, unique_edges
 
 # The part of a tetrahedral mesh where a field lies above a level, as a mesh of its own.
 
@@ -227,16 +225,12 @@ def _field(problem: Problem, density: FloatArray) -> _Field:
     n, nodes = len(mesh.points), mesh.cells.reshape(-1)
     weight = np.bincount(nodes, np.repeat(mesh.volumes, 4), n)
     total = np.bincount(nodes, np.repeat(mesh.volumes * density, 4), n)
-    anchors = [np.unique(mesh.patch(name)) for name in problem.held_or_loaded]
-    for load in (load for case in problem.loads.values() for load in case):
-        if isinstance(load, PointForce):
-            anchors.append(np.array([cKDTree(mesh.points).query(load.point)[1]]))
     return _Field(
         mesh=mesh,
         values=total / np.maximum(weight, 1e-300),
         share=0.25 * weight / mesh.volumes.mean(),
         pairs=unique_edges(mesh.cells[:, mesh.edges].reshape(-1, 2))[0],
-        anchors=anchors,
+        anchors=anchors(problem),
     )
 
 

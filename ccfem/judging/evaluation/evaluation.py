@@ -10,24 +10,29 @@ from ccfem.base.arrays import FloatArray, IntArray, freeze
 from ccfem.base.display import Shown
 from ccfem.base.errors import InputError
 from ccfem.base.threads import in_threads
-from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.body.mesh import TetMesh
+from ccfem.fem.elasticity import PartStress
 from ccfem.fem.materials import Material, named_material
-from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
+from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.judging.evaluation import indices
-from ccfem.judging.evaluation.column import Column
 from ccfem.judging.evaluation.indices.alignment import AlignmentSamples
 from ccfem.judging.evaluation.indices.curvature import CurvatureSamples
-from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
-from ccfem.judging.evaluation.plane_paths import PlanePaths, plane_paths, pool
-from ccfem.judging.evaluation.printed_stack import Printed, printed
+from ccfem.judging.evaluation.layer_paths import (
+    Basis,
+    Column,
+    LayerPaths,
+    PlanePaths,
+    Printed,
+    plane_paths,
+    pool,
+    printed,
+)
 from ccfem.judging.evaluation.sensitivity import strand_lamina
-from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.judging.virtual_testing import Strand
 from ccfem.machine.machine import Machine
 from ccfem.paths.fields.chart import chart_of
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.layers.layer import Layer, stress_on
 from ccfem.slicing.slicers.planar import Planar
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from ccfem.judging.evaluation.plane_paths import PlanePaths
+from ccfem.judging.evaluation.layer_paths import PlanePaths
 
 _FINE = 0.01
 """Deviation, in fibre widths, to which paths are simplified before their area is taken."""

@@ -1,6 +1,10 @@
 """The virtual test: the part re-solved with its fibres, before anything is printed."""
 
-from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.judging.virtual_testing.several_cases import specimens
+from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.strand import RHO, Strand
+from ccfem.judging.virtual_testing.strands import Strands, cut_strands
+from ccfem.judging.virtual_testing.strength import first_failure
 from ccfem.judging.virtual_testing.virtual_test import (
     Bracket,
     VirtualTest,
@@ -8,4 +12,16 @@ from ccfem.judging.virtual_testing.virtual_test import (
     virtual_test,
 )
 
-__all__ = ["Bracket", "Strand", "VirtualTest", "virtual_bracket", "virtual_test"]
+__all__ = [
+    "RHO",
+    "Bracket",
+    "Specimen",
+    "Strand",
+    "Strands",
+    "VirtualTest",
+    "cut_strands",
+    "first_failure",
+    "specimens",
+    "virtual_bracket",
+    "virtual_test",
+]

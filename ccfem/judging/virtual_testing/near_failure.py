@@ -18,13 +18,12 @@ import numpy as np
 from ccfem.base.arrays import FloatArray, IntArray, in_brief
 from ccfem.base.errors import InputError
 from ccfem.base.tensor import from_voigt, to_voigt, von_mises
-from ccfem.fem.elasticity.ball import BALL, ball_averages, ball_shares
+from ccfem.fem.elasticity import StressField
+from ccfem.fem.elasticity.loads import strain_forces
 from ccfem.fem.elasticity.recovery import cell_strain, times
-from ccfem.fem.elasticity.stress_field import StressField
-from ccfem.fem.elasticity.volume_loads import strain_forces
-from ccfem.fem.elasticity.zone import ZONE, distance_from_patches
+from ccfem.fem.elasticity.zone import BALL, ZONE, ball_averages, ball_shares, distance_from_patches
+from ccfem.judging.virtual_testing.strand import Limits
 from ccfem.judging.virtual_testing.strength import FIBRE_SHARE
-from ccfem.judging.virtual_testing.strengths import Limits
 
 Key = TypeVar("Key", bound=Hashable)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ccfem.base.arrays import FloatArray, in_brief
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.judging.virtual_testing.equilibrium import TENSION
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import Strand
@@ -102,7 +102,6 @@ def virtual_tests(
 
     Parameters
     ----------
-    fibres : Toolpaths or Strands
     parts : WeightedCases, or sequence of Specimen
         The part without fibres under each case.
     strand, mode, machine, tolerance

@@ -8,11 +8,8 @@ import scipy.sparse as sp
 
 from ccfem.base.arrays import BoolArray, FloatArray, in_brief
 from ccfem.base.errors import InputError
+from ccfem.fem.elasticity import Solver, StressField, System, Temperature, prepare
 from ccfem.fem.elasticity.held import Held
-from ccfem.fem.elasticity.load_kinds import Temperature
-from ccfem.fem.elasticity.solvers import Solver
-from ccfem.fem.elasticity.stress_field import StressField
-from ccfem.fem.elasticity.system import System, prepare
 
 _SOLVES = 30
 """Right-hand sides to expect: a virtual test takes some twenty, a design hundreds."""

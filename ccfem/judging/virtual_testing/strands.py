@@ -9,13 +9,12 @@ from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, in_brief
 from ccfem.base.errors import InputError
-from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.geometry.buckets import Buckets, bucket
+from ccfem.body.mesh import TetMesh
+from ccfem.geometry.locate import Buckets, bucket
 from ccfem.geometry.polylines import starts_segment
 from ccfem.judging.virtual_testing.strand_room import StrandParts, room_of, strand_parts
 from ccfem.machine.machine import Machine
-from ccfem.paths.planning.given_paths import GivenPaths
-from ccfem.paths.planning.strategy import Strategy
+from ccfem.paths.planning import GivenPaths, Strategy
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
 

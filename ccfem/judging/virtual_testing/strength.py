@@ -12,11 +12,12 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray, freeze, in_brief
 from ccfem.judging.virtual_testing import failure_laws
-from ccfem.judging.virtual_testing.failure_laws.fibre import FIBRE_SHARE as FIBRE_SHARE
-from ccfem.judging.virtual_testing.failure_laws.fibre import fibre_peak as fibre_peak
+from ccfem.judging.virtual_testing.failure_laws.fibre import (
+    FIBRE_SHARE as FIBRE_SHARE,
+    fibre_peak as fibre_peak,
+)
 from ccfem.judging.virtual_testing.failure_laws.matrix import matrix_peak as matrix_peak
-from ccfem.judging.virtual_testing.strand import Strand
-from ccfem.judging.virtual_testing.strengths import Limits
+from ccfem.judging.virtual_testing.strand import Limits, Strand
 from ccfem.judging.virtual_testing.virtual_test import VirtualTest
 from ccfem.slicing.layers import Layer
 

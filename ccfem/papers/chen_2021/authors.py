@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
-from ccfem.fem.elasticity.solve import solve
-from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.elasticity import StressField, solve
 from ccfem.geometry.polylines import turning_angles
 from ccfem.judging.evaluation import Evaluation, evaluate
 from ccfem.machine import Machine

@@ -13,9 +13,7 @@ from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.csv_table import write_csv
 from ccfem.comparison.plot.colours import INK, OUTLINE
 from ccfem.judging.evaluation import Evaluation, evaluate
-from ccfem.judging.virtual_testing.specimen import Specimen
-from ccfem.judging.virtual_testing.strength import first_failure
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
+from ccfem.judging.virtual_testing import Specimen, first_failure, virtual_test
 from ccfem.papers.chen_2021.authors import STATED
 from ccfem.papers.chen_2021.loop import FOLDER
 from ccfem.papers.chen_2021.pipeline import STAGES, LayerStages
@@ -346,7 +344,6 @@ def length_table(study: Study, values: Mapping[str, float]) -> str:
 # The quantities that the paper's claims are about, and the verdicts.
 
 
-EXPECTED = Path(__file__).with_name("expected.toml")
 _VALLEY = (0.3, 0.7)
 """Products of vectors about eta = 0.5 that "separated" leaves few pairs between."""
 

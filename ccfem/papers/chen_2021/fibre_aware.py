@@ -15,19 +15,16 @@ from time import perf_counter, process_time
 from typing import Any
 
 from ccfem.cases.case import Case
+from ccfem.fem.elasticity import StressField, solve
 from ccfem.fem.elasticity.problem import Bearing
-from ccfem.fem.elasticity.solve import solve
-from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.judging.virtual_testing.specimen import Specimen
-from ccfem.judging.virtual_testing.stiffer import HONEST_PROMISE
 from ccfem.judging.virtual_testing.strands import cut_strands
 from ccfem.judging.virtual_testing.strength import first_failure
-from ccfem.judging.virtual_testing.virtual_test import virtual_bracket, virtual_test
+from ccfem.judging.virtual_testing.virtual_test import HONEST_PROMISE, virtual_bracket, virtual_test
 from ccfem.papers.chen_2021.authors import TABLE_2
 from ccfem.papers.chen_2021.loop import LAYERS_TABLE_2, authors_loop
 from ccfem.papers.chen_2021.virtual_test import MATRIX_STRENGTH, authors_paths
-from ccfem.paths.planning import plan
-from ccfem.paths.planning.equal_fibre import plan_to_length
+from ccfem.paths.planning import plan, plan_to_length
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.planar import Planar

@@ -11,20 +11,15 @@ from time import perf_counter
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
-from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.isocontours import Isocontours
 from ccfem.machine.machine import Machine
-from ccfem.paths.fields.compatibility import incompatible
 from ccfem.paths.fields.directed import Directed, directed
-from ccfem.paths.fields.levels import extract_levels
-from ccfem.paths.fields.orientation import orient
-from ccfem.paths.fields.scalar import fit_literal
-from ccfem.paths.fields.tensile import Tension, spatial_tension
-from ccfem.paths.linking.conformal import lead_into, parallel_curve
-from ccfem.paths.linking.finishing import keep_off_border, linked_paths
+from ccfem.paths.fields.scalar import extract_levels, fit_literal
+from ccfem.paths.fields.tensile import Tension, incompatible, orient, spatial_tension
+from ccfem.paths.linking.finishing import keep_off_border, lead_into, linked_paths, parallel_curve
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.holes import holes_on
-from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer import Layer, holes_on
 from ccfem.strategies.isocurve import Isocurve
 
 STAGES = ("u", "s", "extraction", "connection")

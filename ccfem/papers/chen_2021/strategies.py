@@ -13,14 +13,11 @@ from collections.abc import Callable
 
 from ccfem.fem.elasticity import solve
 from ccfem.judging.evaluation import evaluate
-from ccfem.judging.virtual_testing.specimen import Specimen
-from ccfem.judging.virtual_testing.strength import first_failure
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
+from ccfem.judging.virtual_testing import Specimen, first_failure, virtual_test
 from ccfem.papers.chen_2021.loop import authors_loop
 from ccfem.papers.chen_2021.slicers import PATTERNS, slicer_found, slicer_paths_to_length
 from ccfem.papers.chen_2021.virtual_test import MATRIX_STRENGTH, authors_paths
-from ccfem.paths.planning import Strategy, plan
-from ccfem.paths.planning.equal_fibre import plan_to_length
+from ccfem.paths.planning import Strategy, plan, plan_to_length
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.strategies import create
 from ccfem.strategies.isocurve import Isocurve

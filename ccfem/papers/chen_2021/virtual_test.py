@@ -15,17 +15,22 @@ import numpy as np
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
 from ccfem.base.tensor import from_voigt, strain_from_voigt, to_voigt
-from ccfem.fem.elasticity.problem import Bearing, Problem
-from ccfem.fem.elasticity.solve import solve
-from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.elasticity import Problem, StressField, solve
+from ccfem.fem.elasticity.problem import Bearing
 from ccfem.fem.materials import Material, named_material
-from ccfem.judging.virtual_testing.bars import bar_stiffness
+from ccfem.judging.virtual_testing.equilibrium import bar_stiffness
 from ccfem.judging.virtual_testing.specimen import Specimen
-from ccfem.judging.virtual_testing.stiffer import FIRST, HONEST_PROMISE, SECOND, stiffer
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.judging.virtual_testing.strands import Strands, cut_strands
 from ccfem.judging.virtual_testing.strength import first_failure, matrix_peak
-from ccfem.judging.virtual_testing.virtual_test import virtual_bracket, virtual_test
+from ccfem.judging.virtual_testing.virtual_test import (
+    FIRST,
+    HONEST_PROMISE,
+    SECOND,
+    stiffer,
+    virtual_bracket,
+    virtual_test,
+)
 from ccfem.papers.chen_2021.authors import PATHS
 from ccfem.papers.chen_2021.loop import LAYERS_TABLE_2, authors_folder, authors_loop
 from ccfem.paths.toolpaths import Toolpaths

@@ -6,14 +6,12 @@ from pathlib import Path
 import numpy as np
 
 from ccfem.base.errors import InputError
+from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.bisection import bisected
 from ccfem.body.mesh.patches import patches_from_rules
-from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases.bodies import T_BRACKET_HOLES
-from ccfem.fem.elasticity.part_stress import PartStress
-from ccfem.fem.elasticity.problem import Bearing, Problem, Support
-from ccfem.fem.elasticity.solve import solve
-from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.elasticity import PartStress, Problem, StressField, solve
+from ccfem.fem.elasticity.problem import Bearing, Support
 from ccfem.fem.materials import isotropic
 from ccfem.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths

@@ -14,18 +14,15 @@ from ccfem.comparison.files import write_results
 from ccfem.comparison.plot.canvas import png
 from ccfem.comparison.plot.stack_page import space_picture, turning_page
 from ccfem.comparison.result import Comparison
-from ccfem.fem.elasticity.part_stress import PartStress
-from ccfem.fem.elasticity.solve import solve
-from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.elasticity import PartStress, StressField, solve
 from ccfem.fem.elasticity.zone import ZONE, distance_from_patches
 from ccfem.geometry.locate import locate
+from ccfem.judging.virtual_testing.failure_laws.interlayer import layer_traction
 from ccfem.machine import Machine
 from ccfem.papers.contents import Contents, table, write_claims
 from ccfem.papers.fang_2024.authors import authors_mesh, authors_stress, finer_mesh
-from ccfem.papers.fang_2024.measures import Strands
 from ccfem.papers.fang_2024.planar_against_curved import ROWS, against, failure_loads
 from ccfem.papers.fang_2024.t_bracket import PAPER_SECONDS, study, timed_chain
-from ccfem.papers.layer_traction import layer_traction
 from ccfem.paths.planning import plan
 from ccfem.paths.toolpaths import MATRIX
 from ccfem.printing.export.robot_waypoints import write_robot_waypoints
@@ -98,14 +95,14 @@ def _failures_explained(pulled: Comparison, folder: Path) -> dict[str, float]:
 
 def quantities(
     field: Mapping[str, float],
-    strands: Mapping[str, Strands],
+    strands: Mapping[str, Mapping[str, float]],
     seconds: Mapping[str, float],
     tests: Mapping[str, Comparison],
 ) -> dict[str, float]:
     """Every quantity that `expected.toml` may name; orders that hold are 1, others 0."""
     values = {**field, **{f"seconds, {name}": value for name, value in seconds.items()}}
     for name, figures in strands.items():
-        values |= {f"{name}: {key}": value for key, value in figures.table().items()}
+        values |= {f"{name}: {key}": value for key, value in figures.items()}
     for figure, name in (("thickness ratio", "thickness ratio"), ("pieces a layer", "pieces")):
         ratio = values[f"all lines {figure}"] / values[f"default {figure}"]
         values[f"all lines {name} over default"] = ratio
@@ -298,12 +295,12 @@ def field_figures(
 
 def targets_table(
     field: Mapping[str, float],
-    strands: Mapping[str, Strands],
+    strands: Mapping[str, Mapping[str, float]],
     seconds: Mapping[str, float],
     finer: Mapping[str, float],
 ) -> str:
     """Markdown table: figure, ours, ours with ``even``, the authors', what is wanted, verdict."""
-    ours, even, theirs = (strands[name].table() for name in ("winding", "winding, even", "authors"))
+    ours, even, theirs = (strands[name] for name in ("winding", "winding, even", "authors"))
     rows = [_target_row(target, field[target.figure]) for target in _FIELD]
     for target in _STRANDS:
         name = target.figure
@@ -404,7 +401,7 @@ def _opening(stress: StressField, layers: tuple[Layer, ...], force: float) -> Op
     mesh, material = stress.mesh, stress.problem.material
     middle = mesh.points[mesh.corners].mean(axis=1)
     judged = np.flatnonzero(distance_from_patches(stress.problem, stress.case, middle, ZONE) > ZONE)
-    opening, sliding = layer_traction(stress, layers, judged)
+    opening, sliding, _ = layer_traction(stress, layers, judged)
     tensile = material.interlayer_tensile
     assert tensile is not None
     shear = tensile if material.interlayer_shear is None else material.interlayer_shear

@@ -1,21 +1,20 @@
 """Figures of strands in space: the same measures for ours and for the published ones."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
 
 import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import FloatArray, IntArray
-from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.locate import locate
 from ccfem.geometry.polylines import resample, sample_midpoints, turning_angles
 from ccfem.paths.fields.chart import chart_of
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.principal_lines import strongest_stress
-from ccfem.strategies.winding_curves.joint_loops import joint_loops
+from ccfem.strategies.winding_curves.piece import joint_loops
 from ccfem.strategies.winding_curves.spaced import CLOSEST
 
 _AWAY = 12.0
@@ -28,62 +27,36 @@ _MEASURED = 0.99
 """Allowance for the steps of the samples, which are cut afresh."""
 
 
-@dataclass(frozen=True)
-class Strands:
-    """Figures of the strands of a part.
-
-    Attributes
-    ----------
-    layers, per_layer : float
-        Layers with fibre, and strands on each of them.
-    closed, round_all : float
-        Shares of the strands that are closed, and that go once round all joints of their layer.
-    angle, angle_weighted : float, degrees
-        Mean angle to the strongest stress where stress lines join the joints, by length, and by
-        length and number of these lines.
-    spacing_10, spacing_50, spacing_90 : float, mm
-    curvature_50, curvature_80, curvature_95 : float, 1/mm
-    near, far : float
-        Shares of the strands' length with the next strand nearer than 0.7 nominal spacings, and
-        further than 1.5.
-    covered : float
-        Share of the area of the layers with fibre within half of 1.5 nominal spacings of a strand.
-    closed_length : float
-        Share of the strands' length in closed ones.
-    """
-
-    layers: float
-    per_layer: float
-    closed: float
-    round_all: float
-    metres_per_layer: float
-    angle: float
-    angle_weighted: float
-    spacing_10: float
-    spacing_50: float
-    spacing_90: float
-    curvature_50: float
-    curvature_80: float
-    curvature_95: float
-    near: float
-    far: float
-    covered: float
-    closed_length: float
-
-    def table(self) -> dict[str, float]:
-        """Figures by name."""
-        return asdict(self)
-
-
 def measured(
     paths: Toolpaths, layers: Sequence[Layer], stress: PartStress, weight: FloatArray
-) -> Strands:
+) -> dict[str, float]:
     """Measure strands.
 
     Parameters
     ----------
     weight : (m,) array
         Of the cells: above 0 where stress lines join the joints.
+
+    Returns
+    -------
+    layers, per_layer, metres_per_layer
+        Layers with fibre, strands on each of them, and their length, m.
+    closed, round_all
+        Shares of the strands that are closed, and that go once round all joints of their layer.
+    angle, angle_weighted
+        Mean angle, degrees, to the strongest stress where stress lines join the joints, by length,
+        and by length and number of these lines.
+    spacing_10, spacing_50, spacing_90
+        Percentiles, mm.
+    curvature_50, curvature_80, curvature_95
+        Percentiles, 1/mm.
+    near, far
+        Shares of the strands' length with the next strand nearer than 0.7 nominal spacings, and
+        further than 1.5.
+    covered
+        Share of the area of the layers with fibre within half of 1.5 nominal spacings of a strand.
+    closed_length
+        Share of the strands' length in closed ones.
     """
     with_fibre = np.unique(paths.layer)
     angle, length, cell = _angles(paths, stress)
@@ -98,27 +71,22 @@ def measured(
         area += _covered(mine, known[index], 0.5 * WIDEST * NOMINAL)
     apart, bend = np.concatenate(spacing), np.concatenate(curvature)
     apart = apart[np.isfinite(apart)]
-    low, middle, high = np.quantile(apart, [0.1, 0.5, 0.9])
-    half, most, nearly_all = (float(value) for value in np.quantile(bend, [0.5, 0.8, 0.95]))
-    return Strands(
-        float(len(with_fibre)),
-        len(paths) / len(with_fibre),
-        float(paths.closed.mean()),
-        float(np.concatenate(round_all).mean()),
-        float(paths.lengths.sum()) / 1e3 / len(with_fibre),
-        float(np.average(angle[critical], weights=length[critical])),
-        float(np.average(angle, weights=length * weight[cell])),
-        float(low),
-        float(middle),
-        float(high),
-        half,
-        most,
-        nearly_all,
-        float((apart < _MEASURED * CLOSEST * NOMINAL).mean()),
-        float((apart > WIDEST * NOMINAL).mean()),
-        float(area[0] / area[1]),
-        float(paths.lengths[paths.closed].sum() / paths.lengths.sum()),
-    )
+    figures = {
+        "layers": len(with_fibre),
+        "per_layer": len(paths) / len(with_fibre),
+        "closed": paths.closed.mean(),
+        "round_all": np.concatenate(round_all).mean(),
+        "metres_per_layer": float(paths.lengths.sum()) / 1e3 / len(with_fibre),
+        "angle": np.average(angle[critical], weights=length[critical]),
+        "angle_weighted": np.average(angle, weights=length * weight[cell]),
+        **{f"spacing_{share}": np.quantile(apart, share / 100) for share in (10, 50, 90)},
+        **{f"curvature_{share}": np.quantile(bend, share / 100) for share in (50, 80, 95)},
+        "near": (apart < _MEASURED * CLOSEST * NOMINAL).mean(),
+        "far": (apart > WIDEST * NOMINAL).mean(),
+        "covered": area[0] / area[1],
+        "closed_length": paths.lengths[paths.closed].sum() / paths.lengths.sum(),
+    }
+    return {name: float(value) for name, value in figures.items()}
 
 
 def _angles(paths: Toolpaths, stress: PartStress) -> tuple[FloatArray, FloatArray, IntArray]:

@@ -14,18 +14,15 @@ in that order.
 from collections.abc import Sequence
 
 from ccfem.cases.bodies import bolt_heads
-from ccfem.fem.elasticity.problem import Bearing, Problem, Support
-from ccfem.fem.elasticity.solve import solve
-from ccfem.fem.elasticity.stress_field import StressField
-from ccfem.fem.elasticity.support_kinds import AnySupport, PressingSupport
+from ccfem.fem.elasticity import PressingSupport, Problem, StressField, solve
+from ccfem.fem.elasticity.problem import Bearing, Support
+from ccfem.fem.elasticity.support_kinds import AnySupport
 from ccfem.fem.materials import isotropic
+from ccfem.judging.virtual_testing import Specimen, first_failure, virtual_test
 from ccfem.judging.virtual_testing.failure_laws.interlayer import interlayer
-from ccfem.judging.virtual_testing.specimen import Specimen
-from ccfem.judging.virtual_testing.strength import first_failure
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine
 from ccfem.papers.fang_2024.authors import authors_layers, authors_mesh, authors_strands
-from ccfem.paths.planning.equal_fibre import plan_to_length
+from ccfem.paths.planning import plan_to_length
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers import Layer
 from ccfem.slicing.slicers.planar import Planar

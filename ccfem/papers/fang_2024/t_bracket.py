@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ccfem.fem.elasticity.part_stress import GivenStress, PartStress
+from ccfem.fem.elasticity import GivenStress, PartStress
 from ccfem.machine import Machine
 from ccfem.papers.contents import table
 from ccfem.papers.fang_2024.authors import (
@@ -22,15 +22,12 @@ from ccfem.papers.fang_2024.authors import (
     authors_strands,
     authors_stress,
 )
-from ccfem.papers.fang_2024.measures import Strands, measured
-from ccfem.paths.planning import plan
-from ccfem.paths.planning.strategy import PartStrategy, Strategy
+from ccfem.papers.fang_2024.measures import measured
+from ccfem.paths.planning import PartStrategy, Strategy, plan
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.layer_matrix import layer_matrix
-from ccfem.slicing.guidance.joint_lines import joint_lines
-from ccfem.slicing.guidance.joints import joints_of
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.guidance.joints import joint_lines, joints_of
+from ccfem.slicing.layers.layer import Layer, stress_on
 from ccfem.slicing.slicers.spatial import Spatial, SpatialSlicing
 from ccfem.strategies import create
 
@@ -158,13 +155,13 @@ def _times(seconds: dict[str, float], cells: int) -> str:
     return "\n".join(lines)
 
 
-def study(stress: PartStress, sliced: SpatialSlicing) -> dict[str, Strands]:
+def study(stress: PartStress, sliced: SpatialSlicing) -> dict[str, dict[str, float]]:
     """Print the tables of field and strands; the strands' figures by name."""
     machine = Machine()
     quality = [(name, f"{value:.3f}") for name, value in vars(sliced.quality).items()]
     print(f"\n{table(('field', 'ours'), quality)}", end="")
     weight = sliced.region.weight
-    strands: dict[str, Strands] = {}
+    strands: dict[str, dict[str, float]] = {}
     for name, given in VARIANTS.items():
         paths = plan(create("winding", given), sliced.layers, stress, machine)
         strands[name] = measured(paths, sliced.layers, stress, weight)
@@ -172,8 +169,8 @@ def study(stress: PartStress, sliced: SpatialSlicing) -> dict[str, Strands]:
     strands["authors"] = measured(authors_strands(theirs), theirs, stress, weight)
     paths = plan(create("winding"), theirs, stress, machine)
     strands["winding on the authors' layers"] = measured(paths, theirs, stress, weight)
-    rows = [(k, *(f"{v:.3g}" for v in row.table().values())) for k, row in strands.items()]
-    print(f"\n{table(('strands', *strands['authors'].table()), rows)}", end="")
+    rows = [(k, *(f"{v:.3g}" for v in row.values())) for k, row in strands.items()]
+    print(f"\n{table(('strands', *strands['authors']), rows)}", end="")
     return strands
 
 

@@ -13,22 +13,25 @@ from ccfem.base.progress import Progress, silent
 from ccfem.body.meshing import extrude
 from ccfem.cases.bodies import ARM_BRACKET_HOLES
 from ccfem.comparison.plot.canvas import png
-from ccfem.fem.elasticity.solve import solve
-from ccfem.fem.elasticity.stress_field import StressField
-from ccfem.fem.elasticity.support_kinds import PressingSupport
+from ccfem.fem.elasticity import PressingSupport, StressField, solve
 from ccfem.fem.materials import isotropic
-from ccfem.judging.virtual_testing.failure_laws.interlayer import interlayer
+from ccfem.judging.virtual_testing.failure_laws.interlayer import interlayer, layer_traction
 from ccfem.machine import Machine
 from ccfem.papers.contents import Contents, WhenAsked, table, write_claims
-from ccfem.papers.kipping_2023.chain import PAPER_SECONDS, PARTS, Chain, chain, table_1, table_2
+from ccfem.papers.kipping_2023.chain import (
+    PAPER_SECONDS,
+    PARTS,
+    Chain,
+    chain,
+    distances_below,
+    table_1,
+    table_2,
+)
 from ccfem.papers.kipping_2023.figures import part_figures, senses_figure
-from ccfem.papers.kipping_2023.thickness import distances_below
-from ccfem.papers.layer_traction import layer_traction
 from ccfem.papers.panels import canvas
 from ccfem.paths.fields.chart import chart_of
 from ccfem.printing.support import support_columns
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.layers.layer import Layer, LayerStress
 from ccfem.slicing.slicers.load_oriented import LoadOriented
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies.fiso import Fiso
@@ -478,7 +481,7 @@ def sliding_picture(run: Chain, models: dict[str, StressField]) -> bytes:
     figure, row = canvas(14.0, 3.2 * len(slicings) * len(models), layout="tight"), 0
     for model, stress in models.items():
         for name, layers in slicings.items():
-            opening, sliding = layer_traction(stress, layers, shown)
+            opening, sliding, _ = layer_traction(stress, layers, shown)
             for column, (what, values) in enumerate(
                 {"across the layers": opening, "along the layers": sliding}.items()
             ):

@@ -23,18 +23,15 @@ from ccfem.judging.evaluation.indices.sinuosity import (
     sinuosity_indices,
 )
 from ccfem.judging.evaluation.indices.stiffness_alignment import agreement
-from ccfem.judging.evaluation.plane_paths import plane_paths
-from ccfem.papers.contents import (
-    Contents,
-    claim_table,
-    judged,
-    table,
-    write_figures,
-    write_report,
-)
-from ccfem.papers.plocher_2022.fibre_map import fibre_map
+from ccfem.judging.evaluation.layer_paths import plane_paths
+from ccfem.papers.contents import Contents, claim_table, judged, table, write_figures, write_report
 from ccfem.papers.plocher_2022.figures import figures
-from ccfem.papers.plocher_2022.plane_study import laid_plate, print_seconds, reduced_stiffness
+from ccfem.papers.plocher_2022.plane_study import (
+    fibre_map,
+    laid_plate,
+    print_seconds,
+    reduced_stiffness,
+)
 from ccfem.papers.plocher_2022.plates import Plate, five_holes, single_hole
 from ccfem.papers.plocher_2022.study import MATERIALS, RASTER, CaseStudy, machine_of, run_study
 from ccfem.paths.planning import plan

@@ -8,21 +8,25 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from ccfem.base.arrays import FloatArray
+from ccfem.base.errors import InputError
 from ccfem.base.tensor import strongest_in_plane
 from ccfem.comparison.plot.colours import INK, OUTLINE, scale
 from ccfem.fem.materials import named_material
 from ccfem.fem.plates import rotate_plane, stack_plane
 from ccfem.judging.evaluation.indices.sinuosity import LONG
 from ccfem.judging.evaluation.indices.stiffness_alignment import agreement
-from ccfem.judging.evaluation.plane_paths import PlanePaths
+from ccfem.judging.evaluation.layer_paths import PlanePaths
 from ccfem.judging.evaluation.sensitivity import OffAxis
 from ccfem.papers import panels
 from ccfem.papers.contents import drawn_of
 from ccfem.papers.panels import bar, canvas, title
-from ccfem.papers.plocher_2022.plane_study import laid_plate, reduced_stiffness, turned_energies
+from ccfem.papers.plocher_2022.plane_study import (
+    ANGLES,
+    laid_plate,
+    reduced_stiffness,
+    turned_energies,
+)
 from ccfem.papers.plocher_2022.plates import Plate
-from ccfem.papers.plocher_2022.radar import draw_radar
-from ccfem.papers.plocher_2022.sensitivity import ANGLES
 from ccfem.papers.plocher_2022.study import MATERIALS, CaseStudy, PatternStudy
 from ccfem.paths.raster.patterns import inside_shells
 from ccfem.paths.raster.skeleton import skeleton
@@ -513,3 +517,58 @@ def shear(case: CaseStudy) -> Figure:
         "direction of the largest stress (red: tension, blue: compression)",
     )
     return figure
+
+
+# Radar ("spider") plots: several indices of several strategies on one scale.
+
+
+_RINGS = (0.25, 0.5, 0.75, 1.0)
+
+
+def normalised(values: FloatArray, better: str) -> FloatArray:
+    """Scores (k,) in [0, 1] of the values (k,) > 0 of one index: the best has 1, NaN stays.
+
+    ``min / x`` where `better` is "low", ``x / max`` where it is "high": Plocher et al. 2022 do not
+    say how they scale.
+    """
+    known = values[np.isfinite(values)]
+    least = 0.0 if better == "high" else np.nextafter(0.0, 1.0)
+    if len(known) and not known.min() >= least:
+        raise InputError(
+            f"an index to scale must be {'at least' if better == 'high' else 'above'} 0; got "
+            f"{known.min():g}"
+        )
+    if not len(known):
+        return np.array(values)
+    if better == "low":
+        return np.asarray(known.min() / values)
+    return np.asarray(values / known.max()) if known.max() > 0.0 else np.ones_like(values)
+
+
+def draw_radar(
+    axes: Any,
+    series: Mapping[str, Sequence[float]],
+    indices: Mapping[str, str],
+    colours: Mapping[str, str],
+) -> None:
+    """Draw several series, a value an index each; "low" or "high" values are better by spoke."""
+    columns = np.array(list(series.values()), dtype=np.float64).T
+    scores = np.transpose([normalised(*two) for two in zip(columns, indices.values(), strict=True)])
+    spokes = 0.5 * np.pi - 2.0 * np.pi * np.arange(len(indices)) / len(indices)
+    ends = np.stack([np.cos(spokes), np.sin(spokes)], axis=1)
+    closed = np.concatenate([ends, ends[:1]])
+    for ring in _RINGS:
+        axes.plot(*(ring * closed).T, color=OUTLINE, lw=0.4, alpha=0.6)
+        axes.text(0.02, ring, f"{ring:g}", size=5.5, color=OUTLINE, va="center")
+    for end, name in zip(ends, indices, strict=True):
+        axes.plot([0.0, end[0]], [0.0, end[1]], color=OUTLINE, lw=0.4, alpha=0.6)
+        side = "center" if abs(end[0]) < 0.1 else ("left" if end[0] > 0.0 else "right")
+        axes.text(*(1.08 * end), name, size=7.5, ha=side, va="center", color=INK)
+    for name, score in zip(series, scores, strict=True):
+        line = np.nan_to_num(score)[:, None] * ends
+        axes.plot(*np.concatenate([line, line[:1]]).T, color=colours[name], lw=1.6, label=name)
+        axes.fill(*line.T, color=colours[name], alpha=0.06)
+    axes.set_xlim(-1.15, 1.15)
+    axes.set_ylim(-1.15, 1.15)
+    axes.set_aspect("equal")
+    axes.set_axis_off()

@@ -17,9 +17,9 @@ from ccfem.base.arrays import BoolArray, FloatArray, freeze
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import TetMesh
 from ccfem.body.meshing import extrude
+from ccfem.fem.elasticity import Problem, StressField
 from ccfem.fem.elasticity.load_kinds import SurfaceLoad
-from ccfem.fem.elasticity.problem import Force, PointForce, Problem, Support
-from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.elasticity.problem import Force, PointForce, Support
 from ccfem.fem.materials import isotropic, plane_stress
 from ccfem.fem.plates import PlaneField, PlaneMesh, PlaneProblem, raster_mesh, solve_plane
 from ccfem.fem.topopt import Design, Simp, outline
@@ -47,8 +47,6 @@ class Plate:
         Row 0 is the top; a pixel is solid where its centre lies in the section.
     bead : float, mm
         Side of a pixel, and bead width.
-    supports : tuple of Support
-    load : tuple of loads
     points : mapping of patch name to (x, y), mm
         Patches of the one node nearest to a point.
     peaks : tuple of (x, y), mm

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ccfem.base.progress import Progress, silent
-from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.elasticity import StressField
 from ccfem.fem.materials import named_material
 from ccfem.fem.plates import solve_plane
 from ccfem.geometry.polylines import lengths, pack
@@ -25,17 +25,18 @@ from ccfem.judging.evaluation.indices.sinuosity import (
     sinuosity_indices,
 )
 from ccfem.judging.evaluation.indices.stiffness_alignment import READINGS
-from ccfem.judging.evaluation.plane_paths import PlanePaths, plane_paths
+from ccfem.judging.evaluation.layer_paths import PlanePaths, plane_paths
 from ccfem.machine import Machine, Process
 from ccfem.papers.contents import WhenAsked
-from ccfem.papers.plocher_2022.fibre_map import FibreMap, fibre_map
 from ccfem.papers.plocher_2022.plane_study import (
     PRINT_SPEED,
     TRAVEL_SPEED,
     Benchmark,
+    FibreMap,
     LaidPlate,
     bead_area,
     benchmark,
+    fibre_map,
     laid_plate,
     mixed_stiffness,
     print_seconds,
@@ -48,8 +49,7 @@ from ccfem.paths.raster.raster_plan import RasterPlan
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.printing.export.gcode import gcode
 from ccfem.printing.print_plan import PrintPlan
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.layers.layer import Layer, stress_on
 from ccfem.strategies import create
 
 Patterns = Mapping[str, tuple[str, dict[str, Any]]]
@@ -83,8 +83,6 @@ class PatternStudy:
     ----------
     toolpaths : Toolpaths
         Of two layers for the grids, which turn from one to the next, of one for the others.
-    paths : tuple of PlanePaths
-    maps : tuple of FibreMap
     laid : mapping of "C", "S", "mixed" to LaidPlate
     values : mapping of index to float
     raster : tuple of RasterPlan

@@ -16,16 +16,9 @@ from ccfem.geometry.medial_axis import medial_axis
 from ccfem.judging.evaluation.indices.curvature import sample_curvature
 from ccfem.judging.evaluation.indices.manufacture import sample_manufacture
 from ccfem.judging.evaluation.indices.matching import READINGS, THRESHOLDS, matching_rate
-from ccfem.judging.evaluation.plane_paths import PlanePaths, plane_paths
+from ccfem.judging.evaluation.layer_paths import PlanePaths, plane_paths
 from ccfem.machine import SpeedTable
-from ccfem.papers.contents import (
-    Contents,
-    claim_table,
-    judged,
-    table,
-    write_figures,
-    write_report,
-)
+from ccfem.papers.contents import Contents, claim_table, judged, table, write_figures, write_report
 from ccfem.papers.wang_2021.figures import figures
 from ccfem.papers.wang_2021.study import (
     BASELINES,

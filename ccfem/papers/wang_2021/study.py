@@ -24,17 +24,14 @@ from ccfem.geometry.polylines import resample, turning_angles
 from ccfem.judging.evaluation import evaluate
 from ccfem.judging.evaluation.indices.curvature import sample_curvature
 from ccfem.judging.evaluation.indices.matching import READINGS, matching_rate
-from ccfem.judging.evaluation.plane_paths import PlanePaths, plane_paths
-from ccfem.judging.virtual_testing.specimen import Specimen
-from ccfem.judging.virtual_testing.strand import RHO, Strand
-from ccfem.judging.virtual_testing.virtual_test import virtual_bracket
+from ccfem.judging.evaluation.layer_paths import PlanePaths, plane_paths
+from ccfem.judging.virtual_testing import RHO, Specimen, Strand, virtual_bracket
 from ccfem.machine import Machine
 from ccfem.papers.contents import WhenAsked
 from ccfem.paths.planning import plan
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers import LayerStress
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.layers.layer import Layer, stress_on
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create, named
 
@@ -156,7 +153,6 @@ def run_study(
     ----------
     design : bool, default True
         Whether to optimise the plates again, beside the outlines that are stored.
-    progress : callable, optional
     """
     known = named()
     chosen = [name for name in patterns if PATTERNS[name][0] in known]

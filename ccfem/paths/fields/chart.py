@@ -14,14 +14,11 @@ from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.base.errors import InputError
-from ccfem.geometry.locate import locate
-from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
+from ccfem.geometry.locate import locate, nearest_on_triangles
 from ccfem.geometry.polylines import subdivide
 from ccfem.paths.fields.layer_elements import Surface, positive_definite
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer, curved_layers
-from ccfem.slicing.layers.plane import Plane, plane_frame
-from ccfem.slicing.layers.rounded_rings import charted_rings
+from ccfem.slicing.layers.layer import Layer, Plane, charted_rings, curved_layers, plane_frame
 
 _ROUNDS = 30
 _STEP = 0.5

@@ -9,9 +9,8 @@ import scipy.sparse as sparse
 from scipy.sparse.linalg import splu
 
 from ccfem.base.arrays import FloatArray, IntArray, read_only
-from ccfem.geometry.facets import paired
+from ccfem.geometry.facets import paired, signed_areas
 from ccfem.geometry.isocontours import triangle_edges
-from ccfem.geometry.measures import signed_areas
 from ccfem.slicing.layers.layer import Layer
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import shapely
@@ -82,8 +82,7 @@ def possible_links(
             lines, points, outward, ends, section, 0.5 * width, limit, turn_cost
         )
     if radius > 0.0:
-        smooth = smooth_links(lines, ends, limit, width, radius)
-        links += [Link(*link, smooth=True) for link in smooth]
+        links += smooth_links(lines, ends, limit, width, radius)
         links = _without_folds(lines, links, radius)
     return links
 
@@ -267,19 +266,9 @@ _MOST_TURN = np.radians(200.0)
 """Largest total turn of a link: beyond it there is no strand to be met."""
 
 
-class SmoothLink(NamedTuple):
-    """A possible link: its cost and turn, the two ends, and the points from one to the other."""
-
-    cost: float
-    turn: float
-    first: int
-    second: int
-    path: FloatArray
-
-
 def smooth_links(
     lines: Sequence[FloatArray], ends: IntArray, limit: float, width: float, radius: float
-) -> list[SmoothLink]:
+) -> list[Link]:
     """Find possible links between ends that lie near each other, one for each pair.
 
     Parameters
@@ -296,7 +285,7 @@ def smooth_links(
 
     Returns
     -------
-    list of SmoothLink
+    list of Link
         The cost is the length of the link plus what it cuts off the strands, mm.
     """
     if len(ends) < 2:
@@ -314,7 +303,7 @@ def smooth_links(
         end[2] += np.pi
         path = shortest_curve(start, end, radius, _STEP * width)
         if len(path) > 1:
-            links.append(SmoothLink(float(cost), float(turn), int(ends[a]), int(ends[b]), path))
+            links.append(Link(float(cost), float(turn), int(ends[a]), int(ends[b]), path, True))
     return links
 
 

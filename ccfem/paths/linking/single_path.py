@@ -21,10 +21,9 @@ from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
 from ccfem.geometry.dubins import WORDS, curve_points, word_sizes
 from ccfem.geometry.offsets import ring_from
-from ccfem.geometry.places import INSIDE, VOID, cut_at_section
 from ccfem.geometry.polylines import between, is_closed, line_length, resample, runs
 from ccfem.geometry.section_grid import SectionGrid, section_grid
-from ccfem.geometry.shapes import Region, Shapes
+from ccfem.geometry.shapes import INSIDE, VOID, Region, Shapes, cut_at_section
 from ccfem.paths.linking.exchanges import Clusters, greedy_order, improved_order, strands
 from ccfem.paths.linking.link_curves import (
     LinkCurves,

@@ -1,6 +1,12 @@
 """Which layers and regions of a part get fibre, settled before any strategy plans."""
 
-from ccfem.paths.placement.fibre_places import FibrePlaces, FibreRegion
-from ccfem.paths.placement.region_shapes import InBody, InBox, InCylinder, NearPatch
+from ccfem.paths.placement.fibre_places import (
+    FibrePlaces,
+    FibreRegion,
+    InBody,
+    InBox,
+    InCylinder,
+    NearPatch,
+)
 
 __all__ = ["FibrePlaces", "FibreRegion", "InBody", "InBox", "InCylinder", "NearPatch"]

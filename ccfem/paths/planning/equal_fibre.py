@@ -13,14 +13,13 @@ from typing import Any
 import numpy as np
 
 from ccfem.base.checks import check_number
-from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.fem.elasticity import PartStress
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.bracketing import around, close_in, interpolated
+from ccfem.paths.planning.infill import about_short_pieces
 from ccfem.paths.planning.mixing import layer_lengths, mixed
 from ccfem.paths.planning.plan import check_layers, plan, plan_layers
-from ccfem.paths.planning.planned import Planned
-from ccfem.paths.planning.short_pieces import about_short_pieces
-from ccfem.paths.planning.strategy import LengthStrategy, Strategy
+from ccfem.paths.planning.strategy import LengthStrategy, Planned, Strategy
 from ccfem.paths.planning.unfolding import may_fold
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer

@@ -11,8 +11,7 @@ from ccfem.base.errors import InputError
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.strategy import Amount
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.layers.layer import Layer, LayerStress
 
 _SAME = 1e-3
 """Heights nearer than this, mm, are equal: it allows for the rounding of path files."""

@@ -8,16 +8,15 @@ import numpy as np
 from ccfem.base.checks import check_instance
 from ccfem.base.errors import InputError
 from ccfem.base.threads import in_threads
-from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.even_steps import OFF, even_steps
 from ccfem.machine.machine import Machine
 from ccfem.paths.fields.chart import chart_of, flat_view
 from ccfem.paths.planning.strategy import LayerPlanner, PartStrategy, Strategy
 from ccfem.paths.planning.unfolding import may_fold, unfolded_paths
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer, curved_layers
-from ccfem.slicing.layers.layer_stress import stress_on
-from ccfem.slicing.layers.pitch import check_pitch
+from ccfem.slicing.layers.layer import Layer, curved_layers, stress_on
+from ccfem.slicing.layers.slicer import check_pitch
 
 
 def plan(

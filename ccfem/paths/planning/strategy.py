@@ -1,15 +1,17 @@
-"""The protocols that strategies follow."""
+"""The protocols that strategies follow, and a plan that one of them made."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Protocol, runtime_checkable
 
-from ccfem.fem.elasticity.part_stress import PartStress
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
+import numpy as np
+
+from ccfem.base.arrays import in_brief
+from ccfem.fem.elasticity import PartStress
+from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.layers.layer import Layer, LayerStress
 
 
 @dataclass(frozen=True)
@@ -134,3 +136,57 @@ class CasesStrategy(LengthStrategy, Protocol):
 
 
 Strategy = LayerStrategy | PartStrategy
+
+
+# Toolpaths of a part planned to a length of fibre.
+
+
+@dataclass(frozen=True)
+class Planned:
+    """Toolpaths of a part, and the strategy that made them.
+
+    Attributes
+    ----------
+    strategy : Strategy
+        With the values found (for most layers, see `note`).
+    length_per_layer : float, mm
+        Fibre length divided by the number of layers.
+    note : str
+        Empty, or one line: which layers have another value, or why the wanted length was missed.
+    reached : bool
+        Whether the plan lays the wanted length within the tolerance
+        (`ccfem.paths.planning.equal_fibre`).
+    """
+
+    strategy: Strategy
+    toolpaths: Toolpaths
+    length_per_layer: float
+    note: str = ""
+    reached: bool = True
+
+    __repr__ = in_brief
+
+
+# Common parts of strategies that plan all layers of a part at once, to a share of its area.
+
+
+def full_length(layers: Sequence[Layer], machine: Machine) -> float:
+    """Length of fibre that covers a layer side by side, mm, mean over the layers."""
+    return float(np.mean([layer.areas.sum() for layer in layers])) / machine.fibre_width
+
+
+@dataclass(frozen=True)
+class WholePart:
+    """Paths of a whole part, returned layer by layer: a `LayerPlanner`.
+
+    Attributes
+    ----------
+    toolpaths : Toolpaths
+        Of all layers.
+    """
+
+    toolpaths: Toolpaths
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        """Paths of one layer."""
+        return self.toolpaths.on_layer(layer.index)

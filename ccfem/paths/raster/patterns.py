@@ -10,7 +10,7 @@ import numpy as np
 from scipy import ndimage
 
 from ccfem.base.arrays import BoolArray, IntArray, freeze
-from ccfem.paths.raster.bands import Metric, bands
+from ccfem.paths.raster.bitmap import Metric, bands
 from ccfem.paths.raster.skeleton import nearest_segment, skeleton
 
 SHELL, GUIDE, INFILL = range(3)

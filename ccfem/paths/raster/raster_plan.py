@@ -10,7 +10,7 @@ from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, seen_only
 from ccfem.geometry.polylines import pack
 from ccfem.paths.raster.bitmap import NEIGHBOURS, Bitmap
 from ccfem.paths.raster.patterns import Regions
-from ccfem.paths.raster.thinning import thin
+from ccfem.paths.raster.skeleton import thin
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
@@ -523,7 +523,7 @@ _STAIRS = 3
 
 
 def corners(pixels: IntArray, offsets: IntArray, stairs: bool = True) -> BoolArray:
-    """Points of pixel paths that stay: those where the path turns.
+    """Mask (P,) of the points of pixel paths that stay: those where the path turns.
 
     Parameters
     ----------
@@ -534,10 +534,6 @@ def corners(pixels: IntArray, offsets: IntArray, stairs: bool = True) -> BoolArr
         Whether three or more steps along sides of pixels, alternating between two directions, are
         one straight step from the first pixel to the last. Two staircases share no step, and a
         single corner stays.
-
-    Returns
-    -------
-    (P,) bool array
     """
     return np.asarray(
         _pixel_corners(np.ascontiguousarray(pixels), offsets, _STAIRS if stairs else 0)

@@ -16,20 +16,12 @@ from scipy.ndimage import label
 
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.errors import InputError
-from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.geometry.polylines import (
-    along_line,
-    between,
-    is_closed,
-    line_length,
-    points_along,
-    runs,
-)
+from ccfem.body.mesh import TetMesh
+from ccfem.geometry.polylines import along_line, between, is_closed, line_length, points_along, runs
 from ccfem.geometry.shapes import Region, strings
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.unfolding import part_of_line
-from ccfem.paths.splitting.slabs import LOW, Slab, slabs_of
-from ccfem.paths.splitting.strand_density import StrandDensity
+from ccfem.paths.splitting.slabs import LOW, Slab, StrandDensity, slabs_of
 from ccfem.paths.toolpaths import FIBRE, MATRIX, Toolpaths
 from ccfem.slicing.layers import Layer
 from ccfem.slicing.layers.layer import curved_layers

@@ -5,17 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from ccfem.base.whole import whole_file
-from ccfem.printing.moves import (
-    CUT,
-    EVENTS,
-    FEED,
-    LAY,
-    PATH_END,
-    PATH_START,
-    TOOL,
-    TRAVEL,
-    Moves,
-)
+from ccfem.printing.moves import CUT, EVENTS, FEED, LAY, PATH_END, PATH_START, TOOL, TRAVEL, Moves
 
 _HEADER = "path,tool,layer,x,y,z,nx,ny,nz,speed,feed,beside,width,height,event"
 

@@ -8,9 +8,9 @@ import numpy as np
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
 from ccfem.base.whole import existing_file, whole_file
-from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
+from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.machine.machine import Machine
-from ccfem.paths.linking.print_speed import step_speeds
+from ccfem.paths.linking.print_order import step_speeds
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
 

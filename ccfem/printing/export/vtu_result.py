@@ -8,7 +8,7 @@ from ccfem.base.whole import whole_file
 from ccfem.body.files.formats import vtu
 from ccfem.body.files.vtk_xml import as_bytes
 from ccfem.fem.elasticity.stress_field import StressField
-from ccfem.fem.stress_files.vtu_tensors import UNIT, VTK_COMPONENTS, vtk_tensors
+from ccfem.fem.stress_files.stress_file import UNIT, VTK_COMPONENTS, vtk_tensors
 
 
 def result_path(path: str | Path, case: str = "") -> Path:

@@ -20,7 +20,7 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.locate import locate
 from ccfem.printing.support.overhang import hanging_facets
-from ccfem.slicing.layers.plane import plane_frame
+from ccfem.slicing.layers.layer import plane_frame
 
 _INWARD = 1e-3
 """Share of the way to the middle of its hanging facets at which a line is looked along: just inside

@@ -15,7 +15,7 @@ from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.printing.support.overhang import hanging_facets
-from ccfem.slicing.layers.plane import plane_frame
+from ccfem.slicing.layers.layer import plane_frame
 
 _OFF = 0.381966
 """Where columns stand between lines of the grid: off the corners and edges of parts."""

@@ -8,11 +8,10 @@ import shapely
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.geometry.facets import paired
-from ccfem.geometry.measures import connected
+from ccfem.geometry.facets import connected, paired
 from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
-from ccfem.slicing.layers.plane import plane_frame
+from ccfem.slicing.layers.layer import plane_frame
 from ccfem.slicing.slicers.planar import Planar
 
 _SLACK = 2.0
@@ -63,7 +62,7 @@ class Overhang:
     Attributes
     ----------
     region : shapely (Multi)Polygon, mm
-        Seen along the build direction, in the frame of `ccfem.slicing.layers.plane.plane_frame`.
+        Seen along the build direction, in the frame of `ccfem.slicing.layers.layer.plane_frame`.
     height : float, mm
         Of the lowest of it, above the bed.
     share : float

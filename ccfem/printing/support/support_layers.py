@@ -9,13 +9,12 @@ import numpy as np
 from ccfem.base.arrays import FloatArray, IntArray, freeze
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.fem.elasticity.stress_field import PartStress
 from ccfem.machine.machine import Machine
 from ccfem.printing.support.column_mesh import ColumnMesh, column_mesh
 from ccfem.printing.support.support_field import SupportField, support_field
 from ccfem.slicing.layers.layer import Layer, curved_layers
-from ccfem.slicing.layers.slicer import Slicer, Vector
-from ccfem.slicing.layers.standing import standing
+from ccfem.slicing.layers.slicer import Slicer, Vector, standing
 from ccfem.slicing.layers.sublayers import layers_within
 from ccfem.slicing.principal_lines.trace import mean_edge
 

@@ -12,8 +12,7 @@ from ccfem.machine.machine import Machine
 from ccfem.paths.fields.chart import Chart
 from ccfem.paths.toolpaths import MATRIX, Toolpaths
 from ccfem.printing.support.support_layers import SupportLayers
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.plane import Plane, plane_frame
+from ccfem.slicing.layers.layer import Layer, Plane, plane_frame
 
 
 def support_paths(support: SupportLayers, machine: Machine, spacing: float = 3.0) -> Toolpaths:

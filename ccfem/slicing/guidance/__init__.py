@@ -1,8 +1,13 @@
 """Guidance field: a scalar field on the part whose level surfaces are its layers."""
 
-from ccfem.slicing.guidance.guidance_field import GuidanceField, Weights, guidance_field
+from ccfem.slicing.guidance.guidance_field import (
+    FieldQuality,
+    GuidanceField,
+    Weights,
+    field_quality,
+    guidance_field,
+)
 from ccfem.slicing.guidance.joints import Joint, joint_of
-from ccfem.slicing.guidance.quality import FieldQuality, field_quality
 
 __all__ = [
     "FieldQuality",

@@ -13,8 +13,8 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from ccfem.base.arrays import FloatArray, freeze
-from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.fem.elasticity.assembly import cell_gradients
+from ccfem.body.mesh import TetMesh
+from ccfem.fem.elasticity import cell_gradients
 from ccfem.fem.elasticity.direct import superlu
 from ccfem.slicing.guidance.bounded_gradient import Bounds, bounded
 from ccfem.slicing.guidance.energies import gradient_energy

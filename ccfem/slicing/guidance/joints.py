@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -10,9 +10,16 @@ from scipy.sparse.csgraph import connected_components
 
 from ccfem.base.arrays import FloatArray, IntArray, read_only
 from ccfem.base.errors import InputError
+from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.smooth_faces import fitted_cylinder
-from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.fem.elasticity import PartStress
+from ccfem.slicing.principal_lines.critical import (
+    CriticalRegion,
+    Keep,
+    Strongest,
+    critical_region,
+    strongest_stress,
+)
 
 _AGREE = np.cos(np.radians(20.0))
 """Cosine of the angle up to which a stated axis and that of the wall are the same one."""
@@ -252,3 +259,40 @@ def _cells_within(mesh: TetMesh, nodes: IntArray, rings: int) -> IntArray:
         touched = corners[reached[corners].any(axis=1)]
         reached[touched] = True
     return np.flatnonzero(reached[corners].all(axis=1))
+
+
+# Stress lines between joints, traced once and shared by all that use the same stress.
+
+
+_KNOWN = "_joint_lines"
+
+
+class JointLines(NamedTuple):
+    """Strongest stress of the cells, and the region where lines along it join joints."""
+
+    strongest: Strongest
+    region: CriticalRegion
+
+
+def joint_lines(stress: PartStress, joints: Sequence[Joint], keep: Keep) -> JointLines:
+    """Trace the lines of the strongest stress from every cell; the stress stores the result.
+
+    Parameters
+    ----------
+    keep : {"joining", "touching", "all"}
+        As in `critical_region`.
+
+    Raises
+    ------
+    InputError
+        As in `critical_region`.
+    """
+    known = vars(stress).setdefault(_KNOWN, {})
+    key = (tuple(joint.name for joint in joints), keep)
+    if key not in known:
+        strongest = strongest_stress(stress.stress)
+        walls, pairs = [joint.wall for joint in joints], joining_pairs(joints, stress)
+        region = critical_region(stress.mesh, strongest.direction, walls, pairs, keep)
+        known[key] = JointLines(strongest, region)
+    lines: JointLines = known[key]
+    return lines

@@ -15,7 +15,7 @@ from numba import njit
 from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
 
 from ccfem.base.arrays import FloatArray, IntArray, freeze
-from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity.direct import superlu
 from ccfem.slicing.guidance.energies import faces_between
 from ccfem.slicing.guidance.stress_regions import StressRegions

@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components, mini
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.base.errors import InputError
-from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.mesh import TetMesh
 
 _FEWEST = 10
 """Number of cells of the smallest region that counts."""

@@ -8,8 +8,8 @@ import numpy as np
 from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.round_walls import RoundWall
-from ccfem.body.mesh.tet_mesh import TetMesh
 
 Group = TypeVar("Group", str, int)
 

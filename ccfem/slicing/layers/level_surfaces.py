@@ -11,9 +11,9 @@ from scipy.sparse.csgraph import connected_components
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.threads import in_threads
+from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.round_walls import RoundWall
-from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.fem.elasticity.assembly import cell_gradients
+from ccfem.fem.elasticity import cell_gradients
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.level_cut import border_edges, chain, cut_at_zero
 
@@ -33,7 +33,6 @@ class LevelSurfaces:
 
     Attributes
     ----------
-    layers : tuple of Layer
     bubbles : int
         Number of closed pieces, which are left out: they have no border, as with a maximum of the
         field inside the part.

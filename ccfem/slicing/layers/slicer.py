@@ -1,10 +1,15 @@
-"""The protocol that slicers follow."""
+"""The protocol that slicers follow, and what holds for the layers of them all."""
 
+from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
 
-from ccfem.fem.elasticity.part_stress import PartStress
+import numpy as np
+
+from ccfem.base.arrays import FloatArray
+from ccfem.base.errors import InputError
+from ccfem.fem.elasticity import PartStress
 from ccfem.machine.machine import Machine
-from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer import Layer, curved_layers
 
 Vector = tuple[float, float, float]
 
@@ -35,3 +40,66 @@ def slicer_remarks(slicer: Slicer, stress: PartStress) -> tuple[str, ...]:
     """Ask a slicer with a method ``remarks`` what it has to say of a part, one line each."""
     remarks = getattr(slicer, "remarks", None)
     return () if remarks is None else tuple(remarks(stress))
+
+
+# Orientation in which a part of curved layers is printed.
+
+
+_DOWN = 1e-3
+"""Share of the layers' area that may face downwards."""
+
+
+def standing(layers: Sequence[Layer], build: Vector) -> Vector:
+    """Choose the unit vector along which layers are stacked on a bed.
+
+    Layers that face downwards can be printed by no head that stands over them, and rest on no
+    support. If layers do, as seen along the build direction, the part is rotated so that their mean
+    normal points up, as Kipping and Schueppstuhl 2023 do with all parts (section 2.3). Flat layers
+    stay as they are.
+
+    Parameters
+    ----------
+    build : tuple of 3 floats
+        Build direction.
+    """
+    up = np.asarray(build, dtype=np.float64) / np.linalg.norm(build)
+    area = np.concatenate([layer.areas for layer in layers])
+    normals = np.concatenate([layer.normals for layer in layers])
+    curved = curved_layers(layers)
+    mean = area @ normals
+    size = float(np.linalg.norm(mean))
+    if curved and area[normals @ up < 0.0].sum() > _DOWN * area.sum() and size > 0.0:
+        up = mean / size
+    x, y, z = up.tolist()
+    return (x, y, z)
+
+
+# Check of the distance between layers: at least the height of their fibre.
+
+
+_ROUNDING = 1e-6
+"""Share of a strand's height by which layers may be nearer than it, because of rounding."""
+
+
+def check_pitch(layers: Sequence[Layer], machine: Machine) -> None:
+    """Refuse flat layers nearer to each other than the height of a strand of the machine.
+
+    Curved layers are not checked, since their distance varies.
+    """
+    check_heights(
+        np.sort([layer.flat.height for layer in layers if layer.flat is not None]), machine
+    )
+
+
+def check_heights(heights: FloatArray, machine: Machine) -> None:
+    """Refuse ascending heights, mm, of flat layers that are nearer than the height of a strand."""
+    if len(heights) < 2:
+        return
+    gaps, least = np.diff(heights), machine.strand_height
+    k = int(gaps.argmin())
+    if gaps[k] < least * (1.0 - _ROUNDING):
+        raise InputError(
+            f"layers must lie at least {least:.4g} mm apart, the height of a strand "
+            f"(machine.fibre_height, or filament_area over fibre_width); got {gaps[k]:.4g} mm "
+            f"between those at {heights[k]:.6g} and {heights[k + 1]:.6g} mm: use fewer layers"
+        )

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
-from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.mesh import TetMesh
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.level_cut import border_edges, chain
 from ccfem.slicing.layers.level_surfaces import LevelSurfaces, level_surfaces, thickness_at_nodes

@@ -1,7 +1,11 @@
 """Lines along the strongest principal stress of a part, and the region that carries the load."""
 
-from ccfem.slicing.principal_lines.critical import CriticalRegion, critical_region
-from ccfem.slicing.principal_lines.strongest import Strongest, strongest_stress
+from ccfem.slicing.principal_lines.critical import (
+    CriticalRegion,
+    Strongest,
+    critical_region,
+    strongest_stress,
+)
 from ccfem.slicing.principal_lines.trace import Traced, Tracer, trace
 
 __all__ = [

@@ -11,8 +11,8 @@ from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray, read_only
 from ccfem.base.threads import in_threads
-from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.fem.elasticity.assembly import cell_gradients
+from ccfem.body.mesh import TetMesh
+from ccfem.fem.elasticity import cell_gradients
 
 LONGEST = 100.0
 """Longest half of a line, in mean edge lengths (Fang et al. 2024, section 2.2)."""

@@ -7,7 +7,7 @@ from ccfem.base import plugins
 from ccfem.base.checks import check_instance
 from ccfem.base.errors import InputError, shown
 from ccfem.base.toml import assignment
-from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.fem.elasticity.stress_field import PartStress
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.slicer import Slicer, Vector

@@ -13,7 +13,7 @@ import numpy as np
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.checks import check_fields
 from ccfem.base.errors import InputError
-from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.fem.elasticity import PartStress
 from ccfem.machine.machine import Machine
 from ccfem.slicing.guidance.height_field import HeightField, height_field, inverted_share
 from ccfem.slicing.guidance.normal_field import NormalField, normal_field
@@ -98,7 +98,6 @@ class LoadOrientedSlicing:
 
     Attributes
     ----------
-    layers : tuple of Layer
     step : float
         Difference of the field between layers.
     inverted : float

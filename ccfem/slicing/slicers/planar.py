@@ -9,15 +9,13 @@ import numpy as np
 from ccfem.base.arrays import FloatArray
 from ccfem.base.checks import check_choices, check_number
 from ccfem.base.errors import InputError
-from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.fem.elasticity.part_stress import PartStress
-from ccfem.geometry.measures import counter_clockwise
+from ccfem.body.mesh import TetMesh
+from ccfem.fem.elasticity import PartStress
+from ccfem.geometry.facets import counter_clockwise
 from ccfem.machine.machine import Machine
-from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer import Layer, Plane, plane_frame
 from ccfem.slicing.layers.level_cut import border_edges, chain, cut_at_zero, patch_edges, wall_edges
-from ccfem.slicing.layers.pitch import check_heights
-from ccfem.slicing.layers.plane import Plane, plane_frame
-from ccfem.slicing.layers.slicer import Vector
+from ccfem.slicing.layers.slicer import Vector, check_heights
 
 _TOP = 1e-3
 """Share of the part's height below its top where a height that cuts nothing lies on it."""

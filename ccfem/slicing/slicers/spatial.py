@@ -14,12 +14,17 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
-from ccfem.fem.elasticity.part_stress import PartStress
+from ccfem.fem.elasticity import PartStress
 from ccfem.machine.machine import Machine
-from ccfem.slicing.guidance.guidance_field import GuidanceField, JointForm, Weights, guidance_field
-from ccfem.slicing.guidance.joint_lines import joint_lines
-from ccfem.slicing.guidance.joints import Joint, joints_of
-from ccfem.slicing.guidance.quality import FieldQuality, field_quality
+from ccfem.slicing.guidance.guidance_field import (
+    FieldQuality,
+    GuidanceField,
+    JointForm,
+    Weights,
+    field_quality,
+    guidance_field,
+)
+from ccfem.slicing.guidance.joints import Joint, joint_lines, joints_of
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.level_surfaces import level_surfaces
 from ccfem.slicing.layers.slicer import Vector
@@ -44,10 +49,8 @@ class SpatialSlicing:
 
     Attributes
     ----------
-    layers : tuple of Layer
     region : CriticalRegion
         Stress lines that join the joints.
-    joints : tuple of Joint
     step : float
         Difference of the field between layers.
     bubbles, specks : int

@@ -8,10 +8,9 @@ import numpy as np
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.checks import check_fields
 from ccfem.base.errors import InputError
-from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.fem.elasticity.part_stress import PartStress
-from ccfem.geometry.locate import locate
-from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
+from ccfem.body.mesh import TetMesh
+from ccfem.fem.elasticity import PartStress
+from ccfem.geometry.locate import locate, nearest_on_triangles
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.level_cut import border_edges, chain

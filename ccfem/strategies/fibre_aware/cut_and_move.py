@@ -7,12 +7,11 @@ the strength as asked for, and for half of that.
 
 from collections.abc import Callable, Sequence
 
-from ccfem.judging.virtual_testing.specimen import Specimen
-from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.judging.virtual_testing import Specimen, Strand
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.equal_fibre import TOLERANCE
 from ccfem.paths.planning.plan import plan_layers
-from ccfem.paths.planning.whole_part import WholePart
+from ccfem.paths.planning.strategy import WholePart
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.judges import (

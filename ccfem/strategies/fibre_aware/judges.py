@@ -8,13 +8,11 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray, freeze, in_brief
 from ccfem.base.checks import check_known
-from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.body.mesh import TetMesh
+from ccfem.fem.elasticity import StressField
+from ccfem.judging.virtual_testing import Specimen, Strand, Strands, cut_strands
 from ccfem.judging.virtual_testing.equilibrium import Equilibrium, equilibrium
 from ccfem.judging.virtual_testing.several_cases import cases_failure, virtual_tests
-from ccfem.judging.virtual_testing.specimen import Specimen
-from ccfem.judging.virtual_testing.strand import Strand
-from ccfem.judging.virtual_testing.strands import Strands, cut_strands
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer

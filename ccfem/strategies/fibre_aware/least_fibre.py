@@ -9,16 +9,15 @@ import numpy as np
 from ccfem.base.arrays import FloatArray, freeze, in_brief
 from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
-from ccfem.fem.elasticity.stress_field import StressField
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
-from ccfem.judging.virtual_testing.several_cases import specimens, virtual_tests
-from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.fem.elasticity import StressField
+from ccfem.fem.elasticity.stress_field import WeightedCases
+from ccfem.judging.virtual_testing import Strand, specimens
+from ccfem.judging.virtual_testing.several_cases import virtual_tests
 from ccfem.judging.virtual_testing.strands import carrying_strands
 from ccfem.machine.machine import Machine
+from ccfem.paths.planning import Planned, Strategy
 from ccfem.paths.planning.bracketing import close_in, interpolated
-from ccfem.paths.planning.planned import Planned
-from ccfem.paths.planning.strategy import Strategy
-from ccfem.paths.planning.whole_part import full_length
+from ccfem.paths.planning.strategy import full_length
 from ccfem.paths.splitting.printed_strands import printed_strands
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.plan_cases import plan_cases

@@ -8,16 +8,14 @@ import shapely
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.tensor import largest_in_plane
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.geometry.shapes import Region, open_lines
 from ccfem.machine.machine import Machine
-from ccfem.paths.fields.layer_tension import layer_tension
-from ccfem.paths.fields.tensile import Tension
+from ccfem.paths.fields.tensile import Tension, layer_tension
 from ccfem.paths.planning.infill import long_enough
 from ccfem.paths.planning.plan import plan_layers
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.layers.layer import Layer, LayerStress
 from ccfem.strategies import create
 from ccfem.strategies.concentric import Concentric
 from ccfem.strategies.fibre_aware.heights import layers_by_case

@@ -9,21 +9,15 @@ stress is planned as it is.
 from collections.abc import Sequence
 
 from ccfem.base.errors import InputError
-from ccfem.fem.elasticity.stress_field import StressField
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
-from ccfem.judging.virtual_testing.several_cases import specimens
-from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.fem.elasticity import StressField
+from ccfem.fem.elasticity.stress_field import WeightedCases
+from ccfem.judging.virtual_testing import Strand, specimens
 from ccfem.machine.machine import Machine
-from ccfem.paths.planning.equal_fibre import (
-    TOLERANCE,
-    length_per_layer,
-    plan_to_length,
-    plan_to_lengths,
-)
-from ccfem.paths.planning.plan import check_layers, plan, plan_layers
-from ccfem.paths.planning.planned import Planned
-from ccfem.paths.planning.short_pieces import about_short_pieces
-from ccfem.paths.planning.strategy import CasesStrategy, LengthStrategy, Strategy
+from ccfem.paths.planning import Planned, Strategy, length_per_layer, plan, plan_to_length
+from ccfem.paths.planning.equal_fibre import TOLERANCE, plan_to_lengths
+from ccfem.paths.planning.infill import about_short_pieces
+from ccfem.paths.planning.plan import check_layers, plan_layers
+from ccfem.paths.planning.strategy import CasesStrategy, LengthStrategy
 from ccfem.paths.planning.unfolding import may_fold
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer, curved_layers

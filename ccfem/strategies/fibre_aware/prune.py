@@ -13,10 +13,8 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.checks import check_number
-from ccfem.fem.elasticity.stress_field import StressField
-from ccfem.judging.virtual_testing.specimen import Specimen
-from ccfem.judging.virtual_testing.strand import Strand
-from ccfem.judging.virtual_testing.strands import Strands, cut_strands
+from ccfem.fem.elasticity import StressField
+from ccfem.judging.virtual_testing import Specimen, Strand, Strands, cut_strands
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.strategies.fibre_aware.judges import Goal, equilibria

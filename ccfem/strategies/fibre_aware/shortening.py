@@ -10,8 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray
-from ccfem.geometry.curvature_samples import curvature_samples
-from ccfem.geometry.polylines import along_line, points_along, runs
+from ccfem.geometry.polylines import along_line, curvature_samples, points_along, runs
 from ccfem.geometry.tight_bends import tight_bends
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import FIBRE, Toolpaths

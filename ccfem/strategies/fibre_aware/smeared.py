@@ -15,12 +15,9 @@ from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray, freeze, in_brief, read_only
 from ccfem.base.errors import SolveError
-from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.fem.elasticity.assembly import cell_gradients
-from ccfem.fem.elasticity.solve import solve
-from ccfem.fem.elasticity.solvers import preconditioned_cg
-from ccfem.fem.elasticity.stress_field import StressField
-from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.body.mesh import TetMesh
+from ccfem.fem.elasticity import StressField, cell_gradients, preconditioned_cg, solve
+from ccfem.judging.virtual_testing import Specimen
 
 _UPDATES = 40
 """Updates of the displacement after which to give up."""

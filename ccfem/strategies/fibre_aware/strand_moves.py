@@ -18,8 +18,8 @@ from ccfem.base.arrays import FloatArray, IntArray, freeze, in_brief
 from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
 from ccfem.base.tensor import in_plane, strain_from_voigt
-from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.fem.elasticity.assembly import cell_gradients
+from ccfem.body.mesh import TetMesh
+from ccfem.fem.elasticity import cell_gradients
 from ccfem.fem.elasticity.recovery import strain_at_nodes
 from ccfem.geometry.locate import locate
 from ccfem.geometry.polylines import starts_segment

@@ -17,7 +17,7 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import FloatArray, IntArray, freeze, in_brief
-from ccfem.fem.elasticity.skyline import skyline_within
+from ccfem.fem.elasticity.direct import skyline_within
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.strand_lines import StrandLines
 

@@ -9,15 +9,19 @@ import numpy as np
 import shapely
 
 from ccfem.base.arrays import FloatArray, IntArray
-from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.mesh import TetMesh
 from ccfem.geometry.isocontours import isocontours, triangle_edges
 from ccfem.geometry.polylines import line_length
 from ccfem.geometry.shapes import Region
-from ccfem.judging.virtual_testing.bars import bars
-from ccfem.judging.virtual_testing.strands import cut_strands
+from ccfem.judging.virtual_testing import cut_strands
+from ccfem.judging.virtual_testing.equilibrium import bars
 from ccfem.machine.machine import Machine
-from ccfem.paths.linking.clearance import trim_to_clearance
-from ccfem.paths.linking.finishing import keep_off_border, linked_paths, long_enough
+from ccfem.paths.linking.finishing import (
+    keep_off_border,
+    linked_paths,
+    long_enough,
+    trim_to_clearance,
+)
 from ccfem.paths.linking.joining import Joined
 from ccfem.paths.planning.unfolding import unfolded, unfolded_paths
 from ccfem.paths.toolpaths import Toolpaths

@@ -13,7 +13,8 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray, in_brief
 from ccfem.base.tensor import to_voigt
-from ccfem.fem.elasticity.volume_loads import strain_forces
+from ccfem.fem.elasticity.loads import strain_forces
+from ccfem.judging.virtual_testing import Strand
 from ccfem.judging.virtual_testing.near_failure import (
     POWER,
     MatrixPeaks,
@@ -22,8 +23,7 @@ from ccfem.judging.virtual_testing.near_failure import (
     nearness,
     stretched_index,
 )
-from ccfem.judging.virtual_testing.strand import Strand
-from ccfem.judging.virtual_testing.strengths import Limits
+from ccfem.judging.virtual_testing.strand import Limits
 from ccfem.strategies.fibre_aware.border_levels import BorderLevels
 from ccfem.strategies.fibre_aware.field_descent import drawn_to_borders
 from ccfem.strategies.fibre_aware.smeared import SmearedSolution

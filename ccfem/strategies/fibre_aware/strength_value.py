@@ -13,9 +13,9 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray, in_brief
 from ccfem.base.checks import check_number
-from ccfem.fem.elasticity.solvers import preconditioned_cg
-from ccfem.judging.virtual_testing.bars import Bars, bars
-from ccfem.judging.virtual_testing.equilibrium import Equilibrium
+from ccfem.fem.elasticity import preconditioned_cg
+from ccfem.judging.virtual_testing import Specimen, Strand, Strands
+from ccfem.judging.virtual_testing.equilibrium import Bars, Equilibrium, Reduced, bars
 from ccfem.judging.virtual_testing.near_failure import (
     POWER,
     MatrixPeaks,
@@ -24,11 +24,7 @@ from ccfem.judging.virtual_testing.near_failure import (
     nearness,
     stretched_index,
 )
-from ccfem.judging.virtual_testing.reinforced import Reduced
-from ccfem.judging.virtual_testing.specimen import Specimen
-from ccfem.judging.virtual_testing.strand import Strand
-from ccfem.judging.virtual_testing.strands import Strands
-from ccfem.judging.virtual_testing.strengths import Limits
+from ccfem.judging.virtual_testing.strand import Limits
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.strategies.fibre_aware.strain_worth import StrainWorth
 

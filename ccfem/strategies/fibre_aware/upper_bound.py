@@ -37,10 +37,10 @@ from numpy.typing import ArrayLike
 from ccfem.base.arrays import FloatArray, freeze, in_brief
 from ccfem.base.checks import check_known, check_number
 from ccfem.base.tensor import largest_in_plane
-from ccfem.fem.elasticity.stress_field import StressField
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.fem.elasticity import StressField
+from ccfem.fem.elasticity.stress_field import WeightedCases
+from ccfem.judging.virtual_testing import Strand
 from ccfem.judging.virtual_testing.equilibrium import MODES, TENSION
-from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.heights import fibre_capacity

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
-from ccfem.geometry.measures import connected
+from ccfem.geometry.facets import connected
 from ccfem.geometry.medial_axis import MedialAxis, MedialSegment, medial_axis
 from ccfem.geometry.shapes import Region
 

@@ -12,10 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
-from ccfem.slicing.layers.layer_stress import LayerStress
-from ccfem.strategies.stress_tracing.criterion import Criterion
+from ccfem.slicing.layers.layer import LayerStress
 from ccfem.strategies.stress_tracing.frame import Frame, Member, ends_at
-from ccfem.strategies.stress_tracing.stress_lines import misalignment, plane_stress_at, stress_lines
+from ccfem.strategies.stress_tracing.stress_lines import (
+    Criterion,
+    misalignment,
+    plane_stress_at,
+    stress_lines,
+)
 
 _REACH = 5.0
 """Length, mm, beyond the disc of a joint over which the direction of a member is measured."""

@@ -3,11 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.tensor import in_plane, strongest_in_plane
 from ccfem.geometry.locate import locate
-from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.layers.layer import LayerStress
 
 
 @dataclass(frozen=True)
@@ -55,3 +56,50 @@ def misalignment(direction: FloatArray, lines: StressLines, undefined: float) ->
     norm = np.maximum(np.linalg.norm(direction, axis=1), 1e-300)
     angle = np.degrees(np.arccos(np.clip(cosine / norm, 0.0, 1.0)))
     return np.where(lines.defined, angle, undefined)
+
+
+# The smoothness of a step of a load path: equations 4 and 5 of the paper.
+
+
+_EPSILON = 0.1
+"""Coefficient of a property that is 0, an arbitrary constant of the paper. Its two others, the
+amplification k and eta, are 1."""
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """Criterion for a good step of a load path.
+
+    Attributes
+    ----------
+    turn : float, degrees
+        Limit of the angle alpha between one step and the next.
+    misalignment : float, degrees
+        Limit of the angle beta between a step and the stress.
+    distance : float, mm
+        Limit of the length d of a step.
+    """
+
+    turn: float = 75.0
+    misalignment: float = 60.0
+    distance: float = 3.0
+
+    def __call__(self, turn: ArrayLike, misalignment: ArrayLike, distance: ArrayLike) -> FloatArray:
+        """Smoothness of steps, the smaller the better: equation 5, the product over all properties.
+
+        Each property contributes its coefficient (equation 4): 0.1 at 0, and 1 at the limit.
+
+        Parameters
+        ----------
+        turn, misalignment : arrays, degrees
+        distance : array, mm
+        """
+        return (
+            _coefficient(turn, self.turn)
+            * _coefficient(misalignment, self.misalignment)
+            * _coefficient(distance, self.distance)
+        )
+
+
+def _coefficient(value: ArrayLike, limit: float) -> FloatArray:
+    return np.asarray(value) / limit * (1.0 - _EPSILON) + _EPSILON

@@ -14,7 +14,7 @@ from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.geometry.offsets import ring_from
 from ccfem.geometry.polylines import along_line, subdivide, turning_angles
 from ccfem.geometry.shapes import Region
-from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.layers.layer import LayerStress
 from ccfem.strategies.stress_tracing.band import STEP, Band
 from ccfem.strategies.stress_tracing.counts import places
 from ccfem.strategies.stress_tracing.stress_lines import plane_stress_at, stress_lines
@@ -224,7 +224,7 @@ _TURNING_ROUNDS = 2
 def relaxed(
     lines: FloatArray, band: Band, stress: LayerStress, section: Region, share: FloatArray
 ) -> FloatArray:
-    """Turn the tracks of a band towards the stress.
+    """Turn the tracks of a band towards the stress: (k, n, 2) mm.
 
     Parameters
     ----------
@@ -233,10 +233,6 @@ def relaxed(
     section : shapely (Multi)Polygon, mm
     share : (k, n) array
         Place of the tracks across the band, from left (1) to right (-1).
-
-    Returns
-    -------
-    (k, n, 2) array, mm
     """
     along = np.roll(lines, -1, axis=1) - np.roll(lines, 1, axis=1)
     if not band.closed:

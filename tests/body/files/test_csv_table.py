@@ -10,7 +10,7 @@ import pytest
 from ccfem.base.csv_table import as_text, write_csv
 from ccfem.comparison.files import write_table
 from ccfem.fem.stress_files.stress_file import table_stress
-from ccfem.judging.virtual_testing.force_displacement import read_curve
+from ccfem.judging.virtual_testing.calibration import read_curve
 
 NUMBERS = ("-1.5", "+2", "-1e-300", "0", "-inf", "nan", "1_000")
 FORMULAS = (

@@ -5,8 +5,7 @@ import meshio
 import numpy as np
 import pytest
 import pyvista
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from ccfem.base.errors import InputError
 from ccfem.body.files import read_mesh, whole_file, write_mesh

@@ -2,8 +2,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from ccfem.base.errors import InputError
 from ccfem.base.toml import assignment, from_table, read_toml

@@ -83,7 +83,7 @@ def test_a_reader_that_crashes_is_one_line(monkeypatch, tmp_path, read):
     def crash(*_, **__):
         raise ChildError("the library crashed (SIGSEGV)")
 
-    monkeypatch.setattr("ccfem.body.isolated.limited.in_own_process", crash)
+    monkeypatch.setattr("ccfem.body.isolated.process.in_own_process", crash)
     path = tmp_path / ("a.stl" if read is read_surface else "a.msh")
     path.write_text("$MeshFormat\n")
     with pytest.raises(InputError, match="can be read") as caught:

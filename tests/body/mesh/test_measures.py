@@ -4,7 +4,7 @@ import networkx as nx
 import numpy as np
 import shapely
 
-from ccfem.geometry.measures import connected, signed_areas, signed_volumes
+from ccfem.geometry.facets import connected, signed_areas, signed_volumes
 
 RNG = np.random.default_rng(4)
 

@@ -2,11 +2,10 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from ccfem.body.mesh import TetMesh, box_mesh
-from ccfem.body.mesh.pairing import CROWDED, FOLDED, FREE
+from ccfem.body.mesh.tet_mesh import CROWDED, FOLDED, FREE
 from ccfem.geometry.facets import facet_keys
 
 

@@ -4,8 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from ccfem.base.errors import InputError
 from ccfem.body.files import read_mesh

@@ -6,8 +6,8 @@ import shapely
 
 from ccfem.body.files.surface import Surface
 from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.body.meshing.fidelity import fidelity
-from ccfem.body.meshing.prisms import extrude
+from ccfem.body.meshing.planform import extrude
+from ccfem.body.meshing.volume import fidelity
 
 HEIGHT = 6.0
 

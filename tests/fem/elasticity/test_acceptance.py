@@ -9,8 +9,8 @@ import pytest
 from ccfem.base.errors import SolveError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity import Force, Problem, Support, solve
-from ccfem.fem.elasticity.conditioning import incompressibility
-from ccfem.fem.elasticity.solution import ROUNDING
+from ccfem.fem.elasticity.conjugate_gradient import ROUNDING
+from ccfem.fem.elasticity.plausibility import incompressibility
 from ccfem.fem.elasticity.system import prepare
 from ccfem.fem.materials import isotropic
 

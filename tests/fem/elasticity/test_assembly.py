@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from ccfem.base.tensor import rotate_stiffness, strain_to_voigt
 from ccfem.body.mesh import TetMesh

@@ -14,11 +14,10 @@ from ccfem.body.meshing import extrude
 from ccfem.fem.elasticity import Pressure, Problem, Support, solve
 from ccfem.fem.elasticity.assembly import assemble
 from ccfem.fem.elasticity.load_kinds import BodyForce, Force, Traction
-from ccfem.fem.elasticity.loads import nodal_forces
+from ccfem.fem.elasticity.loads import nodal_forces, strain_forces, volume_forces
 from ccfem.fem.elasticity.plausibility import about_problem
 from ccfem.fem.elasticity.recovery import nodal_stress
 from ccfem.fem.elasticity.support_kinds import PointSupport
-from ccfem.fem.elasticity.volume_loads import strain_forces, volume_forces
 from ccfem.fem.materials import isotropic
 
 ANGLE = np.radians(37.0)

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 
 from ccfem.fem.elasticity.conjugate_gradient import conjugate_gradient
 from ccfem.fem.elasticity.gauss_seidel import GaussSeidel

@@ -15,14 +15,13 @@ from ccfem.body.meshing import extrude
 from ccfem.fem.elasticity import Pressure, Problem, Support, solve
 from ccfem.fem.elasticity.loads import nodal_forces
 from ccfem.fem.elasticity.problem import Bearing
-from ccfem.fem.elasticity.springs import spring_forces
 from ccfem.fem.elasticity.support_kinds import (
     Foundation,
     PointSupport,
     PressingSupport,
     SlidingSupport,
 )
-from ccfem.fem.elasticity.supports import held
+from ccfem.fem.elasticity.supports import held, spring_forces
 from ccfem.fem.materials import isotropic
 
 TURN = np.linalg.qr([[1.0, 2.0, 3.0], [4.0, -1.0, 2.0], [0.5, 1.0, -3.0]])[0]

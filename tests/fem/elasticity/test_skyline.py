@@ -1,11 +1,10 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from ccfem.base.errors import SolveError
-from ccfem.fem.elasticity.skyline import skyline, skyline_operations, skyline_within
+from ccfem.fem.elasticity.direct import skyline, skyline_operations, skyline_within
 
 
 def random_matrix(nodes, block, seed, density=0.2):

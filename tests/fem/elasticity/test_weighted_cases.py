@@ -6,7 +6,7 @@ import pytest
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity import Force, Problem, Support, solve
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.fem.materials import isotropic
 
 

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from ccfem.base.errors import InputError
-from ccfem.fem.plates.mesh import PlaneMesh, Sheet
-from ccfem.fem.plates.raster_mesh import raster_mesh
+from ccfem.fem.plates.mesh import PlaneMesh, Sheet, raster_mesh
 
 
 def test_triangles_have_areas_and_neighbours():

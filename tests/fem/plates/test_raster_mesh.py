@@ -1,12 +1,10 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
 
 from ccfem.base.errors import InputError
-from ccfem.fem.plates.mesh import PlaneMesh, Sheet
-from ccfem.fem.plates.raster_mesh import raster_image, raster_mesh
+from ccfem.fem.plates.mesh import PlaneMesh, Sheet, raster_image, raster_mesh
 
 MASKS = arrays(bool, st.tuples(st.integers(1, 6), st.integers(1, 6))).filter(lambda a: a.any())
 

@@ -1,20 +1,19 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from ccfem.base.errors import InputError
 from ccfem.fem.materials import plane_stress
-from ccfem.fem.plates.raster_mesh import raster_mesh
-from ccfem.fem.plates.solve import PlaneElements
-from ccfem.fem.plates.stiffness import (
+from ccfem.fem.plates.mesh import raster_mesh
+from ccfem.fem.plates.problem import (
     rotate_plane,
     stack_plane,
     strain_in_axes,
     stress_in_axes,
     turned_by,
 )
-from ccfem.fem.topopt.material_axes import harmonics
+from ccfem.fem.plates.solve import PlaneElements
+from ccfem.fem.topopt.design import harmonics
 
 Q = plane_stress(73200.0, 4100.0, 0.33, 2200.0)
 WANG = plane_stress(18300.0, 19800.0, 0.17, 5150.0)

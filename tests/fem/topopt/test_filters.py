@@ -1,9 +1,8 @@
 import numpy as np
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
-from ccfem.fem.topopt.filters import ConeFilter
-from ccfem.fem.topopt.iteration import optimality_criteria
+from ccfem.fem.topopt.parametrisation import ConeFilter
+from ccfem.fem.topopt.simp import optimality_criteria
 
 
 def dense(centres, volumes, radius):

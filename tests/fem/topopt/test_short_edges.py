@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.body.meshing.prisms import extrude
+from ccfem.body.meshing.planform import extrude
 from ccfem.fem.topopt.sheet_part import without_short_edges
 
 WHOLE = shapely.box(0, 0, 40, 20)

@@ -18,7 +18,7 @@ from ccfem.fem.materials import (
 )
 from ccfem.fem.plates import PlaneProblem, raster_mesh, rotate_plane
 from ccfem.fem.topopt import Compliance, Simp, Somp
-from ccfem.fem.topopt.material_axes import harmonics, sheet
+from ccfem.fem.topopt.design import harmonics, sheet
 from ccfem.fem.topopt.somp import OrientedCompliance
 
 FIBRE = plane_stress(50000.0, 4000.0, 0.3, 2500.0)

@@ -10,7 +10,7 @@ from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.fem.materials import isotropic
-from ccfem.judging.evaluation.plane_paths import PlanePaths, plane_paths
+from ccfem.judging.evaluation.layer_paths import PlanePaths, plane_paths
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.planar import Planar

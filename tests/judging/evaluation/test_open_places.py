@@ -5,8 +5,8 @@ import pytest
 import shapely
 
 from ccfem.body.meshing import extrude
+from ccfem.judging.evaluation.layer_paths import plane_paths
 from ccfem.judging.evaluation.open_places import open_places
-from ccfem.judging.evaluation.plane_paths import plane_paths
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.slicers.planar import Planar
 

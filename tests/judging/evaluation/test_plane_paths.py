@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ccfem.judging.evaluation.plane_paths import plane_paths
+from ccfem.judging.evaluation.layer_paths import plane_paths
 
 
 def pieces(paths):

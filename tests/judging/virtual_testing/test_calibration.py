@@ -9,8 +9,13 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity.problem import Force, Problem, Support
 from ccfem.fem.materials import isotropic, transversely_isotropic
-from ccfem.judging.virtual_testing.calibration import Calibration, calibrate, read_calibration
-from ccfem.judging.virtual_testing.force_displacement import Curve, read_curve
+from ccfem.judging.virtual_testing.calibration import (
+    Calibration,
+    Curve,
+    calibrate,
+    read_calibration,
+    read_curve,
+)
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.paths.toolpaths import Toolpaths
 

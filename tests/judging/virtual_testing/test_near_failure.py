@@ -8,7 +8,7 @@ import pytest
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity import Force, Problem, Support, solve
-from ccfem.fem.elasticity.ball import ball_averages, ball_shares
+from ccfem.fem.elasticity.zone import ball_averages, ball_shares
 from ccfem.fem.materials import isotropic
 from ccfem.judging.virtual_testing.failure_laws.interlayer import interlayer
 from ccfem.judging.virtual_testing.near_failure import (
@@ -18,9 +18,8 @@ from ccfem.judging.virtual_testing.near_failure import (
     nearness,
     stretched_index,
 )
-from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.judging.virtual_testing.strand import Limits, Strand
 from ccfem.judging.virtual_testing.strength import matrix_peak
-from ccfem.judging.virtual_testing.strengths import Limits
 from ccfem.slicing.slicers.planar import Planar
 
 NORMAL = np.array([0.0, 0.0, 1.0])

@@ -6,7 +6,7 @@ import pytest
 from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity.problem import Force, Problem, Support, Traction
 from ccfem.fem.elasticity.solve import solve
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.fem.materials import isotropic
 from ccfem.judging.virtual_testing.several_cases import cases_failure, specimens, virtual_tests
 from ccfem.judging.virtual_testing.strand import Strand

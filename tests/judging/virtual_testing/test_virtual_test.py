@@ -5,8 +5,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from ccfem.base.errors import InputError, SolveError
 from ccfem.body.mesh.box import box_mesh
@@ -15,20 +14,17 @@ from ccfem.fem.elasticity.problem import Force, PointForce, Problem, Support
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.materials import isotropic
 from ccfem.judging.virtual_testing import equilibrium as equilibrium_module
-from ccfem.judging.virtual_testing.bars import bars
-from ccfem.judging.virtual_testing.equilibrium import BONDED, MODES, TENSION, equilibrium
+from ccfem.judging.virtual_testing.equilibrium import BONDED, MODES, TENSION, bars, equilibrium
 from ccfem.judging.virtual_testing.specimen import Specimen
-from ccfem.judging.virtual_testing.stiffer import (
+from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.judging.virtual_testing.strands import cut_strands
+from ccfem.judging.virtual_testing.virtual_test import (
     FIRST,
     RESOLUTION,
     SAME,
     SECOND,
     UNDECIDED,
     stiffer,
-)
-from ccfem.judging.virtual_testing.strand import Strand
-from ccfem.judging.virtual_testing.strands import cut_strands
-from ccfem.judging.virtual_testing.virtual_test import (
     virtual_bracket,
     virtual_test,
 )

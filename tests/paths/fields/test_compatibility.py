@@ -5,7 +5,7 @@ import pytest
 
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
-from ccfem.paths.fields.compatibility import incompatible
+from ccfem.paths.fields.tensile import incompatible
 
 
 def plainly(direction, cells, defined, rule, limit):

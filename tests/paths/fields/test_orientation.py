@@ -3,10 +3,9 @@
 import networkx
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
-from ccfem.paths.fields.orientation import orient
+from ccfem.paths.fields.tensile import orient
 
 
 def by_traversal(direction: np.ndarray, pairs: np.ndarray) -> np.ndarray:

@@ -6,10 +6,10 @@ import pytest
 import scipy.sparse as sp
 from scipy.spatial import Delaunay
 
-from ccfem.paths.fields.fill import fill_laplacian, fill_screened
+from ccfem.paths.fields.directed import fill_laplacian, fill_screened
 from ccfem.paths.fields.layer_elements import Surface
-from ccfem.paths.fields.orientation import orient
 from ccfem.paths.fields.scalar import fit_cone, fit_constrained, fit_literal, fit_weighted
+from ccfem.paths.fields.tensile import orient
 
 
 def annulus(inner: float = 5.0, outer: float = 15.0, size: float = 0.7) -> Surface:

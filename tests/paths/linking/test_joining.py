@@ -3,13 +3,16 @@
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from ccfem.geometry.polylines import line_length
-from ccfem.paths.linking.clearance import trim_to_clearance
-from ccfem.paths.linking.conformal import lead_into, parallel_curve
-from ccfem.paths.linking.finishing import close_short_ring, keep_off_border
+from ccfem.paths.linking.finishing import (
+    close_short_ring,
+    keep_off_border,
+    lead_into,
+    parallel_curve,
+    trim_to_clearance,
+)
 from ccfem.paths.linking.joining import Joint, join, link_ends
 
 SQUARE = shapely.box(0.0, 0.0, 20.0, 20.0)

@@ -6,9 +6,9 @@ import shapely
 
 from ccfem.base.errors import InputError
 from ccfem.geometry.dubins import WORDS, curve_points, word_sizes
-from ccfem.geometry.places import INSIDE, OUTSIDE, VOID
 from ccfem.geometry.polylines import runs
 from ccfem.geometry.section_grid import contains, place, place_and_room, section_grid
+from ccfem.geometry.shapes import INSIDE, OUTSIDE, VOID
 from ccfem.paths.linking import single_path
 from ccfem.paths.linking.link_curves import curve_cost
 from ccfem.paths.linking.single_path import LinkedPath, link_tracks

@@ -20,7 +20,7 @@ from ccfem.paths.planning.equal_fibre import (
     plan_to_length,
     plan_to_lengths,
 )
-from ccfem.paths.planning.planned import Planned
+from ccfem.paths.planning.strategy import Planned
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.slicers.planar import Planar
 

@@ -18,7 +18,7 @@ from ccfem.paths.planning.plan import in_even_steps
 from ccfem.paths.planning.unfolding import may_fold, unfolded_paths
 from ccfem.paths.raster.patterns import grid_regions
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.layers.layer import stress_on
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies.grid import Grid
 from ccfem.strategies.mat import Mat

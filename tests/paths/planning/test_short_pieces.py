@@ -2,7 +2,7 @@ import pytest
 
 from ccfem.body.mesh.box import box_mesh
 from ccfem.machine import Machine
-from ccfem.paths.planning.short_pieces import about_short_pieces, short_share
+from ccfem.paths.planning.infill import about_short_pieces, short_share
 from ccfem.slicing.slicers.planar import Planar
 
 

@@ -3,7 +3,7 @@ import pytest
 from scipy import ndimage
 from scipy.spatial.distance import cdist
 
-from ccfem.paths.raster.bands import bands, depth
+from ccfem.paths.raster.bitmap import bands, depth
 from ccfem.paths.raster.patterns import (
     GUIDE,
     INFILL,

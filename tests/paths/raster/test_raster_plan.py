@@ -5,16 +5,14 @@ from functools import cache
 
 import numpy as np
 import pytest
+import section_layer
 import shapely
 from shapely import affinity
 
 from ccfem.base.errors import InputError
-from ccfem.body.meshing import triangulate
 from ccfem.machine import Machine
 from ccfem.paths.raster.patterns import GUIDE
 from ccfem.slicing.layers import LayerStress
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.plane import Plane
 from ccfem.strategies.concentric import Concentric
 from ccfem.strategies.grid import Grid
 from ccfem.strategies.mat import Mat
@@ -44,34 +42,7 @@ SECTIONS = {
 
 @cache
 def layer_of(name):
-    """Triangulated layer of a section, which may have several parts."""
-    points, triangles, loops, start = [], [], [], 0
-    for part in shapely.get_parts(SECTIONS[name]):
-        plane, corners = triangulate(part, 2.0)
-        directed = corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-        sides = np.sort(directed, axis=1)
-        _, index, count = np.unique(sides, axis=0, return_index=True, return_counts=True)
-        following = dict(directed[index[count == 1]].tolist())
-        while following:
-            loop = [next(iter(following))]
-            while loop[-1] in following:
-                loop.append(following.pop(loop[-1]))
-            loops.append(start + np.array(loop[:-1]))
-        points.append(plane)
-        triangles.append(start + corners)
-        start += len(plane)
-    plane, corners = np.concatenate(points), np.concatenate(triangles)
-    return Layer(
-        points=np.column_stack([plane, np.zeros(start)]),
-        triangles=corners,
-        cell=np.zeros(len(corners)),
-        nodes=np.zeros((start, 2)),
-        weights=np.zeros(start),
-        loops=tuple(loops),
-        flat=Plane(np.eye(3), 0.0),
-        index=0,
-        thickness=1.0,
-    )
+    return section_layer.layer_of(SECTIONS[name], 2.0)
 
 
 def pulled(layer, angle=0.0):

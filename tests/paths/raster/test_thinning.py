@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from ccfem.paths.raster.skeleton import segments, skeleton
-from ccfem.paths.raster.thinning import thin
+from ccfem.paths.raster.skeleton import segments, skeleton, thin
 
 ALL = np.ones((3, 3), dtype=bool)
 

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from ccfem.paths.raster.bands import bands
-from ccfem.paths.raster.bitmap import NEIGHBOURS
+from ccfem.paths.raster.bitmap import NEIGHBOURS, bands
 from ccfem.paths.raster.raster_plan import corners, trace
 
 

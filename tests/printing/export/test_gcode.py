@@ -12,7 +12,7 @@ from ccfem.base.toml import from_table
 from ccfem.body.mesh.box import box_mesh
 from ccfem.body.meshing import extrude
 from ccfem.judging.evaluation.indices.manufacture import manufacture_indices, sample_manufacture
-from ccfem.judging.evaluation.plane_paths import plane_paths
+from ccfem.judging.evaluation.layer_paths import plane_paths
 from ccfem.machine import Machine, Process, SpeedTable
 from ccfem.machine.gcode_profile import GcodeProfile
 from ccfem.paths.toolpaths import MATRIX, Toolpaths

@@ -9,7 +9,7 @@ import shapely.affinity
 
 from ccfem.body.mesh import TetMesh, box_mesh
 from ccfem.body.meshing import extrude
-from ccfem.geometry.sections import corners_only
+from ccfem.geometry.shapes import corners_only
 from ccfem.paths.fields.chart import flat_view
 from ccfem.slicing.layers.level_surfaces import level_surfaces
 from ccfem.slicing.slicers import Planar

@@ -8,7 +8,7 @@ from scipy.spatial import KDTree
 
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import box_mesh
-from ccfem.fem.elasticity.part_stress import GivenStress
+from ccfem.fem.elasticity.stress_field import GivenStress
 from ccfem.machine import Machine
 from ccfem.slicing.guidance.height_field import height_field
 from ccfem.slicing.guidance.normal_field import normal_field

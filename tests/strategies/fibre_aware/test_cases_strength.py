@@ -7,13 +7,12 @@ import pytest
 
 from ccfem.base.errors import InputError
 from ccfem.fem.elasticity.solve import solve
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.judging.virtual_testing.equilibrium import equilibrium
 from ccfem.judging.virtual_testing.several_cases import cases_failure, specimens, virtual_tests
-from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.judging.virtual_testing.strand import Limits, Strand
 from ccfem.judging.virtual_testing.strands import cut_strands
 from ccfem.judging.virtual_testing.strength import first_failure
-from ccfem.judging.virtual_testing.strengths import Limits
 from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.body.meshing.prisms import extrude
+from ccfem.body.meshing.planform import extrude
 from ccfem.machine import Machine
 from ccfem.paths.folds import folds_in
 from ccfem.paths.toolpaths import Toolpaths

@@ -5,7 +5,7 @@ import pytest
 
 from ccfem.base.errors import InputError
 from ccfem.fem.elasticity.solve import solve
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.judging.virtual_testing.several_cases import specimens, virtual_tests
 from ccfem.machine import Machine
 from ccfem.paths.planning import plan

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 import shapely
 
 from ccfem.base.errors import InputError
-from ccfem.judging.virtual_testing.bars import bars
+from ccfem.judging.virtual_testing.equilibrium import bars
 from ccfem.judging.virtual_testing.several_cases import specimens
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import Strand

@@ -7,14 +7,12 @@ import pytest
 
 from ccfem.base.errors import InputError
 from ccfem.fem.elasticity.solve import solve
-from ccfem.judging.virtual_testing.bars import bars
-from ccfem.judging.virtual_testing.equilibrium import equilibrium
+from ccfem.judging.virtual_testing.equilibrium import bars, equilibrium
 from ccfem.judging.virtual_testing.near_failure import nearness
 from ccfem.judging.virtual_testing.specimen import Specimen
-from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.judging.virtual_testing.strand import Limits, Strand
 from ccfem.judging.virtual_testing.strands import cut_strands
 from ccfem.judging.virtual_testing.strength import first_failure
-from ccfem.judging.virtual_testing.strengths import Limits
 from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine
 from ccfem.paths.planning.plan import plan_layers

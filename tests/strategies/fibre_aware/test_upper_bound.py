@@ -7,7 +7,7 @@ from benchmarks.studies.strand_losses import along_one_direction, tension_of
 from ccfem.base.errors import InputError
 from ccfem.fem.elasticity.problem import Force, Support
 from ccfem.fem.elasticity.solve import solve
-from ccfem.fem.elasticity.weighted_cases import WeightedCases
+from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine

@@ -2,8 +2,12 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.strategies.stress_tracing.criterion import Criterion
-from ccfem.strategies.stress_tracing.stress_lines import misalignment, plane_stress_at, stress_lines
+from ccfem.strategies.stress_tracing.stress_lines import (
+    Criterion,
+    misalignment,
+    plane_stress_at,
+    stress_lines,
+)
 
 
 def test_smoothness_by_hand():

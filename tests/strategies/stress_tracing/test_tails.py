@@ -7,7 +7,7 @@ import shapely
 from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity import Force, Problem, Support, solve
 from ccfem.fem.materials import isotropic
-from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.layers.layer import stress_on
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies.stress_tracing.band import band, extension
 from ccfem.strategies.stress_tracing.frame import FREE, Frame, Member

@@ -7,8 +7,8 @@ import pytest
 import shapely
 
 from ccfem.body.meshing import triangulate
+from ccfem.geometry.facets import connected
 from ccfem.geometry.isocontours import isocontours
-from ccfem.geometry.measures import connected
 from ccfem.paths.fields.layer_elements import Surface
 from ccfem.strategies.winding import (
     PaperWeights,

@@ -16,8 +16,8 @@ import numpy as np
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError
 from ccfem.body.files.cells import tetrahedra
+from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.patches import match_boundary
-from ccfem.body.mesh.tet_mesh import TetMesh
 
 _KINDS = (
     (r"C3D4|DC3D4", "tetra", 4),

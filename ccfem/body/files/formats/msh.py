@@ -7,10 +7,9 @@ import numpy as np
 from ccfem.base.arrays import IntArray
 from ccfem.base.errors import InputError
 from ccfem.body.files.cells import tetrahedra
-from ccfem.body.isolated.limited import read_isolated
-from ccfem.body.isolated.process import ChildError
+from ccfem.body.isolated.process import ChildError, read_isolated
+from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.patches import with_groups
-from ccfem.body.mesh.tet_mesh import TetMesh
 
 
 def read(path: Path) -> TetMesh:

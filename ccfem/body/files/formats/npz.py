@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ccfem.base.errors import InputError, shown
-from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.mesh import TetMesh
 
 _PATCH = "patch:"
 _SMALL, _PACKED = 10_000_000, 200

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ccfem.base.errors import InputError
-from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.body.mesh import TetMesh
 
 
 def read(path: Path) -> TetMesh:

@@ -13,10 +13,9 @@ from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError
 from ccfem.body.files.cells import tetrahedra
 from ccfem.body.files.vtk_xml import write_vtk_xml
-from ccfem.body.isolated.limited import read_isolated
-from ccfem.body.isolated.process import ChildError
+from ccfem.body.isolated.process import ChildError, read_isolated
+from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.patches import with_groups
-from ccfem.body.mesh.tet_mesh import TetMesh
 
 _PATCH = "patch:"
 _TYPES = {

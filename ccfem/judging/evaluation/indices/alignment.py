@@ -8,11 +8,9 @@ from ccfem.base.arrays import FloatArray, read_only
 from ccfem.base.tensor import in_plane, largest_in_plane
 from ccfem.geometry.locate import locate
 from ccfem.geometry.polylines import sample_midpoints
-from ccfem.judging.evaluation.column import Column
-from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
-from ccfem.judging.evaluation.plane_paths import PlanePaths
+from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, PlanePaths
 from ccfem.judging.evaluation.sensitivity import acute
-from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.layers.layer import LayerStress
 
 PLACE = 40
 """Of these columns in tables: the smaller, the farther to the left."""

@@ -6,12 +6,9 @@ import numpy as np
 import shapely
 
 from ccfem.base.arrays import FloatArray
-from ccfem.geometry.places import INSIDE, TOLERANCE, section_places
 from ccfem.geometry.polylines import sample_midpoints
-from ccfem.geometry.shapes import Region, Shapes
-from ccfem.judging.evaluation.column import Column
-from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
-from ccfem.judging.evaluation.plane_paths import PlanePaths
+from ccfem.geometry.shapes import INSIDE, TOLERANCE, Region, Shapes, section_places
+from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, PlanePaths
 
 PLACE = 100
 """Of these columns in tables: the smaller, the farther to the left."""

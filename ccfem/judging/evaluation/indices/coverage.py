@@ -9,10 +9,8 @@ from scipy.ndimage import binary_opening
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.tensor import in_plane
 from ccfem.geometry.polylines import starts_segment, subdivide
-from ccfem.judging.evaluation.column import Column
-from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
-from ccfem.judging.evaluation.plane_paths import PlanePaths
-from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, PlanePaths
+from ccfem.slicing.layers.layer import LayerStress
 
 PLACE = 90
 """Of these columns in tables: the smaller, the farther to the left."""

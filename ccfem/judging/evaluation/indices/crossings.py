@@ -6,9 +6,7 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray
 from ccfem.geometry.intersections import find_crossings
-from ccfem.judging.evaluation.column import Column
-from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
-from ccfem.judging.evaluation.plane_paths import PlanePaths
+from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, PlanePaths
 
 PLACE = 130
 """Of these columns in tables: the smaller, the farther to the left."""

@@ -6,11 +6,8 @@ import numpy as np
 import shapely
 
 from ccfem.base.arrays import FloatArray, read_only
-from ccfem.geometry.curvature_samples import curvature_samples
-from ccfem.geometry.polylines import arc_lengths, inner_points, turning_angles
-from ccfem.judging.evaluation.column import Column
-from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
-from ccfem.judging.evaluation.plane_paths import PlanePaths
+from ccfem.geometry.polylines import arc_lengths, curvature_samples, inner_points, turning_angles
+from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, PlanePaths
 from ccfem.machine.machine import Machine
 
 PLACE = 30

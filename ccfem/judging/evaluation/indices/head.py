@@ -6,11 +6,9 @@ import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray, read_only
 from ccfem.geometry.cones import earlier_in_cones
-from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
+from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.geometry.polylines import merge_repeated, sample_midpoints
-from ccfem.judging.evaluation.column import Column
-from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
-from ccfem.judging.evaluation.printed_stack import COARSE, Printed
+from ccfem.judging.evaluation.layer_paths import COARSE, Basis, Column, LayerPaths, Printed
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer

@@ -5,10 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
-from ccfem.geometry.places import INSIDE, OUTSIDE, VOID, cut_at_section
-from ccfem.judging.evaluation.column import Column
-from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
-from ccfem.judging.evaluation.plane_paths import PlanePaths
+from ccfem.geometry.shapes import INSIDE, OUTSIDE, VOID, cut_at_section
+from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, PlanePaths
 
 PLACE = 120
 """Of these columns in tables: the smaller, the farther to the left."""

@@ -6,12 +6,9 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray
 from ccfem.geometry.polylines import arc_lengths
-from ccfem.judging.evaluation.column import Column
-from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
-from ccfem.judging.evaluation.plane_paths import PlanePaths
+from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, PlanePaths
 from ccfem.machine.machine import Machine
-from ccfem.paths.linking.print_order import nearest_end_order
-from ccfem.paths.linking.print_speed import step_speeds
+from ccfem.paths.linking.print_order import nearest_end_order, step_speeds
 from ccfem.paths.toolpaths import FIBRE, TRAVEL, Toolpaths
 
 PLACE = 10

@@ -21,15 +21,13 @@ from ccfem.base.arrays import FloatArray, read_only
 from ccfem.base.checks import check_known
 from ccfem.base.errors import InputError
 from ccfem.base.tensor import in_plane, strongest, strongest_in_plane
-from ccfem.geometry.places import INSIDE, section_places
 from ccfem.geometry.polylines import starts_segment, subdivide
-from ccfem.judging.evaluation.column import Column
+from ccfem.geometry.shapes import INSIDE, section_places
 from ccfem.judging.evaluation.indices.alignment import AlignmentSamples, sample_alignment
-from ccfem.judging.evaluation.layer_paths import Basis
-from ccfem.judging.evaluation.plane_paths import PlanePaths, plane_paths, pool
+from ccfem.judging.evaluation.layer_paths import Basis, Column, PlanePaths, plane_paths, pool
 from ccfem.judging.evaluation.sensitivity import acute
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer_stress import LayerStress
+from ccfem.slicing.layers.layer import LayerStress
 
 PLACE = 50
 """Of these columns in tables: the smaller, the farther to the left."""

@@ -7,12 +7,9 @@ import shapely
 
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.geometry.beads import beads
-from ccfem.geometry.places import INSIDE, VOID, section_places
 from ccfem.geometry.polylines import sample_midpoints
-from ccfem.geometry.shapes import Region
-from ccfem.judging.evaluation.column import Column
-from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
-from ccfem.judging.evaluation.plane_paths import PlanePaths
+from ccfem.geometry.shapes import INSIDE, VOID, Region, section_places
+from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, PlanePaths
 from ccfem.judging.virtual_testing.strand_room import width_inside
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer

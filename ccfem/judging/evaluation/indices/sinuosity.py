@@ -7,9 +7,7 @@ import shapely
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.polylines import lengths
-from ccfem.judging.evaluation.column import Column
-from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
-from ccfem.judging.evaluation.plane_paths import PlanePaths
+from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, PlanePaths
 
 PLACE = 20
 """Of these columns in tables: the smaller, the farther to the left."""

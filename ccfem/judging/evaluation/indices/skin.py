@@ -5,13 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray, read_only
-from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.geometry.locate import locate
-from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
-from ccfem.geometry.places import INSIDE, section_places
+from ccfem.body.mesh import TetMesh
+from ccfem.geometry.locate import locate, nearest_on_triangles
 from ccfem.geometry.polylines import merge_repeated, sample_midpoints
-from ccfem.judging.evaluation.column import Column
-from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
+from ccfem.geometry.shapes import INSIDE, section_places
+from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer

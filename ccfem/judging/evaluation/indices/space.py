@@ -6,23 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ccfem.base.arrays import BoolArray, FloatArray, IntArray, read_only
-from ccfem.fem.elasticity.part_stress import PartStress
-from ccfem.geometry.locate import locate
-from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
+from ccfem.base.arrays import FloatArray, IntArray, read_only
+from ccfem.fem.elasticity import PartStress
+from ccfem.geometry.locate import locate, nearest_on_triangles
 from ccfem.geometry.polylines import (
-    inner_points,
-    lengths,
+    curvature_samples,
     merge_repeated,
-    resample,
     sample_midpoints,
-    turning_angles,
 )
-from ccfem.judging.evaluation.column import Column
-from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
+from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.principal_lines.strongest import strongest_stress
+from ccfem.slicing.principal_lines.critical import strongest_stress
 
 PLACE = 140
 """Of these columns in tables: the smaller, the farther to the left."""
@@ -150,7 +145,7 @@ def sample_space(fibre: Toolpaths, layer: Layer, stress: PartStress, step: float
         length,
         angle,
         size,
-        _even_curvature(points, offsets, fibre.closed, step),
+        curvature_samples(points, offsets, fibre.closed, step),
         fibre.lengths,
         _linked(fibre, layer, stress.held_or_loaded, _REACH * step),
         layer.areas,
@@ -172,21 +167,6 @@ def _on_layer(layer: Layer, points: FloatArray) -> tuple[IntArray, FloatArray]:
         nearest = nearest_on_triangles(layer.points, layer.triangles, points[left])
         triangle[left], weights[left] = nearest.triangle, nearest.weights
     return triangle, weights
-
-
-def _even_curvature(
-    points: FloatArray, offsets: IntArray, closed: BoolArray, step: float
-) -> FloatArray:
-    """Curvature at points equally far apart."""
-    if not len(points):
-        return np.zeros(0)
-    size = lengths(points, offsets)
-    even, ends = resample(points, offsets, step)
-    angle = turning_angles(even, ends, closed)
-    parts = np.diff(ends)
-    apart = np.repeat(size / np.maximum(parts - 1, 1), parts)
-    inner = inner_points(ends, closed) & (apart > 0.0)
-    return np.asarray(angle[inner] / apart[inner])
 
 
 def _linked(fibre: Toolpaths, layer: Layer, patches: Sequence[str], reach: float) -> FloatArray:

@@ -7,11 +7,9 @@ import numpy as np
 from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray
-from ccfem.geometry.buckets import Buckets, bucket
+from ccfem.geometry.locate import Buckets, bucket
 from ccfem.geometry.polylines import arc_lengths, sample_midpoints, starts_segment, subdivide
-from ccfem.judging.evaluation.column import Column
-from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
-from ccfem.judging.evaluation.plane_paths import PlanePaths
+from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, PlanePaths
 from ccfem.machine.machine import Machine
 
 PLACE = 70

@@ -8,9 +8,8 @@ from ccfem.base.arrays import FloatArray
 from ccfem.base.checks import check_known
 from ccfem.base.tensor import strongest
 from ccfem.fem.materials import Material
-from ccfem.judging.evaluation.column import Column
 from ccfem.judging.evaluation.indices.alignment import AlignmentSamples
-from ccfem.judging.evaluation.layer_paths import Basis
+from ccfem.judging.evaluation.layer_paths import Basis, Column
 from ccfem.judging.evaluation.sensitivity import OffAxis, acute, plane_compliance
 
 PLACE = 60

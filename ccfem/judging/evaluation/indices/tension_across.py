@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ccfem.base.arrays import FloatArray, read_only
-from ccfem.fem.elasticity.part_stress import PartStress
-from ccfem.judging.evaluation.column import Column
-from ccfem.judging.evaluation.layer_paths import Basis, LayerPaths
+from ccfem.fem.elasticity import PartStress
+from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths
 from ccfem.slicing.layers.layer import Layer
 
 PLACE = 150

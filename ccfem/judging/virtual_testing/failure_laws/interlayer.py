@@ -14,15 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ccfem.base.arrays import FloatArray, freeze
+from ccfem.base.arrays import FloatArray, IntArray, freeze
 from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
-from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.fem.elasticity.ball import BALL, ball_averages
-from ccfem.fem.elasticity.stress_field import StressField
-from ccfem.fem.elasticity.zone import ZONE, distance_from_patches
+from ccfem.body.mesh import TetMesh
+from ccfem.fem.elasticity import StressField
+from ccfem.fem.elasticity.zone import BALL, ZONE, ball_averages, distance_from_patches
 from ccfem.fem.materials import Material
-from ccfem.judging.virtual_testing.strengths import Failure, Limits
+from ccfem.judging.virtual_testing.strand import Failure, Limits
 from ccfem.judging.virtual_testing.virtual_test import VirtualTest
 from ccfem.slicing.layers import Layer
 
@@ -129,14 +128,7 @@ def interlayer(
             "bond between layers cannot be judged: the part is too small for this index"
         )
     # Singular stress at corners depends on the mesh; its mean over a ball does not.
-    every = np.arange(len(centroid))
-    tensor = ball_averages(centroid, stress.stress.reshape(-1, 9), mesh.volumes, every, radius)
-    tensor = tensor.reshape(-1, 3, 3)
-    normal = layer_normals(layers, centroid)
-    # Traction on the layer, across and along it; pressing does not open the bond.
-    traction = np.einsum("mij,mj->mi", tensor, normal)
-    opening = np.einsum("mi,mi->m", traction, normal)
-    sliding = np.linalg.norm(traction - opening[:, None] * normal, axis=1)
+    opening, sliding, tensor = layer_traction(stress, layers, np.arange(len(centroid)), radius)
     shear = tensile if shear is None else shear
     # Quadratic criterion: 1 at failure.
     index = np.hypot(np.maximum(opening, 0.0) / tensile, sliding / shear)
@@ -151,6 +143,29 @@ def interlayer(
         zone_indices=zones,
         note=_about_ball(mesh, radius),
     )
+
+
+def layer_traction(
+    stress: StressField, layers: Sequence[Layer], cells: IntArray, radius: float = BALL
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Traction of the averaged stress on the layers at the middle of some cells (k,).
+
+    Returns
+    -------
+    opening, sliding : (k,) arrays, MPa
+        Across the layers, positive where it opens them, and the size of that along them.
+    tensor : (k, 3, 3) array, MPa
+        The averaged stress.
+    """
+    mesh = stress.mesh
+    centre = mesh.points[mesh.corners].mean(axis=1)
+    values = stress.stress.reshape(-1, 9)
+    tensor = ball_averages(centre, values, mesh.volumes, cells, radius).reshape(-1, 3, 3)
+    normal = layer_normals(layers, centre[cells])
+    traction = np.einsum("mij,mj->mi", tensor, normal)
+    opening = np.einsum("mi,mi->m", traction, normal)
+    sliding = np.linalg.norm(traction - opening[:, None] * normal, axis=1)
+    return opening, sliding, tensor
 
 
 def layer_normals(layers: Sequence[Layer], places: FloatArray) -> FloatArray:

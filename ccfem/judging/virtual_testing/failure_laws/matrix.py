@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
-from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.elasticity import StressField
 from ccfem.fem.elasticity.zone import ZONE, averaged_mises
-from ccfem.judging.virtual_testing.strengths import Failure, Limits
+from ccfem.judging.virtual_testing.strand import Failure, Limits
 from ccfem.judging.virtual_testing.virtual_test import VirtualTest
 from ccfem.slicing.layers import Layer
 

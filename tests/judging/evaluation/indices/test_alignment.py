@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ccfem.judging.evaluation.indices.alignment import alignment_indices, sample_alignment
-from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.layers.layer import stress_on
 
 
 def indices(part, *lines):

@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from ccfem.judging.evaluation.indices.coverage import coverage_indices, sample_coverage
-from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.layers.layer import stress_on
 
 
 def indices(part, *lines, width=1.0):

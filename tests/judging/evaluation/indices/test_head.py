@@ -5,11 +5,10 @@ import pytest
 
 from ccfem.base.errors import InputError
 from ccfem.judging.evaluation.indices.head import head_indices, sample_head
-from ccfem.judging.evaluation.printed_stack import printed
+from ccfem.judging.evaluation.layer_paths import printed
 from ccfem.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.plane import Plane, plane_frame
+from ccfem.slicing.layers.layer import Layer, Plane, plane_frame
 
 UP = (0.0, 0.0, 1.0)
 

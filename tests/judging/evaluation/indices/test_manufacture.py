@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ccfem.judging.evaluation.indices.manufacture import manufacture_indices, sample_manufacture
-from ccfem.judging.evaluation.plane_paths import plane_paths
+from ccfem.judging.evaluation.layer_paths import plane_paths
 from ccfem.machine import Machine
 from ccfem.paths.toolpaths import MATRIX, TRAVEL, Toolpaths
 

@@ -14,7 +14,7 @@ from ccfem.judging.evaluation.indices.matching import (
     matching_indices,
     matching_rate,
 )
-from ccfem.slicing.layers.layer_stress import stress_on
+from ccfem.slicing.layers.layer import stress_on
 
 
 def rate(part, paths, reading="path", **options):

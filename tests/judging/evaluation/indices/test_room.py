@@ -6,7 +6,7 @@ import pytest
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.box import box_mesh
 from ccfem.judging.evaluation.indices.room import room_indices, sample_room
-from ccfem.judging.evaluation.printable import why_not
+from ccfem.judging.evaluation.strand_rules import why_not
 from ccfem.machine import Limits, Machine
 
 MACHINE = Machine(fibre_width=1.0, fibre_height=0.1, filament_area=0.1)
