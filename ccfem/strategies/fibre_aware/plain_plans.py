@@ -58,7 +58,9 @@ class StraightRows:
         rows = shapely.linestrings(np.stack([middle - reach * along, middle + reach * along], 1))
         # Rows on an edge must not be lost by rounding.
         inside = shapely.intersection(rows, shapely.buffer(room, 1e-6 * width))
-        lines = [_drawn_to_border(line, section, width) for line in open_lines(inside)]
+        allowed = shapely.buffer(section, 1e-3 * width)
+        shapely.prepare((section, allowed))
+        lines = [_drawn_to_border(line, section, allowed, width) for line in open_lines(inside)]
         return long_enough(Toolpaths.from_plane(lines, layer), None, machine)
 
 
@@ -78,14 +80,16 @@ def _longer_side(section: Region) -> FloatArray:
     return longest
 
 
-def _drawn_to_border(line: FloatArray, section: Region, width: float) -> FloatArray:
-    """Row (2, 2) with its ends drawn out to the border where the strand stays inside there."""
+def _drawn_to_border(
+    line: FloatArray, section: Region, allowed: Region, width: float
+) -> FloatArray:
+    """Row (2, 2), its ends drawn out to the border where all its width is allowed there."""
     step = (line[-1] - line[0]) / np.linalg.norm(line[-1] - line[0])
     for end, way in ((0, -step), (-1, step)):
         ray = shapely.linestrings([line[end], line[end] + width * way])
         out = shapely.intersection(ray, section)
         whole = shapely.buffer(out, 0.5 * width, cap_style="flat")
-        if out.length and shapely.covers(shapely.buffer(section, 1e-3 * width), whole):
+        if out.length and shapely.covers(allowed, whole):
             line = line.copy()
             line[end] = line[end] + out.length * way
     return line
