@@ -43,6 +43,9 @@ _CLEARANCE, _INSET = 0.9, 0.48
 _STEP = 0.25
 """Longest step of such a curve, in widths."""
 
+_JAG, _SHARP = 0.2, 0.6
+"""A jag: a corner by more than this angle, radians, at a piece below this length, in widths."""
+
 _ROUNDS = 4
 """Number of times that the pieces of a strand are cut again."""
 
@@ -98,6 +101,9 @@ def unfolded_paths(
 ) -> Toolpaths:
     """Fibre of one layer, led round its folds or cut there; on a curved layer it is only cut.
 
+    Points of jags are left out first: where levels cross the corner of a triangle, or rings that of
+    a section, strands of smooth fields waver by hundredths of a width.
+
     Parameters
     ----------
     layer : Layer or None
@@ -107,6 +113,7 @@ def unfolded_paths(
     """
     least, radius = machine.shortest_strand if least is None else least, machine.minimum_radius
     radius *= _MARGIN if layer is not None else 1.0
+    paths = _without_jags(paths, machine.fibre_width)
     bends = folds(paths.points, paths.offsets, paths.closed, radius)
     folded = (bends.counts > 0) & (paths.kind == FIBRE)
     if not folded.any():
@@ -146,6 +153,31 @@ def unfolded_paths(
         closed=paths.closed[source] & [is_closed(line[:, :3]) for line in columns],
         link=np.concatenate(links),
     )
+
+
+def _without_jags(paths: Toolpaths, width: float) -> Toolpaths:
+    """Leave out points at sharp corners beside short pieces, until there are none; ends stay."""
+    while len(paths.points) > 2:
+        step = np.diff(paths.points, axis=0)
+        length = np.linalg.norm(step, axis=1)
+        unit = step / np.maximum(length, 1e-300)[:, None]
+        sharp = np.einsum("ij,ij->i", unit[1:], unit[:-1]) < np.cos(_SHARP)
+        short = np.minimum(length[1:], length[:-1]) < _JAG * width
+        jag = np.zeros(len(paths.points), dtype=bool)
+        jag[1:-1] = sharp & short
+        jag[paths.offsets[:-1]] = jag[paths.offsets[1:] - 1] = False
+        jag[1:] &= ~jag[:-1]  # of two beside each other the first one
+        if not jag.any():
+            break
+        before = np.concatenate([[0], np.cumsum(~jag)])
+        paths = replace(
+            paths,
+            points=paths.points[~jag],
+            normals=paths.normals[~jag],
+            offsets=before[paths.offsets],
+            link=paths.link[~jag],
+        )
+    return paths
 
 
 def without_folds(paths: Toolpaths, layers: Sequence[Layer], machine: Machine) -> Toolpaths:

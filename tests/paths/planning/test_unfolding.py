@@ -179,3 +179,17 @@ def test_no_curve_is_looked_for_in_a_meander(monkeypatch):
     assert not freed(meander).lines
     with pytest.raises(AssertionError, match="a curve was looked for"):
         freed(corner(120))
+
+
+def test_jags_of_hundredths_of_a_width_are_left_out():
+    """A straight line that wavers by .05 mm is straight again; its corners and ends stay."""
+    line = np.array(
+        [[0.0, 0.0], [30.0, 0.0], [30.03, 0.05], [30.06, -0.02], [30.2, 0.0], [60.0, 0.0]]
+    )
+    corner_after = np.vstack([line, [[60.0, 50.0]]])
+    (layer,) = Planar(count=1).cut(box_mesh((80.0, 80.0, 2.0), (4, 4, 1)))
+    (straight,) = unfolded_paths(Toolpaths.from_plane([corner_after + 5.0], layer), layer, MACHINE)
+    off = np.abs(straight[:, 1] - 5.0)[straight[:, 0] < 64.9]
+    assert off.max() < 0.051
+    assert line_length(straight) == pytest.approx(110.0, abs=0.01)
+    np.testing.assert_allclose(straight[[0, -2, -1], :2], [[5.0, 5.0], [65.0, 5.0], [65.0, 55.0]])
