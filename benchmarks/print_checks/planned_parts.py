@@ -4,9 +4,10 @@
 
 A row a plan; what is in FOLDER already is not planned again. Parts are cases, or the part files of
 `docs/how_to/your_part.md`; `LAYERS` says how many layers each has by default. The columns: what
-ccfem says of printing it; strands, minutes of laying and grams of the table and of the file;
-strands of the file that are none of the written paths; strands that break each rule. A row is
-*wrong* where the table says other than the file, or where ccfem calls printable what breaks a rule.
+ccfem says of printing it; strands, minutes of the fibre tool and grams of fibre, of the table and
+of the file; strands of the file that are none of the written paths; strands that break each rule.
+A row is *wrong* where the table says other than the file, or where ccfem calls printable what
+breaks a rule.
 """
 
 import re
@@ -70,14 +71,14 @@ def planned(plan: str, folder: Path) -> Folder:
 
 def _row(plan: str, folder: Folder) -> tuple[str, bool]:
     """Row of a plan, and whether it is wrong."""
-    said, done = folder.table(), folder.file()
+    said, done, (_, mass) = folder.table(), folder.file(), folder.head()
     count = tally(folder.printed, folder.rules)
     other = len(folder.printed) - len(folder.pairs())
     alike = all(good for *_, good in agreement(folder))
     printable = bool(folder.verdict["printable"])
     row = (
         f"| {plan} | {'yes' if printable else 'no'} | {said.strands:.0f}/{done.strands} "
-        f"| {said.seconds / 60:.1f}/{done.seconds / 60:.1f} | {said.mass:.2f}/{done.mass:.2f} "
+        f"| {said.seconds / 60:.1f}/{folder.fibre_tool() / 60:.1f} | {said.mass:.2f}/{mass:.2f} "
         f"| {other} | {' | '.join(str(count[rule]) for rule in RULES)} |"
     )
     return row, not alike or (printable and bool(count))

@@ -278,7 +278,11 @@ def figures(strands: Sequence[Measured], rules: Rules) -> str:
 
 
 def agreement(folder: Folder) -> list[tuple[str, str, bool]]:
-    """Rows of what table, record, page and file say: name, numbers, whether they agree."""
+    """Rows of what table, record, page and file say: name, numbers, whether they agree.
+
+    The table's time is all that of the fibre tool, with feeds and the strand beside the part; its
+    mass is all the fibre that the print takes, as in the head of the file.
+    """
     file, (whole, used) = folder.file(), folder.head()
     rows = []
     for name in ("table", "record", "page"):
@@ -288,8 +292,8 @@ def agreement(folder: Folder) -> list[tuple[str, str, bool]]:
             for a, b, most in (
                 (said.strands, file.strands, 0.0),
                 (said.cuts, file.cuts, 0.0),
-                (said.seconds, file.seconds, 0.02),
-                (said.mass, file.mass, 0.01),
+                (said.seconds, folder.fibre_tool(), 0.02),
+                (said.mass, used, 0.01),
             )
         )
         rows.append((name, _numbers(said), good))
