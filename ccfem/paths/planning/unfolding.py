@@ -113,7 +113,7 @@ def unfolded_paths(
     """
     least, radius = machine.shortest_strand if least is None else least, machine.minimum_radius
     radius *= _MARGIN if layer is not None else 1.0
-    paths = _without_jags(paths, machine.fibre_width)
+    paths = _without_jags(paths, machine.fibre_width, least)
     bends = folds(paths.points, paths.offsets, paths.closed, radius)
     folded = (bends.counts > 0) & (paths.kind == FIBRE)
     if not folded.any():
@@ -155,8 +155,11 @@ def unfolded_paths(
     )
 
 
-def _without_jags(paths: Toolpaths, width: float) -> Toolpaths:
-    """Leave out points at sharp corners beside short pieces, until there are none; ends stay."""
+def _without_jags(paths: Toolpaths, width: float, least: float) -> Toolpaths:
+    """Leave out points at sharp corners beside short pieces, until there are none.
+
+    Ends stay, and so do the jags of paths that would become shorter than the least length, mm.
+    """
     while len(paths.points) > 2:
         step = np.diff(paths.points, axis=0)
         length = np.linalg.norm(step, axis=1)
@@ -167,6 +170,12 @@ def _without_jags(paths: Toolpaths, width: float) -> Toolpaths:
         jag[1:-1] = sharp & short
         jag[paths.offsets[:-1]] = jag[paths.offsets[1:] - 1] = False
         jag[1:] &= ~jag[:-1]  # of two beside each other the first one
+        at = np.flatnonzero(jag)
+        path = np.searchsorted(paths.offsets, at, side="right") - 1
+        across = np.linalg.norm(paths.points[at + 1] - paths.points[at - 1], axis=1)
+        lost = np.bincount(path, length[at - 1] + length[at] - across, len(paths))
+        too_short = (paths.lengths >= least) & (paths.lengths - lost < least)
+        jag[at[too_short[path]]] = False
         if not jag.any():
             break
         before = np.concatenate([[0], np.cumsum(~jag)])
@@ -314,7 +323,7 @@ class _Rounding:
     ) -> _Marked | None:
         """Line with a curve in place of the fold between two places; None without room for it."""
         along = along_line(line)
-        curves = self._curves(line, along, start, stop)
+        curves = self._possible_curves(line, along, start, stop)
         curves = [curve for curve in curves if self._clear(k, line, along, curve)]
         # What folds is told for all curves at once, each with a window of the line on both sides.
         near = [_replaced(line, along, curve, self.window) for curve in curves]
@@ -330,7 +339,7 @@ class _Rounding:
         whole[-1] = False
         return _replaced(line, along, curve, np.inf), whole
 
-    def _curves(
+    def _possible_curves(
         self, line: FloatArray, along: FloatArray, start: float, stop: float
     ) -> list[_Curve]:
         """Curves, no detours, in place of the part of a line between two places, best first."""

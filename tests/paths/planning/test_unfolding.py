@@ -193,3 +193,11 @@ def test_jags_of_hundredths_of_a_width_are_left_out():
     assert off.max() < 0.051
     assert line_length(straight) == pytest.approx(110.0, abs=0.01)
     np.testing.assert_allclose(straight[[0, -2, -1], :2], [[5.0, 5.0], [65.0, 5.0], [65.0, 55.0]])
+
+
+def test_jags_stay_where_a_strand_would_become_too_short_for_the_cutter():
+    line = np.array([[0.0, 0.0], [20.0, 0.0], [20.05, 0.04], [20.1, 0.0], [41.9, 0.0]])
+    line[-1, 0] -= line_length(line) - MACHINE.minimum_length
+    (layer,) = Planar(count=1).cut(box_mesh((80.0, 80.0, 2.0), (4, 4, 1)))
+    (kept,) = unfolded_paths(Toolpaths.from_plane([line + 5.0], layer), layer, MACHINE)
+    assert line_length(kept) == pytest.approx(MACHINE.minimum_length, abs=1e-9)
