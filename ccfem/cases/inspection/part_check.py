@@ -452,8 +452,8 @@ def _no_room(case: Case) -> list[str]:
     most = side * longest / width
     if least > most:
         return [
-            f"machine.minimum_length asks for strands of {least:g} mm: no layer has room for more "
-            f"than {most:.4g} mm of {width:g} mm width; are all lengths in mm?"
+            f"machine.minimum_length and held_length ask for strands of {least:g} mm: no layer has "
+            f"room for more than {most:.4g} mm of {width:g} mm width; are all lengths in mm?"
         ]
     return []
 

@@ -177,7 +177,7 @@ def test_the_picture_shows_patches_loads_and_supports():
         ({"fibre_width": 50.0}, "machine.fibre_width = 50 mm is wider than the part, 20 mm"),
         (
             {"minimum_length": 1e4},
-            "machine.minimum_length asks for strands of 10000 mm: no layer has room",
+            "machine.minimum_length and held_length ask for strands of 10000 mm: no layer has",
         ),
         ({"minimum_length": 42.0}, None),
     ],
