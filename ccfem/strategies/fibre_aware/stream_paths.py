@@ -139,7 +139,7 @@ class Extraction:
         def round_holes(number: int, phase: int) -> list[FloatArray]:
             number = source[number]
             if (number, phase) not in led:
-                tried, first = range(1, LEVELS + 1), kind[number]
+                tried, first = range(1, LEVELS + 1), source[kind[number]]
                 if number != first:  # as many as in the layer that stands for all of its kind
                     round_holes(first, phase)
                     tried = range(levels[first, phase], levels[first, phase] + 1)

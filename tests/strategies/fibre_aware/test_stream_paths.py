@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from benchmarks.studies.strand_losses import share_inside
+from ccfem.body.mesh import box_mesh
 from ccfem.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.slicers import Planar
 from ccfem.strategies.fibre_aware.smeared import SmearedPart
 from ccfem.strategies.fibre_aware.spline_grid import SplineGrid
 from ccfem.strategies.fibre_aware.stream_paths import Extraction, refined
@@ -94,3 +96,18 @@ def test_layers_of_one_section_are_drawn_once_for_each_field(two_pulls, monkeypa
         heights = paths.on_layer(k).points @ layers[k].plane.frame[2]
         np.testing.assert_allclose(heights, layers[k].plane.height, atol=1e-9)
     assert len(of[1]) < len(of[2])
+
+
+def test_sections_that_grow_by_less_than_half_a_width_are_drawn_each(monkeypatch):
+    """Three layers of 24 x 24 mm below three of 24 x 24.2 mm: one kind, of two sections."""
+    parts = [box_mesh((24.0, side, 6.0), (4, 4, 2)) for side in (24.0, 24.2)]
+    lower, upper = (Planar(count=6).cut(part) for part in parts)
+    layers = (*lower[:3], *upper[3:])
+    points = refined(upper[0])[0]
+    grid = SplineGrid.over(points, points.mean(axis=0), np.eye(2), 2.0)
+    rising = grid.centre[1] + grid.size * (grid.used[:, 1] + 0.5)
+    machine = Machine(minimum_length=20.0)
+    extraction = Extraction((rising,), grid, parts[1], (), machine, 1, 0.5, 10.0)
+    monkeypatch.setattr("ccfem.strategies.fibre_aware.stream_paths._REACHES", (0.0,))
+    ((paths,),) = extraction.candidates(layers, np.zeros(6, dtype=int), [1000.0])
+    assert set(paths.layer) == {layer.index for layer in layers}
