@@ -45,6 +45,8 @@ COLUMNS: tuple[Column, ...] = tuple(
 
 _ROUNDING = 1e-3
 """Rounding, mm, of coordinates in path files."""
+_DOWN = 0.01
+"""Least cosine to the way down of a face that looks down: upright walls are bent by rounding."""
 
 
 @dataclass(frozen=True)
@@ -211,7 +213,7 @@ def _below(layer: Layer, layers: Sequence[Layer], mesh: TetMesh, machine: Machin
     """Find what the fibre of a flat layer lies on: the flat layer under it, or the matrix between.
 
     None for the lowest layer, and for curved ones. The matrix is cut only where the layer reaches
-    beyond the one under it.
+    beyond the one under it, or the part widens between the matrix and the layer.
     """
     if layer.flat is None:
         return None
@@ -221,10 +223,20 @@ def _below(layer: Layer, layers: Sequence[Layer], mesh: TetMesh, machine: Machin
     level = height - 0.5 * (machine.strand_height + machine.highest_matrix(0.0))
     if lower is None or lower.plane.height >= level:
         return lower
-    if lower.plane.polygon.buffer(0.5 * machine.fibre_width).covers(layer.plane.polygon):
+    up = layer.plane.frame[2]
+    covered = lower.plane.polygon.buffer(0.5 * machine.fibre_width).covers(layer.plane.polygon)
+    if covered and not _widens(mesh, up, level, height):
         return lower
-    sections = Planar(heights=(level,)).cut(mesh, tuple(layer.plane.frame[2].tolist()))
+    sections = Planar(heights=(level,)).cut(mesh, tuple(up.tolist()))
     return sections[0] if sections else lower
+
+
+def _widens(mesh: TetMesh, up: FloatArray, low: float, high: float) -> bool:
+    """Whether a face of a part looks down between two heights."""
+    _, normal = mesh.facet_areas(mesh.boundary)
+    height = (mesh.points @ up)[mesh.boundary]
+    down = (normal @ up < -_DOWN) & (height.max(axis=1) > low) & (height.min(axis=1) < high)
+    return bool(down.any())
 
 
 def _view(

@@ -4,7 +4,7 @@
   two folds and is shorter is a scribble that no head lays. Patterns that turn so by design keep
   their turns, and are judged by what still carries.
 * It holds before it is cut: `Machine.held_length` lies without a fold behind its start, and as much
-  before its cut, a tail before its end.
+  before its cut, a tail before its end. The head may begin at either end.
 * Of the area of a strand, its length times a fibre width, no more than a twentieth lies outside the
   part. Links do not count as outside: those are laid on pads and cut off.
 """
@@ -98,7 +98,7 @@ def strand_verdict(
     fibre = toolpaths.of_kind(FIBRE)
     parts = strand_parts(toolpaths, machine, layers)
     folded = () if folds_by_design else _folded(fibre, parts, machine)
-    held = _not_held(fibre, parts, machine)
+    held = () if folds_by_design else _not_held(fibre, parts, machine)
     count, places = int((parts.folds.counts > 0).sum()), len(parts.folds.line)
     remark = ""
     if count:
@@ -139,22 +139,28 @@ def _folded(fibre: Toolpaths, parts: StrandParts, machine: Machine) -> tuple[Bro
 
 def _not_held(fibre: Toolpaths, parts: StrandParts, machine: Machine) -> tuple[BrokenRule, ...]:
     """Strands that fold before they hold, behind their start or before their cut."""
-    folds, held = parts.folds, machine.held_length
-    cut = folds.lengths[folds.line] - machine.tail
-    behind_start = folds.start < held
-    before_cut = (folds.stop > cut - held) & (folds.start < cut)
-    near = np.flatnonzero(behind_start | before_cut) if held > 0.0 else np.zeros(0, dtype=int)
-    if not len(near):
+    folds, held, tail = parts.folds, machine.held_length, machine.tail
+    size = folds.lengths[folds.line]
+    near = np.zeros(len(size), dtype=bool)
+    # Printed forwards, and backwards: the order of printing decides.
+    for start, stop in ((folds.start, folds.stop), (size - folds.stop, size - folds.start)):
+        near |= (start < held) | ((stop > size - tail - held) & (start < size - tail))
+    if not held or not near.any():
         return ()
-    strands, first = np.unique(folds.line[near], return_index=True)
-    lines, places = list(fibre), folds.places[near[first]]
+    # The fold nearest to an end is the worst.
+    off = np.minimum(folds.start, size - folds.stop)
+    order = np.flatnonzero(near)[np.argsort(off[near], kind="stable")]
+    _, first = np.unique(folds.line[order], return_index=True)
+    worst = order[np.sort(first)]
+    strands, lines = folds.line[worst], list(fibre)
+    at = zip(strands.tolist(), folds.places[worst].tolist(), strict=True)
     return (
         _broken(
             "held",
             strands,
-            np.array([point_at(lines[k], at) for k, at in zip(strands, places, strict=True)]),
+            np.array([point_at(lines[k], place) for k, place in at]),
             f"{len(strands)} of {len(fibre)} strands turn back within the {held:g} mm behind their "
-            "start or before their cut that are to hold them",
+            "start or before their cut that are to hold them; the worst",
         ),
     )
 

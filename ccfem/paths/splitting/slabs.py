@@ -135,7 +135,7 @@ def check_cover(slabs: Sequence[Slab], machine: Machine) -> list[str]:
         problems.append(
             f"{len(thin)} layer{'s' * (len(thin) > 1)} of matrix only {min(thin):.3g} mm high, "
             f"less than machine.least_line, {machine.least_line:g} mm: lay fibre layers at least "
-            f"{pitch:.3g} mm apart, or with no matrix between them"
+            f"{pitch:.4g} mm apart, or with no matrix between them"
         )
     return problems
 

@@ -63,6 +63,8 @@ class Overhang:
     ----------
     region : shapely (Multi)Polygon, mm
         Seen along the build direction, in the frame of `ccfem.slicing.layers.layer.plane_frame`.
+    area : float, mm^2
+        Of all of it, also of what lies above each other.
     height : float, mm
         Of the lowest of it, above the bed.
     share : float
@@ -72,6 +74,7 @@ class Overhang:
     """
 
     region: Region
+    area: float
     height: float
     share: float
     angle: float
@@ -81,7 +84,7 @@ class Overhang:
         """One line: how much it is, from where on, and the cure."""
         share = f"{self.share:.1%}" if self.share >= 1e-3 else "less than 0.1%"
         return (
-            f"{share} of the matrix would be laid in air: {self.region.area:.3g} mm^2 of the part, "
+            f"{share} of the matrix would be laid in air: {self.area:.3g} mm^2 of the part, "
             f"from {self.height:.3g} mm above the bed on, hang over by more than {self.angle:g} "
             "degrees: turn the part, print support below it (--gcode --support), or raise "
             "machine.limits.overhang"
@@ -137,8 +140,9 @@ def overhang(mesh: TetMesh, build: Sequence[float], machine: Machine) -> Overhan
             height = min(height, low - bed)
     if not in_air:
         return None
-    share = sum(region.area for region in in_air) * thickness / float(mesh.volumes.sum())
-    return Overhang(shapely.union_all(in_air), height, share, limits.overhang)
+    area = sum(region.area for region in in_air)
+    share = area * thickness / float(mesh.volumes.sum())
+    return Overhang(shapely.union_all(in_air), area, height, share, limits.overhang)
 
 
 def _facet_groups(facets: IntArray) -> list[IntArray]:

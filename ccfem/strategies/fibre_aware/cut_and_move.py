@@ -82,6 +82,8 @@ def prune_and_move(
         slid = moved(kept, layers, goal.mesh, machine, judge, moves, radius=radius)
         if slid is not kept:
             offered.append(cut(slid, 0.0, 1))
+    if len(offered) == 1:
+        return kept
     # Tested as they are planned in the end, and only if they still lay the length.
     stress = goal.parts[0].unreinforced
     final = [

@@ -55,11 +55,27 @@ def test_a_strand_holds_before_it_is_cut():
     assert (rule.rule, rule.strands.tolist()) == ("held", [0])
     assert rule.places[0] == pytest.approx([10.0, 20.5, 1.0], abs=0.3)
     assert verdict([hook], machine=replace(MACHINE, held_length=5.0)).broken == ()
-    # Backwards the fold lies in the tail, which is laid after the cut, 42 mm before the end.
-    assert verdict([hook[::-1]], machine=replace(MACHINE, held_length=16.0)).broken == ()
-    # With a cutter at 5 mm it lies before the cut.
-    near = replace(MACHINE, held_length=16.0, cutter_distance=5.0)
-    assert [rule.rule for rule in verdict([hook[::-1]], machine=near).broken] == ["held"]
+    # Backwards the fold lies in the tail, but the head may begin there.
+    (rule,) = verdict([hook[::-1]], machine=replace(MACHINE, held_length=16.0)).broken
+    assert (rule.rule, rule.strands.tolist()) == ("held", [0])
+    assert verdict([hook], by_design=True, machine=replace(MACHINE, held_length=16.0)).broken == ()
+
+
+def test_the_strand_that_folds_nearest_to_an_end_is_named_first():
+    hooks = [
+        [[10.0 + off, y + 1.0], [10.0, y + 1.0], [10.0, y], [95.0, y]]
+        for off, y in ((12.0, 10.0), (6.0, 20.0))
+    ]
+    (rule,) = verdict(hooks, machine=replace(MACHINE, held_length=16.0)).broken
+    assert (rule.rule, rule.strands.tolist()) == ("held", [1, 0])
+
+
+def test_a_fold_before_the_cut_lets_go():
+    """A hairpin at 90 of 151 mm, 19 mm before the cut, which is 42 mm before the end."""
+    line = [[5.0, 10.0], [95.0, 10.0], [95.0, 11.0], [35.0, 11.0]]
+    for held, rules in ((0.0, []), (15.0, []), (25.0, ["held"])):
+        broken = verdict([line], machine=replace(MACHINE, held_length=held)).broken
+        assert [rule.rule for rule in broken] == rules
 
 
 def test_the_shortest_strand_holds_before_its_cut():
