@@ -39,7 +39,7 @@ def test_layers_of_matrix_that_no_machine_prints_are_said():
     said = check_cover(slabs_of(layers, 0.0, 1.5, Machine()), Machine())
     assert said == [
         "1 layer of matrix only 0.0225 mm high, less than machine.least_line, 0.05 mm: lay fibre "
-        "layers at least 0.158 mm apart, or with no matrix between them"
+        "layers at least 0.1575 mm apart, or with no matrix between them"
     ]
     layers = Planar(heights=(0.5, 0.6075)).cut(box_mesh((60.0, 20.0, 1.5), (6, 2, 1)))
     assert check_cover(slabs_of(layers, 0.0, 1.5, Machine()), Machine()) == []

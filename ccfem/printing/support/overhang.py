@@ -20,6 +20,8 @@ _LINES = 2
 """Least width of what is laid in air, in lines side by side: edges that are rounded below pass."""
 _ARC = 8
 """Segments per quarter circle."""
+_ACROSS = 20
+"""Lines across a piece that are looked at."""
 _SMOOTH = 0.02
 """Deviation of sections that is no matter, mm."""
 
@@ -124,15 +126,19 @@ def overhang(mesh: TetMesh, build: Sequence[float], machine: Machine) -> Overhan
         if not shapely.buffer(seen, -0.5 * _LINES * width).is_empty:
             regions.append(seen)
             lowest.append(float(corners[:, :, 2].min()))
-    # Just below each piece lies what may hold it, or bridge to it.
-    step = 0.5 * thickness
+    # Just below each piece lies what may hold it, or bridge to it; farther down a round roof is
+    # wider than what is bridged.
+    step = 0.125 * thickness
     below = np.clip(np.array(lowest) - step, bed + min(step, 0.5 * (top - bed)), None)
     below = bed + np.floor((below - bed) / step + 0.5) * step
     in_air, height = list[Region](), np.inf
     held = _bridged(mesh, frame, np.unique(below), limits.free_span)
     reach = 0.5 * _LINES * width
     for seen, low, level in zip(regions, lowest, below.tolist(), strict=True):
-        free = shapely.difference(seen, held.get(level, shapely.Polygon()))
+        below_it = held.get(level, shapely.Polygon())
+        free = shapely.difference(seen, below_it)
+        if _is_spanned(seen, below_it, limits.free_span):
+            continue
         inner = shapely.buffer(free, -reach, quad_segs=_ARC)
         if not inner.is_empty:
             opened = shapely.buffer(inner, reach, quad_segs=_ARC)
@@ -152,6 +158,25 @@ def _facet_groups(facets: IntArray) -> list[IntArray]:
     piece = connected(pairs // 3, len(facets))
     order = np.argsort(piece, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(piece[order])) + 1)
+
+
+def _is_spanned(seen: Region, held: Region, span: float) -> bool:
+    """Whether lines along a side of a piece lie on something at both of their ends.
+
+    So do those of the roof of a slot, up to its open ends, where `_bridged` leaves corners.
+    """
+    box = shapely.get_coordinates(shapely.minimum_rotated_rectangle(seen))
+    sides = np.diff(box, axis=0)[:2]
+    size = np.linalg.norm(sides, axis=1)
+    share = np.linspace(-0.49, 0.49, _ACROSS)[:, None]
+    for k in range(len(size)):
+        if size[k] <= span:
+            places = box[:4].mean(axis=0) + share * sides[1 - k]
+            reach = (0.5 + 5.0 * _SMOOTH / size[k]) * sides[k]
+            ends = shapely.points(np.concatenate([places - reach, places + reach]))
+            if shapely.dwithin(ends, held, 5.0 * _SMOOTH).all():
+                return True
+    return False
 
 
 def _bridged(

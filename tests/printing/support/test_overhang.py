@@ -104,3 +104,14 @@ def test_support_stands_beside_the_stem_and_below_the_arms(files):
     assert abs(x).max() <= 30.0
     assert abs(y).max() <= 10.0
     assert propped.volume(Machine()) == pytest.approx(bare.volume(Machine()), rel=1e-6)
+
+
+@pytest.mark.parametrize("deep", [6.0, 20.0])
+def test_the_roof_of_a_slot_with_open_ends_is_bridged(deep):
+    """A gap of 7 mm below a slab, through the whole depth; at 9 mm it is too wide for 8."""
+    for gap, bridged in ((7.0, True), (9.0, False)):
+        size, cells = (40.0, deep, 15.0), (40, 2, 6)
+        part = cut_out(
+            size, cells, lambda at, g=gap: (at[:, 2] > 10.0) | (abs(at[:, 0] - 20.0) > 0.5 * g)
+        )
+        assert (overhang(part, UP, Machine()) is None) == bridged
