@@ -113,8 +113,9 @@ def front_of(
     spread, kinds = Spread(points), _kinds(name, strategy, strengths)
     if counts is not None:
         _check_counts(counts)
-    # A front shows the supports of the part alone.
-    request = replace(request, case=replace(request.case, alternative_supports=()))
+    # A front shows the supports of the part alone, and is a curve itself.
+    alone = replace(request.case, alternative_supports=())
+    request = replace(request, case=alone, curve=False)
     if counts is not None:
         request = replace(request, slicings=_slicings(counts), amount=spread)
     basis = solved(request) if known is None else known
@@ -126,7 +127,7 @@ def front_of(
     if counts is None:
         counts = counts_to_try(request.case, basis.planned_on)
     slicings = _slicings(counts)
-    request = replace(request, strategies=kinds, slicings=slicings, amount=spread, curve=False)
+    request = replace(request, strategies=kinds, slicings=slicings, amount=spread)
     return _front(name, answer(request, progress, basis))
 
 

@@ -189,3 +189,9 @@ def test_no_plan_says_why(bar):
     cutter = Case("bar", "", case.problem, machine=Machine(minimum_length=500.0))
     with pytest.raises(InputError, match="zigzag finds no plan of 'bar': 2 layers: laid no fibre"):
         fibre_front(cutter, stress, "zigzag", create("zigzag", ALONG), (2,), points=2)
+
+
+def test_a_front_of_a_request_with_a_curve_is_the_curve(bar):
+    case, _ = bar
+    request = Request(case, {"zigzag": create("zigzag", ALONG)}, curve=True)
+    assert {point.layers for point in front_of(request, (2,), points=3).points} == {2}
