@@ -203,6 +203,6 @@ def in_air(machine: Machine, run: Run) -> float:
 
 
 def air(job: Job, run: Run) -> list[str]:
-    """Matrix is laid on something, but for half a hundredth of it."""
+    """Matrix is laid on something, except for at most half a percent of it."""
     share = in_air(job.machine, run)
     return [f"{share:.1%} of the matrix is laid in air"] if share > 0.005 else []

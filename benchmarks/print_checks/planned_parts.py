@@ -65,7 +65,7 @@ def planned(plan: str, folder: Path) -> Folder:
         count = layers or LAYERS.get(name)
         words = ("--layers", str(count)) if count else ()
         words += ("--machine", machine or "marlin_two_tools", "--no-virtual-test", "--gcode")
-        _ccfem("plan", part, "--strategy", strategy, *words, "--out", str(results))
+        _ccfem("plan", part, "--strategy", strategy, *words, "--force", "--out", str(results))
     return Folder(results, mesh, strategy)
 
 

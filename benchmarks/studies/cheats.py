@@ -272,7 +272,7 @@ def study(part: Posed, given: dict[str, list[Line]], folder: Path) -> int:
         name: float(run["total"].get("stiffness_ratio_tension", np.nan))
         for name, run in runs.items()
     }
-    print(f"\n| {part.name} | printable | times as stiff | N/mm | bound | referee | remarks |")
+    print(f"\n| {part.name} | printable | stiffness ratio | N/mm | bound | referee | remarks |")
     print("|---|---|---|---|---|---|---|")
     wins = 0
     for name in sorted(runs, key=lambda name: -ratio[name]):

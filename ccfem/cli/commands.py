@@ -372,7 +372,10 @@ def check(
         ),
     ] = None,
 ) -> None:
-    """Say and draw all that is known of a part before it is solved; all mistakes at once."""
+    """Say and draw all that is known of a part before it is solved; all mistakes at once.
+
+    Mistakes end with exit code 2; a part that cannot be printed whatever is planned ends with 3.
+    """
     from ccfem.cli.check_part import check_part
 
     read = partial(load, case, set_case, False, machine, set_machine, set_fibre)

@@ -45,7 +45,7 @@ class Machine:
     held_length : float, mm
         Least length that lies, without a fold, between the start of a strand and its cut, so that
         the strand holds. Default: 0, since the paper lays strands of 42 mm, the distance from its
-        cutter; a FibreSeek asks for 16 mm, as far as its cutter again.
+        cutter.
     minimum_radius : float, mm
         Tightest turn that a strand follows without folding; 0.26 1/mm in curvature.
     fibre_speed, matrix_speed, travel_speed : float, mm/s
