@@ -20,16 +20,13 @@ from ccfem.base.tensor import von_mises
 from ccfem.cli.docstring import about, attributes
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.shown import file_stem
-from ccfem.comparison.table import Cell, Row, Table as Values, load_cases_table
+from ccfem.comparison.table import FIRST_REMARKS, Cell, Row, Table as Values, load_cases_table
 from ccfem.fem.elasticity.stress_field import StressField, about_cells
 from ccfem.judging.virtual_testing.virtual_test import HONEST_PROMISE, IN_SHORT
 from ccfem.printing.export.gcode import clock
 from ccfem.printing.print_totals import PrintTotals
 
 Item = typing.TypeVar("Item")
-
-_REMARKS = 3
-"""Number of remarks that are shown first."""
 
 _TITLES, _NUMBERS = 30, 20
 """Characters that a table is given for its titles and for each strategy, where neither a terminal
@@ -184,7 +181,7 @@ def print_comparison(
     if load_cases is not None:
         _print_columns(console, load_cases, "load cases")
     lines = comparison.notes
-    shown = lines if details else lines[:_REMARKS]
+    shown = lines if details else lines[:FIRST_REMARKS]
     if details:
         console.print(about_cells(comparison.stress), style="dim", markup=False)
     for line in shown:

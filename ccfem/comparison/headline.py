@@ -250,8 +250,8 @@ class Headline:
 HEADLINE = (
     Headline("printable", "printable", "", "{}"),
     Headline("stiffness", "stiffness, N/mm", "high", "{:.4g}"),
-    Headline("stiffness_ratio_tension", "stiffness ratio, tension only", "high", "{:.2f}"),
-    Headline("share_of_gain", "share of the possible gain", "high", "{:.0%}"),
+    Headline("stiffness_ratio_tension", "stiffness ratio", "high", "{:.2f}"),
+    Headline("share_of_gain", "share of gain", "high", "{:.0%}"),
     Headline("stiffness_ratio_bonded", "stiffness ratio, bonded", "high", "{:.2f}"),
     Headline(
         "stiffness_ratio_tension_alternative", "stiffness ratio, other supports", "", "{:.2f}"
@@ -275,18 +275,6 @@ HEADLINE = (
     Headline("all_crossings", "crossings", "low", "{:.0f}"),
 )
 """The columns of the headline table; those that no run has are left out."""
-
-SHORT = {
-    "printable": "printable",
-    "stiffness_ratio_tension": "stiffness ratio",
-    "share_of_gain": "share of gain",
-    "first_failure_load": "first failure, N",
-    "fibre_per_layer": "fibre, mm a layer",
-    "fibre_length": "fibre, mm",
-    "print_time_nearest": "laying fibre, min",
-    "whole_print_time": "whole print, min",
-}
-"""Columns of the table that a terminal shows first, and what stands beside them."""
 
 _OVER_SLICINGS = (
     "printable",

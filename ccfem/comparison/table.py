@@ -11,7 +11,6 @@ from ccfem.comparison.curve import Curve
 from ccfem.comparison.headline import (
     HEADLINE,
     HEADLINE_OF_SLICINGS,
-    SHORT,
     TEST_COLUMNS,
     Headline,
     cell_text,
@@ -34,8 +33,22 @@ _OWN = {
 """Meaning of columns that are no index of their own."""
 
 
-_FIRST = (*SHORT, "interlayer_load")
+_FIRST = (
+    "printable",
+    "stiffness_ratio_tension",
+    "share_of_gain",
+    "first_failure_load",
+    "fibre_per_layer",
+    "fibre_length",
+    "print_time_nearest",
+    "whole_print_time",
+    "interlayer_load",
+)
 """Columns that are shown first; the others follow behind a click, or with --details."""
+
+
+FIRST_REMARKS = 3
+"""Remarks that are shown first."""
 
 
 @dataclass(frozen=True)
@@ -149,7 +162,7 @@ def headline_table(runs: Sequence[Run], wanted: Wanted, over_slicings: bool = Fa
     return Table(
         tuple(
             Head(
-                SHORT.get(head.column, head.title),
+                head.title,
                 _OWN.get(head.column, about.get(head.column, "")),
                 head.column in hidden,
             )
@@ -246,7 +259,7 @@ def curve_table(curve: Curve | None) -> Table | None:
                 Cell(run.failure or run.why_not or "yes", bad=not run.printable),
             )
             rows.append((name, cells, ""))
-    titles = ("wanted, mm a layer", "laid", "stiffness ratio, tension only", "bonded", "printable")
+    titles = ("wanted, mm a layer", "laid", "stiffness ratio", "bonded", "printable")
     return Table(tuple(map(Head, titles)), tuple(rows))
 
 

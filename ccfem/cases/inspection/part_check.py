@@ -193,7 +193,7 @@ class Check(Shown):
     not_planned : tuple of str
         What prevents it from being planned, as layers that cannot be cut.
     not_printable : tuple of str
-        What keeps it from being printed, whatever is planned: `Run.why_not` begins with it.
+        What keeps it from being printed, whatever is planned: `Run.why_not` holds it.
     """
 
     case: Case

@@ -21,6 +21,7 @@ from ccfem.comparison.report.layer_view import layer_views
 from ccfem.comparison.report.packing import Rounded, as_bytes, compressed, pack
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.table import (
+    FIRST_REMARKS,
     against_each_other,
     all_indices,
     curve_table,
@@ -104,6 +105,7 @@ def report_html(
         "colours": colours,
         "left_out": left_out,
         "remarks": comparison.notes,
+        "first": FIRST_REMARKS,
         "promise": HONEST_PROMISE if any(run.tested is not None for run in ranked) else "",
         "has_curve": curve is not None,
         "curve_said": _about_curve(comparison),

@@ -216,7 +216,7 @@ def jobs_of(study: Study, progress: Progress = silent) -> Jobs:
     ------
     InputError
         For parts, slicings and strategies that do not exist, parameters that they do not take, and
-        flat layers that cannot be cut.
+        a part that none of the slicings can cut.
     """
     slicings = _slicings(study)
     parts: list[Part] = []
@@ -230,9 +230,12 @@ def jobs_of(study: Study, progress: Progress = silent) -> Jobs:
             check_known(f"load case of {case.name}", load_case, case.problem.cases)
         if not case.problem.cases:
             raise InputError(f"part '{label}' has no load case: give it at least one load")
-        for cut, slicer in slicings:
-            with mistakes.noted(f"{label}, slicing {cut['slicing']}: "):
+        refused = [Mistakes() for _ in slicings]
+        for (cut, slicer), note in zip(slicings, refused, strict=True):
+            with note.noted(f"{label}, slicing {cut['slicing']}: "):
                 case.check_layers(slicer)
+        if all(note.lines for note in refused):  # as `compare`: of several, where none can
+            mistakes.lines += [line for note in refused for line in note.lines]
         part = Part(case, study.load_cases or case.problem.cases[:1])
         number = len(parts)
         parts.append(part)

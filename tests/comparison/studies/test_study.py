@@ -5,7 +5,7 @@ import os
 import pickle
 import signal
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -16,12 +16,13 @@ import ccfem
 from ccfem.base.errors import InputError
 from ccfem.base.result_folder import whole_folder
 from ccfem.comparison.files import RESULT_FILES
-from ccfem.comparison.studies.jobs import Part
+from ccfem.comparison.studies.jobs import Part, jobs_of
 from ccfem.comparison.studies.running import TABLES, opened
 from ccfem.comparison.studies.transport import unpacked
 from ccfem.comparison.studies.work import part_bytes, solve_part
 from ccfem.comparison.studies.worker import _stress
 from ccfem.paths.planning import Amount
+from ccfem.slicing.slicers import Planar
 
 CELL = """
 from dataclasses import dataclass
@@ -366,3 +367,12 @@ def test_a_study_and_a_comparison_do_not_mix_in_one_folder(tmp_path):
     with opened(tmp_path / "study") as store, store.writing(*TABLES) as files:  # its own go on
         (files / "results.csv").write_text("again")
     assert (tmp_path / "study" / "results.csv").read_text() == "again"
+
+
+def test_a_slicing_that_cannot_be_cut_leaves_the_others_as_in_a_comparison():
+    thin = Planar(thickness=0.05)
+    case = ccfem.read("bar", element_size=10.0)
+    study = replace(STUDY, parts=(case,), strategies=("zigzag",), slicings=(Planar(count=2), thin))
+    assert len(jobs_of(study).jobs) == 2
+    with pytest.raises(InputError, match="layers must lie at least"):
+        jobs_of(replace(study, slicings=(thin,)))
