@@ -22,6 +22,7 @@ from ccfem.geometry.polylines import (
     lengths,
     line_length,
     merge_repeated,
+    turning_angles,
 )
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
@@ -44,6 +45,8 @@ _SLACK = 2e-3
 """By how much a turn may exceed the angle, radians: a square corner in rounded coordinates."""
 _SPREAD = 0.25
 """Largest length, in windows, over which a vertex of a polyline spreads its turn to each side."""
+_SURELY = 0.999
+"""Share of the angle up to which the turns of vertices in a window may add up without a fold."""
 _STRAIGHT = 1e-6
 """Turn, radians, up to which a point lies on a straight piece: it then decides nothing."""
 
@@ -160,17 +163,43 @@ def folds(points: FloatArray, offsets: IntArray, closed: BoolArray, radius: floa
     size = lengths(points, offsets)
     if radius == 0.0:  # the machine turns on the spot
         return Folds(*_NONE, lengths=size, closed=closed)
+    turning = np.flatnonzero(_may_turn(points, offsets, closed, window))
+    count = np.diff(offsets)[turning]
+    owner, number = repeated(count)
+    points = points[offsets[turning][owner] + number]
     # As many lines at a time as the memory for their samples allows.
-    batch = np.floor(np.cumsum(size) / (_BATCH * _spacing(window))).astype(np.int64)
+    batch = np.floor(np.cumsum(size[turning]) / (_BATCH * _spacing(window))).astype(np.int64)
     ends = np.flatnonzero(np.diff(batch, append=-1)) + 1
+    offsets = np.concatenate([[0], np.cumsum(count)])
     parts: list[tuple[IntArray, FloatArray, FloatArray]] = []
     for first, last in pairwise([0, *ends.tolist()]):
-        some = slice(offsets[first], offsets[last])
-        lines = (points[some], offsets[first : last + 1] - offsets[first], closed[first:last])
-        k, start, stop = _fold_stretches(*lines, begin[first:last], size[first:last], window)
-        parts.append((k + first, start, stop))
+        some, own = slice(offsets[first], offsets[last]), turning[first:last]
+        lines = (points[some], offsets[first : last + 1] - offsets[first], closed[own])
+        k, start, stop = _fold_stretches(*lines, begin[own], size[own], window)
+        parts.append((own[k], start, stop))
     line, start, stop = (np.concatenate(column) for column in zip(_NONE, *parts, strict=True))
     return Folds(line, start, stop, lengths=size, closed=closed)
+
+
+def _may_turn(points: FloatArray, offsets: IntArray, closed: BoolArray, window: float) -> BoolArray:
+    """Mask of the polylines whose vertices turn by the angle within a window, (K,).
+
+    The mean tangents of a window lie between those of the segments in it, so others cannot fold.
+    Closed ones always may: they turn all the way round.
+    """
+    may: BoolArray = np.array(closed)
+    points, offsets, _ = merge_repeated(points, offsets)
+    turn = turning_angles(points, offsets, np.zeros_like(closed))
+    # What a window can hold: itself, how far vertices spread their turn, and the samples over which
+    # tangents are averaged. On one axis for all lines, they lie farther apart than that.
+    reach = window * (1.0 + 2.0 * _SPREAD) + 2.0 * (2 * _SMOOTH + 1) * _spacing(window)
+    size = lengths(points, offsets)
+    line = np.repeat(np.arange(len(size)), np.diff(offsets))
+    along = arc_lengths(points, offsets) + (np.cumsum(size + reach) - size)[line]
+    total = np.concatenate([[0.0], np.cumsum(turn)])
+    last = np.searchsorted(along, along + reach, side="right")
+    may[line[total[last] - total[:-1] > _SURELY * ANGLE]] = True
+    return may
 
 
 def _spacing(window: float) -> float:

@@ -28,9 +28,9 @@ from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer, stress_on
 from ccfem.strategies.fibre_aware.cut_and_move import prune_and_move
 from ccfem.strategies.fibre_aware.heights import (
-    alike_share,
     fibre_capacity,
     group_layers,
+    grouped_by_stress,
     layer_counts,
     layers_by_case,
     middle_layers,
@@ -53,11 +53,6 @@ from ccfem.strategies.fibre_aware.stream_design import (
 from ccfem.strategies.fibre_aware.stream_paths import Extraction, refined
 from ccfem.strategies.fibre_aware.strength_design import design_for_strength
 from ccfem.strategies.fibre_aware.upper_bound import measures
-
-_ALIKE = 0.8
-"""Share of the stress common to all heights above which all layers get one field."""
-
-_MOST_GROUPS = 6
 
 _ROUNDS = 3
 """Virtual tests that decide what to cut."""
@@ -337,11 +332,10 @@ class StreamFunction:
         centres = part.centroids @ part.frame[:2].T
         size = max(self.grid * machine.fibre_width, float(np.cbrt(6.0 * mesh.volumes.mean())))
         stresses = [specimen_part.specimen.unreinforced.stress for specimen_part in parts]
-        groups = self.groups
-        if not groups:
-            alike = min(alike_share(part, specimen_part, size) for specimen_part in stresses)
-            groups = 1 if alike > _ALIKE else _MOST_GROUPS
-        group = group_layers(layers, groups)
+        if self.groups:
+            group = group_layers(layers, self.groups)
+        else:
+            group = grouped_by_stress(mesh, stresses, layers, size)
         corners = mesh.points[np.unique(mesh.corners)] @ part.frame[:2].T
         points = [corners, centres]
         for layer in layers:

@@ -1,14 +1,26 @@
 """Layers over the height of a part: their cells, how they differ, and the case that each serves."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
+import shapely
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.tensor import in_plane
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.machine.machine import Machine
+from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.smeared import SmearedPart
+
+_ALIKE = 0.8
+"""Share of the stress common to all heights above which all layers get one field."""
+
+_MOST_GROUPS = 6
+
+_EQUAL = 1e-6
+"""Distance, mm, up to which two sections are equal: paths drawn on one are those of the other."""
 
 
 def nearest_layer(part: SmearedPart, layers: Sequence[Layer]) -> IntArray:
@@ -40,11 +52,13 @@ def group_layers(layers: Sequence[Layer], groups: int) -> IntArray:
     return group
 
 
-def alike_share(part: SmearedPart, stress: FloatArray, size: float) -> float:
+def alike_share(mesh: TetMesh, frame: FloatArray, stress: FloatArray, size: float) -> float:
     """Share of the in-plane stress that is the same at all heights, in [0, 1].
 
     Parameters
     ----------
+    frame : (3, 3) array
+        Of the layers: two directions in their plane, and their normal.
     stress : (m, 3, 3) array, MPa
     size : float, mm
         Side of the squares above which the stress is averaged over the height.
@@ -54,15 +68,68 @@ def alike_share(part: SmearedPart, stress: FloatArray, size: float) -> float:
     float
         1 for a plate loaded in its plane, about 0 for a plate that is bent.
     """
-    volume = part.mesh.volumes
-    place = part.centroids @ part.frame[:2].T
-    plane = in_plane(stress, part.frame) * np.array([1.0, 1.0, np.sqrt(2.0)])
+    volume = mesh.volumes
+    place = mesh.points[mesh.corners].mean(axis=1) @ frame[:2].T
+    plane = in_plane(stress, frame) * np.array([1.0, 1.0, np.sqrt(2.0)])
     square = np.floor((place - place.min(axis=0)) / size).astype(np.int64)
     _, column = np.unique(square, axis=0, return_inverse=True)
     total = np.bincount(column, volume)
     mean = np.stack([np.bincount(column, volume * s) / total for s in plane.T], axis=1)
     whole = float(volume @ (plane**2).sum(axis=1))
     return float(total @ (mean**2).sum(axis=1)) / whole if whole > 0.0 else 1.0
+
+
+def grouped_by_stress(
+    mesh: TetMesh, stresses: Sequence[FloatArray], layers: Sequence[Layer], size: float = 0.0
+) -> IntArray:
+    """Group of each layer, (layers,): one group where the stress is alike at all heights.
+
+    Parameters
+    ----------
+    stresses : sequence of (m, 3, 3) arrays, MPa
+        Of the load cases.
+    layers : sequence of Layer
+        Flat ones.
+    size : float, mm, default 0
+        As of `alike_share`, where it is more than the mean edge of the cells.
+    """
+    size = max(size, float(np.cbrt(6.0 * mesh.volumes.mean())))
+    frame = layers[0].plane.frame
+    alike = min(alike_share(mesh, frame, stress, size) for stress in stresses)
+    return group_layers(layers, 1 if alike > _ALIKE else _MOST_GROUPS)
+
+
+def layers_of_one_kind(
+    layers: Sequence[Layer], group: IntArray, distance: float = _EQUAL
+) -> list[IntArray]:
+    """Numbers of the layers of each kind: they share a group, and a section up to a distance, mm.
+
+    Parameters
+    ----------
+    group : (layers,) int array
+    """
+    kinds: list[list[int]] = []
+    borders = [shapely.boundary(layer.plane.polygon) for layer in layers]
+    for k, border in enumerate(borders):
+        for kind in kinds:
+            same = group[kind[0]] == group[k]
+            if same and shapely.hausdorff_distance(borders[kind[0]], border) < distance:
+                kind.append(k)
+                break
+        else:
+            kinds.append([k])
+    return [np.array(kind) for kind in kinds]
+
+
+def on_layer(paths: Toolpaths, layer: Layer) -> Toolpaths:
+    """Paths of a layer with the same section, drawn on another."""
+    points = layer.plane.to_space(layer.plane.project(paths.points))
+    return replace(paths, points=points, layer=np.full(len(paths), layer.index))
+
+
+def middle(numbers: IntArray) -> int:
+    """Return the middle one of the numbers."""
+    return int(numbers[len(numbers) // 2])
 
 
 def middle_layers(layers: Sequence[Layer], group: IntArray) -> list[Layer]:

@@ -1,6 +1,6 @@
 """Plans that cost little: a designed plan is tested against them, and has to be better."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,18 +8,24 @@ import shapely
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.tensor import largest_in_plane
-from ccfem.fem.elasticity.stress_field import WeightedCases
+from ccfem.fem.elasticity.stress_field import StressField, WeightedCases
 from ccfem.geometry.shapes import Region, open_lines
 from ccfem.machine.machine import Machine
 from ccfem.paths.fields.tensile import Tension, layer_tension
 from ccfem.paths.planning.infill import long_enough
-from ccfem.paths.planning.plan import plan_layers
+from ccfem.paths.planning.plan import plan, plan_layers
+from ccfem.paths.planning.strategy import LayerPlanner
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer, LayerStress
 from ccfem.strategies import create
 from ccfem.strategies.concentric import Concentric
-from ccfem.strategies.fibre_aware.heights import layers_by_case
-from ccfem.strategies.fibre_aware.plan_cases import plan_by_layers
+from ccfem.strategies.fibre_aware.heights import (
+    grouped_by_stress,
+    layers_by_case,
+    layers_of_one_kind,
+    middle,
+    on_layer,
+)
 
 _CAP = 60.0
 """Percentile of the stress at which isocurves lie side by side: more fibre than is kept."""
@@ -100,6 +106,8 @@ def plain_plans(
 ) -> list[Toolpaths]:
     """Plan straight rows, contours and isocurves, each with more fibre than is usually kept.
 
+    Layers of one section under alike stress are planned once.
+
     Parameters
     ----------
     layers : sequence of Layer
@@ -112,18 +120,31 @@ def plain_plans(
     list of Toolpaths
         Without folds.
     """
-    case = layers_by_case(cases.weights, layers)
+    case, field = layers_by_case(cases.weights, layers), cases.heaviest
+    stresses = [field.stress for field in cases.fields]
+    kinds = layers_of_one_kind(
+        layers, case * len(layers) + grouped_by_stress(field.mesh, stresses, layers)
+    )
+    middles = [middle(numbers) for numbers in kinds]
 
-    def rows(along: str) -> Toolpaths:
-        planned = []
+    def in_all(planned: Callable[[Sequence[Layer], StressField], Toolpaths]) -> Toolpaths:
+        """Plan the middle layer of each kind, and draw its paths on the others."""
+        drawn: dict[int, Toolpaths] = {}
         for k, field in enumerate(cases.fields):
-            shown = [layer for layer, number in zip(layers, case, strict=True) if number == k]
-            planned.append(plan_layers(StraightRows(along), shown, shown, field, machine))
-        return Toolpaths.concatenate(planned)
+            chosen = [layers[number] for number in middles if case[number] == k]
+            paths = planned(chosen, field) if chosen else Toolpaths.empty()
+            drawn |= {layer.index: paths.on_layer(layer.index) for layer in chosen}
+        source = {int(k): n for numbers, n in zip(kinds, middles, strict=True) for k in numbers}
+        return Toolpaths.concatenate(
+            on_layer(drawn[layers[source[k]].index], layer) for k, layer in enumerate(layers)
+        )
 
-    field = cases.heaviest
+    def by(planner: LayerPlanner) -> Toolpaths:
+        return in_all(lambda some, field: plan_layers(planner, some, some, field, machine))
+
     rings = Concentric().for_part(field, layers, machine)
-    plans = [rows("tension"), rows("section"), plan_layers(rings, layers, layers, field, machine)]
+    plans = [by(StraightRows("tension")), by(StraightRows("section")), by(rings)]
     if curves:
-        plans.append(plan_by_layers(create("isocurve", {"cap": _CAP}), layers, cases, machine))
+        isocurve = create("isocurve", {"cap": _CAP})
+        plans.append(in_all(lambda some, field: plan(isocurve, some, field, machine)))
     return plans

@@ -26,6 +26,7 @@ from ccfem.paths.linking.joining import Joined
 from ccfem.paths.planning.unfolding import unfolded, unfolded_paths
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
+from ccfem.strategies.fibre_aware.heights import layers_of_one_kind, middle, on_layer
 from ccfem.strategies.fibre_aware.hole_wraps import LEVELS, led_round_holes
 from ccfem.strategies.fibre_aware.path_profile import Profile, least_price
 from ccfem.strategies.fibre_aware.prune import profiles
@@ -56,14 +57,6 @@ _BETTER = 0.003
 _SAME = 0.5
 """Distance, in strand widths, up to which the borders of two sections count as the same. The levels
 that are best for one layer are then used for the other."""
-
-_EQUAL = 1e-6
-"""Distance, mm, up to which two sections are equal: paths drawn on one are those of the other."""
-
-
-def middle(numbers: IntArray) -> int:
-    """Return the middle one of the numbers."""
-    return int(numbers[len(numbers) // 2])
 
 
 @dataclass(frozen=True)
@@ -120,9 +113,9 @@ class Extraction:
         list of list of Toolpaths
             For each length; the paths worth most first.
         """
-        alike = _alike(layers, group, _SAME * self.machine.fibre_width)
+        alike = layers_of_one_kind(layers, group, _SAME * self.machine.fibre_width)
         kind = {int(k): middle(numbers) for numbers in alike for k in numbers}
-        equal = _alike(layers, group, _EQUAL)
+        equal = layers_of_one_kind(layers, group)
         source = {int(k): middle(numbers) for numbers in equal for k in numbers}
         cut: dict[tuple[int, int], list[FloatArray]] = {}
         levels: dict[tuple[int, int], int] = {}
@@ -151,7 +144,7 @@ class Extraction:
         def paths(number: int, phase: int, reach: float = 0.0) -> Toolpaths:
             key = number, phase, reach
             if key not in drawn and not reach and number != source[number]:
-                drawn[key] = _on_layer(paths(source[number], phase), layers[number])
+                drawn[key] = on_layer(paths(source[number], phase), layers[number])
             if key not in drawn:  # what links are worth differs from layer to layer
                 drawn[key] = self.linked(layers[number], round_holes(number, phase), reach)
             return drawn[key]
@@ -328,27 +321,6 @@ class Extraction:
         for worth, displacement in self.strains_of:
             value += worth * np.maximum(pieces.strain(displacement), 0.0) ** 2
         return profiles(toolpaths, strands, value)
-
-
-def _on_layer(paths: Toolpaths, layer: Layer) -> Toolpaths:
-    """Paths of a layer with the same section, drawn on another."""
-    points = layer.plane.to_space(layer.plane.project(paths.points))
-    return replace(paths, points=points, layer=np.full(len(paths), layer.index))
-
-
-def _alike(layers: Sequence[Layer], group: IntArray, distance: float) -> list[IntArray]:
-    """Numbers of the layers of each kind: they share a field, and a section up to a distance."""
-    kinds: list[list[int]] = []
-    borders = [shapely.boundary(layer.plane.polygon) for layer in layers]
-    for k, border in enumerate(borders):
-        for kind in kinds:
-            same = group[kind[0]] == group[k]
-            if same and shapely.hausdorff_distance(borders[kind[0]], border) < distance:
-                kind.append(k)
-                break
-        else:
-            kinds.append([k])
-    return [np.array(kind) for kind in kinds]
 
 
 def refined(layer: Layer) -> tuple[FloatArray, IntArray]:

@@ -154,10 +154,10 @@ def test_heights_of_layers(pulled_bar):
 def test_stress_is_alike_at_all_heights_in_the_plane_and_not_in_bending(pulled_bar):
     stress, layers = pulled_bar
     part = SmearedPart.of(stress, layers[0].plane.frame)
-    assert alike_share(part, stress.stress, 2.0) == pytest.approx(1.0, abs=1e-9)
+    assert alike_share(part.mesh, part.frame, stress.stress, 2.0) == pytest.approx(1.0, abs=1e-9)
     bent = np.zeros((len(part.mesh.cells), 3, 3))
     bent[:, 0, 0] = part.centroids[:, 2] - 2.0
-    assert alike_share(part, bent, 5.0) < 0.05
+    assert alike_share(part.mesh, part.frame, bent, 5.0) < 0.05
 
 
 def test_axes_turn_with_the_part(bent_beam):
