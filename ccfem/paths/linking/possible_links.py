@@ -89,14 +89,20 @@ def possible_links(
 
 def _without_folds(lines: Sequence[FloatArray], links: list[Link], radius: float) -> list[Link]:
     """Links in which the joined strand does not fold, nor where it enters and leaves them."""
+    heads: dict[tuple[int, bytes], FloatArray] = {}
+
+    def head(end: int, place: FloatArray) -> FloatArray:
+        """Line that runs from a place at one of its ends; most links leave it at the end itself."""
+        key = end, place.tobytes()
+        if key not in heads:
+            line = lines[end // 2][:: -1 if end % 2 else 1]
+            heads[key] = _head(cut_start(line, place), _WINDOWS * radius)
+        return heads[key]
+
     joined = []
     for link in links:
-        ends = ((link.first, link.path[0]), (link.second, link.path[-1]))
-        heads = [
-            _head(cut_start(lines[end // 2][:: -1 if end % 2 else 1], place), _WINDOWS * radius)
-            for end, place in ends
-        ]
-        joined.append(np.concatenate([heads[0][:0:-1], link.path, heads[1][1:]]))
+        before, after = head(link.first, link.path[0]), head(link.second, link.path[-1])
+        joined.append(np.concatenate([before[:0:-1], link.path, after[1:]]))
     open_ = np.zeros(len(links), dtype=bool)
     counts = folds(*pack(joined), open_, _MARGIN * radius).counts
     return [link for link, count in zip(links, counts.tolist(), strict=True) if not count]

@@ -6,7 +6,7 @@ way at once.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -95,13 +95,18 @@ class Spacing:
     def __post_init__(self) -> None:
         freeze(self, inset=float, border=float, inward=float)
 
-    def spread(self, slide: FloatArray) -> FloatArray:
+    def of(self, lines: StrandLines, inset: float) -> "Spacing":
+        """Return the same for strands that have slid on, all of which come in to an inset, mm."""
+        depth = np.full(len(lines.path), inset)
+        return replace(self, lines=lines, inset=depth, roughness=lines.roughness)
+
+    def spread(self, slide: FloatArray, rounds: int = _ROUNDS) -> FloatArray:
         """Slides (P,), mm, close to the given ones, after which strands keep their distances."""
         lines, count = self.lines, len(self.lines.path)
         points = lines.points(slide)
         pairs = self._pairs(points)
         _, near = self.tree.query(_lifted(points, lines.layer), k=_NEAREST)
-        for _ in range(_ROUNDS):
+        for _ in range(rounds):
             points = lines.start + slide[:, None] * lines.normals
             column, value, missing = _too_near(points, lines.normals, pairs, self.width)
             off, wanted = _outside(

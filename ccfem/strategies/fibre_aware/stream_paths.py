@@ -350,6 +350,9 @@ _ROUNDS = 2
 _OUT = 0.25
 """Steps, in widths, in which strands are slid out of holes: the way out changes as they go."""
 
+_ON_THE_WAY = 2
+"""Rounds of such a step; the last one has as many as any slide."""
+
 _INNER, _APART = 1.01, 1.004
 """Factors on the distances that slides aim at: from the border, and between strands. A slide only
 approaches its aim, and the steps between points cut corners."""
@@ -419,11 +422,13 @@ def slid_out(
     Parameters as of `slid_in`; `depth` is how far inside a hole paths lie, in strand widths.
     """
     width, off = machine.fibre_width, _INNER * inset
-    for step in np.append(np.arange(off - depth - 1.0, off, _OUT), off):
-        lines = strand_lines(paths, (layer,), machine, hold=False)
-        apart = spacing(lines, (layer,), _APART * width, step * width, come_in=True, radius=radius)
-        paths = lines.slid(apart.spread(np.zeros(len(lines.path))))
-    return paths
+    steps = np.arange(off - depth - 1.0, off, _OUT)
+    lines = strand_lines(paths, (layer,), machine, hold=False)
+    apart = spacing(lines, (layer,), _APART * width, off, come_in=True, radius=radius)
+    for step in steps:
+        slide = apart.of(lines, step * width).spread(np.zeros(len(lines.path)), _ON_THE_WAY)
+        lines = strand_lines(lines.slid(slide), (layer,), machine, hold=False)
+    return lines.slid(apart.of(lines, off * width).spread(np.zeros(len(lines.path))))
 
 
 def _back_inside(paths: Toolpaths, layer: Layer) -> Toolpaths:
