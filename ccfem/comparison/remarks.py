@@ -82,8 +82,10 @@ def _about(run: Run, wanted: Wanted, bounded: bool) -> list[str]:
         "no first-failure load": run.tested.note if run.tested is not None else "",
     }
     lines = [f"{what}: {reason}" for what, reason in reasons.items() if reason]
-    if run.tested is not None and run.tested.failure is not None and run.tested.failure.note:
-        lines.append(run.tested.failure.note)
+    if run.tested is not None and run.tested.failure is not None:
+        cases = run.cases.failure.each if run.cases and run.cases.failure else ()
+        notes = [failure.note for failure in (run.tested.failure, *cases)]
+        lines += dict.fromkeys(filter(None, notes))
     if run.evaluation is not None:
         lines += _about_links(run.evaluation.total)
         meant = getattr(run.strategy, "crosses", False)

@@ -17,7 +17,7 @@ from ccfem.judging.virtual_testing.failure_laws.fibre import (
     fibre_peak as fibre_peak,
 )
 from ccfem.judging.virtual_testing.failure_laws.matrix import matrix_peak as matrix_peak
-from ccfem.judging.virtual_testing.strand import Limits, Strand
+from ccfem.judging.virtual_testing.strand import Failure, Limits, Strand
 from ccfem.judging.virtual_testing.virtual_test import VirtualTest
 from ccfem.slicing.layers import Layer
 
@@ -99,7 +99,12 @@ def first_failure(
         default the tensile strength of the material of the part.
     layers : sequence of Layer, optional
         Of the matrix. Without them, and where the material has no strength between layers, that
-        bond is not judged; `FirstFailure.note` says so where layers are given.
+        bond is not judged.
+
+    Returns
+    -------
+    FirstFailure
+        Its note names every law that did not judge the part.
 
     Raises
     ------
@@ -116,6 +121,13 @@ def first_failure(
         what=what,
         where=judged[what].where,
         loads={name: failure.load for name, failure in judged.items()},
-        note="; ".join(failure.note for failure in failures.values() if failure.note),
+        note="; ".join(filter(None, (_note(*law) for law in failures.items()))),
         **values,
     )
+
+
+def _note(name: str, failure: Failure) -> str:
+    """Return the note of a law, or that it gave neither a load nor a note."""
+    if failure.note or not np.isnan(failure.load):
+        return failure.note
+    return f"law of failure '{name}' did not judge the part, and gave no reason"

@@ -4,7 +4,7 @@ A module has
 
 * ``fails(test, limits, layers)``, which takes a `VirtualTest`, the strengths of the part (`Limits`)
   and the layers of its matrix, or None, and returns a `Failure`: the load at which it happens
-  first, and where; a note alone where it cannot judge the part;
+  first, and where; a note alone, with the reason, where it cannot judge the part;
 * ``COLUMN``, a `Column` for that load in tables and CSV files, if it has one of its own.
 
 The name of the module is what a part then fails in. Modules of other packages are found by entry

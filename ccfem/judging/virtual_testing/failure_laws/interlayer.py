@@ -68,7 +68,7 @@ class Interlayer:
 def fails(test: VirtualTest, _: Limits, layers: Sequence[Layer] | None) -> Failure:
     """Load at which printed layers come apart; not judged without layers or strengths."""
     if layers is None:
-        return Failure()
+        return Failure(note="bond between layers not judged: no layers were given")
     try:
         bond = interlayer(test.solution, layers)
     except InputError as error:
