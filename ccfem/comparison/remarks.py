@@ -94,8 +94,9 @@ def _about(run: Run, wanted: Wanted, bounded: bool) -> list[str]:
             lines += _about_open(run.evaluation)
     if run.strand_verdict.remark:
         lines.append(run.strand_verdict.remark)
-    if run.why_not and run.why_not != run.unprinted:
-        lines.append(f"not printable as planned: {run.why_not}")
+    further = run.why_not.removeprefix(run.unprinted).removeprefix("; ")
+    if further:
+        lines.append(f"not printable as planned: {further}")
     if run.print_plan is not None:
         lines += run.print_plan.warnings
     elif run.strands is not None:
