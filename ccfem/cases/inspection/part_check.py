@@ -454,7 +454,7 @@ def _no_room(case: Case) -> list[str]:
     most = side * longest / width
     if least > most:
         return [
-            f"machine.minimum_length and held_length ask for strands of {least:g} mm: no layer has "
+            f"{machine.shortest_strand_by}: strands must be {least:g} mm long, but no layer has "
             f"room for more than {most:.4g} mm of {width:g} mm width; are all lengths in mm?"
         ]
     return []
