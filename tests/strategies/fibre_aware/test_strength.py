@@ -17,8 +17,9 @@ from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine
 from ccfem.paths.planning.plan import plan_layers
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.strategies.fibre_aware import strength_value
-from ccfem.strategies.fibre_aware.cut_and_move import best_cut
+from ccfem.strategies.fibre_aware import cut_and_move, judges, strength_value
+from ccfem.strategies.fibre_aware.cut_and_move import best_cut, prune_and_move
+from ccfem.strategies.fibre_aware.judges import Goal
 from ccfem.strategies.fibre_aware.prune import prune
 from ccfem.strategies.fibre_aware.stream_design import design
 from ccfem.strategies.fibre_aware.strength_design import StrengthProblem, design_for_strength
@@ -110,6 +111,24 @@ def test_cut_for_strength_leaves_a_stronger_and_softer_part(strong_beam, lines):
         found.append((first_failure(test, layers=layers).load, test.ratio))
     assert found[1][0] > 1.05 * found[0][0]
     assert found[1][1] < found[0][1]
+
+
+def test_tests_for_strength_have_the_tolerance_of_those_for_stiffness(
+    strong_beam, lines, monkeypatch
+):
+    """Rough while paths are cut; the last ones of moved paths, which gain little, are exact."""
+    stress, layers = strong_beam
+    residuals, virtual_tests = [], judges.virtual_tests
+
+    def recorded(*about, tolerance=1e-8, **more):
+        residuals.append(tolerance)
+        return virtual_tests(*about, tolerance=tolerance, **more)
+
+    monkeypatch.setattr(judges, "virtual_tests", recorded)
+    monkeypatch.setattr(cut_and_move, "moved", lambda *_, **__: lines)
+    length, strength, moves = 0.93 * float(lines.lengths.sum()), 0.5, 1
+    prune_and_move([lines], layers, Goal.of(stress), length, SHORT, Strand(), 1, strength, moves)
+    assert sorted(set(residuals)) == [1e-6, 1e-4]
 
 
 def test_values_below_zero_are_raised_and_keep_their_order():
