@@ -98,6 +98,11 @@ class CellMesh(ABC):
         return self.cells
 
     @cached_property
+    def centres(self) -> FloatArray:
+        """Mean of the corners of each cell, (m, d), mm."""
+        return read_only(self.points[self.corners].mean(axis=1))
+
+    @cached_property
     def _pairing(self) -> tuple[IntArray, IntArray]:
         return paired(self.facets)
 
@@ -269,6 +274,11 @@ class TetMesh(CellMesh, Shown):
     def partners(self) -> IntArray:
         """Facet on the other side of each facet, (4 m,): see `pair_facets`."""
         return read_only(pair_facets(self.corners, _FACES), np.int64)
+
+    @cached_property
+    def centres(self) -> FloatArray:
+        """Mean of the corners of each cell, (m, d), mm."""
+        return read_only(self.points[self.corners].mean(axis=1))
 
     @cached_property
     def _pairing(self) -> tuple[IntArray, IntArray]:

@@ -143,15 +143,10 @@ class MatrixPeaks:
     __repr__ = in_brief
 
     @cached_property
-    def _centroids(self) -> FloatArray:
-        mesh = self.part.mesh
-        return np.asarray(mesh.points[mesh.corners].mean(axis=1))
-
-    @cached_property
     def judged(self) -> IntArray:
         """Cells outside the zone round loads and supports, as in `matrix_peak`."""
         part = self.part
-        distance = distance_from_patches(part.problem, part.case, self._centroids, ZONE)
+        distance = distance_from_patches(part.problem, part.case, self.part.mesh.centres, ZONE)
         return np.flatnonzero(np.isinf(distance))
 
     @cached_property
@@ -163,14 +158,14 @@ class MatrixPeaks:
     def _averages(self, values: FloatArray) -> FloatArray:
         """Averages (k, c) of the values (m, c) of all cells over a ball round each judged cell."""
         volumes = self.part.mesh.volumes
-        return ball_averages(self._centroids, values, volumes, self.judged, BALL)
+        return ball_averages(self.part.mesh.centres, values, volumes, self.judged, BALL)
 
     def _back(self, slopes: FloatArray) -> FloatArray:
         """Transpose of `_averages`: (m, c) of derivatives (k, c) by the averages."""
         size = np.abs(slopes).max(axis=1)
         hot = np.flatnonzero(size > _HOT * size.max())
         volumes = self.part.mesh.volumes
-        return ball_shares(self._centroids, slopes[hot], volumes, self.judged[hot], BALL)
+        return ball_shares(self.part.mesh.centres, slopes[hot], volumes, self.judged[hot], BALL)
 
     def _norm(self, index: FloatArray) -> tuple[float, float, FloatArray]:
         """Peak and norm of an index (k,), and the derivative of the norm's logarithm by it."""

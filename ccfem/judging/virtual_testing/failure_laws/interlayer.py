@@ -120,7 +120,7 @@ def interlayer(
         )
     check_number("radius of the ball", radius, above=0.0, unit="mm")
     mesh = stress.mesh
-    centroid = mesh.points[mesh.corners].mean(axis=1)
+    centroid = mesh.centres
     distance = distance_from_patches(stress.problem, stress.case, centroid, ZONE)
     if not (distance > ZONE).any():
         raise InputError(
@@ -158,7 +158,7 @@ def layer_traction(
         The averaged stress.
     """
     mesh = stress.mesh
-    centre = mesh.points[mesh.corners].mean(axis=1)
+    centre = mesh.centres
     values = stress.stress.reshape(-1, 9)
     tensor = ball_averages(centre, values, mesh.volumes, cells, radius).reshape(-1, 3, 3)
     normal = layer_normals(layers, centre[cells])
