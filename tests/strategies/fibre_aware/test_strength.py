@@ -1,12 +1,14 @@
 """Planning for the load at first failure: what fibre is worth for it, and its design."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from ccfem.base.errors import InputError
 from ccfem.fem.elasticity.solve import solve
+from ccfem.judging.virtual_testing import failure_laws
 from ccfem.judging.virtual_testing.equilibrium import bars, equilibrium
 from ccfem.judging.virtual_testing.near_failure import nearness
 from ccfem.judging.virtual_testing.specimen import Specimen
@@ -71,9 +73,16 @@ def work_of(found):
     return float(np.vdot(u, (found.matrix @ u.reshape(-1)).reshape(u.shape)))
 
 
-@pytest.mark.parametrize("limits", [(86.0, 50.0), (1.0, 1e4), (1e4, 1.0)])
-def test_value_agrees_with_finite_differences(strong_beam, lines, limits):
-    """More fibre in some pieces, solved anew: both logarithms change as the values say."""
+@pytest.mark.parametrize("limits", [(86.0, 50.0), (1.0, 1e4), (1e4, 1.0), "brittle"])
+def test_value_agrees_with_finite_differences(strong_beam, lines, limits, monkeypatch):
+    """More fibre in some pieces, solved anew: both logarithms change as the values say.
+
+    Also with a law of a file, Rankine's of a brittle matrix, which alone decides.
+    """
+    if limits == "brittle":
+        law = SimpleNamespace(index=lambda stress, *_: np.linalg.eigvalsh(stress)[:, -1])
+        monkeypatch.setattr(failure_laws, "named", lambda: {"brittle": law})
+        limits = (1e4, 1e4)
     specimen = Specimen.of(strong_beam[0])
     strands = cut_strands(lines, specimen.unreinforced.mesh)
     worth = Worth.of((specimen,), Strand(), 1.0)
