@@ -470,7 +470,7 @@ def test_thin_fibre_is_reported_not_dropped():
         ({"strategies": ["isocurf"]}, "no strategy named 'isocurf'; there are: concentric,"),
         ({"strategies": []}, "at least one strategy"),
         ({"strategies": ["zigzag", "zigzag"]}, "'zigzag' more than once"),
-        ({"layers": 0}, "at least 1; got 0"),
+        ({"layers": 0}, "at least 1 and at most 100000; got 0"),
         ({"fibre_per_layer": -1.0}, "above 0 mm; got -1"),
         ({"fibre_per_layer": 10.0, "natural": True}, "not both"),
         ({"load_case": "twist"}, "no load case named 'twist'; there are: pull, push"),
