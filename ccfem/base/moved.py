@@ -1,4 +1,4 @@
-"""Names that packages had before release 0.2: they still work, and warn of their new ones."""
+"""Names that packages had before release 0.2: they still work, or say what replaces them."""
 
 import importlib
 import sys
@@ -263,6 +263,14 @@ MOVED = {
 }
 """New name of each package and module by its old one, both below ``ccfem``."""
 
+GONE = {
+    "papers.layer_traction": (
+        "use ccfem.judging.virtual_testing.failure_laws.interlayer.layer_traction, which returns "
+        "the averaged stress too: opening, sliding, tensor"
+    ),
+}
+"""What replaces modules whose functions changed when they moved."""
+
 
 class _Finder(MetaPathFinder):
     """Finds a module under its old name."""
@@ -274,6 +282,8 @@ class _Finder(MetaPathFinder):
         if not name.startswith("ccfem."):
             return None
         stem = name.removeprefix("ccfem.")
+        if stem in GONE:
+            raise ModuleNotFoundError(f"{name} is gone: {GONE[stem]}", name=name)
         old, rest = stem, ""
         while old and old not in MOVED:
             old, _, last = old.rpartition(".")

@@ -350,7 +350,7 @@ def corner_bracket_design(
     mesh = crossed_mesh(corner_bracket_outlines(), element_size, CORNER_BRACKET_HOLES)
     feet = tuple(Support(f"foot_{k}") for k in range(1, 5))
     problem = Problem(mesh, printed_pla(), feet, {"lift": (Bearing("upper", (0.0, 0.0, 100.0)),)})
-    x, y, z = mesh.points[mesh.cells].mean(axis=1).T
+    x, y, z = mesh.centres.T
     bolt = np.hypot(np.abs(x) - 20.5, np.abs(y) - 20.5) <= 2.75 + _RIM
     axle = (np.hypot(y, z - 20.0) <= 4.0 + _RIM) & (np.abs(x) <= 5.0)
     rims = np.asarray((bolt & (z <= 6.0)) | axle)
@@ -400,7 +400,7 @@ def bracket_design(
             "side": tuple(Force(name, (0.0, 0.0, 100.0)) for name in loaded),
         },
     )
-    centre = mesh.points[mesh.cells].mean(axis=1)[:, None, :2]
+    centre = mesh.centres[:, None, :2]
     distance = np.linalg.norm(centre - np.array(list(BRACKET_HOLES.values())), axis=2)
     rims = np.asarray((distance <= BRACKET_HOLE_RADIUS + _RIM).any(axis=1))
     return solid_design(problem, 0.3, element_size, rims, max_iterations, progress)

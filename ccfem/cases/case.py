@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from ccfem.base.arrays import freeze
@@ -79,9 +80,17 @@ class Case(Shown):
             check_number(f"weight of load case '{name}'", weight, above=0.0)
         check_name(self.name, self.title)
 
+    @cached_property
+    def _flat_layers(self) -> dict[Planar, tuple[Layer, ...]]:
+        """Flat layers that were cut already, by their slicer."""
+        return {}
+
     def fibre_layers(self, stress: PartStress, slicer: Slicer | None = None) -> tuple[Layer, ...]:
         """Cut the part into the layers that get fibre, by its own slicer or another."""
         chosen = self.slicing if slicer is None else slicer
+        if isinstance(chosen, Planar) and stress.mesh is self.problem.mesh:
+            chosen.check(stress.mesh, self.build, self.machine)
+            return self.known_layers(chosen)
         layers = chosen(stress, self.build, self.machine)
         if self.fibre is None:
             return layers
@@ -105,13 +114,20 @@ class Case(Shown):
             check_strands(self.known_layers(chosen), self.machine)
 
     def known_layers(self, slicer: Slicer | None = None) -> tuple[Layer, ...]:
-        """Layers that get fibre, where they are known before the part is solved: flat ones."""
+        """Layers that get fibre, where they are known before the part is solved: flat ones.
+
+        They are cut once.
+        """
         chosen = self.slicing if slicer is None else slicer
         if not isinstance(chosen, Planar):
             return ()
-        mesh = self.problem.mesh
-        layers = chosen.cut(mesh, self.build)
-        return layers if self.fibre is None else self.fibre.on(layers, mesh, self.machine)
+        if chosen not in self._flat_layers:
+            mesh = self.problem.mesh
+            layers = chosen.cut(mesh, self.build)
+            if self.fibre is not None:
+                layers = self.fibre.on(layers, mesh, self.machine)
+            self._flat_layers[chosen] = layers
+        return self._flat_layers[chosen]
 
 
 def check_name(name: str, title: str) -> None:

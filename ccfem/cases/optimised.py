@@ -266,7 +266,7 @@ def _of_solid(case: Case, asked: Optimisation, progress: Progress) -> Optimised:
     mesh = problem.mesh if problem.mesh.order == 1 else problem.mesh.linear()
     whole = replace(problem, mesh=mesh, order=1, combinations={})
     size = _median_edge(whole)
-    centres = mesh.points[mesh.cells].mean(axis=1)
+    centres = mesh.centres
     full = cells_in(asked.solid, centres)
     for name in asked.keep or ():
         nodes = mesh.points[np.unique(mesh.patch(name))]

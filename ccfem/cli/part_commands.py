@@ -2,9 +2,10 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from ccfem.cli.arguments import path_of
 from ccfem.cli.options import Backend, CasePath, Refine, SetCase
@@ -70,14 +71,12 @@ def _cite(
 def _mesh(
     body: Annotated[
         Path,
-        typer.Argument(metavar="BODY", help="Surface (.stl, .obj, .ply) or CAD file (.step ...)."),
+        typer.Argument(metavar="BODY", help="Surface ({surfaces}) or CAD file ({cad_files})."),
     ],
     size: Annotated[float, typer.Option("--size", metavar="MM", help="Edge length of the cells.")],
     out: Annotated[
         Path,
-        typer.Option(
-            "-o", "--out", metavar="MESH", parser=path_of, help="Mesh (.vtu, .npz, .tet)."
-        ),
+        typer.Option("-o", "--out", metavar="MESH", parser=path_of, help="Mesh ({meshes})."),
     ],
     scale: Annotated[
         float, typer.Option(metavar="S", help="Factor that converts a file's coordinates to mm.")
@@ -129,7 +128,32 @@ _COMMANDS: dict[str, Callable[..., None]] = {
 }
 
 
+class _NamingFormats(TyperCommand):
+    """A command whose help names the suffixes of all files that are read and written.
+
+    They are looked for when the help is printed: the modules of the formats import what is slow.
+    """
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help."""
+        from ccfem.body.files import surface
+        from ccfem.body.files.formats import suffixes
+        from ccfem.body.meshing import cad
+
+        known = {
+            "surfaces": surface.SUFFIXES,
+            "cad_files": cad.SUFFIXES,
+            "meshes": suffixes(writable=True),
+        }
+        names = {kind: ", ".join(those) for kind, those in known.items()}
+        for parameter in self.params:
+            text = getattr(parameter, "help", None)
+            if text:
+                parameter.help = text.format(**names)  # type: ignore[attr-defined]
+        super().format_help(ctx, formatter)
+
+
 def add_part_commands(app: typer.Typer) -> None:
     """Add the commands of this module to the command line."""
     for name, command in _COMMANDS.items():
-        app.command(name)(command)
+        app.command(name, cls=_NamingFormats if command is _mesh else None)(command)

@@ -82,8 +82,10 @@ def _about(run: Run, wanted: Wanted, bounded: bool) -> list[str]:
         "no first-failure load": run.tested.note if run.tested is not None else "",
     }
     lines = [f"{what}: {reason}" for what, reason in reasons.items() if reason]
-    if run.tested is not None and run.tested.failure is not None and run.tested.failure.note:
-        lines.append(run.tested.failure.note)
+    if run.tested is not None and run.tested.failure is not None:
+        cases = run.cases.failure.each if run.cases and run.cases.failure else ()
+        notes = [failure.note for failure in (run.tested.failure, *cases)]
+        lines += dict.fromkeys(filter(None, notes))
     if run.evaluation is not None:
         lines += _about_links(run.evaluation.total)
         meant = getattr(run.strategy, "crosses", False)
@@ -92,8 +94,9 @@ def _about(run: Run, wanted: Wanted, bounded: bool) -> list[str]:
             lines += _about_open(run.evaluation)
     if run.strand_verdict.remark:
         lines.append(run.strand_verdict.remark)
-    if run.why_not and run.why_not != run.unprinted:
-        lines.append(f"not printable as planned: {run.why_not}")
+    further = run.why_not.removeprefix(run.unprinted).removeprefix("; ")
+    if further:
+        lines.append(f"not printable as planned: {further}")
     if run.print_plan is not None:
         lines += run.print_plan.warnings
     elif run.strands is not None:

@@ -35,7 +35,7 @@ from ccfem.paths.planning.strategy import LengthStrategy, Planned
 from ccfem.paths.planning.unfolding import may_fold
 from ccfem.paths.splitting.printed_strands import printed_strands
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.printing.before_solving import why_not_printable
+from ccfem.printing.before_solving import in_air, refusal
 from ccfem.printing.curved_plan import curved_plan
 from ccfem.printing.part_moves import part_moves
 from ccfem.printing.print_plan import plan_print
@@ -96,12 +96,23 @@ class Part:
     propped: bool = False
     remarks: tuple[str, ...] = ()
 
+    @property
+    def flat_layers(self) -> tuple[Layer, ...]:
+        """Its layers, if they are flat."""
+        return () if curved_layers(self.layers) else self.layers
+
+    @cached_property
+    def refusal(self) -> str:
+        """Why no print of it is planned, whatever its paths are; else empty."""
+        build = self.build or (0.0, 0.0, 1.0)
+        return refusal(self.stress.mesh, build, self.machine, self.flat_layers)
+
     @cached_property
     def why_not_printable(self) -> tuple[str, ...]:
         """What keeps it from being printed, whatever is planned."""
-        build = self.build or (0.0, 0.0, 1.0)
-        layers = () if curved_layers(self.layers) else self.layers
-        return why_not_printable(self.stress.mesh, build, self.machine, layers, self.propped)
+        layers = () if self.propped else self.flat_layers
+        air = in_air(self.stress.mesh, self.machine, layers)
+        return tuple(filter(None, (self.refusal, air)))
 
     @property
     def several_cases(self) -> bool:
@@ -335,6 +346,8 @@ def with_print(run: Run, part: Part, tell: Tell) -> Run:
     tell(f"planning the print of {run.name}")
     if run.evaluation is None or run.strands is None:
         return run
+    if part.refusal:
+        return replace(run, unprinted=part.refusal)  # said in `why_not` since the evaluation
     try:
         what = (run.strands, part.layers, part.stress.mesh, part.machine)
         build = part.build or (0.0, 0.0, 1.0)
@@ -344,8 +357,8 @@ def with_print(run: Run, part: Part, tell: Tell) -> Run:
         )
         moves = part_moves(plan, part.machine)
     except InputError as error:
-        reasons = dict.fromkeys([str(error), *filter(None, [run.why_not])])
-        return replace(run, unprinted=str(error), why_not="; ".join(reasons))
+        why = "; ".join(filter(None, (str(error), run.why_not)))
+        return replace(run, unprinted=str(error), why_not=why)
     share = plan.volume(part.machine) / float(part.stress.mesh.volumes.sum())
     totals = print_totals(moves, part.machine)
     return replace(run, print_plan=plan, moves=moves, print_totals=totals, printed_volume=share)

@@ -75,6 +75,19 @@ def are_among(facets: IntArray, others: IntArray) -> BoolArray:
     return np.isin(wanted, known)
 
 
+def sides_at(edges: IntArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
+    """Triangle and side of each directed edge (e, 2), of the triangles (t, 3) that have them.
+
+    Side k goes from corner k of its triangle to the next one, so that corner k + 2 is opposite.
+    """
+    sides = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    count = int(triangles.max()) + 1
+    known = sides[:, 0] * count + sides[:, 1]
+    order = np.argsort(known, kind="stable")
+    at = order[np.searchsorted(known[order], edges[:, 0] * count + edges[:, 1])]
+    return at // 3, at % 3
+
+
 def unique_edges(ends: IntArray) -> tuple[IntArray, IntArray]:
     """Edges (e, 2) that pairs of nodes (k, 2) stand for, and the edge (k,) of each pair.
 

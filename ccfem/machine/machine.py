@@ -192,6 +192,13 @@ class Machine:
         return max(self.minimum_length, self.tail + self.held_length)
 
     @property
+    def shortest_strand_by(self) -> str:
+        """What decides the length of the shortest strand, in words for messages."""
+        if self.shortest_strand <= self.minimum_length:
+            return "machine.minimum_length"
+        return f"machine.held_length, {self.held_length:g} mm, and {self.tail:g} mm from the cutter"
+
+    @property
     def tail(self) -> float:
         """Length of fibre still to be laid after a cut, mm."""
         if self.cutter_distance is None:

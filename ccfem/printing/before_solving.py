@@ -77,35 +77,21 @@ def _check_room(mesh: TetMesh, build: Sequence[float], machine: Machine) -> None
     part_moves(plan, machine)
 
 
-def why_not_printable(
-    mesh: TetMesh,
-    build: Sequence[float],
-    machine: Machine,
-    layers: Sequence[Layer] = (),
-    support: bool = False,
-) -> tuple[str, ...]:
-    """Say what keeps a part from being printed whatever is planned on it.
-
-    Parameters
-    ----------
-    mesh, build, machine, layers
-        As of `check_print`.
-    support : bool, default False
-        Whether support is printed below what flat layers would lay in air.
-
-    Returns
-    -------
-    tuple of str
-        Why `check_print` refuses it, and what its flat layers would lay in air.
-    """
-    reasons = []
+def refusal(
+    mesh: TetMesh, build: Sequence[float], machine: Machine, layers: Sequence[Layer] = ()
+) -> str:
+    """Say why `check_print` refuses a print; empty where it does not."""
     try:
         check_print(mesh, build, machine, layers)
     except InputError as error:
-        reasons.append(str(error))
-    free = bool(layers) and not support
-    hanging = overhang(mesh, _upwards(build, layers), machine) if free else None
-    return (*reasons, *([] if hanging is None else [hanging.words]))
+        return str(error)
+    return ""
+
+
+def in_air(mesh: TetMesh, machine: Machine, layers: Sequence[Layer]) -> str:
+    """Say what flat layers of a part would lay in air without support; empty for nothing."""
+    hanging = overhang(mesh, _upwards((), layers), machine) if layers else None
+    return "" if hanging is None else hanging.words
 
 
 def check_support(mesh: TetMesh, layers: Sequence[Layer], machine: Machine) -> None:

@@ -8,7 +8,7 @@ import warnings
 import pytest
 
 import ccfem
-from ccfem.base.moved import MOVED
+from ccfem.base.moved import GONE, MOVED
 from ccfem.slicing.slicers.planar import Planar
 
 
@@ -19,6 +19,14 @@ def test_an_old_name_is_the_same_module(old):
         module = importlib.import_module(f"ccfem.{old}")
     assert module is importlib.import_module(f"ccfem.{MOVED[old]}")
     assert module.__name__ == module.__spec__.name == f"ccfem.{MOVED[old]}"
+
+
+@pytest.mark.parametrize("old", GONE)
+def test_a_name_that_is_gone_says_what_replaces_it(old):
+    with pytest.raises(ModuleNotFoundError, match=f"ccfem.{old} is gone: use ccfem") as gone:
+        importlib.import_module(f"ccfem.{old}")
+    module, _, name = str(gone.value).split("use ")[1].split(",")[0].rpartition(".")
+    assert callable(getattr(importlib.import_module(module), name))
 
 
 def test_an_old_name_warns_of_the_new_one_where_it_is_imported():

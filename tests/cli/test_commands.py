@@ -12,9 +12,10 @@ import pytest
 
 from ccfem import __version__
 from ccfem.base.errors import InputError
-from ccfem.body.files import write_mesh
+from ccfem.body.files import formats, surface, write_mesh
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.box import box_mesh
+from ccfem.body.meshing import cad
 from ccfem.cli.arguments import parameters_by_strategy
 from ccfem.cli.main import main
 from ccfem.comparison.plot.part_views import draw_part
@@ -392,7 +393,10 @@ HOLE = '[patches.pin]\nrule = "cylinder"\npoint = [30, 12, 0]\naxis = "z"\nradiu
         (PART + "[strategies.isocurf]\na = 1\n", "no strategy named 'isocurf'; there are: "),
         (PART.replace("layers = 3", "layer = 3"), "no key 'layer'; .*did you mean 'layers'"),
         (PART + "[strategies.isocurve]\nkap = 1\n", "no parameter 'kap'; it has: .*cap"),
-        (PART.replace("layers = 3", "layers = 0"), "layers must be at least 1; got 0"),
+        (
+            PART.replace("layers = 3", "layers = 0"),
+            "layers must be at least 1 and at most 100000; got 0",
+        ),
         (PART.replace("poisson = 0.35", "poisson = 0.5"), "poisson"),
         ("mesh = ", "is not a TOML file"),
     ],
@@ -421,7 +425,10 @@ def test_bad_parts_end_in_one_line(ccfem, folder, text, message):
         (["part.toml", "--set", "zigzag.spacing"], "expected NAME=VALUE"),
         (["part.toml", "--set-case", "force=1"], "'part.toml' is a part file"),
         (["bar", "--set-case", "length=1"], "case 'bar' has no parameter 'length'; it has:"),
-        (["part.toml", "--layers", "0"], "number of layers must be at least 1; got 0"),
+        (
+            ["part.toml", "--layers", "0"],
+            "number of layers must be at least 1 and at most 100000; got",
+        ),
         (["part.toml", "--layers", "many"], "--layers"),
         (["part.toml", "--heights", "1,2,9"], "height 9 mm lies outside the part.* from 0 to 4 mm"),
         (["part.toml", "--heights", "1,x"], "expected numbers"),
@@ -496,6 +503,14 @@ def test_what_takes_one_load_case_does_not_offer_all(ccfem, command):
     said = " ".join(ccfem(command, "--help")[1].split())
     assert "Load case to take; default the first." in said
     assert "plans for all at once" not in said
+
+
+def test_the_help_of_mesh_names_every_format(ccfem, monkeypatch):
+    """Also one that another package adds."""
+    known = [*surface.SUFFIXES, *cad.SUFFIXES, *formats.suffixes(writable=True), ".new"]
+    monkeypatch.setattr(formats, "suffixes", lambda writable: tuple(known[-4:]))
+    said = " ".join(ccfem("mesh", "--help")[1].split())
+    assert all(re.search(rf"[( ]\{suffix}[,)]", said) for suffix in known)
 
 
 def test_a_plan_that_cannot_be_printed_says_so_and_ends_with_three(ccfem, folder):

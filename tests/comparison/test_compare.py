@@ -436,6 +436,27 @@ def test_what_cannot_be_printed_as_planned_is_reported():
         compare(replace(strip(), machine=Machine(fibre_speed=0.0)), ["zigzag"], **options)
 
 
+def test_a_bed_that_is_too_small_is_said_once():
+    """Also beside other reasons, where the layers are not known before the solve."""
+
+    def flat(stress, build, machine):
+        return Planar(count=1).cut(stress.mesh, build)
+
+    machine = replace(strip().machine, gcode=GcodeProfile(bed=(50.0, 50.0, 50.0)))
+    case = replace(strip(), machine=machine)
+    lines = [np.array([[10.0, 12.0], [80.0, 12.0]])] * 2
+    given = GivenPaths(Toolpaths.from_plane(lines, Planar(count=1).cut(case.problem.mesh)[0]), "")
+    options = {"strand": None, "natural": True, "print_plans": True}
+    result = compare(case, {"piled": given}, layers=flat, **options)
+    (run,) = result.runs
+    assert run.unprinted.startswith("the part needs 59.2 x 23.2 x 5 mm, but the printer")
+    assert run.why_not.count("the part needs") == 1
+    assert "; 50% of the fibre lies on other fibre" in run.why_not
+    assert sum("the part needs" in line for line in result.remarks) == 1
+    (further,) = [line for line in result.remarks if "not printable as planned: " in line]
+    assert "50% of the fibre lies on other fibre" in further
+
+
 def test_thin_fibre_is_reported_not_dropped():
     strategies = {"zigzag": create("zigzag", {"spacing": 20.0})}
     case = replace(strip(), machine=Machine(minimum_length=5000.0))
@@ -449,7 +470,7 @@ def test_thin_fibre_is_reported_not_dropped():
         ({"strategies": ["isocurf"]}, "no strategy named 'isocurf'; there are: concentric,"),
         ({"strategies": []}, "at least one strategy"),
         ({"strategies": ["zigzag", "zigzag"]}, "'zigzag' more than once"),
-        ({"layers": 0}, "at least 1; got 0"),
+        ({"layers": 0}, "at least 1 and at most 100000; got 0"),
         ({"fibre_per_layer": -1.0}, "above 0 mm; got -1"),
         ({"fibre_per_layer": 10.0, "natural": True}, "not both"),
         ({"load_case": "twist"}, "no load case named 'twist'; there are: pull, push"),

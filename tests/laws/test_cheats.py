@@ -161,6 +161,9 @@ PARTS: dict[str, tuple[float, tuple[str, ...]]] = {
 }
 """Parts, with their element sizes; on the round one those cheats that lie otherwise there."""
 
+UNTESTED = {"bar": {"short_pieces", "meanders", "outside"}, "loop": {"bundles", "outside"}}
+"""Cheats that leave the part, or of which nothing is left to print, so that none is tested."""
+
 
 @pytest.fixture(scope="module", params=PARTS)
 def judged(request):
@@ -174,6 +177,7 @@ def judged(request):
 def test_no_cheat_ranks_above_an_honest_strategy(judged):
     order = [run.name for run in judged.ranking]
     assert set(order[: len(HONEST)]) == set(HONEST)
+    assert set(order[len(HONEST) :]) == set(PARTS[judged.case.name][1])
     assert judged.ranking[0].printable
     assert not any(name in judged.verdict.split(" Not printable")[0] for name in CHEATS)
     table = judged.frame.set_index("strategy")
@@ -182,8 +186,8 @@ def test_no_cheat_ranks_above_an_honest_strategy(judged):
 
 
 def test_each_cheat_is_named_for_what_it_is(judged):
-    cheats = [run for run in judged.runs if run.name in CHEATS]
-    assert len(cheats) >= 5
+    cheats = judged.runs[len(HONEST) :]
+    assert tuple(run.name for run in cheats) == PARTS[judged.case.name][1]
     for run in cheats:
         _, said = CHEATS[run.name]
         assert said in (run.why_not or run.failure), run.name
@@ -212,8 +216,9 @@ def test_piling_up_gains_nothing(judged):
 def test_no_cheat_exceeds_the_bound(judged):
     """The bound has one strand a width in each layer; only strands that cross may have more."""
     ratios = {run.name: run.tested.bracket.tension.ratio for run in judged.runs if run.tested}
+    name = judged.case.name
+    assert ratios.keys() == {*HONEST, *PARTS[name][1]} - UNTESTED[name]
     del ratios["fan"]
-    assert len(ratios) >= len(HONEST) + 2
     assert max(ratios.values()) <= judged.bound.ratio
 
 
@@ -222,6 +227,10 @@ def test_fibre_on_the_skin_is_not_printable():
     asked = {"natural": True, "strand": None}
     (on_skin,) = ccfem.compare(case, ["zigzag"], layers=[0.0, 2.5], **asked).runs
     assert "50% of the fibre stands out of the part's top or bottom" in on_skin.why_not
+    # Strands are 0.1075 mm high, and 0.15 mm of matrix below them hold them (`Process.cover`): a
+    # first layer is printable from 0.204 mm on.
+    (thin,) = ccfem.compare(case, ["zigzag"], layers=[0.2, 2.5], **asked).runs
+    assert thin.why_not.startswith("0.146 mm of matrix below the first fibre layer do not hold it")
     (inside,) = ccfem.compare(case, ["zigzag"], layers=[0.25, 2.5], **asked).runs
     assert inside.printable
 

@@ -8,6 +8,7 @@ import ccfem
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
+from ccfem.comparison.engine import solved
 from ccfem.comparison.fibre_front import front_of
 from ccfem.comparison.request import Request
 from ccfem.comparison.studies import Study
@@ -100,3 +101,16 @@ def test_numbers_of_layers_of_a_front_are_refused_before_the_solve(monkeypatch):
 def test_layers_that_follow_the_stress_are_not_known():
     case = replace(part(), slicing=ccfem.slicing.slicers.create("spatial"))
     assert case.known_layers() == ()
+
+
+def test_flat_layers_are_cut_once(monkeypatch):
+    """For the checks before the solve, to plan on, and for the report: the same layers."""
+    case, cuts, cut = part(), [], Planar.cut
+    monkeypatch.setattr(Planar, "cut", lambda *about: cuts.append(about) or cut(*about))
+    request = Request.of(case, ["zigzag"], print_plans=True)
+    layers = solved(request).cut(request.slicings[""].slicer).layers
+    assert ccfem.check(case).not_printable == ()
+    assert layers is case.known_layers()
+    assert len(cuts) == 1
+    (lone,) = case.known_layers(Planar(count=1))
+    assert lone.plane.height == pytest.approx(2.0)

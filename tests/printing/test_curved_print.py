@@ -136,7 +136,7 @@ def test_an_upright_head_lays_what_it_does_not_touch(part):
     short = replace(MACHINE.process, short="error")
     long = replace(MACHINE, minimum_length=60.0, process=short)
     with pytest.raises(
-        InputError, match=r"no shorter than the 60 mm that the cutter allows; 4 of 4"
+        InputError, match=r"no shorter than the 60 mm of machine.minimum_length; 4 of 4"
     ):
         curved_plan(paths, layers, mesh, long)
 

@@ -262,7 +262,7 @@ class CellBox:
 
     def __call__(self, mesh: TetMesh) -> IntArray:
         """Cells (k,) in the box."""
-        centres = _centres(mesh)
+        centres = mesh.centres
         inside: BoolArray = np.all((centres >= self.lower) & (centres <= self.upper), axis=1)
         return _chosen(inside, f"box {self.lower} to {self.upper}", mesh)
 
@@ -291,7 +291,7 @@ class CellCylinder:
     def __call__(self, mesh: TetMesh) -> IntArray:
         """Cells (k,) in the cylinder."""
         axis = unit_vector(self.axis, "cylinder axis")
-        arm = _centres(mesh) - np.asarray(self.point)
+        arm = mesh.centres - np.asarray(self.point)
         away = np.linalg.norm(arm - np.outer(arm @ axis, axis), axis=1)
         label = f"cylinder round {self.point} along {self.axis}, radius {self.radius:g} mm"
         inside: BoolArray = away <= self.radius
@@ -302,10 +302,6 @@ def check_box(lower: Vector, upper: Vector) -> None:
     """Refuse opposite corners of a box, mm, of which the first does not lie below the second."""
     if not (np.asarray(lower) < np.asarray(upper)).all():
         raise InputError(f"box lower must lie below upper; got {lower} and {upper}: swap them")
-
-
-def _centres(mesh: TetMesh) -> FloatArray:
-    return np.asarray(mesh.points[mesh.corners].mean(axis=1))
 
 
 def _chosen(inside: BoolArray, label: str, mesh: TetMesh) -> IntArray:

@@ -98,8 +98,14 @@ class CellMesh(ABC):
         return self.cells
 
     @cached_property
+    def centres(self) -> FloatArray:
+        """Mean of the corners of each cell, (m, d), mm."""
+        return read_only(self.points[self.corners].mean(axis=1))
+
+    @cached_property
     def _pairing(self) -> tuple[IntArray, IntArray]:
-        return paired(self.facets)
+        pairs, single = paired(self.facets)
+        return read_only(pairs, int), read_only(single, int)
 
     @property
     def _facets_a_cell(self) -> int:
@@ -274,7 +280,7 @@ class TetMesh(CellMesh, Shown):
     def _pairing(self) -> tuple[IntArray, IntArray]:
         facet = np.flatnonzero(self.partners > np.arange(len(self.partners)))
         pairs = np.stack([facet, self.partners[facet]], axis=1)
-        return pairs, np.flatnonzero(self.partners == FREE)
+        return read_only(pairs, int), read_only(np.flatnonzero(self.partners == FREE), int)
 
     @cached_property
     def flaw(self) -> str:

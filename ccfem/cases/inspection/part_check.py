@@ -33,7 +33,7 @@ from ccfem.fem.elasticity.solve import support_sets
 from ccfem.fem.elasticity.supports import held
 from ccfem.fem.elasticity.system import prepare
 from ccfem.geometry.facets import connected, facet_keys
-from ccfem.printing.before_solving import why_not_printable
+from ccfem.printing.before_solving import in_air, refusal
 from ccfem.slicing.layers.layer import Layer
 
 if TYPE_CHECKING:
@@ -315,7 +315,9 @@ def check(part: str | os.PathLike[str] | Case, **parameters: Any) -> Check:
     with layers.noted():
         case.check_layers()
         known = case.known_layers()
-        not_printable = why_not_printable(problem.mesh, case.build, case.machine, known)
+        mesh, machine = problem.mesh, case.machine
+        refused = refusal(mesh, case.build, machine, known)
+        not_printable = tuple(filter(None, (refused, in_air(mesh, machine, known))))
     fibre = () if case.fibre is None else known
     return Check(
         case,
@@ -452,7 +454,7 @@ def _no_room(case: Case) -> list[str]:
     most = side * longest / width
     if least > most:
         return [
-            f"machine.minimum_length and held_length ask for strands of {least:g} mm: no layer has "
+            f"{machine.shortest_strand_by}: strands must be {least:g} mm long, but no layer has "
             f"room for more than {most:.4g} mm of {width:g} mm width; are all lengths in mm?"
         ]
     return []

@@ -54,11 +54,6 @@ class PlaneMesh(CellMesh):
         return read_only(0.5 * (x[:, :-1] * y[:, 1:] - x[:, 1:] * y[:, :-1]).sum(axis=1))
 
     @cached_property
-    def centres(self) -> FloatArray:
-        """Mean of the corners of each cell, (m, 2), mm."""
-        return read_only(self.points[self.cells].mean(axis=1))
-
-    @cached_property
     def congruent(self) -> bool:
         """Whether all cells are the same up to a translation, to 1e-9 of their size."""
         shape = self.points[self.cells] - self.points[self.cells[:, :1]]

@@ -209,7 +209,7 @@ class TetEquations:
                 "the problem has a density already: give it as `start`, or fold it into stiffness"
             )
         self.system = prepare_tets(problem)
-        self.centres = problem.mesh.points[problem.mesh.cells].mean(axis=1)
+        self.centres = problem.mesh.centres
         self.volumes = problem.mesh.volumes
 
     def backend(self) -> str:

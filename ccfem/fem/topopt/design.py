@@ -106,7 +106,7 @@ class Design:
         if self.angle is None:
             return None
         mesh = self.full.mesh
-        centres = mesh.points[mesh.cells].mean(axis=1)
+        centres = mesh.centres
         return axes_about_z(self.angle[cKDTree(centres).query(points[:, : centres.shape[1]])[1]])
 
     def filled(self, volume_fraction: float | None = None) -> BoolArray:

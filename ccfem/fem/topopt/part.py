@@ -114,7 +114,7 @@ def as_problem(
         return plate_part(design, material, thickness, edge_length, domain, volume_fraction)
     _no_plate(thickness=thickness, edge_length=edge_length, domain=domain)
     mesh = part_mesh(design, volume_fraction)
-    axes = design.axes_at(mesh.points[mesh.corners].mean(axis=1))
+    axes = design.axes_at(mesh.centres)
     return Problem(mesh, material, full.supports, full.loads, axes, order=full.order)
 
 
@@ -203,7 +203,7 @@ def plate_part(
         material,
         (*supports, Support(_BOTTOM, "z")),
         loads,
-        design.axes_at(mesh.points[mesh.corners].mean(axis=1)),
+        design.axes_at(mesh.centres),
         order=1,
     )
 

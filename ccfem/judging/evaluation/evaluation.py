@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import shapely
 
 from ccfem.base.arrays import FloatArray, IntArray, freeze
 from ccfem.base.display import Shown
@@ -14,6 +15,7 @@ from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity import PartStress
 from ccfem.fem.materials import Material, named_material
 from ccfem.geometry.locate import nearest_on_triangles
+from ccfem.geometry.shapes import Region
 from ccfem.judging.evaluation import indices
 from ccfem.judging.evaluation.indices.alignment import AlignmentSamples
 from ccfem.judging.evaluation.indices.curvature import CurvatureSamples
@@ -209,26 +211,25 @@ def _upright(layers: Sequence[Layer], build: Sequence[float] | None) -> FloatArr
     return np.asarray(up / max(float(np.linalg.norm(up)), 1e-300))
 
 
-def _below(layer: Layer, layers: Sequence[Layer], mesh: TetMesh, machine: Machine) -> Layer | None:
+def _below(layer: Layer, layers: Sequence[Layer], mesh: TetMesh, machine: Machine) -> Region | None:
     """Find what the fibre of a flat layer lies on: the flat layer under it, or the matrix between.
 
-    None for the lowest layer, and for curved ones. The matrix is cut only where the layer reaches
-    beyond the one under it, or the part widens between the matrix and the layer.
+    Empty where nothing is there. None where all of it lies on something: on the bed, and where the
+    part does not widen between the matrix and the layer. None for curved layers.
     """
     if layer.flat is None:
         return None
-    height = layer.flat.height
+    height, up = layer.flat.height, layer.plane.frame[2]
+    level = height - 0.5 * (machine.strand_height + machine.highest_matrix(0.0))
     flat = [each for each in layers if each.flat is not None and each.plane.height < height]
     lower = max(flat, key=lambda each: each.plane.height, default=None)
-    level = height - 0.5 * (machine.strand_height + machine.highest_matrix(0.0))
-    if lower is None or lower.plane.height >= level:
-        return lower
-    up = layer.plane.frame[2]
-    covered = lower.plane.polygon.buffer(0.5 * machine.fibre_width).covers(layer.plane.polygon)
-    if covered and not _widens(mesh, up, level, height):
-        return lower
+    if lower is not None and lower.plane.height >= level:
+        return lower.plane.polygon
+    bed = float((mesh.points @ up)[mesh.corners].min())
+    if level <= bed or not _widens(mesh, up, level, height):
+        return None
     sections = Planar(heights=(level,)).cut(mesh, tuple(up.tolist()))
-    return sections[0] if sections else lower
+    return sections[0].plane.polygon if sections else shapely.Polygon()
 
 
 def _widens(mesh: TetMesh, up: FloatArray, low: float, high: float) -> bool:
@@ -244,7 +245,7 @@ def _view(
     layer: Layer,
     stress: PartStress,
     machine: Machine,
-    below: Layer | None,
+    below: Region | None,
     late: int,
     stack: Printed | None,
     build: FloatArray,

@@ -11,7 +11,7 @@ from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.fem.elasticity import PartStress
 from ccfem.fem.materials import Material
 from ccfem.geometry.polylines import lengths, merge_repeated, starts_segment
-from ccfem.geometry.shapes import INSIDE, cut_at_section
+from ccfem.geometry.shapes import INSIDE, Region, cut_at_section
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer, LayerStress, curved_layers
@@ -224,8 +224,8 @@ class LayerPaths:
         The fibre in the plane of a flat layer, or in the chart of a curved one.
     layer_stress : LayerStress
         On the flat layer, or on the chart.
-    below : Layer, optional
-        Flat layer under a flat one.
+    below : shapely (Multi)Polygon, optional
+        What is under a flat layer, empty where nothing is; None where all of it lies on something.
     late : int
         Paths that are printed after paths of a higher layer.
     stack : Printed, optional
@@ -242,7 +242,7 @@ class LayerPaths:
     layer_stress: LayerStress
     stress: PartStress
     machine: Machine
-    below: Layer | None
+    below: Region | None
     late: int
     stack: Printed | None
     build: FloatArray

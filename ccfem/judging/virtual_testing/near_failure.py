@@ -5,13 +5,13 @@ fibre, of the stress in the matrix, of the traction between layers. Each peak is
 p-norm over the part, and the relative change of the norm stands for that of the peak. The peaks
 themselves say how much each of them counts (Le, Norato, Bruns, Ha and Tortorelli, Structural and
 Multidisciplinary Optimization 41, 2010, 605-620: the p-norm, and its factor that follows the true
-peak).
+peak). Laws of failure give the index of their averaged stress, which is derived by differences.
 """
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import TypeVar
+from functools import cached_property, partial
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from ccfem.fem.elasticity import StressField
 from ccfem.fem.elasticity.loads import strain_forces
 from ccfem.fem.elasticity.recovery import cell_strain, times
 from ccfem.fem.elasticity.zone import BALL, ZONE, ball_averages, ball_shares, distance_from_patches
+from ccfem.judging.virtual_testing import failure_laws
 from ccfem.judging.virtual_testing.strand import Limits
 from ccfem.judging.virtual_testing.strength import FIBRE_SHARE
 
@@ -35,6 +36,12 @@ _BETWEEN = 8.0
 
 _HOT = 1e-9
 """Share of the largest weight below which a cell does not count in a derivative."""
+
+_STEP = 1e-6
+"""Step of the differences of an index, over the size of the stress."""
+
+Index: TypeAlias = Callable[[FloatArray], FloatArray | None]
+"""Index (k,) of a law of failure at stresses (k, 3, 3), MPa; None where it cannot judge them."""
 
 _ENGINEERING = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 
@@ -128,6 +135,25 @@ def stretched_index(
     return max(float(strain[at]), 0.0) / limit, norm, power / whole
 
 
+def _of_law(
+    law: Any, limits: Limits, normal: FloatArray | None, stress: FloatArray
+) -> FloatArray | None:
+    """Index (k,) of a law at stresses (k, 3, 3) on layers of one normal."""
+    normals = None if normal is None else np.broadcast_to(normal, (len(stress), 3))
+    index: FloatArray | None = law.index(stress, limits, normals)
+    return index
+
+
+def _slopes(index: Callable[[FloatArray], Any], stress: FloatArray) -> FloatArray:
+    """Derive an index by the components of stresses (k, 6), by differences: (k, 6), 1/MPa."""
+    step = _STEP * np.linalg.norm(stress, axis=1)
+    slopes = np.empty_like(stress)
+    for k, unit in enumerate(np.eye(6)):
+        ends = [index(from_voigt(stress + sign * step[:, None] * unit)) for sign in (1.0, -1.0)]
+        slopes[:, k] = (ends[0] - ends[1]) / (2.0 * step)
+    return slopes
+
+
 @dataclass(frozen=True)
 class MatrixPeaks:
     """The cells of a part in which the matrix is judged, for any number of displacements.
@@ -143,15 +169,10 @@ class MatrixPeaks:
     __repr__ = in_brief
 
     @cached_property
-    def _centroids(self) -> FloatArray:
-        mesh = self.part.mesh
-        return np.asarray(mesh.points[mesh.corners].mean(axis=1))
-
-    @cached_property
     def judged(self) -> IntArray:
         """Cells outside the zone round loads and supports, as in `matrix_peak`."""
         part = self.part
-        distance = distance_from_patches(part.problem, part.case, self._centroids, ZONE)
+        distance = distance_from_patches(part.problem, part.case, self.part.mesh.centres, ZONE)
         return np.flatnonzero(np.isinf(distance))
 
     @cached_property
@@ -163,14 +184,14 @@ class MatrixPeaks:
     def _averages(self, values: FloatArray) -> FloatArray:
         """Averages (k, c) of the values (m, c) of all cells over a ball round each judged cell."""
         volumes = self.part.mesh.volumes
-        return ball_averages(self._centroids, values, volumes, self.judged, BALL)
+        return ball_averages(self.part.mesh.centres, values, volumes, self.judged, BALL)
 
     def _back(self, slopes: FloatArray) -> FloatArray:
         """Transpose of `_averages`: (m, c) of derivatives (k, c) by the averages."""
         size = np.abs(slopes).max(axis=1)
         hot = np.flatnonzero(size > _HOT * size.max())
         volumes = self.part.mesh.volumes
-        return ball_shares(self._centroids, slopes[hot], volumes, self.judged[hot], BALL)
+        return ball_shares(self.part.mesh.centres, slopes[hot], volumes, self.judged[hot], BALL)
 
     def _norm(self, index: FloatArray) -> tuple[float, float, FloatArray]:
         """Peak and norm of an index (k,), and the derivative of the norm's logarithm by it."""
@@ -201,25 +222,17 @@ class MatrixPeaks:
         by_stress = to_voigt(1.5 * deviator) * _ENGINEERING * (by_mises / size[:, None])
         return Peak(peak, norm, self._by_displacement(by_stress))
 
-    def bond(
-        self, displacement: FloatArray, normal: FloatArray, strength: tuple[float, float]
-    ) -> Peak | None:
-        """Traction on layers of one normal (3,), as in `interlayer`; None where there is none."""
-        tensile, shear = strength
-        stress = self._stress(displacement)
-        traction = self._averages(to_voigt(stress))
-        traction = from_voigt(traction) @ normal
-        opening = traction @ normal
-        sliding = traction - opening[:, None] * normal
-        opening = np.maximum(opening, 0.0)
-        index = np.hypot(opening / tensile, np.linalg.norm(sliding, axis=1) / shear)
-        if not index.max() > 0.0:
+    def averaged(self, displacement: FloatArray, index: Index) -> Peak | None:
+        """Index (k,) of averaged stresses (k, 3, 3); None where there is none, or none above 0."""
+        stress = self._averages(to_voigt(self._stress(displacement)))
+        values = index(from_voigt(stress))
+        if values is None or not values.max() > 0.0:
             return None
-        peak, norm, slope = self._norm(index)
-        by_traction = opening[:, None] / tensile**2 * normal + sliding / shear**2
-        by_traction *= (slope / np.where(index > 0.0, index, 1.0))[:, None]
-        tensor = 0.5 * (by_traction[:, :, None] * normal + normal[:, None] * by_traction[:, None])
-        return Peak(peak, norm, self._by_displacement(self._back(to_voigt(tensor) * _ENGINEERING)))
+        peak, norm, slope = self._norm(np.maximum(values, 0.0))
+        hot = np.flatnonzero(slope > _HOT * slope.max())
+        by_stress = np.zeros_like(stress)
+        by_stress[hot] = slope[hot, None] * _slopes(index, stress[hot])
+        return Peak(peak, norm, self._by_displacement(self._back(by_stress)))
 
     def peaks(
         self,
@@ -228,7 +241,7 @@ class MatrixPeaks:
         limits: Limits,
         normal: FloatArray | None,
     ) -> dict[str, Peak]:
-        """All indices: of the fibre, of the matrix and, where it can be judged, of the bond.
+        """All indices: of the fibre, of the matrix, and of the laws of failure that have one.
 
         Parameters
         ----------
@@ -240,9 +253,10 @@ class MatrixPeaks:
         """
         peaks = {} if fibre is None else {"fibre": fibre}
         peaks["matrix"] = self.matrix(displacement, limits.matrix)
-        if limits.bond is not None and normal is not None:
-            bond = self.bond(displacement, normal, limits.bond)
-            peaks |= {} if bond is None else {"interlayer": bond}
+        for name, law in failure_laws.named().items():
+            if hasattr(law, "index"):
+                peak = self.averaged(displacement, partial(_of_law, law, limits, normal))
+                peaks |= {} if peak is None else {name: peak}
         return peaks
 
     def _stress(self, displacement: FloatArray) -> FloatArray:

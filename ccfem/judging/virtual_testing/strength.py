@@ -7,17 +7,20 @@ predicted.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from ccfem.base.arrays import FloatArray, freeze, in_brief
+from ccfem.fem.elasticity.zone import BALL, ZONE, ball_averages, distance_from_patches
 from ccfem.judging.virtual_testing import failure_laws
 from ccfem.judging.virtual_testing.failure_laws.fibre import (
     FIBRE_SHARE as FIBRE_SHARE,
     fibre_peak as fibre_peak,
 )
+from ccfem.judging.virtual_testing.failure_laws.interlayer import layer_normals
 from ccfem.judging.virtual_testing.failure_laws.matrix import matrix_peak as matrix_peak
-from ccfem.judging.virtual_testing.strand import Limits, Strand
+from ccfem.judging.virtual_testing.strand import Failure, Limits, Strand
 from ccfem.judging.virtual_testing.virtual_test import VirtualTest
 from ccfem.slicing.layers import Layer
 
@@ -99,7 +102,12 @@ def first_failure(
         default the tensile strength of the material of the part.
     layers : sequence of Layer, optional
         Of the matrix. Without them, and where the material has no strength between layers, that
-        bond is not judged; `FirstFailure.note` says so where layers are given.
+        bond is not judged.
+
+    Returns
+    -------
+    FirstFailure
+        Its note names every law that did not judge the part.
 
     Raises
     ------
@@ -107,7 +115,12 @@ def first_failure(
         When the strength of matrix or fibre is missing.
     """
     limits = Limits.of(test.solution.problem.material, strand, matrix_strength)
-    failures = {name: law.fails(test, limits, layers) for name, law in failure_laws.named().items()}
+    failures = {
+        name: law.fails(test, limits, layers)
+        if hasattr(law, "fails")
+        else _by_index(law, test, limits, layers)
+        for name, law in failure_laws.named().items()
+    }
     judged = {name: failure for name, failure in failures.items() if not np.isnan(failure.load)}
     what = min(judged, key=lambda name: judged[name].load)
     values = {k: value for failure in failures.values() for k, value in failure.values.items()}
@@ -116,6 +129,33 @@ def first_failure(
         what=what,
         where=judged[what].where,
         loads={name: failure.load for name, failure in judged.items()},
-        note="; ".join(failure.note for failure in failures.values() if failure.note),
+        note="; ".join(filter(None, (_note(*law) for law in failures.items()))),
         **values,
     )
+
+
+def _by_index(
+    law: Any, test: VirtualTest, limits: Limits, layers: Sequence[Layer] | None
+) -> Failure:
+    """Find the load at which the index of a law is 1 somewhere away from loads and supports."""
+    stress, mesh = test.solution, test.solution.mesh
+    distance = distance_from_patches(stress.problem, stress.case, mesh.centres, ZONE)
+    judged = np.flatnonzero(distance > ZONE)
+    if not len(judged):
+        return Failure()
+    values = stress.stress.reshape(-1, 9)
+    tensor = ball_averages(mesh.centres, values, mesh.volumes, judged, BALL).reshape(-1, 3, 3)
+    normal = None if layers is None else layer_normals(layers, mesh.centres[judged])
+    index = law.index(tensor, limits, normal)
+    if index is None or np.isnan(index).any():
+        return Failure()
+    peak = int(index.argmax())
+    load = test.force / float(index[peak]) if index[peak] > 0.0 else np.inf
+    return Failure(load, mesh.centres[judged[peak]])
+
+
+def _note(name: str, failure: Failure) -> str:
+    """Return the note of a law, or that it gave neither a load nor a note."""
+    if failure.note or not np.isnan(failure.load):
+        return failure.note
+    return f"law of failure '{name}' did not judge the part, and gave no reason"

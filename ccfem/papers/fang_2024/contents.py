@@ -206,7 +206,7 @@ def _between(coarse: SpatialSlicing, fine: SpatialSlicing) -> float:
     the nearer of the two counts.
     """
     mesh, coarse_mesh = fine.field.mesh, coarse.field.mesh
-    centre = coarse_mesh.points[coarse_mesh.corners].mean(axis=1)
+    centre = coarse_mesh.centres
     angles = []
     for mirror in ([1.0, 1.0, 1.0], [1.0, 1.0, -1.0]):
         holder, _ = locate(mesh.points, mesh.corners, centre * mirror, 2.0)
@@ -399,7 +399,7 @@ def openings(compared: Comparison, pressing: bool = False) -> dict[str, Opening]
 def _opening(stress: StressField, layers: tuple[Layer, ...], force: float) -> Opening:
     """Load of each cell outside the zones of loads and supports, as `interlayer` judges it."""
     mesh, material = stress.mesh, stress.problem.material
-    middle = mesh.points[mesh.corners].mean(axis=1)
+    middle = mesh.centres
     judged = np.flatnonzero(distance_from_patches(stress.problem, stress.case, middle, ZONE) > ZONE)
     opening, sliding, _ = layer_traction(stress, layers, judged)
     tensile = material.interlayer_tensile

@@ -474,7 +474,7 @@ def on_pressing_supports(run: Chain) -> StressField:
 def sliding_picture(run: Chain, models: dict[str, StressField]) -> bytes:
     """Where layers open and where they slide, near the middle of the arm bracket, at 100 N."""
     mesh = run.stress.mesh
-    centre = mesh.points[mesh.corners].mean(axis=1)
+    centre = mesh.centres
     middle = 0.5 * (mesh.points[:, 1].min() + mesh.points[:, 1].max())
     shown = np.flatnonzero(np.abs(centre[:, 1] - middle) < 3.0)
     slicings = {name: layers for name, layers in _slicings(run).items() if "best" not in name}

@@ -38,7 +38,7 @@ def _thinned(chosen: IntArray) -> IntArray:
 def part_figures(name: str, run: "Chain") -> dict[str, bytes]:
     """Figures of a part by file: 1 and 2 regions, 4 field, 5 layers, 6 support, 8 paths."""
     mesh, sliced = run.stress.mesh, run.sliced
-    centre = mesh.points[mesh.corners].mean(axis=1)
+    centre = mesh.centres
     inside = _thinned(np.flatnonzero(sliced.regions.region >= 0))
     least = np.linalg.eigh(run.stress.stress[inside])[1][:, :, 0]
     pictures = {}
@@ -86,7 +86,7 @@ def part_figures(name: str, run: "Chain") -> dict[str, bytes]:
 def senses_figure() -> tuple[bytes, float, float]:
     """Figures 1 and 3 on a cube: the same field, and energy, whatever the sense of a region."""
     mesh = box_mesh((10.0, 10.0, 10.0), (8, 8, 8))
-    centre = mesh.points[mesh.corners].mean(axis=1)
+    centre = mesh.centres
     tilt = np.radians(20.0)
     region = np.full(len(centre), -1)
     region[centre[:, 0] < 3.0], region[centre[:, 0] > 7.0] = 0, 1

@@ -115,8 +115,8 @@ def printed_strands(
     short = [piece for piece in split if line_length(piece.line) < limit]
     if short and process.short == "error":
         raise InputError(
-            f"process.turns cuts strands into pieces below the {limit:g} mm that the cutter "
-            "allows: set it to 'pad', or process.short to 'matrix'"
+            f"process.turns cuts strands into pieces below the {machine.shortest_strand:g} mm of "
+            f"{machine.shortest_strand_by}: set it to 'pad', or process.short to 'matrix'"
         )
     # In layers too low for a line of matrix, the matrix above fills the place of short strands.
     low = max(LOW, machine.least_line)
@@ -144,9 +144,9 @@ def _check_fibre(fibre: Toolpaths, layers: Sequence[Layer], machine: Machine) ->
     short = fibre.lengths < limit * (1.0 - SHORT)
     if short.any() and machine.process.short == "error":
         raise InputError(
-            f"fibre paths must be no shorter than the {limit:g} mm that the cutter allows; "
-            f"{int(short.sum())} of {len(fibre)} are, the shortest {fibre.lengths.min():.4g} mm: "
-            "plan with machine.minimum_length of at least that, or set process.short = 'matrix'"
+            f"fibre paths must be no shorter than the {limit:g} mm of "
+            f"{machine.shortest_strand_by}; {int(short.sum())} of {len(fibre)} are, the shortest "
+            f"{fibre.lengths.min():.4g} mm: plan for this machine, or set process.short = 'matrix'"
         )
 
 

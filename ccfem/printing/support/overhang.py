@@ -118,12 +118,13 @@ def overhang(mesh: TetMesh, build: Sequence[float], machine: Machine) -> Overhan
     facets = mesh.boundary[hanging]
     if angle >= 90.0 or not len(facets):
         return None
+    reach = 0.5 * _LINES * width
     regions: list[Region] = []
     lowest: list[float] = []
     for rows in _facet_groups(facets):
         corners = places[facets[rows][:, :3]]
         seen = shapely.union_all(shapely.polygons(corners[:, :, :2]))
-        if not shapely.buffer(seen, -0.5 * _LINES * width).is_empty:
+        if not shapely.buffer(seen, -reach).is_empty:
             regions.append(seen)
             lowest.append(float(corners[:, :, 2].min()))
     # Just below each piece lies what may hold it, or bridge to it; farther down a round roof is
@@ -133,7 +134,6 @@ def overhang(mesh: TetMesh, build: Sequence[float], machine: Machine) -> Overhan
     below = bed + np.floor((below - bed) / step + 0.5) * step
     in_air, height = list[Region](), np.inf
     held = _bridged(mesh, frame, np.unique(below), limits.free_span)
-    reach = 0.5 * _LINES * width
     for seen, low, level in zip(regions, lowest, below.tolist(), strict=True):
         below_it = held.get(level, shapely.Polygon())
         free = shapely.difference(seen, below_it)

@@ -14,7 +14,7 @@ from ccfem.base.errors import InputError
 from ccfem.base.tensor import in_axes
 from ccfem.body.mesh.round_walls import RoundWall, moved_onto
 from ccfem.fem.elasticity import PartStress
-from ccfem.geometry.facets import connected
+from ccfem.geometry.facets import connected, sides_at
 from ccfem.geometry.shapes import Region
 
 # The plane of a flat layer: its frame and height, and coordinates in it.
@@ -391,18 +391,16 @@ def charted_rings(
     tuple of (k, 2) arrays, mm
         Each loop in the chart; the first point is not repeated.
     """
-    sides = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    triangle_of = dict(zip(map(tuple, sides.tolist()), np.arange(len(sides)) // 3, strict=True))
     round_walls = [wall for wall, _ in walls]
     of_edge = _by_edge(walls)
     rings = []
     for loop in loops:
-        edges = list(zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True))
-        wall = np.array([of_edge.get(edge, -1) for edge in edges])
+        edges = np.column_stack([loop, np.roll(loop, -1)])
+        wall = np.array([of_edge.get(edge, -1) for edge in map(tuple, edges.tolist())])
         if (wall < 0).all():
             rings.append(image[loop])
             continue
-        turn = turns[[triangle_of[edge] for edge in edges]]
+        turn = turns[sides_at(edges, triangles)[0]]
         # Points with chords of one wall on both sides lie on mesh edges, which are chords too.
         inner = (wall >= 0) & (wall == np.roll(wall, 1))
         corners = points[loop].copy()

@@ -14,6 +14,7 @@ from ccfem.base.threads import in_threads
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.round_walls import RoundWall
 from ccfem.fem.elasticity import cell_gradients
+from ccfem.geometry.facets import sides_at
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.level_cut import border_edges, chain, cut_at_zero
 
@@ -188,7 +189,8 @@ def _along_walls(
     Of a chord the surface ends at the wall, so that both look the same way.
     """
     border = border_edges(triangles, len(points))
-    opposite = _opposite(border, triangles)
+    triangle, side = sides_at(border, triangles)
+    opposite = triangles[triangle, (side + 2) % 3]
     along = points[border[:, 1]] - points[border[:, 0]]
     inwards = points[opposite] - points[border[:, 0]]
     square = np.maximum(np.einsum("ed,ed->e", along, along), 1e-300)
@@ -200,16 +202,6 @@ def _along_walls(
         facing = np.einsum("ed,ed->e", outwards, -inwards[on]) > _FACING
         if facing.any():
             yield wall, border[on][facing]
-
-
-def _opposite(border: IntArray, triangles: IntArray) -> IntArray:
-    """Third point of the triangle at each directed border edge."""
-    sides = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    count = int(triangles.max()) + 1
-    known = sides[:, 0] * count + sides[:, 1]
-    order = np.argsort(known, kind="stable")
-    at = order[np.searchsorted(known[order], border[:, 0] * count + border[:, 1])]
-    return np.asarray(triangles[at // 3, (at + 2) % 3])
 
 
 def _areas(points: FloatArray, triangles: IntArray) -> FloatArray:

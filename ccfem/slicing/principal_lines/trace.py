@@ -83,7 +83,7 @@ class Tracer:
 
         A line then finds most cells in the processor's cache: three times as quick (measured).
         """
-        return _along_curve(self.mesh.points[self.mesh.corners].mean(axis=1))
+        return _along_curve(self.mesh.centres)
 
     @cached_property
     def _place_of_cell(self) -> IntArray:

@@ -69,8 +69,7 @@ class Planar:
         if not given:
             object.__setattr__(self, "count", _COUNT)
         if self.count is not None:
-            check_number("the number of layers", self.count, at_least=1)
-            check_number("the number of layers", self.count, at_most=_MOST)
+            check_number("the number of layers", self.count, at_least=1, at_most=_MOST)
         if self.heights is not None:
             object.__setattr__(self, "heights", _rising(self.heights))
 

@@ -71,7 +71,7 @@ def prune_and_move(
         if not strength:
             return (stiffness_judge(aim, machine, strand, layers, tolerance),)
         how = (aim, layers, machine, strand, strength)
-        return tuple(strength_judge(*how, for_both) for for_both in _FOR_BOTH)
+        return tuple(strength_judge(*how, for_both, tolerance) for for_both in _FOR_BOTH)
 
     judges = judges_of(goal, _ROUGH)
     kept = best_cut(candidates, cut, judges[0], strength, rounds)

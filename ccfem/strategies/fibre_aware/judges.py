@@ -203,6 +203,7 @@ def strength_judge(
     strand: Strand,
     strength: float,
     for_both: bool = True,
+    tolerance: float = _TOLERANCE,
 ) -> Judge:
     """Judge of paths by the stiffness in all load cases and the load at first failure.
 
@@ -210,7 +211,7 @@ def strength_judge(
     failure over the load of its case: at a strength of one half, relative changes of both count
     equally. Where supports move, the load of the case is the one that they take in the part without
     fibre. With `for_both` the worth of fibre by its strain is that for both, else that for the
-    stiffness alone.
+    stiffness alone. The error of a load at first failure is of the size of the residual.
     """
     goal = Goal.of(part)
     known: list[FloatArray] = []
@@ -219,7 +220,7 @@ def strength_judge(
 
     def judge(toolpaths: Toolpaths) -> Judged:
         near, strands = known or None, _carrying(toolpaths, goal, machine, layers)
-        tested = virtual_tests(strands, goal.parts, strand, known=near)
+        tested = virtual_tests(strands, goal.parts, strand, known=near, tolerance=tolerance)
         known[:] = [one.solution.displacement for one in tested.tests]
         loads = [one.load for one in cases_failure(tested, strand, layers=layers).each]
         factor = min(load / size for load, size in zip(loads, bare, strict=True))
@@ -231,7 +232,7 @@ def strength_judge(
             if not for_both:
                 work = [2.0 * one.solution.strain_energy for one in tested.tests]
                 return _stiff_worths(counts / work, displaced)
-            equilibrium_of = equilibria(goal, strands, strand, displaced).found
+            equilibrium_of = equilibria(goal, strands, strand, displaced, tolerance).found
             return worth.strain_worths(strands, equilibrium_of, normal, counts)
 
         return Judged(float(value), strain_worths)

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ccfem.base.arrays import BoolArray, FloatArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.polylines import along_line, curvature_samples, points_along, runs
 from ccfem.geometry.tight_bends import tight_bends
 from ccfem.machine.machine import Machine
@@ -54,8 +54,8 @@ def shorten(
     -------
     Toolpaths
         The price is the same for all paths: the smallest at which the length is not exceeded. The
-        room it leaves is filled path by path with what slightly lower prices would keep, or with a
-        part of that where all of it is too long.
+        room it leaves is filled path by path with what slightly lower prices would keep, or with
+        parts of that, no shorter than `minimum`, where all of it is too long.
     """
     price = least_price(along, length, minimum, cut_cost)
     chosen = {profile.path: profile.kept(price, minimum, cut_cost)[0] for profile in along}
@@ -83,8 +83,9 @@ def shorten_bent(
 ) -> Toolpaths:
     """As `shorten`, with at most a share of the fibre in bends tighter than the machine's radius.
 
-    A mm of such a bend has an extra price, the smallest that meets the share. Fibre that carries
-    nothing stays where there is room for it: plans are compared at equal length.
+    A mm of such a bend has an extra price, the smallest that meets the share within the bisection.
+    Fibre that carries nothing stays where there is room for a stretch of the machine's shortest
+    strand, since plans are compared at equal length. Fibre that does harm goes.
 
     Parameters
     ----------
@@ -164,26 +165,38 @@ def _tight_pieces(
 def _grown(
     kept: BoolArray, longer: BoolArray, count: int, value: FloatArray, least: int
 ) -> BoolArray:
-    """Kept pieces (n,), and up to `count` adjoining pieces of a longer choice.
+    """Kept pieces (n,), and up to `count` more of a longer choice.
 
-    Where none is kept, the `count` neighbours worth most, if a stretch may be so short.
+    Those that adjoin kept ones come first, then stretches of at least `least` pieces, of most worth
+    first.
     """
     grown = kept.copy()
-    if not kept.any() and least <= count <= len(kept):
-        window = np.ones(count)
-        whole = np.convolve(longer, window, "valid") > count - 0.5
-        worth = np.where(whole, np.convolve(value, window, "valid"), -np.inf)
-        first = int(np.argmax(worth))
-        grown[first : first + count] = whole[first]
-        return grown
     while count > 0:
         beside = np.concatenate([[False], grown[:-1]]) | np.concatenate([grown[1:], [False]])
         fresh = np.flatnonzero(longer & ~grown & beside)[:count]
+        if not len(fresh):
+            fresh = _worthiest(runs(longer & ~grown), count, value, least)
         if not len(fresh):
             break
         grown[fresh] = True
         count -= len(fresh)
     return grown
+
+
+def _worthiest(spans: IntArray, count: int, value: FloatArray, least: int) -> IntArray:
+    """Pieces of the stretch of most worth in spans (k, 2) of pieces: `least` to `count` of them."""
+    worth = np.concatenate([[0.0], np.cumsum(value)])
+    best, pieces = -np.inf, np.arange(0)
+    for start, end in spans.tolist():
+        size = min(end - start, count)
+        if size < least:
+            continue
+        first = start + int(
+            np.argmax(worth[start + size : end + 1] - worth[start : end + 1 - size])
+        )
+        if worth[first + size] - worth[first] > best:
+            best, pieces = worth[first + size] - worth[first], np.arange(first, first + size)
+    return pieces
 
 
 def _shortened(

@@ -116,10 +116,10 @@ class SmearedPart:
         """Young's modulus of the matrix, MPa."""
         return self.specimen.modulus
 
-    @cached_property
+    @property
     def centroids(self) -> FloatArray:
         """Centroids of the cells, (m, 3), mm."""
-        return read_only(self.mesh.points[self.mesh.corners].mean(axis=1))
+        return self.mesh.centres
 
     @cached_property
     def unreinforced(self) -> SmearedSolution:

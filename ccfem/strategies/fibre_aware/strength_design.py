@@ -69,7 +69,7 @@ class StrengthProblem:
     judges : tuple of MatrixPeaks
         One for each load case.
     factors : mapping of (int, str) to float
-        Index over norm of fibre, matrix and bond in each case, by `at`.
+        Index over norm of fibre, matrix and further laws in each case, by `at`.
     """
 
     problem: StreamProblem

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from ccfem.body.mesh.box import box_mesh
-from ccfem.geometry.facets import are_among, facet_keys, paired, positions, unique_edges
+from ccfem.geometry.facets import (
+    are_among,
+    facet_keys,
+    paired,
+    positions,
+    sides_at,
+    unique_edges,
+)
 
 SHIFTS = [0, 3_000_000, 4_000_000_000]
 """The last is far above the numbers whose cubes, and just above those whose squares, fit."""
@@ -72,3 +79,10 @@ def test_the_corners_of_a_quadratic_mesh_are_the_linear_one():
     for name, facets in mesh.patches.items():
         np.testing.assert_array_equal(back.patches[name], facets)
     assert mesh.linear() is mesh
+
+
+def test_a_directed_edge_has_the_side_of_one_triangle():
+    triangles = np.array([[0, 1, 2], [2, 1, 3]])
+    triangle, side = sides_at(np.array([[2, 0], [1, 2], [2, 1], [3, 2]]), triangles)
+    np.testing.assert_array_equal(triangle, [0, 0, 1, 1])
+    np.testing.assert_array_equal(triangles[triangle, (side + 2) % 3], [1, 0, 3, 1])

@@ -177,8 +177,9 @@ def test_the_picture_shows_patches_loads_and_supports():
         ({"fibre_width": 50.0}, "machine.fibre_width = 50 mm is wider than the part, 20 mm"),
         (
             {"minimum_length": 1e4},
-            "machine.minimum_length and held_length ask for strands of 10000 mm: no layer has",
+            "machine.minimum_length: strands must be 10000 mm long, but no layer has",
         ),
+        ({"held_length": 1e4}, "machine.held_length, 10000 mm, and 42 mm from the cutter: strands"),
         ({"minimum_length": 42.0}, None),
     ],
 )

@@ -274,3 +274,20 @@ def test_turning_and_moving_part_and_paths_changes_nothing(part, lines, seed):
     first = evaluate(here, part.layers, part.stress, MACHINE).total
     second = evaluate(there, layers, stress, MACHINE).total
     assert_same(first, second)
+
+
+def test_fibre_over_a_gap_lies_on_nothing(make_part):
+    """Two slabs above each other: the lower one, 1.4 mm farther down, holds nothing."""
+    mesh = box_mesh((60.0, 40.0, 3.0), (12, 8, 3))
+    points = np.array(mesh.points)
+    points[:, 2] = np.interp(points[:, 2], [0.0, 1.0, 2.0, 3.0], [0.0, 1.5, 2.9, 4.0])
+    middle = points[mesh.cells].mean(axis=1)[:, 2]
+    apart = TetMesh(points, mesh.cells[(middle < 1.5) | (middle > 2.9)])
+    part = make_part(bent, mesh=apart, count=2)
+    paths = part.paths([[5.0, 20.0], [55.0, 20.0]], layer=1)
+    for layers in (part.layers, part.layers[1:]):
+        assert evaluate(paths, layers, part.stress, MACHINE).total["free_span"] == pytest.approx(
+            50.0
+        )
+    on_bed = part.paths([[5.0, 20.0], [55.0, 20.0]])
+    assert evaluate(on_bed, part.layers, part.stress, MACHINE).total["free_span"] == 0.0

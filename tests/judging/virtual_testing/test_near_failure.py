@@ -1,6 +1,7 @@
 """Smooth indices of first failure, and their derivatives."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity import Force, Problem, Support, solve
 from ccfem.fem.elasticity.zone import ball_averages, ball_shares
 from ccfem.fem.materials import isotropic
+from ccfem.judging.virtual_testing import failure_laws, first_failure, virtual_test
+from ccfem.judging.virtual_testing.failure_laws import fibre, matrix
 from ccfem.judging.virtual_testing.failure_laws.interlayer import interlayer
 from ccfem.judging.virtual_testing.near_failure import (
     MatrixPeaks,
@@ -20,6 +23,7 @@ from ccfem.judging.virtual_testing.near_failure import (
 )
 from ccfem.judging.virtual_testing.strand import Limits, Strand
 from ccfem.judging.virtual_testing.strength import matrix_peak
+from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.slicers.planar import Planar
 
 NORMAL = np.array([0.0, 0.0, 1.0])
@@ -36,14 +40,24 @@ def beam():
     return solve(Problem(mesh, material, (Support("x_min"),), loads, order=1))["tip"]
 
 
+def brittle(stress, limits, normal):
+    """Rankine's law: the largest principal stress reaches the strength."""
+    return np.linalg.eigvalsh(stress)[:, -1] / limits.matrix
+
+
 def judged(beam, what, displacement):
-    judge = MatrixPeaks(beam)
-    if what == "matrix":
-        return judge.matrix(displacement, 50.0)
-    return judge.bond(displacement, NORMAL, (18.0, 14.0))
+    limits = Limits(86.0, 50.0, (18.0, 14.0))
+    return MatrixPeaks(beam).peaks(displacement, None, limits, NORMAL)[what]
 
 
-@pytest.mark.parametrize("what", ["matrix", "bond"])
+@pytest.fixture
+def with_brittle(monkeypatch):
+    laws = {**failure_laws.named(), "brittle": SimpleNamespace(index=brittle)}
+    monkeypatch.setattr(failure_laws, "named", lambda: laws)
+
+
+@pytest.mark.usefixtures("with_brittle")
+@pytest.mark.parametrize("what", ["matrix", "interlayer", "brittle"])
 def test_derivative_agrees_with_finite_differences(beam, what):
     u, rng = beam.displacement, np.random.default_rng(3)
     found = judged(beam, what, u)
@@ -60,7 +74,30 @@ def test_peaks_are_those_of_first_failure(beam):
         matrix_peak(beam)[0] / 50.0, rel=1e-12
     )
     bond = interlayer(beam, Planar(count=2).cut(beam.mesh)).index
-    assert judged(beam, "bond", beam.displacement).index == pytest.approx(bond, rel=1e-12)
+    assert judged(beam, "interlayer", beam.displacement).index == pytest.approx(bond, rel=1e-12)
+
+
+@pytest.mark.usefixtures("with_brittle")
+def test_a_law_that_is_an_index_alone_fails_where_that_is_largest(beam):
+    """Its load and its place are those of the index away from loads and supports."""
+    layers = Planar(count=2).cut(beam.mesh)
+    line = Toolpaths.from_plane([[[1.0, 5.0], [23.0, 5.0]]], layers[0])
+    test = virtual_test(line, beam, Strand(rho=1e-6), span=())
+    failure = first_failure(test, layers=layers)
+    near = judged(beam, "brittle", test.solution.displacement).index
+    assert test.force / failure.loads["brittle"] == pytest.approx(near, rel=1e-9)
+
+
+@pytest.mark.parametrize("values", [None, np.nan])
+def test_an_index_that_judges_nothing_is_named(beam, monkeypatch, values):
+    law = SimpleNamespace(index=lambda stress, *_: values and np.full(len(stress), values))
+    monkeypatch.setattr(
+        failure_laws, "named", lambda: {"matrix": matrix, "fibre": fibre, "mute": law}
+    )
+    layers = Planar(count=1).cut(beam.mesh)
+    line = Toolpaths.from_plane([[[1.0, 5.0], [23.0, 5.0]]], layers[0])
+    failure = first_failure(virtual_test(line, beam, span=()))
+    assert failure.note == "law of failure 'mute' did not judge the part, and gave no reason"
 
 
 def test_derivative_on_cells_with_midside_nodes(beam):

@@ -1,6 +1,7 @@
 """First failure: indices against brute force, the lower of two limits, refusals."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,9 @@ from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity.problem import Force, PointForce, Problem, Support
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.materials import isotropic
-from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.judging.virtual_testing import failure_laws
+from ccfem.judging.virtual_testing.failure_laws import fibre, matrix
+from ccfem.judging.virtual_testing.strand import Failure, Strand
 from ccfem.judging.virtual_testing.strength import fibre_peak, first_failure, matrix_peak
 from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.paths.toolpaths import Toolpaths
@@ -131,6 +134,24 @@ def test_no_stretched_fibre_never_breaks():
     assert fibre_peak(test)[0] == 0.0
     failure = first_failure(test)
     assert (failure.what, failure.fibre_load) == ("matrix", np.inf)
+
+
+@pytest.mark.parametrize(
+    ("failure", "said"),
+    [
+        (Failure(), "law of failure 'creep' did not judge the part, and gave no reason"),
+        (Failure(np.nan, note="no creep data"), "no creep data"),
+        (Failure(1e9, note="creep of another grade"), "creep of another grade"),
+        (Failure(1e9), ""),
+    ],
+)
+def test_a_law_that_does_not_judge_the_part_is_named(monkeypatch, failure, said):
+    creep = SimpleNamespace(fails=lambda test, limits, layers: failure)
+    laws = {"matrix": matrix, "fibre": fibre, "creep": creep}
+    monkeypatch.setattr(failure_laws, "named", lambda: laws)
+    result = first_failure(virtual_test(LINES, solve(clamped(BEND))["load"], span=()))
+    assert result.note == said
+    assert ("creep" in result.loads) == (failure.load == 1e9)
 
 
 def test_a_part_within_the_zones_is_refused(monkeypatch):

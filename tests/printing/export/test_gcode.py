@@ -463,6 +463,10 @@ def test_prints_that_cannot_be(plate, tmp_path):
     short = Toolpaths.from_plane([np.array([[0.0, 15.0], [41.9, 15.0]])], layers[0])
     with pytest.raises(InputError, match=r"no shorter than the 42 mm .*; 1 of 1 are, the"):
         plan_print(short, layers, mesh, MACHINE)
+    held = replace(MACHINE, held_length=5.0)
+    by = r"than the 47 mm of machine\.held_length, 5 mm, and 42 mm from the cutter; 1 of 1 are, the"
+    with pytest.raises(InputError, match=by):
+        plan_print(short, layers, mesh, held)
     with pytest.raises(InputError, match=r"minimum_length is 20 mm, but the cutter lies 42 mm"):
         check_machine(replace(MACHINE, minimum_length=20.0, cutter_distance=42.0))
     with pytest.raises(InputError, match=r"machine\.matrix_height must be above 0 to print"):

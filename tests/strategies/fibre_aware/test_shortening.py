@@ -10,7 +10,7 @@ from ccfem.paths.planning import plan
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.strategies.fibre_aware.path_profile import Profile
 from ccfem.strategies.fibre_aware.prune import prune
-from ccfem.strategies.fibre_aware.shortening import shorten_bent, tight_share
+from ccfem.strategies.fibre_aware.shortening import shorten, shorten_bent, tight_share
 from ccfem.strategies.isocurve import Isocurve
 
 MACHINE = Machine(minimum_length=10.0)
@@ -146,3 +146,17 @@ def test_room_too_short_for_a_path_gets_the_part_of_it_that_is_worth_most(bent_b
             np.testing.assert_allclose(left.points[-2:, 0], ends)
     # A part below the 10 mm of the machine is none.
     assert shorten_bent(paths, equal, 49.0, MACHINE, 1.0).lengths.sum() == pytest.approx(40.0)
+
+
+@pytest.mark.parametrize(
+    ("length", "lengths"), [(75.0, [60, 15]), (80.0, [60, 15]), (85.0, [60, 15, 10]), (69.0, [60])]
+)
+def test_room_is_filled_with_stretches_shorter_than_it_too(bent_beam, length, lengths):
+    """Two stretches that are worth the same: 80 mm must not lay less than 75 mm do."""
+    rows = [np.array([[10.0, y], [70.0, y]]) for y in (4.0, 10.0)]
+    paths = Toolpaths.from_plane(rows, bent_beam[1][0])
+    value = np.zeros(60)
+    value[5:20] = value[35:50] = np.repeat([1.0, 0.8, 1.0], [2, 11, 2])
+    along = [Profile(0, np.full(60, 1.5), 1.0, 0.0), Profile(1, value, 1.0, 0.0)]
+    left = shorten(paths, along, length, 10.0, cut_cost=0.0)
+    np.testing.assert_allclose(np.sort(left.lengths)[::-1], lengths)

@@ -1,12 +1,14 @@
 """Planning for the load at first failure: what fibre is worth for it, and its design."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from ccfem.base.errors import InputError
 from ccfem.fem.elasticity.solve import solve
+from ccfem.judging.virtual_testing import failure_laws
 from ccfem.judging.virtual_testing.equilibrium import bars, equilibrium
 from ccfem.judging.virtual_testing.near_failure import nearness
 from ccfem.judging.virtual_testing.specimen import Specimen
@@ -17,8 +19,9 @@ from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine
 from ccfem.paths.planning.plan import plan_layers
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.strategies.fibre_aware import strength_value
-from ccfem.strategies.fibre_aware.cut_and_move import best_cut
+from ccfem.strategies.fibre_aware import cut_and_move, judges, strength_value
+from ccfem.strategies.fibre_aware.cut_and_move import best_cut, prune_and_move
+from ccfem.strategies.fibre_aware.judges import Goal
 from ccfem.strategies.fibre_aware.prune import prune
 from ccfem.strategies.fibre_aware.stream_design import design
 from ccfem.strategies.fibre_aware.strength_design import StrengthProblem, design_for_strength
@@ -70,9 +73,16 @@ def work_of(found):
     return float(np.vdot(u, (found.matrix @ u.reshape(-1)).reshape(u.shape)))
 
 
-@pytest.mark.parametrize("limits", [(86.0, 50.0), (1.0, 1e4), (1e4, 1.0)])
-def test_value_agrees_with_finite_differences(strong_beam, lines, limits):
-    """More fibre in some pieces, solved anew: both logarithms change as the values say."""
+@pytest.mark.parametrize("limits", [(86.0, 50.0), (1.0, 1e4), (1e4, 1.0), "brittle"])
+def test_value_agrees_with_finite_differences(strong_beam, lines, limits, monkeypatch):
+    """More fibre in some pieces, solved anew: both logarithms change as the values say.
+
+    Also with a law of a file, Rankine's of a brittle matrix, which alone decides.
+    """
+    if limits == "brittle":
+        law = SimpleNamespace(index=lambda stress, *_: np.linalg.eigvalsh(stress)[:, -1])
+        monkeypatch.setattr(failure_laws, "named", lambda: {"brittle": law})
+        limits = (1e4, 1e4)
     specimen = Specimen.of(strong_beam[0])
     strands = cut_strands(lines, specimen.unreinforced.mesh)
     worth = Worth.of((specimen,), Strand(), 1.0)
@@ -110,6 +120,24 @@ def test_cut_for_strength_leaves_a_stronger_and_softer_part(strong_beam, lines):
         found.append((first_failure(test, layers=layers).load, test.ratio))
     assert found[1][0] > 1.05 * found[0][0]
     assert found[1][1] < found[0][1]
+
+
+def test_tests_for_strength_have_the_tolerance_of_those_for_stiffness(
+    strong_beam, lines, monkeypatch
+):
+    """Rough while paths are cut; the last ones of moved paths, which gain little, are exact."""
+    stress, layers = strong_beam
+    residuals, virtual_tests = [], judges.virtual_tests
+
+    def recorded(*about, tolerance=1e-8, **more):
+        residuals.append(tolerance)
+        return virtual_tests(*about, tolerance=tolerance, **more)
+
+    monkeypatch.setattr(judges, "virtual_tests", recorded)
+    monkeypatch.setattr(cut_and_move, "moved", lambda *_, **__: lines)
+    length, strength, moves = 0.93 * float(lines.lengths.sum()), 0.5, 1
+    prune_and_move([lines], layers, Goal.of(stress), length, SHORT, Strand(), 1, strength, moves)
+    assert sorted(set(residuals)) == [1e-6, 1e-4]
 
 
 def test_values_below_zero_are_raised_and_keep_their_order():

@@ -12,7 +12,6 @@ from ccfem.geometry.shapes import INSIDE, VOID, Region, section_places
 from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, PlanePaths
 from ccfem.judging.virtual_testing.strand_room import width_inside
 from ccfem.machine.machine import Machine
-from ccfem.slicing.layers.layer import Layer
 
 PLACE = 80
 """Of these columns in tables: the smaller, the farther to the left."""
@@ -125,14 +124,14 @@ class RoomSamples:
 
 
 def sample_room(
-    paths: PlanePaths, machine: Machine, below: Layer | None = None, late: int = 0
+    paths: PlanePaths, machine: Machine, below: Region | None = None, late: int = 0
 ) -> RoomSamples:
     """Find the room of the strands of a layer.
 
     Parameters
     ----------
-    below : Layer, optional
-        The layer under it; by default it lies on the bed.
+    below : shapely (Multi)Polygon, optional
+        What is under it; by default all of it lies on something.
     late : int
         Number of paths printed after one of a higher layer.
     """
@@ -152,7 +151,7 @@ def sample_room(
         room.stack,
         inside,
         room.fill * machine.filament_area / (width * height),
-        _free_runs(paths, 0.5 * width, None if below is None else below.plane.polygon),
+        _free_runs(paths, 0.5 * width, below),
         np.array([width * float((room.length * (1.0 - room.every)).sum())]),
         np.array([machine.filament_area * float((room.length * inside).sum())]),
         np.array([float(layer.areas.sum()) * layer.thickness]),

@@ -68,7 +68,7 @@ class Interlayer:
 def fails(test: VirtualTest, _: Limits, layers: Sequence[Layer] | None) -> Failure:
     """Load at which printed layers come apart; not judged without layers or strengths."""
     if layers is None:
-        return Failure()
+        return Failure(note="bond between layers not judged: no layers were given")
     try:
         bond = interlayer(test.solution, layers)
     except InputError as error:
@@ -83,6 +83,27 @@ def fails(test: VirtualTest, _: Limits, layers: Sequence[Layer] | None) -> Failu
         "interlayer_zones": zones,
     }
     return Failure(zones[0], bond.where, bond.note, values)
+
+
+def index(stress: FloatArray, limits: Limits, normal: FloatArray | None) -> FloatArray | None:
+    """Return f at averaged stresses (k, 3, 3) on layers of normals (k, 3); None without either."""
+    if limits.bond is None or normal is None:
+        return None
+    return _criterion(*_across_and_along(stress, normal), *limits.bond)
+
+
+def _across_and_along(tensor: FloatArray, normal: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Traction (k,) across layers, positive where it opens them, and the size of that in them."""
+    traction = np.einsum("mij,mj->mi", tensor, normal)
+    opening = np.einsum("mi,mi->m", traction, normal)
+    return opening, np.linalg.norm(traction - opening[:, None] * normal, axis=1)
+
+
+def _criterion(
+    opening: FloatArray, sliding: FloatArray, tensile: float, shear: float
+) -> FloatArray:
+    """Quadratic criterion: 1 at failure."""
+    return np.asarray(np.hypot(np.maximum(opening, 0.0) / tensile, sliding / shear))
 
 
 def interlayer(
@@ -120,7 +141,7 @@ def interlayer(
         )
     check_number("radius of the ball", radius, above=0.0, unit="mm")
     mesh = stress.mesh
-    centroid = mesh.points[mesh.corners].mean(axis=1)
+    centroid = mesh.centres
     distance = distance_from_patches(stress.problem, stress.case, centroid, ZONE)
     if not (distance > ZONE).any():
         raise InputError(
@@ -130,8 +151,7 @@ def interlayer(
     # Singular stress at corners depends on the mesh; its mean over a ball does not.
     opening, sliding, tensor = layer_traction(stress, layers, np.arange(len(centroid)), radius)
     shear = tensile if shear is None else shear
-    # Quadratic criterion: 1 at failure.
-    index = np.hypot(np.maximum(opening, 0.0) / tensile, sliding / shear)
+    index = _criterion(opening, sliding, tensile, shear)
     index[np.hypot(np.maximum(opening, 0.0), sliding) <= _ROUNDING * np.abs(tensor).max()] = 0.0
     zones = tuple(float(index[distance > zone].max()) for zone in ZONES)
     peak = int(np.where(distance > ZONE, index, -1.0).argmax())
@@ -158,14 +178,10 @@ def layer_traction(
         The averaged stress.
     """
     mesh = stress.mesh
-    centre = mesh.points[mesh.corners].mean(axis=1)
+    centre = mesh.centres
     values = stress.stress.reshape(-1, 9)
     tensor = ball_averages(centre, values, mesh.volumes, cells, radius).reshape(-1, 3, 3)
-    normal = layer_normals(layers, centre[cells])
-    traction = np.einsum("mij,mj->mi", tensor, normal)
-    opening = np.einsum("mi,mi->m", traction, normal)
-    sliding = np.linalg.norm(traction - opening[:, None] * normal, axis=1)
-    return opening, sliding, tensor
+    return *_across_and_along(tensor, layer_normals(layers, centre[cells])), tensor
 
 
 def layer_normals(layers: Sequence[Layer], places: FloatArray) -> FloatArray:

@@ -76,6 +76,7 @@ def test_fibre_needs_something_below(make_part, uniform):
     # At 0.5 mm it reaches 32.5 mm from its middle, at 1.5 mm 37.5 mm.
     paths = part.plane([[-7, 20], [67, 20]], layer=1)
     assert indices(paths)["free_span"] == 0.0
+    low, high = low.plane.polygon, high.plane.polygon
     assert indices(paths, low)["free_span"] == pytest.approx(37.0 - 32.5 - 0.5, abs=0.6)
     assert indices(paths, high)["free_span"] == 0.0
 
