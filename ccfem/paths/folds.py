@@ -8,6 +8,10 @@ radius r a strand *folds* where its tangent turns by more than 90 degrees within
 
 4 mm by default; on a circle of radius r it turns by 59.5 degrees there. A circle folds if its
 radius is less than r / 1.512. A square corner is no fold.
+
+Judging is mild where points decide: it averages the tangent over some tenths of a millimetre, and a
+vertex spreads its turn as if a curve had been there. Planners are strict: they take the polyline as
+it is, in a window that is `MARGIN` times as long, so that whoever counts folds finds none.
 """
 
 from dataclasses import dataclass
@@ -33,6 +37,10 @@ WINDOW = 4.0 / 3.85
 ANGLE = np.pi / 2.0
 """Turn of the tangent within the window beyond which a strand folds, radians."""
 
+MARGIN = 1.08
+"""Factor on the machine's radius by which planners look for folds: what follows moves points by
+some hundredths of a width, and whoever counts folds may take other points of a strand."""
+
 _SAMPLES = 40
 """Samples of the tangent in a window."""
 _BATCH = 2_000_000
@@ -45,6 +53,8 @@ _SLACK = 2e-3
 """By how much a turn may exceed the angle, radians: a square corner in rounded coordinates."""
 _SPREAD = 0.25
 """Largest length, in windows, over which a vertex of a polyline spreads its turn to each side."""
+_SHARP = 1e-3
+"""That length where nothing is averaged: a vertex turns on the spot."""
 _SURELY = 0.999
 """Share of the angle up to which the turns of vertices in a window may add up without a fold."""
 _STRAIGHT = 1e-6
@@ -138,13 +148,19 @@ class Folds:
         return folded
 
 
-def folds(points: FloatArray, offsets: IntArray, closed: BoolArray, radius: float) -> Folds:
+def folds(
+    points: FloatArray,
+    offsets: IntArray,
+    closed: BoolArray,
+    radius: float,
+    strict: bool = False,
+) -> Folds:
     """Find the folds of polylines.
 
     The tangent is that of the polyline in the space of its points: of strands on a curved layer
-    give the points in space, for so the printer lays them. Each vertex spreads its turn over half a
-    segment to each side, and over a quarter of the window at most, so that a curve folds alike
-    whether its points lie .05 or 2 mm apart.
+    give the points in space, for so the printer lays them. Unless `strict`, each vertex spreads its
+    turn over half a segment to each side, and over a quarter of the window at most, so that a curve
+    folds alike whether its points lie .05 or 2 mm apart.
 
     Parameters
     ----------
@@ -156,6 +172,10 @@ def folds(points: FloatArray, offsets: IntArray, closed: BoolArray, radius: floa
         Closed polylines repeat their first point at their end, and are measured across it.
     radius : float, mm
         Least radius of the machine, at least 0, which allows every turn.
+    strict : bool, default False
+        Whether to take the polyline as it is, as planners do: its pieces are straight, its vertices
+        turn on the spot, and no tangents are averaged. A fold then takes half a window at least,
+        about its middle, so that the pieces of a strand that is cut at a corner do not meet.
     """
     offsets, closed = np.asarray(offsets), np.asarray(closed)
     points, begin = _begun_alike(np.array(points, dtype=float), offsets, closed)
@@ -175,7 +195,7 @@ def folds(points: FloatArray, offsets: IntArray, closed: BoolArray, radius: floa
     for first, last in pairwise([0, *ends.tolist()]):
         some, own = slice(offsets[first], offsets[last]), turning[first:last]
         lines = (points[some], offsets[first : last + 1] - offsets[first], closed[own])
-        k, start, stop = _fold_stretches(*lines, begin[own], size[own], window)
+        k, start, stop = _fold_stretches(*lines, begin[own], size[own], window, strict)
         parts.append((own[k], start, stop))
     line, start, stop = (np.concatenate(column) for column in zip(_NONE, *parts, strict=True))
     return Folds(line, start, stop, lengths=size, closed=closed)
@@ -214,15 +234,19 @@ def _fold_stretches(
     begin: FloatArray,
     size: FloatArray,
     window: float,
+    strict: bool,
 ) -> tuple[IntArray, FloatArray, FloatArray]:
     """Polyline, start and stop, mm, of every fold of polylines that begin at `begin` (K,), mm."""
-    line, position, tangent, step = _tangents(points, offsets, closed, window)
+    line, position, tangent, step = _tangents(
+        points, offsets, closed, window, (_SHARP if strict else _SPREAD) * window
+    )
     # From each sample the nearest one ahead to which the tangent turns by more than the angle.
     samples = np.bincount(line, minlength=len(size))
     ahead = np.zeros(len(line), dtype=np.int64)
     first = np.cumsum(samples) - samples
     number = np.arange(len(line)) - first[line]
-    tangent = _mean_tangents(tangent, first[line], number, samples[line], closed[line])
+    if not strict:
+        tangent = _mean_tangents(tangent, first[line], number, samples[line], closed[line])
     # A ring goes on behind its last sample with its first one.
     most = np.minimum(np.floor(window / step + 1e-9), samples - 1).astype(np.int64)[line]
     most = np.where(closed[line], most, np.minimum(most, samples[line] - 1 - number))
@@ -239,11 +263,16 @@ def _fold_stretches(
     following = ahead[first[line] + (number + 1) % np.maximum(samples[line], 1)]
     shortest = (following == 0) | (following >= ahead)
     at = np.flatnonzero((ahead > 0) & shortest)
-    line, start = line[at], (position + begin[line])[at]
-    start = np.where(start >= size[line], start - size[line], start)
+    line, start, reach = line[at], (position + begin[line])[at], reach[at]
+    if strict:
+        longer = np.maximum(2.0 * _SPREAD * window - reach, 0.0)
+        start, reach = start - 0.5 * longer, reach + longer
+    ring, whole = closed[line], size[line]
+    stop = np.minimum(start + reach, whole)
+    start = np.where(ring, start % whole, np.maximum(start, 0.0))
+    stop = np.where(ring, start + np.minimum(reach, whole), stop)
     order = np.lexsort((start, line))
-    line, start, reach = line[order], start[order], reach[at][order]
-    return _merged_stretches(line, start, start + reach, size, closed)
+    return _merged_stretches(line[order], start[order], stop[order], size, closed)
 
 
 def folds_in(toolpaths: Toolpaths, machine: Machine) -> Folds:
@@ -286,9 +315,14 @@ def _without_straight_points(points: FloatArray, offsets: IntArray) -> tuple[Flo
 
 
 def _tangents(
-    points: FloatArray, offsets: IntArray, closed: BoolArray, window: float
+    points: FloatArray, offsets: IntArray, closed: BoolArray, window: float, spread: float
 ) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
     """Tangents of polylines in equal steps.
+
+    Parameters
+    ----------
+    spread : float, mm
+        Largest length over which a vertex spreads its turn to each side.
 
     Returns
     -------
@@ -313,7 +347,7 @@ def _tangents(
     segment = np.flatnonzero(owner[1:] == owner[:-1])
     vector = points[segment + 1] - points[segment]
     long = np.linalg.norm(vector, axis=1)
-    direction, off = vector / long[:, None], np.minimum(0.5 * long, _SPREAD * window)
+    direction, off = vector / long[:, None], np.minimum(0.5 * long, spread)
     knot = np.stack([along[segment] + off, along[segment] + long - off], axis=1).ravel()
     knot_line, at_knot = np.repeat(owner[segment], 2), np.repeat(direction, 2, axis=0)
     # Ends: an open line goes on as it is, a ring between its last knot and its first.

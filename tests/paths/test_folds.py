@@ -3,16 +3,17 @@
 import numpy as np
 import pytest
 
+from ccfem.geometry.even_steps import even_steps
 from ccfem.geometry.polylines import pack, resample
 from ccfem.paths.folds import WINDOW, Folds, folds
 
 RADIUS = 3.85
 
 
-def of(*lines, closed=None, radius=RADIUS) -> Folds:
+def of(*lines, closed=None, radius=RADIUS, strict=False) -> Folds:
     lines = [np.array(line, dtype=float) for line in lines]
     closed = [bool((line[0] == line[-1]).all()) for line in lines] if closed is None else closed
-    return folds(*pack(lines), np.array(closed), radius)
+    return folds(*pack(lines), np.array(closed), radius, strict)
 
 
 def arc(radius, degrees, count=721):
@@ -27,6 +28,13 @@ def hairpin(leg, radius, count=200):
     """Two legs beside each other, joined by a half circle."""
     half = arc(radius, 180, count) @ [[0.0, 1.0], [-1.0, 0.0]]
     return np.concatenate([[[-leg, -radius]], half[::-1] * [-1.0, 1.0], [[-leg, radius]]])
+
+
+def corner_into_arc(degrees, leg=50.0):
+    """A leg that meets a circle of the least radius at an angle: they turn by 59.5 degrees more."""
+    along, turn = arc(RADIUS, 100, 16) @ [[0.0, -1.0], [1.0, 0.0]], np.radians(degrees)
+    start = along[0] - leg * np.array([np.cos(turn), -np.sin(turn)])
+    return np.concatenate([[start], along])
 
 
 def stepped(line, step):
@@ -100,6 +108,52 @@ def test_wavers_of_a_tenth_of_a_millimetre_are_no_folds():
     ]  # fmt: skip
     assert of(line).counts.tolist() == [0]
     assert of(line[::-1]).counts.tolist() == [0]
+
+
+@pytest.mark.parametrize(("degrees", "fold"), [(20, 0), (27, 0), (35, 1), (42, 1), (60, 1)])
+def test_strict_folds_are_those_of_the_polyline_as_it_is(degrees, fold):
+    """A corner and 4 mm of the circle behind it turn by 59.5 degrees more than the corner."""
+    line = corner_into_arc(degrees)
+    for points in (line, line[::-1]):
+        assert of(points, strict=True).counts.tolist() == [fold]
+    assert of(line).counts.tolist() == [int(degrees > 45)]
+
+
+@pytest.mark.parametrize(("degrees", "fold"), [(60, 0), (90, 0), (92, 1), (150, 1)])
+def test_strict_corners_fold_beyond_a_right_angle(degrees, fold):
+    turn = np.radians(degrees)
+    line = [(-30.0, 0.0), (0.0, 0.0), (30.0 * np.cos(turn), 30.0 * np.sin(turn))]
+    folded = of(line, strict=True)
+    assert folded.counts.tolist() == [fold]
+    # The pieces of a strand that is cut there are to end apart.
+    assert folded.folded[0] == pytest.approx(fold * 0.5 * WINDOW * RADIUS)
+
+
+def test_strict_folds_near_the_ends_of_a_strand_and_the_start_of_a_ring_stay_on_it():
+    hook = [(0.0, 0.0), (30.0, 0.0), (29.7, 0.3)]
+    folded = of(hook, hook[::-1], strict=True)
+    np.testing.assert_allclose(folded.start, [29.05, 0.0], atol=0.06)
+    np.testing.assert_allclose(folded.stop, [folded.lengths[0], 1.37], atol=0.06)
+    ring = of([(0.0, 0.0), (60.0, 0.0), (30.0, 8.0), (0.0, 0.0)], strict=True)
+    _, start, stop = ring.free()
+    assert ring.counts.tolist() == [2]
+    assert (stop - start).sum() + ring.folded[0] == pytest.approx(ring.lengths[0])
+    assert ring.folded[0] == pytest.approx(2 * 0.5 * WINDOW * RADIUS)
+
+
+def test_whatever_folds_also_folds_strictly():
+    """Strands of wavering curvature, with corners, in the steps of planned ones."""
+    random = np.random.default_rng(3)
+    lines = []
+    for _ in range(150):
+        bend = np.convolve(random.normal(0.0, 1.0, 200), np.hanning(random.integers(5, 30)), "same")
+        heading = np.cumsum(0.25 * 0.2 * bend / bend.std())
+        heading += np.cumsum((random.random(200) < 0.01) * random.uniform(-1.8, 1.8, 200))
+        line = 0.25 * np.cumsum(np.column_stack([np.cos(heading), np.sin(heading)]), axis=0)
+        lines.append(even_steps(line, np.array([0, 200]), np.zeros(200, bool), 1.0, 0.005)[0])
+    mild, strict = of(*lines).counts > 0, of(*lines, strict=True).counts > 0
+    assert 50 < mild.sum() < 120
+    assert not (mild & ~strict).any()
 
 
 def test_turns_to_and_fro_cancel():
@@ -219,3 +273,13 @@ def test_folds_of_many_lines_are_those_of_each(monkeypatch):
     few = of(*lines)
     for name in ("line", "start", "stop"):
         np.testing.assert_allclose(getattr(few, name), getattr(whole, name), rtol=1e-9)
+
+
+@pytest.mark.parametrize("strict", [False, True])
+def test_a_polyline_folds_alike_alone_and_beside_others(strict):
+    # A tiny ring, strands that turn too little in a window, and one that turns too much.
+    lines = [arc(0.1, 360, 13), arc(300.0, 10), arc(3.0, 80), arc(1.5, 170), arc(60.0, 300)]
+    together, alone = of(*lines, strict=strict), [of(line, strict=strict) for line in lines]
+    assert together.counts.tolist() == [int(bends.counts[0]) for bends in alone]
+    assert together.counts[1:].tolist() == [0, 0, 1, 0]
+    assert together.stop == pytest.approx(np.concatenate([bends.stop for bends in alone]))

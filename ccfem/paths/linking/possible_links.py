@@ -13,7 +13,7 @@ from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.geometry.dubins import WORDS, shortest_curve, word_sizes
 from ccfem.geometry.polylines import along_line, is_closed, pack, points_along
 from ccfem.geometry.shapes import Region, Shapes, strings
-from ccfem.paths.folds import folds
+from ccfem.paths.folds import MARGIN, folds
 
 CLEARANCE = 0.9
 """Least distance of a link from other strands, in widths. Ends on a slanted boundary are slightly
@@ -23,9 +23,8 @@ CLOSING_TURN = np.deg2rad(60.0)
 """Largest turn, both ends together, of a link that closes a path to a ring. A path of two
 neighbouring strands that closes on itself could no longer join the next strand."""
 
-_MARGIN, _WINDOWS = 1.08, 1.2
-"""Factor on the radius by which folds are looked for, and length of the strands beside a link that
-is looked at, in radii: later steps move points a little."""
+_WINDOWS = 1.2
+"""Length of the strands beside a link that is looked at for folds, in radii."""
 
 _ON_BORDER = 1e-6
 """Distance, mm, by which rounding may move points off a border."""
@@ -104,7 +103,7 @@ def _without_folds(lines: Sequence[FloatArray], links: list[Link], radius: float
         before, after = head(link.first, link.path[0]), head(link.second, link.path[-1])
         joined.append(np.concatenate([before[:0:-1], link.path, after[1:]]))
     open_ = np.zeros(len(links), dtype=bool)
-    counts = folds(*pack(joined), open_, _MARGIN * radius).counts
+    counts = folds(*pack(joined), open_, MARGIN * radius, strict=True).counts
     return [link for link, count in zip(links, counts.tolist(), strict=True) if not count]
 
 

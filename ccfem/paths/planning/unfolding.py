@@ -19,14 +19,10 @@ from ccfem.geometry.dubins import shortest_curve
 from ccfem.geometry.polylines import along_line, is_closed, line_length, pack, points_along
 from ccfem.geometry.shapes import Region, strings
 from ccfem.machine.machine import Machine
-from ccfem.paths.folds import WINDOW, Folds, folds
+from ccfem.paths.folds import MARGIN, WINDOW, Folds, folds
 from ccfem.paths.linking.joining import Joined
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
-
-_MARGIN = 1.08
-"""Factor on the machine's radius by which folds are looked for: what follows moves points by some
-hundredths of a width, and whoever counts folds may take other points of a strand."""
 
 _RADII = (1.0, 0.75)
 """Radii of curves that replace a fold, in least radii of the machine; a circle of 0.66 folds."""
@@ -81,7 +77,7 @@ def unfolded(joined: Joined, section: Region, machine: Machine, least: float) ->
     Joined
         Lines without folds as they were; the pieces of each line in its order.
     """
-    lines, radius = joined.lines, _MARGIN * machine.minimum_radius
+    lines, radius = joined.lines, MARGIN * machine.minimum_radius
     bends = _folds_of(lines, radius)
     if not len(bends.line):
         return joined
@@ -112,9 +108,9 @@ def unfolded_paths(
         Pieces of cut paths that are shorter are dropped; by default the machine's least length.
     """
     least, radius = machine.shortest_strand if least is None else least, machine.minimum_radius
-    radius *= _MARGIN if layer is not None else 1.0
+    radius *= MARGIN if layer is not None else 1.0
     paths = _without_jags(paths, machine.fibre_width, least)
-    bends = folds(paths.points, paths.offsets, paths.closed, radius)
+    bends = folds(paths.points, paths.offsets, paths.closed, radius, strict=True)
     folded = (bends.counts > 0) & (paths.kind == FIBRE)
     if not folded.any():
         return paths
@@ -242,7 +238,7 @@ def _folds_of(lines: Sequence[FloatArray], radius: float) -> Folds:
     """Folds of lines (n_i, c); the first three columns of more than three are the points."""
     points, offsets = pack(list(lines))
     closed = np.array([is_closed(line) for line in lines], dtype=bool)
-    return folds(points[:, :3], offsets, closed, radius)
+    return folds(points[:, :3], offsets, closed, radius, strict=True)
 
 
 def _in_space(line: FloatArray, layer: Layer, normal: FloatArray) -> FloatArray:
@@ -299,9 +295,12 @@ class _Rounding:
         self.tree = shapely.STRtree(self.strands)
         self.curves: list[shapely.LineString] = []
 
+    def _folds_of(self, lines: Sequence[FloatArray]) -> Folds:
+        return _folds_of(lines, MARGIN * self.radius)
+
     def led_round(self, k: int, line: FloatArray, link: BoolArray) -> _Marked:
         """Lead line number k (n, 2) round as many of its folds as there is room for."""
-        bends = _folds_of([line], _MARGIN * self.radius)
+        bends = self._folds_of([line])
         if bends.longest_free[0] < self.window:
             return line, link  # a wave or a meander of folds: no curve could leave and meet it
         if is_closed(line):
@@ -313,7 +312,7 @@ class _Rounding:
             middle, along = 0.5 * float(start[longest] + stop[longest]), along_line(line)
             line, link = part_of_line(line, along, link, middle, middle + float(along[-1]))
             line[-1] = line[0]
-            bends = _folds_of([line], _MARGIN * self.radius)
+            bends = self._folds_of([line])
         for start, stop in zip(bends.start[::-1], bends.stop[::-1], strict=True):
             line, link = self._without(k, line, link, float(start), float(stop)) or (line, link)
         return line, link
@@ -327,7 +326,7 @@ class _Rounding:
         curves = [curve for curve in curves if self._clear(k, line, along, curve)]
         # What folds is told for all curves at once, each with a window of the line on both sides.
         near = [_replaced(line, along, curve, self.window) for curve in curves]
-        fitting = np.flatnonzero(_folds_of(near, _MARGIN * self.radius).counts == 0)
+        fitting = np.flatnonzero(self._folds_of(near).counts == 0)
         if not len(fitting):
             return None
         curve = curves[fitting[0]]

@@ -6,7 +6,7 @@ import shapely
 
 from ccfem.geometry.polylines import line_length
 from ccfem.paths.linking.joining import link_ends
-from ccfem.paths.linking.possible_links import smooth_links
+from ccfem.paths.linking.possible_links import possible_links, smooth_links
 
 RADIUS, WIDTH = 3.85, 1.0
 PLATE = shapely.box(-10.0, -30.0, 110.0, 30.0)
@@ -71,3 +71,16 @@ def test_links_with_corners_join_strands_that_are_too_short_and_are_marked():
     assert steps[link[:-1]].sum() == pytest.approx(np.sqrt(2.0))
     apart = link_ends(lines, PLATE, 1.5, WIDTH, radius=RADIUS, enough=1.5)
     assert not any(link.any() for link in apart.link)
+
+
+def test_no_link_leads_round_a_corner_into_a_bend():
+    """The link leaves by 25 degrees, enters by as much, and 56 of the bend follow: 106 in 4 mm."""
+    way = np.linspace(0.0, 1.4, 15)
+    start, turn = np.array([0.5 * np.cos(0.44), 0.5 * np.sin(0.44)]), np.radians(50.0)
+    bend = RADIUS * np.column_stack([np.sin(way), 1.0 - np.cos(way)])
+    bend = start + bend @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    lines = [np.array([(-50.0, 0.0), (0.0, 0.0)]), bend]
+    ends = possible_links(lines, PLATE, 0.6, WIDTH, along_boundary=False, radius=RADIUS)
+    assert not any({link.first, link.second} == {1, 2} for link in ends)
+    free = possible_links(lines, PLATE, 0.6, WIDTH, along_boundary=False)
+    assert any({link.first, link.second} == {1, 2} for link in free)

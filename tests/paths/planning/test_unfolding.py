@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 import shapely
 
+from benchmarks.print_checks.strand_rules import folds as counted
 from ccfem.body.mesh import box_mesh
 from ccfem.geometry.polylines import along_line, is_closed, line_length, pack
 from ccfem.geometry.tight_bends import tight_bends
 from ccfem.machine import Machine
-from ccfem.paths.folds import folds, folds_in
+from ccfem.paths.folds import WINDOW, folds, folds_in
 from ccfem.paths.linking.joining import Joined
 from ccfem.paths.planning.plan import plan_layers
 from ccfem.paths.planning.strategy import Amount
@@ -34,6 +35,10 @@ def corner(degrees, leg=50.0):
 def freed(*lines, section=WIDE, least=MACHINE.minimum_length, link=None):
     link = [np.zeros(len(line), dtype=bool) for line in lines] if link is None else link
     return unfolded(Joined([np.asarray(x, float) for x in lines], link), section, MACHINE, least)
+
+
+def in_space(line):
+    return np.column_stack([line, np.zeros(len(line))])
 
 
 def count(lines):
@@ -66,6 +71,22 @@ def test_strands_in_corners_side_by_side_keep_their_distance():
         far = shapely.difference(shapely.MultiLineString(list(others)), strand.buffer(1e-6))
         assert shapely.distance(strand, far) > 0.5
     assert sum(map(line_length, lines)) > 0.8 * 500.0
+
+
+@pytest.mark.parametrize(("degrees", "turns"), [(25, 0), (40, 1)])
+def test_no_strand_folds_by_a_count_that_averages_nothing(degrees, turns):
+    """A corner of 40 degrees before an arc of the least radius turns by 99.5 within the window."""
+    radius, turn = MACHINE.minimum_radius, np.radians(degrees)
+    way = np.linspace(0.0, 1.8, 18)
+    arc = radius * np.column_stack([np.sin(way), 1.0 - np.cos(way)])
+    end = arc[-1] + 60.0 * np.array([np.cos(way[-1]), np.sin(way[-1])])
+    line = np.concatenate([[-60.0 * np.array([np.cos(turn), -np.sin(turn)])], arc, [end]])
+    assert len(counted(in_space(line), WINDOW * radius)) == turns
+    narrow = shapely.LineString(line).buffer(0.5)
+    for section, pieces in [(WIDE, 1), (narrow, 1 + turns)]:
+        lines = freed(line, section=section).lines
+        assert len(lines) == pieces
+        assert not any(len(counted(in_space(x), WINDOW * radius)) for x in lines)
 
 
 def test_hairpin_between_strands_is_cut_and_short_pieces_go():

@@ -12,7 +12,7 @@ from ccfem.strategies.fibre_aware.path_profile import Profile
 from ccfem.strategies.fibre_aware.worth_links import link_by_worth
 
 PLATE = shapely.box(-100.0, -100.0, 100.0, 100.0)
-ENOUGH, LIMIT, WIDTH, RADIUS = 42.0, 5.0, 1.0, 1e3  # no link is smooth
+ENOUGH, LIMIT, WIDTH, RADIUS = 42.0, 5.0, 1.0, 0.0  # no link is smooth, and none folds
 
 
 def even(lines):
