@@ -89,7 +89,9 @@ def test_with_all_load_cases_every_one_is_as_stiff():
     said = " ".join(planned.remarks)
     assert "stream: 1.5 times the stiffness without fibre in every load case takes" in said
     ratios = run.tested.cases.tension.ratios
-    assert 1.5 - 1e-5 < ratios.min() < 1.51
+    # Strands come and go one by one: between 278 and 300 mm a layer the least ratio leaps between
+    # 1.48 and 1.545, and the search ends within .5 % of a length that is not enough.
+    assert 1.5 - 1e-5 < ratios.min() < 1.545
     for name, ratio in zip(("pull", "side"), ratios, strict=True):
         assert f"{ratio:.4g} times in '{name}'" in said
 
