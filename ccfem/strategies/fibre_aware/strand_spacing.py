@@ -95,7 +95,7 @@ class Spacing:
     def __post_init__(self) -> None:
         freeze(self, inset=float, border=float, inward=float)
 
-    def of(self, lines: StrandLines, inset: float) -> "Spacing":
+    def for_lines(self, lines: StrandLines, inset: float) -> "Spacing":
         """Return the same for strands that have slid on, all of which come in to an inset, mm."""
         depth = np.full(len(lines.path), inset)
         return replace(self, lines=lines, inset=depth, roughness=lines.roughness)

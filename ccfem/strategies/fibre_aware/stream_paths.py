@@ -426,9 +426,9 @@ def slid_out(
     lines = strand_lines(paths, (layer,), machine, hold=False)
     apart = spacing(lines, (layer,), _APART * width, off, come_in=True, radius=radius)
     for step in steps:
-        slide = apart.of(lines, step * width).spread(np.zeros(len(lines.path)), _ON_THE_WAY)
+        slide = apart.for_lines(lines, step * width).spread(np.zeros(len(lines.path)), _ON_THE_WAY)
         lines = strand_lines(lines.slid(slide), (layer,), machine, hold=False)
-    return lines.slid(apart.of(lines, off * width).spread(np.zeros(len(lines.path))))
+    return lines.slid(apart.for_lines(lines, off * width).spread(np.zeros(len(lines.path))))
 
 
 def _back_inside(paths: Toolpaths, layer: Layer) -> Toolpaths:
