@@ -1,0 +1,56 @@
+"""Rows, contours and isocurves that cost little: planned once for layers that are alike."""
+
+import numpy as np
+
+from ccfem.body.mesh.box import box_mesh
+from ccfem.fem.elasticity.problem import Force, Problem, Support
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.stress_field import WeightedCases
+from ccfem.fem.materials import isotropic
+from ccfem.machine.machine import Machine
+from ccfem.slicing.slicers.planar import Planar
+from ccfem.strategies.fibre_aware.plain_plans import plain_plans
+
+MACHINE = Machine(minimum_length=15.0)
+
+
+def beam(*forces):
+    """A beam 60 x 12 x 4 mm in four layers, held at one end; its load cases by their forces."""
+    mesh = box_mesh((60.0, 12.0, 4.0), (15, 3, 4))
+    loads = {str(k): (Force("x_max", force),) for k, force in enumerate(forces)}
+    problem = Problem(mesh, isotropic(3500.0, 0.3), (Support("x_min"),), loads, order=1)
+    return WeightedCases.of(solve(problem)), Planar(count=4).cut(mesh)
+
+
+def in_plane(paths, layer):
+    return layer.plane.project(paths.on_layer(layer.index).points)
+
+
+def test_layers_that_are_alike_get_the_same_paths():
+    cases, layers = beam((300.0, 0.0, 0.0))
+    for paths in plain_plans(cases, layers, MACHINE):
+        first = in_plane(paths, layers[0])
+        assert len(first)
+        for layer in layers[1:]:
+            np.testing.assert_allclose(in_plane(paths, layer), first, atol=1e-9)
+
+
+def test_where_a_beam_bends_across_its_layers_only_stretched_ones_get_rows_along_it():
+    cases, layers = beam((0.0, 0.0, -20.0))
+    along_tension = plain_plans(cases, layers, MACHINE, curves=False)[0]
+    lengths = [along_tension.on_layer(layer.index).lengths.sum() for layer in layers]
+    # Bent down, it is stretched along its upper side and pressed along its lower one.
+    assert lengths[:2] == [0.0, 0.0]
+    assert min(lengths[2:]) > 0.8 * 12 * 60.0
+
+
+def test_each_layer_is_planned_for_its_own_load_case():
+    cases, layers = beam((300.0, 0.0, 0.0), (0.0, 300.0, 0.0))
+    paths = plain_plans(cases, layers, MACHINE, curves=False)[0]
+    alone = [
+        plain_plans(WeightedCases.of(field), layers, MACHINE, curves=False)[0]
+        for field in cases.fields
+    ]
+    for layer, case in zip(layers, (0, 1, 0, 1), strict=True):
+        expected = in_plane(alone[case], layer)
+        np.testing.assert_allclose(in_plane(paths, layer), expected, atol=0.02)
