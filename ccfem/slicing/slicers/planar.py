@@ -181,12 +181,13 @@ def slice_heights(
     if count is not None:
         return lowest + (np.arange(count, dtype=np.float64) + 0.5) * size / count
     assert thickness is not None
-    if not 0.0 < thickness <= size:
+    # A slab as high as the part is one, whatever the rounding of its ends.
+    slabs = int(np.floor(size / thickness + 1e-9)) if thickness > 0.0 else 0
+    if slabs < 1:
         raise InputError(
             f"layer thickness must be above 0 and at most the part's height {size:g} mm; got "
             f"{thickness:g}"
         )
-    slabs = int(np.floor(size / thickness + 1e-9))
     return lowest + (np.arange(slabs, dtype=np.float64) + 0.5) * thickness
 
 
