@@ -69,7 +69,7 @@ def alike_share(mesh: TetMesh, frame: FloatArray, stress: FloatArray, size: floa
         1 for a plate loaded in its plane, about 0 for a plate that is bent.
     """
     volume = mesh.volumes
-    place = mesh.points[mesh.corners].mean(axis=1) @ frame[:2].T
+    place = mesh.centres @ frame[:2].T
     plane = in_plane(stress, frame) * np.array([1.0, 1.0, np.sqrt(2.0)])
     square = np.floor((place - place.min(axis=0)) / size).astype(np.int64)
     _, column = np.unique(square, axis=0, return_inverse=True)
