@@ -43,7 +43,8 @@ _SEVERAL = 3
 (measured: from 3 on parts one cell high, from 9 on two; never on higher ones)."""
 
 _OFTEN = 30
-"""Right-hand sides from which it pays to store the factor of SuperLU by supernodes."""
+"""Right-hand sides from which it pays to store the factor of SuperLU by supernodes, in single
+precision."""
 
 _THIN = 12.4
 """Neighbours of a node of linear cells, including itself, below which a part is so thin that
@@ -73,8 +74,10 @@ class Solver:
     ----------
     matrix : bsr_array (n, n)
     apply : callable
-        Returns the solution for a right-hand side (n,): exact to rounding for a direct backend,
-        otherwise one application of the preconditioner.
+        Returns the solution for a right-hand side (n,): to rounding if it is `exact`, otherwise
+        one application of the preconditioner.
+    exact : bool
+        For a direct backend, but for a factor that is stored in single precision for many solves.
     make : callable
         Makes `apply` for any matrix with the pattern of this one.
     because : str
@@ -311,7 +314,8 @@ def factorise(
     if backend in _MODULES and find_spec(_MODULES[backend]) is None:
         raise InputError(f"backend '{backend}' is not installed: {_CURES[backend]}")
     make = _maker(backend, matrix, points, parents, solves)
-    return Solver(backend, matrix, make(matrix), backend in DIRECT, make, because)
+    exact = backend in DIRECT and not (backend == "superlu" and solves >= _OFTEN)
+    return Solver(backend, matrix, make(matrix), exact, make, because)
 
 
 def _mean_neighbours(matrix: sp.bsr_array) -> float:

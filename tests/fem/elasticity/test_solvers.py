@@ -53,9 +53,14 @@ def test_a_factor_kept_by_supernodes_solves_as_a_dense_one(divisions):
     assert solver.apply.__name__ == "solve"  # of the supernodes
     rhs = np.random.default_rng(0).normal(size=matrix.shape[0])
     exact = np.linalg.solve(matrix.toarray(), rhs)
-    np.testing.assert_allclose(solver.apply(rhs), exact, atol=1e-11 * np.abs(exact).max())
+    # Stored in single precision, it needs two or three iterations for what a direct solver gives.
+    size = np.abs(exact).max()
+    np.testing.assert_allclose(solver.apply(rhs), exact, atol=1e-5 * size)
+    solution = solver.solve(rhs, tolerance=1e-12)
+    np.testing.assert_allclose(solution.values, exact, atol=1e-10 * size)
+    assert 1 <= solution.iterations <= 3
     stiffer = solver.refactorise(2.0 * matrix)
-    np.testing.assert_allclose(stiffer.apply(rhs), 0.5 * exact, atol=1e-11 * np.abs(exact).max())
+    np.testing.assert_allclose(stiffer.apply(rhs), 0.5 * exact, atol=1e-5 * size)
 
 
 def test_pivots_off_the_diagonal_are_left_to_superlu():
