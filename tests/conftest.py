@@ -51,11 +51,11 @@ def build_box():
 
 
 def pytest_configure():
-    """Give each process of the tests one thread of linear algebra: they share the processors.
+    """Give each process of the tests one processor: they share those that there are.
 
-    More of them wait for each other, busily. This runs before the processes are started.
+    More threads wait for each other, busily. This runs before the processes are started.
     """
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "CCFEM_THREADS"):
         os.environ.setdefault(name, "1")
     gc.disable()
 

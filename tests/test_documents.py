@@ -61,7 +61,7 @@ def test_the_flow_is_drawn_as_it_is(capsys):
     for name in ("solved", "Solved.cut", "Request", "Comparison", "planned", "evaluated"):
         assert name in page
         assert operator.attrgetter(name)(engine)
-    for name in ("with_print", "all_tested", "upper_bound"):
+    for name in ("with_print", "with_test", "upper_bound"):
         assert name in page
         assert callable(getattr(engine, name))
     drawn = set(re.findall(r"`(\w+)`", page.partition("| `amount` |")[2].partition("|")[0]))

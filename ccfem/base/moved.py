@@ -253,7 +253,7 @@ MOVED = {
     "studies": "comparison.studies",
     "support": "printing.support",
     "tensor": "base.tensor",
-    "threads": "base.threads",
+    "threads": "base.parallel",
     "toolpaths": "paths.toolpaths",
     "topopt": "fem.topopt",
     "virtual_testing": "judging.virtual_testing",

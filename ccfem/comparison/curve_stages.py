@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ccfem.base.parallel import in_processes
 from ccfem.comparison.curve import Curve
 from ccfem.comparison.runs import Run
 from ccfem.comparison.stages import Part, Tell, attempted, evaluated, planned_to_lengths
@@ -35,7 +36,7 @@ def along_curve(
     runs: Sequence[Run],
     part: Part,
     wanted: float | None,
-    tested: Callable[[list[Run]], list[Run]],
+    tested: Callable[[Run, Part], Run],
     tell: Tell,
 ) -> Curve:
     """Plan and test every strategy at three to five lengths of fibre.
@@ -51,18 +52,25 @@ def along_curve(
     wanted : float, mm, or None
         Length per layer of the comparison; one of the three if possible.
     tested : callable
-        Tests runs virtually.
+        Tests a run of the part virtually.
     tell : callable
     """
     reaches = [reach for reach in (_reach(run, part, tell) for run in runs) if reach is not None]
     free = [reach for reach in reaches if not isinstance(reach.run.strategy, GivenPaths)]
     lengths = _common(free, [one.least for one in reaches if one not in free], wanted)
     points: dict[str, tuple[tuple[float, Run], ...]] = {}
+
+    def judged(run: Run) -> Run:
+        return tested(evaluated(run, part), part)
+
     for reach in reaches:
         asked = _asked(reach, lengths)
         tell(f"planning {reach.run.name} along the curve")
-        planned = [evaluated(run, part, tell) for run in _planned(reach, asked, part)]
-        points[reach.run.name] = tuple(zip(asked, tested(planned), strict=True))
+        planned = _planned(reach, asked, part)
+        done = in_processes(
+            lambda run: tested(evaluated(run, part), part), planned, shared=[part, tested]
+        )
+        points[reach.run.name] = tuple(zip(asked, done, strict=True))
     return Curve(lengths, points)
 
 

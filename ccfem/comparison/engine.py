@@ -9,10 +9,12 @@ import itertools
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from inspect import signature
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from ccfem.base.checks import refuse_keywords
 from ccfem.base.errors import InputError
@@ -41,15 +43,16 @@ from ccfem.comparison.stages import (
     Part,
     Tell,
     Tests,
-    all_tested,
     counted,
     evaluated,
     natural,
     planned,
     planned_to_lengths,
+    side_by_side,
     timed,
     to_length,
     with_print,
+    with_test,
 )
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.stress_field import GivenStress, PartStress, StressField, WeightedCases
@@ -205,6 +208,9 @@ def otherwise_held(case: Case, field: StressField, backend: str) -> StressField:
         raise InputError(f"alternative supports: {error}") from None
 
 
+# Threads of BLAS cost more than they save on matrices of this size, and their number would change
+# the last digits.
+@threadpool_limits.wrap(limits=1, user_api="blas")
 def answer(
     request: Request,
     progress: Progress = silent,
@@ -240,12 +246,13 @@ def answer(
     steps = (5 if request.print_plans else 4) * len(request.strategies) * len(parts) + 1
     tell = counted(progress, 0.1, steps)
     parts, runs, wanted = _planned(request, basis, parts, tell)
-    runs = [evaluated(run, parts[run.slicing], tell) for run in runs]
+    runs = side_by_side("evaluating {}", evaluated, runs, parts, tell)
     if request.print_plans:
-        runs = [with_print(run, parts[run.slicing], tell) for run in runs]
+        runs = side_by_side("planning the print of {}", with_print, runs, parts, tell)
     if basis.tests is not None:
         span = () if isinstance(request.amount, Spread) else RHO_SPAN
-        runs = [all_tested([run], basis.tests, parts[run.slicing], tell, span)[0] for run in runs]
+        test = partial(with_test, tests=basis.tests, span=span)
+        runs = side_by_side("testing {}", test, runs, parts, tell)
     curve = _curve(request, basis, parts, runs, wanted, tell, seconds)
     bounds = _bounds(request, basis, parts, runs, wanted, tell, seconds)
     runs = [_bounded(run, bounds, wanted) for run in runs]
@@ -452,9 +459,7 @@ def _curve(
             replace(run, strategy=before.strategy)
             for run, before in zip(runs, _unplanned(request, "", part), strict=True)
         ]
-        return along_curve(
-            unchanged, part, held, lambda some: all_tested(some, tests, part, tell, ()), tell
-        )
+        return along_curve(unchanged, part, held, partial(with_test, tests=tests, span=()), tell)
 
 
 def _misses(runs: Sequence[Run], wanted: Wanted) -> bool:

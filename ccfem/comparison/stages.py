@@ -9,6 +9,7 @@ from itertools import count
 from typing import Any
 
 from ccfem.base.errors import InputError, SolveError
+from ccfem.base.parallel import in_processes
 from ccfem.base.progress import Progress
 from ccfem.comparison.runs import Run, Tested
 from ccfem.comparison.tested_cases import in_all_cases
@@ -118,6 +119,26 @@ class Part:
     def several_cases(self) -> bool:
         """Whether paths are planned for more than one load case."""
         return len(self.cases) > 1
+
+
+def side_by_side(
+    what: str, work: Callable[..., Run], runs: Sequence[Run], parts: Mapping[str, Part], tell: Tell
+) -> list[Run]:
+    """Carry runs further, in processes where there are several.
+
+    Parameters
+    ----------
+    what : str
+        What is done with a run, as in "evaluating {}".
+    work : callable
+        Takes a run and the part.
+    """
+    done: list[Run] = []
+    results = in_processes(work, runs, [parts[run.slicing] for run in runs], shared=[work])
+    for run in runs:
+        tell(what.format(run.name))
+        done.append(next(results))
+    return done
 
 
 def planned(
@@ -311,9 +332,8 @@ def _no_fibre(machine: Machine) -> str:
     )
 
 
-def evaluated(run: Run, part: Part, tell: Tell) -> Run:
+def evaluated(run: Run, part: Part) -> Run:
     """Evaluate what was planned, or say why there is nothing to evaluate."""
-    tell(f"evaluating {run.name}")
     if run.failure:
         return run
     if not len(run.toolpaths):
@@ -341,9 +361,8 @@ def evaluated(run: Run, part: Part, tell: Tell) -> Run:
     return _stage(run, "evaluate", work)
 
 
-def with_print(run: Run, part: Part, tell: Tell) -> Run:
+def with_print(run: Run, part: Part) -> Run:
     """Plan the print of the whole part, or say why it cannot be printed."""
-    tell(f"planning the print of {run.name}")
     if run.evaluation is None or run.strands is None:
         return run
     if part.refusal:
@@ -393,18 +412,6 @@ class Tests:
             return cls(strand, refused=str(error))
 
 
-def all_tested(
-    runs: Sequence[Run], tests: Tests, part: Part, tell: Tell, span: Sequence[float] = RHO_SPAN
-) -> list[Run]:
-    """Test every run that did not fail virtually.
-
-    If there is a model of alternative supports, every run is tested under these too.
-    """
-    if tests.refused:
-        return [replace(run, untested=tests.refused) for run in runs]
-    return [_tested(run, tests, part, tell, span) for run in runs]
-
-
 def _peak(stress: StressField) -> float:
     """Peak of the averaged von Mises stress, MPa; NaN where it cannot be judged."""
     try:
@@ -413,9 +420,10 @@ def _peak(stress: StressField) -> float:
         return float("nan")
 
 
-def _tested(run: Run, tests: Tests, part: Part, tell: Tell, span: Sequence[float]) -> Run:
+def with_test(run: Run, part: Part, tests: Tests, span: Sequence[float] = RHO_SPAN) -> Run:
     """Test a run virtually under one or two models of the supports, or say why it cannot be."""
-    tell(f"testing {run.name}")
+    if tests.refused:
+        return replace(run, untested=tests.refused)
     if run.evaluation is None:
         return run
 
@@ -424,11 +432,11 @@ def _tested(run: Run, tests: Tests, part: Part, tell: Tell, span: Sequence[float
         about = (run.strategy, part.layers, mesh, part.machine, run.strand_verdict.parts)
         strands = carrying_strands(run.toolpaths, *about)
         tests_done = [_test(strands, *model, tests.strand, part, span) for model in tests.models]
-        tested = replace(tests_done[0], alternative=[*tests_done[1:], None][0])
+        both = replace(tests_done[0], alternative=[*tests_done[1:], None][0])
         if part.several_cases:
             every = in_all_cases(strands, part.cases, tests.strand, part.layers)
-            tested = replace(tested, cases=every)
-        return replace(run, tested=tested)
+            both = replace(both, cases=every)
+        return replace(run, tested=both)
 
     return _stage(run, "virtual test", work, reason="untested")
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ccfem.base.threads import in_threads
+from ccfem.base.parallel import in_threads
 from ccfem.geometry.offsets import offset_rings
 from ccfem.machine.machine import Machine
 from ccfem.paths.fields.chart import chart_of, flat_view

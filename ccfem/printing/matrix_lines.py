@@ -8,7 +8,7 @@ import shapely
 from scipy.spatial import Voronoi
 
 from ccfem.base.arrays import FloatArray
-from ccfem.base.threads import in_threads
+from ccfem.base.parallel import in_threads
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.offsets import offset_rings

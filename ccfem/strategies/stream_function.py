@@ -15,6 +15,7 @@ import scipy.sparse as sp
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.checks import check_choices, check_fields
 from ccfem.base.errors import InputError
+from ccfem.base.parallel import in_processes
 from ccfem.base.tensor import largest_in_plane
 from ccfem.fem.elasticity import PartStress, StressField
 from ccfem.fem.elasticity.stress_field import WeightedCases, solved
@@ -441,30 +442,40 @@ def designed_to_lengths(
     full = full_length(layers, machine)
     most = max(strategy.amount.most, strategy.coverage) * full
     lengths = [min(length, most) for length in lengths]
-    longest = max(lengths)
-    short = [k for k, length in enumerate(lengths) if length < _NEAR * longest]
-    if short:
-        anew = designed_to_lengths(
-            strategy, layers, machine, [lengths[k] for k in short], cut, again
-        )
-        near = [length for length in lengths if length >= _NEAR * longest]
-        rest = iter(designed_to_lengths(strategy, layers, machine, near, cut, again))
-        of = dict(zip(short, anew, strict=True))
-        return [of[k] if k in of else next(rest) for k in range(len(lengths))]
-    asked = replace(strategy, coverage=longest / full)
-    plans = cut(asked, lengths, False)
-    longest_plan = max(float(paths.lengths.sum()) for paths in plans) / len(layers)
-    short_of = 0.0 < longest_plan < _ENOUGH * longest
-    if again and short_of and strategy.overfill * asked.coverage < DENSEST:
-        more = replace(asked, overfill=min(_MORE * longest / longest_plan, 2.0) * strategy.overfill)
-        longer = cut(more, lengths, True)
-        if max(float(paths.lengths.sum()) for paths in longer) > longest_plan * len(layers):
-            asked, plans = more, longer
-    designed = asked.overfill * asked.coverage
-    return [
-        (_designed_for(asked, length / full, designed), WholePart(paths))
-        for length, paths in zip(lengths, plans, strict=True)
-    ]
+
+    def designed(near: Sequence[float]) -> list[tuple[Designed, LayerPlanner]]:
+        longest = max(near)
+        asked = replace(strategy, coverage=longest / full)
+        plans = cut(asked, near, False)
+        longest_plan = max(float(paths.lengths.sum()) for paths in plans) / len(layers)
+        short_of = 0.0 < longest_plan < _ENOUGH * longest
+        if again and short_of and strategy.overfill * asked.coverage < DENSEST:
+            overfill = min(_MORE * longest / longest_plan, 2.0) * strategy.overfill
+            more = replace(asked, overfill=overfill)
+            longer = cut(more, near, True)
+            if max(float(paths.lengths.sum()) for paths in longer) > longest_plan * len(layers):
+                asked, plans = more, longer
+        whole = asked.overfill * asked.coverage
+        return [
+            (_designed_for(asked, length / full, whole), WholePart(paths))
+            for length, paths in zip(near, plans, strict=True)
+        ]
+
+    # Lengths near the longest share its design; the others are designed for anew.
+    groups: list[list[int]] = []
+    for k in sorted(range(len(lengths)), key=lambda k: -lengths[k]):
+        if groups and lengths[k] >= _NEAR * lengths[groups[-1][0]]:
+            groups[-1].append(k)
+        else:
+            groups.append([k])
+    shared = [strategy, layers, machine]
+    of_groups = in_processes(designed, [[lengths[k] for k in own] for own in groups], shared=shared)
+    plan_of = {
+        k: plan
+        for group, plans in zip(groups, of_groups, strict=True)
+        for k, plan in zip(group, plans, strict=True)
+    }
+    return [plan_of[k] for k in range(len(lengths))]
 
 
 def _designed_for(strategy: Designed, coverage: float, designed: float) -> Designed:

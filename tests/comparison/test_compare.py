@@ -32,6 +32,7 @@ from ccfem.paths.planning.equal_fibre import length_per_layer
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.slicers import Planar
 from ccfem.strategies import create
+from ccfem.strategies.stream_function import StreamFunction
 
 SIZE = (60.0, 24.0, 4.0)
 
@@ -89,7 +90,6 @@ def test_natural_amounts_are_those_of_the_strategies():
     for run in result.runs:
         paths = plan(strategies[run.name], result.layers, result.stress, result.case.machine)
         np.testing.assert_array_equal(run.toolpaths.points, paths.points)
-        assert run.strategy == strategies[run.name]
         assert run.tested is None
 
 
@@ -566,3 +566,24 @@ def test_captions_of_pictures_count_paths(compared):
 def test_the_time_of_the_fibre_is_not_called_that_of_the_print():
     (title,) = (head.title for head in HEADLINE if head.column == "print_time_nearest")
     assert title == "laying fibre, min"
+
+
+def test_results_are_the_same_for_any_number_of_processors(monkeypatch):
+    strategies = {"stream": StreamFunction(evaluations=1, phases=2), "isocurve": create("isocurve")}
+    results = []
+    for count in ("1", "2"):
+        monkeypatch.setenv("CCFEM_THREADS", count)
+        result = compare(strip(), strategies, layers=2, print_plans=True)
+        for run in result.runs:
+            assert run.tested.bracket.tension.unreinforced.mesh is result.stress.mesh
+            assert not run.toolpaths.points.flags.writeable
+        results.append(result)
+    first, second = results
+    same = [name for name in first.frame.columns if "seconds" not in name]
+    pd.testing.assert_frame_equal(first.frame[same], second.frame[same], check_exact=True)
+    for one, two in zip(first.runs, second.runs, strict=True):
+        np.testing.assert_array_equal(one.toolpaths.points, two.toolpaths.points)
+        np.testing.assert_array_equal(
+            one.tested.bracket.tension.solution.displacement,
+            two.tested.bracket.tension.solution.displacement,
+        )

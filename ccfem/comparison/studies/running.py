@@ -24,6 +24,7 @@ from ccfem.base.checks import check_number
 from ccfem.base.csv_table import write_csv
 from ccfem.base.errors import InputError, spared
 from ccfem.base.folder import Folder, private_folder, sweep
+from ccfem.base.parallel import processors
 from ccfem.base.progress import Progress, silent
 from ccfem.base.result_folder import refuse_foreign, whole_folder
 from ccfem.comparison.front import FRONTS
@@ -86,7 +87,7 @@ def study(
         missing = [job for job in jobs.jobs if job.key not in outcomes]
         with store.writing("study.json") as files:
             (files / "study.json").write_text(_about(definition, jobs), encoding="utf-8")
-        count = (os.cpu_count() or 1) if workers is None else workers
+        count = processors() if workers is None else workers
         tell = _Teller(progress, len(jobs.jobs), len(outcomes))
         try:
             with closing(_made(definition, jobs, missing, count, scheduler)) as made:
@@ -608,5 +609,5 @@ def _environment(workers: int) -> dict[str, str]:
     environment["PYTHONPATH"] = os.pathsep.join([str(_PACKAGES), *([before] if before else [])])
     for library in ("OMP", "OPENBLAS", "MKL", "NUMBA"):
         environment[f"{library}_NUM_THREADS"] = "1"
-    environment["CCFEM_NUM_THREADS"] = str(max((os.cpu_count() or 1) // workers, 1))
+    environment["CCFEM_THREADS"] = str(max(processors() // workers, 1))
     return environment

@@ -10,7 +10,7 @@ import shapely
 from ccfem.base.arrays import FloatArray, IntArray, freeze
 from ccfem.base.display import Shown
 from ccfem.base.errors import InputError
-from ccfem.base.threads import in_threads
+from ccfem.base.parallel import in_threads
 from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity import PartStress
 from ccfem.fem.materials import Material, named_material

@@ -11,7 +11,7 @@ import shapely
 
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.checks import check_choices, check_fields
-from ccfem.base.threads import in_threads
+from ccfem.base.parallel import in_threads
 from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.even_steps import OFF, even_steps
 from ccfem.geometry.polylines import along_line, angles_between, is_closed, points_along

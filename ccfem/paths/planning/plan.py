@@ -7,7 +7,7 @@ import numpy as np
 
 from ccfem.base.checks import check_instance
 from ccfem.base.errors import InputError
-from ccfem.base.threads import in_threads
+from ccfem.base.parallel import in_threads
 from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.even_steps import OFF, even_steps
 from ccfem.machine.machine import Machine

@@ -6,7 +6,7 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.checks import check_number
-from ccfem.base.threads import in_threads
+from ccfem.base.parallel import in_threads
 from ccfem.geometry.offsets import offset_rings
 from ccfem.machine.machine import Machine
 from ccfem.paths.fields.chart import Chart

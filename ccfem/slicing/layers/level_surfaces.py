@@ -10,7 +10,7 @@ from numba import njit
 from scipy.sparse.csgraph import connected_components
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
-from ccfem.base.threads import in_threads
+from ccfem.base.parallel import in_threads
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.round_walls import RoundWall
 from ccfem.fem.elasticity import cell_gradients

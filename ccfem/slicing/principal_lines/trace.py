@@ -1,6 +1,5 @@
 """Tracing lines through tetrahedra along a direction field, one from the centre of each seed."""
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray, read_only
-from ccfem.base.threads import in_threads
+from ccfem.base.parallel import in_threads, processors
 from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity import cell_gradients
 
@@ -164,7 +163,7 @@ def _along_curve(points: FloatArray) -> IntArray:
 
 def _in_parts(part: Callable[[int, int], Part], count: int) -> list[Part]:
     """Do a range of work in as many parts as there are processors, in order."""
-    bounds = np.linspace(0, count, (os.cpu_count() or 1) + 1).astype(int).tolist()
+    bounds = np.linspace(0, count, processors() + 1).astype(int).tolist()
     return in_threads(part, bounds[:-1], bounds[1:], most=None)
 
 

@@ -7,6 +7,7 @@ the strength as asked for, and for half of that.
 
 from collections.abc import Callable, Sequence
 
+from ccfem.base.parallel import in_processes
 from ccfem.judging.virtual_testing import Specimen, Strand
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.equal_fibre import TOLERANCE
@@ -116,9 +117,12 @@ def best_cut(
     filled = [paths for paths in candidates if len(paths)]
     if not filled:
         return candidates[0]
-    cuts = [
-        cut(paths, share * strength, rounds)
-        for k, paths in enumerate(filled)
-        for share in (_SHARES if strength and k < _ALL_WAYS else _SHARES[:1])
-    ]
-    return stiffest(cuts, judge)
+    paths, shares = zip(
+        *(
+            (paths, share * strength)
+            for k, paths in enumerate(filled)
+            for share in (_SHARES if strength and k < _ALL_WAYS else _SHARES[:1])
+        ),
+        strict=True,
+    )
+    return stiffest(list(in_processes(cut, paths, shares, len(paths) * [rounds])), judge)

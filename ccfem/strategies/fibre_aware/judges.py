@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Protocol
 
 import numpy as np
 
 from ccfem.base.arrays import FloatArray, freeze, in_brief
 from ccfem.base.checks import check_known
+from ccfem.base.parallel import in_processes
 from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity import StressField
 from ccfem.judging.virtual_testing import Specimen, Strand, Strands, cut_strands
@@ -156,18 +157,25 @@ class Judged:
     ----------
     value : float
         Value to be maximised.
+    displacements : tuple of (n, 3) arrays, mm
+        Of each load case.
     strain_worths : callable
         Returns the worth of fibre by its strain, for each load case. With strength this takes
         further solves, so it is computed only when called.
     """
 
     value: float
+    displacements: tuple[FloatArray, ...]
     strain_worths: Callable[[], tuple[StrainWorth, ...]]
 
     __repr__ = in_brief
 
 
-Judge: TypeAlias = Callable[[Toolpaths], Judged]
+class Judge(Protocol):
+    """Tests paths."""
+
+    def __call__(self, toolpaths: Toolpaths, near: Sequence[FloatArray] | None = None) -> Judged:
+        """Test paths; the displacements of similar ones under each case save time."""
 
 
 def stiffness_judge(
@@ -183,15 +191,13 @@ def stiffness_judge(
     those are given: as a comparison tests them.
     """
     goal = Goal.of(part)
-    known: list[FloatArray] = []
 
-    def judge(toolpaths: Toolpaths) -> Judged:
+    def judge(toolpaths: Toolpaths, near: Sequence[FloatArray] | None = None) -> Judged:
         strands = _carrying(toolpaths, goal, machine, layers)
-        tested = equilibria(goal, strands, strand, known or None, tolerance)
-        known[:] = tested.displacements
+        tested = equilibria(goal, strands, strand, near, tolerance)
         counts = goal.counts(tested.ratios) / tested.work
         worths = _stiff_worths(counts, tested.displacements)
-        return Judged(goal.merit(tested.ratios), lambda: worths)
+        return Judged(goal.merit(tested.ratios), tested.displacements, lambda: worths)
 
     return judge
 
@@ -214,18 +220,16 @@ def strength_judge(
     stiffness alone. The error of a load at first failure is of the size of the residual.
     """
     goal = Goal.of(part)
-    known: list[FloatArray] = []
     worth = Worth.of(goal.parts, strand, strength)
     bare = [one.force(one.unreinforced.reactions) for one in goal.parts]
 
-    def judge(toolpaths: Toolpaths) -> Judged:
-        near, strands = known or None, _carrying(toolpaths, goal, machine, layers)
+    def judge(toolpaths: Toolpaths, near: Sequence[FloatArray] | None = None) -> Judged:
+        strands = _carrying(toolpaths, goal, machine, layers)
         tested = virtual_tests(strands, goal.parts, strand, known=near, tolerance=tolerance)
-        known[:] = [one.solution.displacement for one in tested.tests]
+        displaced = tuple(one.solution.displacement for one in tested.tests)
         loads = [one.load for one in cases_failure(tested, strand, layers=layers).each]
         factor = min(load / size for load, size in zip(loads, bare, strict=True))
         value = goal.merit(tested.ratios) ** (1.0 - strength) * factor**strength
-        displaced = tuple(known)
         normal, counts = layer_normal(toolpaths), goal.counts(tested.ratios)
 
         def strain_worths() -> tuple[StrainWorth, ...]:
@@ -235,7 +239,7 @@ def strength_judge(
             equilibrium_of = equilibria(goal, strands, strand, displaced, tolerance).found
             return worth.strain_worths(strands, equilibrium_of, normal, counts)
 
-        return Judged(float(value), strain_worths)
+        return Judged(float(value), displaced, strain_worths)
 
     return judge
 
@@ -252,7 +256,8 @@ def stiffest(candidates: Sequence[Toolpaths], judge: Judge) -> Toolpaths:
     filled = [paths for paths in candidates if len(paths)]
     if len(filled) < 2:
         return filled[0] if filled else candidates[0]
-    return filled[int(np.argmax([judge(paths).value for paths in filled]))]
+    values = in_processes(lambda paths: judge(paths).value, filled)
+    return filled[int(np.argmax(list(values)))]
 
 
 def _stiff_worths(

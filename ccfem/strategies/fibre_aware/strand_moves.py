@@ -111,7 +111,7 @@ def moved(
         if direction is None:
             direction = _direction(slide, lines, mesh, best, smooth)
         trial = apart.spread(slide + step * direction)
-        judged = judge(lines.slid(trial))
+        judged = judge(lines.slid(trial), best.displacements)
         if judged.value > (1.0 + _BETTER) * best.value:
             best, slide, direction, helped = judged, trial, None, True
             continue

@@ -1,14 +1,16 @@
 """Paths along the levels of designed fields, of which the stretches worth most are kept."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import pairwise
+from itertools import pairwise, product
+from typing import Any
 
 import numpy as np
 import shapely
 
 from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.parallel import in_processes
 from ccfem.body.mesh import TetMesh
 from ccfem.geometry.isocontours import isocontours, triangle_edges
 from ccfem.geometry.polylines import line_length
@@ -113,81 +115,43 @@ class Extraction:
         list of list of Toolpaths
             For each length; the paths worth most first.
         """
-        alike = layers_of_one_kind(layers, group, _SAME * self.machine.fibre_width)
-        kind = {int(k): middle(numbers) for numbers in alike for k in numbers}
-        equal = layers_of_one_kind(layers, group)
-        source = {int(k): middle(numbers) for numbers in equal for k in numbers}
-        cut: dict[tuple[int, int], list[FloatArray]] = {}
-        levels: dict[tuple[int, int], int] = {}
-        led: dict[tuple[int, int], list[FloatArray]] = {}
-        drawn: dict[tuple[int, int, float], Toolpaths] = {}
-
-        def strands(number: int, phase: int) -> list[FloatArray]:
-            number = source[number]
-            if (number, phase) not in cut:
-                field = self.fields[group[number]]
-                cut[number, phase] = self.strands(layers[number], field, phase / self.phases)
-            return cut[number, phase]
-
-        def round_holes(number: int, phase: int) -> list[FloatArray]:
-            number = source[number]
-            if (number, phase) not in led:
-                tried, first = range(1, LEVELS + 1), source[kind[number]]
-                if number != first:  # as many as in the layer that stands for all of its kind
-                    round_holes(first, phase)
-                    tried = range(levels[first, phase], levels[first, phase] + 1)
-                lines = strands(number, phase)
-                led[number, phase], count = self.round_holes(lines, layers[number], tried)
-                levels[number, phase] = count
-            return led[number, phase]
-
-        def paths(number: int, phase: int, reach: float = 0.0) -> Toolpaths:
-            key = number, phase, reach
-            if key not in drawn and not reach and number != source[number]:
-                drawn[key] = on_layer(paths(source[number], phase), layers[number])
-            if key not in drawn:  # what links are worth differs from layer to layer
-                drawn[key] = self.linked(layers[number], round_holes(number, phase), reach)
-            return drawn[key]
-
-        # Leading strands round holes takes most of the time, and does not tell positions apart.
-        tried = [
-            [
-                self.profiles(self.linked(layers[k], strands(k, phase)))
-                for phase in range(self.phases)
-            ]
-            for k in map(middle, alike)
-        ]
+        drawings = _Drawings(self, layers, group)
+        alike = drawings.alike
+        stand_ins = list(map(middle, alike))
         counts = [len(numbers) for numbers in alike]
+        # Leading strands round holes takes most of the time, and does not tell positions apart.
+        drawings.draw("rough", list(product(stand_ins, range(self.phases))))
+        tried = [[drawings.rough(k, phase) for phase in range(self.phases)] for k in stand_ins]
+        prices = [self._price(tried, counts, length) for length in lengths]
+        shifts = [self.best_phases(tried, counts, price) for price in prices]
+        whole = len(alike) * (0,)  # drawn to the border: they may only lack links worth most
+        linked = [dict.fromkeys((some[0], whole)) for some in shifts]
+        pairs = {
+            pair
+            for some in linked
+            for phases in some
+            for pair in zip(stand_ins, phases, strict=True)
+        }
+        drawings.draw("with_links", sorted(pairs))
 
-        def ways(length: float) -> list[tuple[tuple[int, ...], float]]:
-            price = self._price(tried, counts, length)
-            shifts = [(phases, 0.0) for phases in self.best_phases(tried, counts, length)]
-            best = shifts[0][0]
+        def gain(phases: tuple[int, ...], reach: float, price: float) -> float:
+            return sum(
+                count * self._gain(drawings.worth(k, phase, reach), price)
+                for k, count, phase in zip(stand_ins, counts, phases, strict=True)
+            )
 
-            def gain(phases: tuple[int, ...], r: float) -> float:
-                return sum(
-                    len(numbers)
-                    * self._gain(self.profiles(paths(middle(numbers), phase, r)), price)
-                    for numbers, phase in zip(alike, phases, strict=True)
-                )
-
-            whole = len(best) * (0,)  # drawn to the border: they may only lack such links
-            linked = [(phases, r) for phases in dict.fromkeys((best, whole)) for r in _REACHES]
-            gains = [gain(*way) for way in linked]
-            if max(gains) > (1.0 + _BETTER) * gain(best, 0.0):
-                shifts.append(linked[int(np.argmax(gains))])
-            return shifts
-
-        planned: dict[tuple[tuple[int, ...], float], Toolpaths] = {}
-        chosen = [ways(length) for length in lengths]
-        for phases, reach in {way for some in chosen for way in some}:
-            of = {k: p for some, p in zip(alike, phases, strict=True) for k in some.tolist()}
-            paths_of_layers = [paths(k, of[k], reach) for k in range(len(layers))]
-            planned[phases, reach] = Toolpaths.concatenate(paths_of_layers)
+        chosen: list[list[tuple[tuple[int, ...], float]]] = []
+        for some, two, price in zip(shifts, linked, prices, strict=True):
+            chosen.append([(phases, 0.0) for phases in some])
+            ways = list(product(two, _REACHES))
+            gains = [gain(*way, price) for way in ways]
+            if max(gains) > (1.0 + _BETTER) * gain(some[0], 0.0, price):
+                chosen[-1].append(ways[int(np.argmax(gains))])
+        planned = drawings.planned({way for some in chosen for way in some})
         return [[planned[way] for way in some] for some in chosen]
 
     def best_phases(
-        self, tried: list[list[list[Profile]]], counts: Sequence[int], length: float
+        self, tried: list[list[list[Profile]]], counts: Sequence[int], price: float
     ) -> list[tuple[int, ...]]:
         """Position of the levels worth most for each kind of layer, and others close to it.
 
@@ -197,10 +161,9 @@ class Extraction:
             Of one layer of each kind at each position of the levels.
         counts : sequence of int
             Layers of each kind.
-        length : float, mm
-            Of all layers together.
+        price : float
+            Of fibre.
         """
-        price = self._price(tried, counts, length)
         gains = np.array(
             [[self._gain(along, price) for along in profiles] for profiles in tried], dtype=float
         )
@@ -321,6 +284,113 @@ class Extraction:
         for worth, displacement in self.strains_of:
             value += worth * np.maximum(pieces.strain(displacement), 0.0) ** 2
         return profiles(toolpaths, strands, value)
+
+
+class _Drawings:
+    """Paths of layers at positions of the levels, each drawn once, and several at a time.
+
+    Layers of equal section share their strands; of others that are alike the middle one says how
+    many strands are led round holes.
+    """
+
+    def __init__(self, extraction: Extraction, layers: Sequence[Layer], group: IntArray) -> None:
+        self.alike = layers_of_one_kind(layers, group, _SAME * extraction.machine.fibre_width)
+        self._extraction, self._layers, self._group = extraction, layers, group
+        self._kind = {int(k): middle(numbers) for numbers in self.alike for k in numbers}
+        equal = layers_of_one_kind(layers, group)
+        self._source = {int(k): middle(numbers) for numbers in equal for k in numbers}
+        self._strands: dict[tuple[int, int], list[FloatArray]] = {}
+        self._rough: dict[tuple[int, int], list[Profile]] = {}
+        self._led: dict[tuple[int, int], tuple[list[FloatArray], int]] = {}
+        self._paths: dict[tuple[int, int, float], Toolpaths] = {}
+        self._worth: dict[tuple[int, int, float], list[Profile]] = {}
+
+    def draw(self, what: str, keys: Sequence[tuple[Any, ...]]) -> None:
+        """Draw in processes what a method gives for several arguments."""
+        caches = (self._strands, self._rough, self._led, self._paths, self._worth)
+
+        def drawn(*key: Any) -> list[dict[Any, Any]]:
+            getattr(self, what)(*key)
+            return [dict(cache) for cache in caches]
+
+        for filled in in_processes(drawn, *zip(*keys, strict=True), shared=[self]):
+            for cache, more in zip(caches, filled, strict=True):
+                cache.update(more)
+
+    def strands(self, number: int, phase: int) -> list[FloatArray]:
+        """Strands of a layer, not led round holes."""
+        number = self._source[number]
+        if (number, phase) not in self._strands:
+            extraction, layer = self._extraction, self._layers[number]
+            field = extraction.fields[self._group[number]]
+            lines = extraction.strands(layer, field, phase / extraction.phases)
+            self._strands[number, phase] = lines
+        return self._strands[number, phase]
+
+    def rough(self, number: int, phase: int) -> list[Profile]:
+        """Worth of the paths of a layer, not led round holes."""
+        if (number, phase) not in self._rough:
+            paths = self._extraction.linked(self._layers[number], self.strands(number, phase))
+            self._rough[number, phase] = self._extraction.profiles(paths)
+        return self._rough[number, phase]
+
+    def led(self, number: int, phase: int) -> tuple[list[FloatArray], int]:
+        """Strands led round holes, and how many on each side of a hole."""
+        number = self._source[number]
+        if (number, phase) not in self._led:
+            tried, first = range(1, LEVELS + 1), self._source[self._kind[number]]
+            if number != first:
+                count = self.led(first, phase)[1]
+                tried = range(count, count + 1)
+            lines, layer = self.strands(number, phase), self._layers[number]
+            self._led[number, phase] = self._extraction.round_holes(lines, layer, tried)
+        return self._led[number, phase]
+
+    def paths(self, number: int, phase: int, reach: float = 0.0) -> Toolpaths:
+        """Paths of a layer, linked as `Extraction.linked` does."""
+        key, source = (number, phase, reach), self._source[number]
+        if key not in self._paths:
+            layer = self._layers[number]
+            if not reach and number != source:
+                self._paths[key] = on_layer(self.paths(source, phase), layer)
+            else:  # what links are worth differs from layer to layer
+                lines, _ = self.led(number, phase)
+                self._paths[key] = self._extraction.linked(layer, lines, reach)
+        return self._paths[key]
+
+    def worth(self, number: int, phase: int, reach: float) -> list[Profile]:
+        """Worth of the paths of a layer."""
+        key = number, phase, reach
+        if key not in self._worth:
+            self._worth[key] = self._extraction.profiles(self.paths(*key))
+        return self._worth[key]
+
+    def with_links(self, number: int, phase: int) -> None:
+        """Draw the paths of a layer with all links."""
+        for reach in (0.0, *_REACHES):
+            self.worth(number, phase, reach)
+
+    def planned(
+        self, ways: Collection[tuple[tuple[int, ...], float]]
+    ) -> dict[tuple[tuple[int, ...], float], Toolpaths]:
+        """Paths of all layers for positions of each kind of layer and a reach of links."""
+        positions = {
+            (phases, reach): [
+                (k, phase, reach)
+                for numbers, phase in zip(self.alike, phases, strict=True)
+                for k in numbers.tolist()
+            ]
+            for phases, reach in ways
+        }
+        keys = {key for some in positions.values() for key in some}
+        firsts = {(self._source[self._kind[k]], phase) for k, phase, _ in keys}
+        self.draw("led", sorted(firsts))
+        alone = {(k if reach else self._source[k], phase, reach) for k, phase, reach in keys}
+        self.draw("paths", sorted(alone - self._paths.keys()))
+        return {
+            way: Toolpaths.concatenate([self.paths(*key) for key in sorted(some)])
+            for way, some in positions.items()
+        }
 
 
 def refined(layer: Layer) -> tuple[FloatArray, IntArray]:

@@ -1,0 +1,235 @@
+"""Work on many things side by side, on at most CCFEM_THREADS processors.
+
+Results are the same, to the last bit, for any number of them.
+"""
+
+import gc
+import io
+import multiprocessing
+import os
+import pickle
+import signal
+import sys
+import traceback
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from multiprocessing.connection import Connection, wait
+from types import BuiltinFunctionType, FunctionType, MappingProxyType, ModuleType
+from typing import IO, Any, TypeVar, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ccfem.base.errors import InputError
+
+_MOST = 4
+"""Threads at a time; much of the work waits for the interpreter's lock."""
+
+_CODE = (type, ModuleType, FunctionType, BuiltinFunctionType)
+_PLAIN = (str, bytes, int, float, type(None))
+
+Result = TypeVar("Result")
+
+
+def processors() -> int:
+    """Processors that the program may use: CCFEM_THREADS, by default all that the system grants.
+
+    Raises
+    ------
+    InputError
+        When CCFEM_THREADS is not a whole number from 1 on.
+    """
+    wanted = os.environ.get("CCFEM_THREADS", "")
+    if not wanted:
+        granted = getattr(os, "sched_getaffinity", None)
+        return len(granted(0)) if granted is not None else os.cpu_count() or 1
+    if not wanted.isdecimal() or int(wanted) < 1:
+        raise InputError(f"CCFEM_THREADS is a whole number, 1 or more; got '{wanted}'")
+    return int(wanted)
+
+
+def in_threads(
+    work: Callable[..., Result], *items: Sequence[Any], most: int | None = _MOST
+) -> list[Result]:
+    """Results of a function for each of some items, in their order, several at a time.
+
+    Parameters
+    ----------
+    work : callable
+        Called from several threads at once, with one item of each sequence.
+    *items : sequences of one length
+    most : int, optional
+        Threads at a time, default 4; None for as many as there are processors, where the work
+        frees the interpreter.
+
+    Raises
+    ------
+    Exception
+        The first that `work` raises, in the order of the items.
+    """
+    count = min(processors(), processors() if most is None else most, max(len(items[0]), 1))
+    if count == 1:
+        return [work(*arguments) for arguments in zip(*items, strict=True)]
+    with ThreadPoolExecutor(count) as pool:
+        return list(pool.map(work, *items))
+
+
+def in_processes(
+    work: Callable[..., Result], *items: Sequence[Any], shared: Sequence[Any] = ()
+) -> Iterator[Result]:
+    """Yield results of a function for each of some items, in their order, several at a time.
+
+    The processes are copies of this one (fork), so that `work` may be any function; only results
+    are sent. What `work` changes elsewhere is lost. On other systems than Linux, where there is one
+    processor, and within such a process it is done here, one after the other.
+
+    Parameters
+    ----------
+    work : callable
+        Called with one item of each sequence.
+    *items : sequences of one length
+    shared : sequence, optional
+        Where a result refers to these, to the items, or to what they refer to, it refers to the
+        same objects here: they are not sent.
+
+    Raises
+    ------
+    Exception
+        The first that `work` raises, in the order of the items.
+    RuntimeError
+        When a process ends before its work, as where memory runs out.
+    """
+    arguments = list(zip(*items, strict=True))
+    count = min(processors(), len(arguments))
+    if count < 2 or multiprocessing.current_process().daemon or sys.platform != "linux":
+        for some in arguments:
+            yield work(*some)
+        return
+    here, there = zip(*(multiprocessing.Pipe() for _ in range(count)), strict=True)
+    context, known = multiprocessing.get_context("fork"), _reachable([arguments, shared])
+    about = (work, arguments, known)
+    processes = [
+        context.Process(target=_serve, args=(*about, end, (*here, *there)), daemon=True)
+        for end in there
+    ]
+    try:
+        with warnings.catch_warnings():
+            # Python 3.12 warns of forks beside threads. The only one here draws a progress bar.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            for process, end in zip(processes, there, strict=True):
+                process.start()
+                end.close()
+        yield from _in_order(here, len(arguments), known)
+    finally:
+        for process in processes:
+            if process.pid is not None:
+                process.kill()
+                process.join()
+
+
+_Known = dict[int, Any]
+"""Objects by their identity, which is the same in a copy of this process."""
+
+
+def _reachable(roots: Sequence[Any]) -> _Known:
+    """Objects that some refer to, directly or not; no code, and no numbers and words."""
+    known: _Known = {}
+    following = list(roots)
+    while following:
+        thing = following.pop()
+        if id(thing) not in known and not isinstance(thing, _CODE + _PLAIN):
+            known[id(thing)] = thing
+            following += gc.get_referents(thing)
+    return known
+
+
+def _read_only_mapping(content: dict[Any, Any]) -> MappingProxyType[Any, Any]:
+    return MappingProxyType(content)
+
+
+def _read_only_array(content: bytes, dtype: Any, shape: tuple[int, ...]) -> NDArray[Any]:
+    return np.frombuffer(content, dtype).reshape(shape)
+
+
+class _Pickler(pickle.Pickler):
+    def __init__(self, file: IO[bytes], known: _Known) -> None:
+        super().__init__(file, pickle.HIGHEST_PROTOCOL)
+        self._known = known
+
+    def persistent_id(self, thing: Any) -> int | None:
+        return id(thing) if id(thing) in self._known else None
+
+    def reducer_override(self, thing: Any) -> Any:
+        """Keep what is read-only so; arrays would come back without that."""
+        if isinstance(thing, MappingProxyType):
+            return _read_only_mapping, (dict(thing),)
+        if type(thing) is np.ndarray and not (thing.flags.writeable or thing.dtype.hasobject):
+            return _read_only_array, (thing.tobytes(), thing.dtype, thing.shape)
+        return NotImplemented
+
+
+class _Unpickler(pickle.Unpickler):
+    def __init__(self, file: IO[bytes], known: _Known) -> None:
+        super().__init__(file)
+        self._known = known
+
+    def persistent_load(self, identity: int) -> Any:
+        return self._known[identity]
+
+
+def _in_order(ends: Sequence[Connection], count: int, known: _Known) -> Iterator[Any]:
+    """Ask the processes behind some ends of pipes for each result, and yield them in order."""
+    numbers = iter(range(count))
+    asked = {end: next(numbers) for end in ends}
+    for end, number in asked.items():
+        end.send(number)
+    outcomes: dict[int, tuple[Any, Exception | None]] = {}
+    for wanted in range(count):
+        while wanted not in outcomes:
+            for end in cast(list[Connection], wait(list(asked))):
+                try:
+                    received = io.BytesIO(end.recv_bytes())
+                except EOFError:
+                    raise RuntimeError(
+                        "a process ended before its work, as where memory runs out: set "
+                        "CCFEM_THREADS=1"
+                    ) from None
+                outcomes[asked.pop(end)] = _Unpickler(received, known).load()
+                number = next(numbers, None)
+                if number is not None:
+                    end.send(number)
+                    asked[end] = number
+        result, error = outcomes.pop(wanted)
+        if error is not None:
+            raise error
+        yield result
+
+
+def _serve(
+    work: Callable[..., Any],
+    arguments: Sequence[tuple[Any, ...]],
+    known: _Known,
+    end: Connection,
+    inherited: Sequence[Connection],
+) -> None:
+    """Do what is asked for through a pipe, until its other end is closed or the parent is gone."""
+    # The parent says that it was stopped.
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        signal.signal(getattr(signal, name), signal.SIG_IGN)
+    for other in inherited:  # else nobody would see that a process is gone
+        if other is not end:
+            other.close()
+    try:
+        while True:
+            number = end.recv()
+            sent = io.BytesIO()
+            try:
+                _Pickler(sent, known).dump((work(*arguments[number]), None))
+            except Exception as error:
+                error.add_note(traceback.format_exc())
+                sent = io.BytesIO()
+                _Pickler(sent, known).dump((None, error))
+            end.send_bytes(sent.getbuffer())
+    except (EOFError, BrokenPipeError):
+        pass

@@ -1,0 +1,125 @@
+import os
+import threading
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+
+from ccfem.base.arrays import read_only
+from ccfem.base.errors import InputError
+from ccfem.base.parallel import in_processes, in_threads, processors
+
+
+@pytest.fixture
+def two(monkeypatch):
+    monkeypatch.setenv("CCFEM_THREADS", "2")
+
+
+def test_results_come_in_the_order_of_the_items_and_several_are_done_at_a_time(two):
+    both = threading.Barrier(2, timeout=10.0)
+
+    def work(number, name):
+        both.wait()  # breaks where one has to be done before the other starts
+        return f"{name}{number}"
+
+    assert in_threads(work, [0, 1, 2, 3], ["a", "b", "c", "d"]) == ["a0", "b1", "c2", "d3"]
+    assert in_threads(work, [], []) == []
+
+
+@pytest.mark.parametrize("side_by_side", [in_threads, in_processes])
+def test_the_first_error_in_the_order_of_the_items_is_raised(two, side_by_side):
+    def work(number):
+        if number:
+            raise ValueError(f"item {number}")
+
+    with pytest.raises(ValueError, match="item 1"):
+        list(side_by_side(work, [0, 1, 2]))
+
+
+def test_processes_give_results_in_order_and_change_nothing_here(two):
+    seen = []
+
+    def work(number, name):
+        seen.append(number)
+        return f"{name}{number}", os.getpid()
+
+    results = list(in_processes(work, range(5), "abcde"))
+    assert [name for name, _ in results] == ["a0", "b1", "c2", "d3", "e4"]
+    pids = {pid for _, pid in results}
+    assert 1 <= len(pids) <= 2
+    assert os.getpid() not in pids
+    assert seen == []
+    assert list(in_processes(work, [], [])) == []
+
+
+@dataclass(frozen=True)
+class Result:
+    part: object
+    values: np.ndarray
+    notes: MappingProxyType
+
+
+def test_results_refer_to_the_same_objects_and_stay_read_only(two):
+    class Part:  # of no module, and with something that cannot be sent
+        def __init__(self):
+            self.mesh = np.zeros((3, 3))
+            self.solve = lambda: None
+
+    part = Part()
+
+    def work(number, about):
+        notes = MappingProxyType({"mesh": about.mesh})
+        return Result(about, read_only([number, np.nan]), notes)
+
+    for known in (
+        list(in_processes(work, [0, 1], [part, part])),
+        list(in_processes(lambda number: work(number, part), [0, 1], shared=[part])),
+    ):
+        for number, result in enumerate(known):
+            assert result.part is part
+            assert result.notes["mesh"] is part.mesh
+            np.testing.assert_array_equal(result.values, [number, np.nan])
+            assert result.values.dtype == float
+            with pytest.raises(ValueError, match="read-only"):
+                result.values[0] = 1.0
+            with pytest.raises(TypeError):
+                result.notes["mesh"] = None
+
+
+def test_an_error_in_a_process_says_where_it_was(two):
+    def work(number):
+        raise InputError(f"got {number}")
+
+    with pytest.raises(InputError, match=r"^got 3") as caught:
+        list(in_processes(work, [3, 4]))
+    assert "in work" in caught.value.__notes__[0]
+
+
+def test_a_process_that_is_killed_is_named(two):
+    def work(number):
+        if number == 1:
+            os.kill(os.getpid(), 9)
+        return number
+
+    with pytest.raises(RuntimeError, match="a process ended before its work"):
+        list(in_processes(work, [0, 1, 2]))
+
+
+def test_processes_are_not_started_within_one(two):
+    def inner(number):
+        return os.getpid()
+
+    def outer(number):
+        return set(in_processes(inner, [0, 1])) == {os.getpid()}
+
+    assert list(in_processes(outer, [0, 1])) == [True, True]
+
+
+@pytest.mark.parametrize("wanted", ["0", "two", "-1", "1.5"])
+def test_the_number_of_processors_is_a_whole_number(monkeypatch, wanted):
+    monkeypatch.setenv("CCFEM_THREADS", wanted)
+    with pytest.raises(InputError, match=rf"whole number, 1 or more; got '{wanted}'"):
+        processors()
+    monkeypatch.setenv("CCFEM_THREADS", "")
+    assert processors() == len(os.sched_getaffinity(0))
