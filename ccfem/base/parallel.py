@@ -196,10 +196,10 @@ def _in_order(ends: Sequence[Connection], count: int, known: _Known) -> Iterator
                         "CCFEM_THREADS=1"
                     ) from None
                 outcomes[asked.pop(end)] = _Unpickler(received, known).load()
-                number = next(numbers, None)
-                if number is not None:
-                    end.send(number)
-                    asked[end] = number
+                following = next(numbers, None)
+                if following is not None:
+                    end.send(following)
+                    asked[end] = following
         result, error = outcomes.pop(wanted)
         if error is not None:
             raise error

@@ -184,6 +184,7 @@ def run(name: str, ask: "Callable[[], Request]", output: Output) -> "Comparison"
         Reads the part, and returns what is asked of it.
     """
     from ccfem.base.result_folder import whole_folder
+    from ccfem.cli.first_run import compiling_beside
     from ccfem.cli.screen import print_comparison
     from ccfem.comparison.engine import answer
     from ccfem.comparison.files import RESULT_FILES, write_results
@@ -194,6 +195,7 @@ def run(name: str, ask: "Callable[[], Request]", output: Output) -> "Comparison"
     where = output.folder(request.case)
     with (
         whole_folder(where, RESULT_FILES, output.force) as folder,
+        compiling_beside(),
         progress_bar(lines=True) as progress,
     ):
         comparison = answer(request, _part(progress, 0.0, _SOLVED))

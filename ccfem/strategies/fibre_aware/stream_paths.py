@@ -4,7 +4,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise, product
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import shapely
@@ -144,7 +144,7 @@ class Extraction:
         for some, two, price in zip(shifts, linked, prices, strict=True):
             chosen.append([(phases, 0.0) for phases in some])
             ways = list(product(two, _REACHES))
-            gains = [gain(*way, price) for way in ways]
+            gains = [gain(phases, reach, price) for phases, reach in ways]
             if max(gains) > (1.0 + _BETTER) * gain(some[0], 0.0, price):
                 chosen[-1].append(ways[int(np.argmax(gains))])
         planned = drawings.planned({way for some in chosen for way in some})
@@ -307,7 +307,8 @@ class _Drawings:
 
     def draw(self, what: str, keys: Sequence[tuple[Any, ...]]) -> None:
         """Draw in processes what a method gives for several arguments."""
-        caches = (self._strands, self._rough, self._led, self._paths, self._worth)
+        drawn_so_far = (self._strands, self._rough, self._led, self._paths, self._worth)
+        caches = cast(tuple[dict[Any, Any], ...], drawn_so_far)
 
         def drawn(*key: Any) -> list[dict[Any, Any]]:
             getattr(self, what)(*key)
