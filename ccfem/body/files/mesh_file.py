@@ -22,8 +22,9 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0, check: bool = Tr
     ----------
     path : path
         One of the formats in `ccfem.body.files.formats`: ``.tet``, Gmsh ``.msh`` 2.2 or 4.1
-        (physical groups of triangles become patches), ``.vtu``, Abaqus ``.inp`` (surfaces, node
-        sets and sets of triangles become patches) or ``.npz``. Linear or quadratic.
+        (physical groups of triangles become patches), ``.vtu``, Abaqus ``.inp`` (instances where
+        they are placed; surfaces, node sets and sets of triangles become patches) or ``.npz``.
+        Linear or quadratic.
     scale : float, default 1
         Factor on the coordinates, to make them mm: 1000 for a file in metres.
     check : bool, default True
@@ -50,17 +51,22 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0, check: bool = Tr
     check_number("mesh scale", scale, above=0.0)
     try:
         mesh = format_of(suffix).read(path)
-        if scale != 1.0:
+        patches = {name: facets for name, facets in mesh.patches.items() if len(facets)}
+        empty = sorted(mesh.patches.keys() - patches.keys())
+        if scale != 1.0 or empty:
             with np.errstate(over="ignore"):  # what overflows is refused as infinite
                 points = mesh.points * scale
-            mesh = TetMesh(points, mesh.cells, mesh.patches)
+            mesh = TetMesh(points, mesh.cells, patches)
         if not check:
             return mesh
         mesh, report = check_mesh(mesh)
     except InputError as error:
         message = str(error)
         raise InputError(message if str(path) in message else f"{path}: {message}") from None
-    for line in report.findings:
+    lines = list(report.findings)
+    if empty:
+        lines.append(f"sets without a facet on the boundary are no patches: {', '.join(empty)}")
+    for line in lines:
         warnings.warn(f"{path}: {line}", UserWarning, stacklevel=2)
     return mesh
 

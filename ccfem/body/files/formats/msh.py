@@ -6,10 +6,9 @@ import numpy as np
 
 from ccfem.base.arrays import IntArray
 from ccfem.base.errors import InputError
-from ccfem.body.files.cells import tetrahedra
+from ccfem.body.files.cells import tetrahedra, with_groups
 from ccfem.body.isolated.process import ChildError, read_isolated
 from ccfem.body.mesh import TetMesh
-from ccfem.body.mesh.patches import with_groups
 
 
 def read(path: Path) -> TetMesh:
