@@ -44,8 +44,8 @@ def tetrahedra(blocks: Iterable[tuple[str, IntArray]], path: str | PathLike[str]
             f"{held}: mesh it again with one kind"
         )
     raise InputError(
-        f"{path} holds no tetrahedra; it has {held}: mesh the volume with tetrahedra, or give a "
-        "closed surface as STL, OBJ or PLY"
+        f"{path} holds no tetrahedra; it has {held}: mesh the volume with tetrahedra (in Gmsh make "
+        "it a Physical Volume, too), or give a closed surface as STL, OBJ or PLY"
     )
 
 

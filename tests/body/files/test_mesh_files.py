@@ -11,6 +11,7 @@ from ccfem.base.errors import InputError
 from ccfem.body.files import read_mesh, whole_file, write_mesh
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.patches import Plane, match_boundary
+from ccfem.geometry.facets import are_among
 
 MIDDLE = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]]
 
@@ -94,7 +95,7 @@ def test_other_programs_read_a_written_grid(tmp_path, box, order):
 @pytest.mark.parametrize("binary", [0, 1])
 @pytest.mark.parametrize("order", [1, 2])
 def test_gmsh_files(tmp_path, version, binary, order):
-    """Files that Gmsh itself writes, with a group on two faces and one without a name."""
+    """Files that Gmsh itself writes: a group on two faces, one without a name, a name twice."""
     gmsh = pytest.importorskip("gmsh")
     path = tmp_path / "part.msh"
     gmsh.initialize(interruptible=False)
@@ -102,7 +103,7 @@ def test_gmsh_files(tmp_path, version, binary, order):
         gmsh.option.setNumber("General.Terminal", 0)
         volume = gmsh.model.occ.addBox(0, 0, 0, 2, 1, 1)
         gmsh.model.occ.synchronize()
-        gmsh.model.addPhysicalGroup(3, [volume], 7, "solid")
+        gmsh.model.addPhysicalGroup(3, [volume], 7, "left end")
         gmsh.model.addPhysicalGroup(2, [1], 1, "left end")
         gmsh.model.addPhysicalGroup(2, [1, 2], 3, "both")
         gmsh.model.addPhysicalGroup(2, [2], 42)
@@ -112,6 +113,8 @@ def test_gmsh_files(tmp_path, version, binary, order):
         gmsh.option.setNumber("Mesh.MshFileVersion", version)
         gmsh.option.setNumber("Mesh.Binary", binary)
         gmsh.write(str(path))
+        gmsh.model.removePhysicalGroups([(3, 7)])
+        gmsh.write(str(tmp_path / "hollow.msh"))
     finally:
         gmsh.finalize()
     mesh = read_mesh(path)
@@ -127,6 +130,8 @@ def test_gmsh_files(tmp_path, version, binary, order):
     assert facets_as_set(mesh.patches["both"]) == facets_as_set(np.concatenate([left, right]))
     if version == 2.2:
         assert facets_as_set(mesh.patches["42"]) == facets_as_set(right)
+    with pytest.raises(InputError, match=r"holds no tetrahedra; it has \d+ triangle.*Physical Vol"):
+        read_mesh(tmp_path / "hollow.msh")
 
 
 def test_gmsh_writes_abaqus(tmp_path):
@@ -166,6 +171,27 @@ def test_vtu_of_other_programs(tmp_path, box):
     assert facets_as_set(mesh.patches["1"]) == facets_as_set(left)
     assert facets_as_set(mesh.patches["2"]) == facets_as_set(right)
     assert np.array_equal(match_boundary(mesh, right), mesh.patches["2"])
+
+
+@pytest.mark.parametrize("suffix", ["msh", "vtu"])
+def test_cells_that_are_given_twice_keep_their_patches(tmp_path, box, suffix):
+    left, path = box.patches["left"], tmp_path / f"part.{suffix}"
+    cells = [("triangle", left), ("tetra", np.concatenate([box.cells, box.cells[::-1]]))]
+    numbers = [np.full(len(nodes), 7) for _, nodes in cells]
+    data = {"gmsh:physical": numbers, "gmsh:geometrical": numbers}
+    mesh = meshio.Mesh(box.points, cells, cell_data=data)
+    mesh.write(path, **({"file_format": "gmsh22", "binary": False} if suffix == "msh" else {}))
+    with pytest.warns(UserWarning, match=f"{len(box.cells)} cells repeated another: taken out"):
+        found = read_mesh(path)
+    assert facets_as_set(found.patches["7"]) == facets_as_set(left)
+    assert np.array_equal(found.cells, box.cells)
+
+
+def test_a_group_inside_the_part_is_named(tmp_path, box):
+    between = box.facets[~are_among(box.facets, box.boundary)][:2]
+    write_mesh(box.with_patches({"core": between}), tmp_path / "part.vtu")
+    with pytest.warns(UserWarning, match="without a facet on the boundary are no patches: core"):
+        assert "core" not in read_mesh(tmp_path / "part.vtu").patches
 
 
 GOOD_TET = "4 vertices\n1 tets\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n4 0 1 2 3\n"

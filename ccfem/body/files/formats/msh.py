@@ -25,7 +25,8 @@ def read(path: Path) -> TetMesh:
         arrays = read_isolated("gmsh_files:read", path)
     except ChildError as error:
         raise InputError(
-            f"{path} is not a Gmsh mesh that can be read ({error}): save it again as version 4.1"
+            f"{path} is not a Gmsh mesh that can be read ({error}): save it again as version 4.1, "
+            "without all elements (Mesh.SaveAll = 0)"
         ) from None
     parts = {name: name.split(":", 2) for name in arrays}
     blocks = {p[1]: (p[2], arrays[name]) for name, p in parts.items() if p[0] == "cells"}
