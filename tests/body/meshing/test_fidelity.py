@@ -5,9 +5,10 @@ import pytest
 import shapely
 
 from ccfem.body.files.surface import Surface
+from ccfem.body.mesh.box import box_mesh
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.body.meshing.planform import extrude
-from ccfem.body.meshing.volume import fidelity
+from ccfem.body.meshing.volume import fidelity, fill, overlap_of
 
 HEIGHT = 6.0
 
@@ -56,3 +57,44 @@ def test_the_largest_distance_counts():
     top = points[:, 2] == HEIGHT
     points[top, 2] += 0.25
     assert fidelity(plate_surface(), TetMesh(points, mesh.cells)).deviation == pytest.approx(0.25)
+
+
+def boxes(*bounds):
+    """Surface of boxes by least and largest coordinates and a sense, which is -1 for a cavity."""
+    points, triangles = [], []
+    for low, high, sense in bounds:
+        box = box_mesh(np.subtract(high, low), (1, 1, 1))
+        triangles.append(box.boundary[:, ::sense] + sum(map(len, points)))
+        points.append(box.points + low)
+    return Surface(np.concatenate(points), np.concatenate(triangles))
+
+
+LONG = ((0, 0, 0), (20, 10, 4), 1)
+
+
+@pytest.mark.parametrize(
+    ("other", "twice"),
+    [
+        (((10, 0, 0), (30, 10, 4), 1), 400.0),
+        (((10, -3, 1), (30, 13, 3), 1), 200.0),
+        (LONG, 800.0),
+        (((5, 3, 1), (15, 7, 3), 1), 80.0),
+        (((5, 3, 1), (15, 7, 3), -1), 0.0),
+        (((20, 0, 0), (30, 10, 4), 1), 0.0),
+        (((25, 0, 0), (30, 10, 4), 1), 0.0),
+    ],
+)
+def test_what_shells_hold_twice_is_counted(other, twice):
+    surface = boxes(LONG, other)
+    assert overlap_of(surface) * surface.volume == pytest.approx(twice, abs=0.02 * surface.volume)
+    assert (overlap_of(surface) > 0.0) == (twice > 0.0)
+    assert overlap_of(plate_surface()) == 0.0
+
+
+def test_overlapping_shells_are_united():
+    mesh, fit, _ = fill(boxes(LONG, ((10, 0, 0), (30, 10, 4), 1)), 3.0, "ftetwild")
+    assert mesh.volumes.sum() == pytest.approx(1200.0, rel=1e-3)
+    assert abs(fit.volume) < 0.01
+    assert fit.deviation < 0.05
+    (said,) = fit.about_overlap
+    assert said.startswith("shells of the surface overlap in 24.7% of their volume and are united")
