@@ -133,7 +133,8 @@ def test_sets_of_part_and_assembly_are_apart(tmp_path, twice):
     text = PART + twice + "*Nset, nset=Set-1, generate\n1, 8, 1\n*Nset, nset=Foot\n" + LEFT + "\n"
     text += f"{ONE}*Nset, nset=Set-1, instance=P-1\n{LEFT}\n"
     text += "*Nset, nset=Again\nP-1.Foot\n*Nset, nset=Nodes\n"
-    text += ", ".join(f"P-1.{label}" for label in LEFT.split(", ")) + "\n*Nset, nset=Inner"
+    text += ", ".join(f"P-1.{label}" for label in LEFT.split(", "))
+    text += f"\nP-1.0, P-1.{'9' * 20}\n*Nset, nset=Inner"
     text += ", instance=P-1\nFoot\n*Surface, type=NODE, name=Face\nP-1.Foot,\n*End Assembly\n"
     mesh = reading(tmp_path, text)
     left, skin = facets_as_set(Plane("x", "min")(mesh)), facets_as_set(mesh.boundary)

@@ -15,7 +15,7 @@ patch. Names that are the same in another scope, or for another kind of set, are
 
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -103,13 +103,13 @@ _READ = ("NODE", "ELEMENT", "NSET", "ELSET", "SURFACE")
 _REFUSED = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM")
 """Keywords that make or move nodes and elements in ways that are not followed."""
 _KINDS = (
-    (r"C3D4|DC3D4", "tetra", 4),
-    (r"C3D10|DC3D10", "tetra10", 10),
+    (r"D?C3D4", "tetra", 4),
+    (r"D?C3D10", "tetra10", 10),
     (r"(CPS|CPE|S|M3D|SFM3D|R3D|DS|STRI)3|S3R", "triangle", 3),
     (r"(CPS|CPE|M3D|SFM3D|DS)6|STRI65", "triangle6", 6),
-    (r"C3D8|C3D20|C3D27", "hexahedron", 0),
-    (r"C3D6|C3D15", "wedge", 0),
-    (r"C3D5|C3D13", "pyramid", 0),
+    (r"D?C3D(8|20|27)|SC8", "hexahedron", 0),
+    (r"D?C3D(6|15)|SC6", "wedge", 0),
+    (r"D?C3D(5|13)", "pyramid", 0),
 )
 """Element types by the start of their name (variants end in letters), and their nodes."""
 _NODES, _ELEMENTS, _FACES = "node set", "element set", "surface"
@@ -126,7 +126,7 @@ class _Members:
     ----------
     kind : str
         Of the labels and names: `_NODES` or `_ELEMENTS`. A node set may take those of elements.
-    labels : tuple of int
+    labels : (k,) array
     ranges : tuple of range
     names : tuple of str
         Sets, and labels with their instance, as ``P-1.7``.
@@ -137,7 +137,7 @@ class _Members:
     """
 
     kind: str
-    labels: tuple[int, ...] = ()
+    labels: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     ranges: tuple[range, ...] = ()
     names: tuple[str, ...] = ()
     instance: str = ""
@@ -194,7 +194,7 @@ class _Deck:
     assembly: _Scope = field(default_factory=_Scope)
     parts: dict[str, _Scope] = field(default_factory=dict)
     instances: dict[str, _Scope] = field(default_factory=dict)
-    scope: _Scope = field(default_factory=_Scope)
+    scope: _Scope = field(init=False)
 
     def __post_init__(self) -> None:
         self.scope = self.assembly
@@ -218,13 +218,13 @@ def _read_block(deck: _Deck, block: _Block) -> None:
             new = _Scope(parameters.get("NAME", ""), parameters["PART"].upper())
             new.moves = list(map(_move, lines))
             deck.open(deck.instances, new)
-        case "END PART" | "END INSTANCE":
+        case "END PART" | "END INSTANCE" | "ASSEMBLY":
             deck.scope = deck.assembly
         case "NODE":
             labels, points = _nodes(block)
             scope.nodes.append((labels, points))
             if "NSET" in parameters:
-                scope.add(_NODES, parameters["NSET"], _Members(_NODES, tuple(labels.tolist())))
+                scope.add(_NODES, parameters["NSET"], _Members(_NODES, labels))
         case "ELEMENT":
             _read_elements(scope, block)
         case "NSET":
@@ -250,25 +250,23 @@ def _nodes(block: _Block) -> tuple[IntArray, FloatArray]:
     """Labels (n,) and points (n, 3); coordinates that are left out are zero, normals not read."""
     if block.parameters.get("SYSTEM", "R").upper() != "R":
         raise ValueError("only rectangular coordinates are read")
-    labels, points = [], np.zeros((len(block.lines), 3))
-    for k, line in enumerate(block.lines):
-        label, *rest = line.split(",")
-        if len(rest) > 7:
+    rows = [line.split(",") for line in block.lines]
+    for line, row in zip(block.lines, rows, strict=True):
+        if len(row) > 8:
             raise ValueError(f"{shown(line)} is more than a label, coordinates and a normal")
-        labels.append(_label(label))
-        points[k] = _numbers(rest[:3], 3)
-    return np.array(labels, dtype=np.int64), points
+    points = np.array([_numbers(row[1:4], 3) for row in rows]).reshape(-1, 3)
+    return _labels(row[0] for row in rows), points
 
 
-def _numbers(items: list[str], count: int) -> FloatArray:
+def _numbers(items: list[str], count: int) -> list[float]:
     """Numbers of a line, at least so many: blank ones are zero, exponents may be Fortran's D."""
     values = [float(item.strip().upper().replace("D", "E") or 0.0) for item in items]
-    return np.array(values + [0.0] * (count - len(values)))
+    return values + [0.0] * (count - len(values))
 
 
 def _move(line: str) -> FloatArray:
     """Read a translation of an instance, or two points of an axis and an angle."""
-    move = _numbers(line.rstrip(", ").split(","), 3)
+    move = np.array(_numbers(line.rstrip(", ").split(","), 3))
     if len(move) not in (3, 7) or not np.isfinite(move).all():
         raise ValueError(f"expected 3 or 7 finite numbers; got {shown(line)}")
     if len(move) == 7 and not 0.0 < np.linalg.norm(move[3:6] - move[:3]) < np.inf:
@@ -276,31 +274,43 @@ def _move(line: str) -> FloatArray:
     return move
 
 
-def _label(item: str) -> int:
-    """Read a label: a whole number from 1 on."""
-    item = item.strip()
-    if not (item.isascii() and item.isdecimal() and len(item) < _DIGITS and int(item)):
-        raise ValueError(f"labels are whole numbers from 1 on; got {shown(item)}")
-    return int(item)
+def _is_label(item: str) -> bool:
+    return item.isascii() and item.isdecimal()
+
+
+def _labels(items: Iterable[str]) -> IntArray:
+    """Read labels: whole numbers from 1 on."""
+    items = list(items)
+    try:
+        labels = np.array(list(map(int, items)), dtype=np.int64)
+        if (labels > 0).all():
+            return labels
+    except (ValueError, OverflowError):
+        pass
+    short = (item for item in items if _is_label(item.strip()) and len(item.strip()) < _DIGITS)
+    right = {item for item in short if int(item)}
+    wrong = next(item.strip() for item in items if item not in right)
+    raise ValueError(f"labels are whole numbers from 1 on; got {shown(wrong)}")
 
 
 def _read_elements(scope: _Scope, block: _Block) -> None:
     """Add the elements of a block; kinds without volume or area are ignored."""
     name = block.parameters.get("TYPE", "").upper()
     known = [entry for entry in _KINDS if re.fullmatch(rf"(?:{entry[0]})[A-Z]*", name)]
-    labels: list[int] = []
+    labels = np.zeros(0, dtype=np.int64)
     for _, kind, count in known[:1]:
         rows = np.zeros((1, 1), dtype=np.int64)  # of a kind that is refused, how many is no matter
         if count:
-            items = ",".join(line.rstrip(", ") for line in block.lines).split(",")
-            numbers = list(map(_label, items)) if block.lines else []
+            numbers = _labels(
+                [item for line in block.lines for item in line.rstrip(", ").split(",")]
+            )
             if len(numbers) % (count + 1):
                 raise ValueError(f"{len(numbers)} numbers do not make rows of {count + 1}")
-            rows = np.array(numbers, dtype=np.int64).reshape(-1, count + 1)
-            labels = rows[:, 0].tolist()
+            rows = numbers.reshape(-1, count + 1)
+            labels = rows[:, 0]
         scope.elements.append((kind, rows))
     if "ELSET" in block.parameters:
-        scope.add(_ELEMENTS, block.parameters["ELSET"], _Members(_ELEMENTS, tuple(labels)))
+        scope.add(_ELEMENTS, block.parameters["ELSET"], _Members(_ELEMENTS, labels))
 
 
 def _members(kind: str, block: _Block) -> _Members:
@@ -313,16 +323,15 @@ def _members(kind: str, block: _Block) -> _Members:
     for row in rows:
         if len(row) not in (2, 3):
             raise ValueError(f"expected first, last and step; got {shown(', '.join(row))}")
-        first, last, *step = map(_label, row)
+        first, last, *step = _labels(row).tolist()
         ranges.append(range(first, last + 1, *step))
     return _Members(kind, ranges=tuple(ranges), instance=instance)
 
 
 def _listed(kind: str, items: list[str], instance: str = "", face: str = "") -> _Members:
     """Members of a set by labels and names."""
-    labels = [item for item in items if item.isascii() and item.isdecimal()]
-    names = [item.strip('"') for item in items if not (item.isascii() and item.isdecimal())]
-    return _Members(kind, tuple(map(_label, labels)), (), tuple(names), instance, face)
+    names = tuple(item.strip('"') for item in items if not _is_label(item))
+    return _Members(kind, _labels(filter(_is_label, items)), (), names, instance, face)
 
 
 # From scopes to one mesh.
@@ -554,15 +563,16 @@ def _chosen(model: _Model, scope: str, kind: str, members: list[_Members]) -> In
                     "too"
                 )
         known = model.rows[listed.kind, scope]
-        rows = [known.at(np.array(listed.labels, dtype=np.int64))]
+        rows = [known.at(listed.labels)]
         rows += [known.within(labels) for labels in listed.ranges]
         for name in listed.names:
             inner, key = scope, name.upper()
             head, dot, tail = key.partition(".")
             if dot and not scope and head in model.scopes:
                 inner, key = head, tail
-            if key.isascii() and key.isdecimal():
-                rows.append(model.rows[listed.kind, inner].at(np.array([_label(key)])))
+            if _is_label(key):
+                at = [int(key)] if len(key) < _DIGITS else []
+                rows.append(model.rows[listed.kind, inner].at(np.array(at, dtype=np.int64)))
             elif (listed.kind, key) not in model.scopes[inner].sets:
                 raise InputError(
                     f"a set or surface names the {listed.kind} {shown(name)}, which the deck does "
@@ -584,7 +594,7 @@ def _of_nodes(model: _Model, scope: str, members: list[_Members], border: IntArr
     """Whether the corners of each boundary facet are in a node set."""
     inside = np.zeros(len(model.points), dtype=bool)
     inside[_chosen(model, scope, _NODES, members)] = True
-    return inside[border].all(axis=1)
+    return np.asarray(inside[border].all(axis=1))
 
 
 def _of_elements(model: _Model, rows: IntArray, face: str, border: IntArray) -> BoolArray:
