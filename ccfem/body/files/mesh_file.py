@@ -51,22 +51,17 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0, check: bool = Tr
     check_number("mesh scale", scale, above=0.0)
     try:
         mesh = format_of(suffix).read(path)
-        patches = {name: facets for name, facets in mesh.patches.items() if len(facets)}
-        empty = sorted(mesh.patches.keys() - patches.keys())
-        if scale != 1.0 or empty:
+        if scale != 1.0:
             with np.errstate(over="ignore"):  # what overflows is refused as infinite
                 points = mesh.points * scale
-            mesh = TetMesh(points, mesh.cells, patches)
+            mesh = TetMesh(points, mesh.cells, mesh.patches)
         if not check:
             return mesh
         mesh, report = check_mesh(mesh)
     except InputError as error:
         message = str(error)
         raise InputError(message if str(path) in message else f"{path}: {message}") from None
-    lines = list(report.findings)
-    if empty:
-        lines.append(f"sets without a facet on the boundary are no patches: {', '.join(empty)}")
-    for line in lines:
+    for line in report.findings:
         warnings.warn(f"{path}: {line}", UserWarning, stacklevel=2)
     return mesh
 

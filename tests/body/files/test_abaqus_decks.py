@@ -151,7 +151,7 @@ def test_every_instance_is_placed_with_its_sets(tmp_path):
     text += f"*Node\n1, 7., 7., 7.\n*Nset, nset=RP\n1\n*Nset, nset=Held, instance=P-2\n{LEFT}\n"
     with pytest.warns(UserWarning, match="falls into 2 separate") as said:
         mesh = reading(tmp_path, text)
-    assert "sets without a facet on the boundary are no patches: RP" in str(said[-1].message)
+    assert any("patches without a facet on the boundary: RP" in str(w.message) for w in said)
     assert mesh.volumes.sum() == pytest.approx(4.0)
     np.testing.assert_allclose(mesh.points[:8], MESH.points)
     x, y, z = MESH.points.T
