@@ -75,7 +75,7 @@ def mesh_body(
                 "; fTetWild gives a different mesh each time, so this one is stored on this "
                 "machine for reuse"
             )
-        return with_faces_of(surface, mesh, angle), (about, *fit.about_overlap)
+        return with_faces_of(surface, mesh, angle), (about, *fit.doubts)
 
     asked: dict[str, object] = {
         "edge_length": float(edge_length),

@@ -23,6 +23,8 @@ from ccfem.geometry.locate import nearest_on_triangles
 
 _VOLUME = 0.02
 """Share of the volume that may be lost or gained."""
+_FAR = 4.0
+"""Deviation over the mesher's envelope from which a shape may be lost."""
 _FINEST = 0.001
 """Distance, mm, below which none is told from zero."""
 
@@ -36,14 +38,18 @@ class Fidelity:
     volume : float
         Volume of the mesh less that of the surface, over the latter.
     deviation : float, mm
-        Farthest that a node of one boundary lies from the other one.
+        Farthest that a node of the mesh lies from the surface, or a corner or the middle of a
+        triangle of the surface from the boundary of the mesh.
     overlap : float
         Share of the surface's volume that its shells hold twice: the mesh has it once.
+    envelope : float, mm
+        Distance from the surface that the mesher takes for none; 0 for one that takes none.
     """
 
     volume: float
     deviation: float
     overlap: float = 0.0
+    envelope: float = 0.0
 
     @property
     def good(self) -> bool:
@@ -60,25 +66,34 @@ class Fidelity:
         return text if self.good else f"{text}: shorten edge_length to keep the shape"
 
     @property
-    def about_overlap(self) -> tuple[str, ...]:
-        """Say that shells of the surface overlap; nothing where they do not."""
-        if not self.overlap:
-            return ()
-        return (
+    def doubts(self) -> tuple[str, ...]:
+        """One line for each shape of the surface that the mesh may not have."""
+        overlap = (
             f"shells of the surface overlap in {self.overlap:.1%} of their volume and are united: "
-            "where one within another is a cavity, turn its triangles round",
+            "where one within another is a cavity, turn its triangles round"
         )
+        lost = (
+            f"parts of the surface lie up to {self.deviation:.3g} mm from the mesh: gaps and walls "
+            f"thinner than {2.0 * self.envelope:.2g} mm may be lost: widen them, or take mesher = "
+            "'gmsh'"
+        )
+        far = 0.0 < _FAR * self.envelope < self.deviation
+        return (*([overlap] if self.overlap else []), *([lost] if far else []))
 
 
-def fidelity(surface: Surface, mesh: TetMesh, overlap: float = 0.0) -> Fidelity:
+def fidelity(
+    surface: Surface, mesh: TetMesh, overlap: float = 0.0, envelope: float = 0.0
+) -> Fidelity:
     """Compare a mesh with the surface that it was made from, some of it inside its other shells."""
     shell = np.unique(mesh.boundary)
     deviation = _distance(surface.points, surface.triangles, mesh.points[shell])
     if not overlap:
         nodes = surface.points[np.unique(surface.triangles)]
-        deviation = max(deviation, _distance(mesh.points, mesh.boundary, nodes))
+        middles = surface.points[surface.triangles].mean(axis=1)
+        places = np.concatenate([nodes, middles])
+        deviation = max(deviation, _distance(mesh.points, mesh.boundary, places))
     change = float(mesh.volumes.sum()) / (surface.volume * (1.0 - overlap)) - 1.0
-    return Fidelity(change, deviation, overlap)
+    return Fidelity(change, deviation, overlap, envelope)
 
 
 _RAYS = 128
@@ -223,7 +238,8 @@ def fill(
             "itself, and that the edge length suits its thickness"
         )
     mesh = on_round_walls(TetMesh(made["points"], made["cells"]), surface, _ENVELOPE)
-    fit = fidelity(surface, mesh, overlap_of(surface))
+    envelope = _ENVELOPE * float(np.linalg.norm(np.ptp(surface.points, axis=0)))
+    fit = fidelity(surface, mesh, overlap_of(surface), envelope)
     if abs(fit.volume) > _LOST:
         raise InputError(
             f"the mesh of the surface has {1.0 + fit.volume:.1%} of its volume: shorten "
