@@ -571,8 +571,8 @@ def _chosen(model: _Model, scope: str, kind: str, members: list[_Members]) -> In
             if dot and not scope and head in model.scopes:
                 inner, key = head, tail
             if _is_label(key):
-                at = [int(key)] if len(key) < _DIGITS else []
-                rows.append(model.rows[listed.kind, inner].at(np.array(at, dtype=np.int64)))
+                label = int(key) if len(key) < _DIGITS else 0
+                rows.append(model.rows[listed.kind, inner].at(np.array([label])))
             elif (listed.kind, key) not in model.scopes[inner].sets:
                 raise InputError(
                     f"a set or surface names the {listed.kind} {shown(name)}, which the deck does "
