@@ -195,11 +195,11 @@ def test_one_name_for_sets_of_several_kinds(tmp_path):
 
 
 def test_sets_of_elements_and_free_surfaces(tmp_path):
-    """The first cell has corners 1 to 8 of a box of six; the others hide some of its faces."""
-    text = (
-        f"{MESHED}*Nset, nset=All, elset=Eall\n*Surface, name=Skin\nEall,\n*Surface, name=One\n1,\n"
-    )
-    mesh = reading(tmp_path, text)
+    """Of the faces of a cell those on the boundary count. Unions are not read, but named."""
+    text = f"{MESHED}*Nset, nset=All, elset=Eall\n*Surface, name=Skin\nEall,\n"
+    text += "*Surface, name=One\n1,\n*Surface, name=Both, combine=union\nSkin, One\n"
+    with pytest.warns(UserWarning, match="patches without a facet on the boundary: Both"):
+        mesh = reading(tmp_path, text)
     assert facets_as_set(mesh.patches["All"]) == facets_as_set(MESH.boundary)
     assert facets_as_set(mesh.patches["Skin"]) == facets_as_set(MESH.boundary)
     faces = map(frozenset, itertools.combinations(MESH.cells[0].tolist(), 3))

@@ -173,6 +173,22 @@ def test_vtu_of_other_programs(tmp_path, box):
     assert np.array_equal(match_boundary(mesh, right), mesh.patches["2"])
 
 
+@pytest.mark.parametrize("order", [1, 2])
+def test_lagrange_cells_of_low_order_are_the_usual_ones(tmp_path, box, order):
+    """As DOLFINx writes them; VTK itself takes the nodes of both for the same places."""
+    mesh = box if order == 1 else box.quadratic()
+    left = mesh.patches["left"]
+    grid = pyvista.UnstructuredGrid({69: left, 71: mesh.cells}, np.array(mesh.points))
+    numbers = np.repeat([4, 0], [len(left), len(mesh.cells)])
+    grid.cell_data["patch"] = numbers if grid.celltypes[0] == 69 else numbers[::-1]
+    grid.save(tmp_path / "part.vtu")
+    volumes = grid.compute_cell_sizes().cell_data["Volume"][grid.celltypes == 71]
+    found = read_mesh(tmp_path / "part.vtu")
+    assert np.array_equal(found.cells, mesh.cells)
+    np.testing.assert_allclose(found.volumes, volumes)
+    assert facets_as_set(found.patches["4"]) == facets_as_set(left)
+
+
 @pytest.mark.parametrize("suffix", ["msh", "vtu"])
 def test_cells_that_are_given_twice_keep_their_patches(tmp_path, box, suffix):
     left, path = box.patches["left"], tmp_path / f"part.{suffix}"

@@ -238,10 +238,11 @@ def _read_block(deck: _Deck, block: _Block) -> None:
             kind = {"NODE": _NODES, "ELEMENT": _ELEMENTS}.get(
                 parameters.get("TYPE", "ELEMENT").upper()
             )
-            if kind is not None and "COMBINE" not in parameters:
-                rows = [[item.strip() for item in f"{line},".split(",")] for line in lines]
-                members = [_listed(kind, row[:1], face=row[1].upper()) for row in rows]
-                scope.add(_FACES, parameters.get("NAME", ""), *members)
+            rows = [[item.strip() for item in f"{line},".split(",")] for line in lines]
+            if kind is None or "COMBINE" in parameters:  # it stays, without facets
+                rows, kind = [], _NODES
+            members = [_listed(kind, row[:1], face=row[1].upper()) for row in rows]
+            scope.add(_FACES, parameters.get("NAME", ""), *members)
         case keyword if keyword in _REFUSED:
             raise ValueError("it is not followed; only *NODE and *ELEMENT are")
 
