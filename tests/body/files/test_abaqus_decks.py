@@ -165,6 +165,21 @@ def test_every_instance_is_placed_with_its_sets(tmp_path):
     assert mesh.patches["Top"].min() >= 8
 
 
+def test_surfaces_of_the_assembly_are_faces_of_instances(tmp_path):
+    """As Abaqus/CAE writes them; face S3 of a cell has its corners 2, 4 and 3."""
+    text = PART + ONE + "*Instance, name=P-2, part=P\n9.\n*End Instance\n"
+    for k in (1, 2):
+        text += f"*Elset, elset=_Surf_S3, internal, instance=P-{k}\n 1, 2, 3, 4, 5, 6\n"
+    text += "*Surface, type=ELEMENT, name=Surf\n_Surf_S3, S3\n*End Assembly\n"
+    with pytest.warns(UserWarning, match="falls into 2 separate"):
+        mesh = reading(tmp_path, text)
+    faces = {frozenset(cell) for cell in MESH.cells[:, [1, 3, 2]].tolist()}
+    faces &= facets_as_set(MESH.boundary)
+    assert len(faces) > 0
+    both = faces | {frozenset(node + 8 for node in face) for face in faces}
+    assert facets_as_set(mesh.patches["Surf"]) == both
+
+
 def test_only_instances_are_in_the_model(tmp_path):
     other = "*Part, name=Spare\n*Node\n1, 0, 0, 0\n*End Part\n"
     with pytest.warns(UserWarning, match="parts without an instance are left out: Spare"):
