@@ -14,6 +14,7 @@ import signal
 import sys
 import tempfile
 import time
+import warnings
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -44,7 +45,9 @@ def read(path: Path) -> None:
     elif is_surface(path):
         read_surface(path)
     else:
-        read_mesh(path, check=False)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # remarks on the mesh
+            read_mesh(path, check=False)
 
 
 def solve_sizes(path: Path) -> None:

@@ -95,6 +95,7 @@ def good_files(folder: Path) -> list[Path]:
     rows += ["f " + " ".join(str(k + 1) for k in t) for t in triangles.reshape(-1, 3).tolist()]
     (folder / "box.obj").write_text("\n".join(rows) + "\n")
     (folder / "box.inp").write_text(_deck(mesh))
+    (folder / "scopes.inp").write_text(_assembly(mesh))
     (folder / "box.msh").write_text(_msh(mesh))
     (folder / "part.toml").write_text(PART)
     (folder / "stress.frd").write_text(frd(mesh, np.tile((1.5, -2, 0.5, 0.01, 0, 3), (30, 1))))
@@ -134,6 +135,16 @@ def _deck(mesh) -> str:
     lines += ["*NSET, NSET=SOME, GENERATE", "1, 12, 2", "*ELSET, ELSET=FIRST", "1, 2, 3"]
     lines += ["*SURFACE, NAME=SKIN", "FIRST, S1", "ALL, S2"]
     return "\n".join(lines) + "\n"
+
+
+def _assembly(mesh) -> str:
+    """Abaqus deck of two instances of a part, one of them turned, with sets in every scope."""
+    lines = ["*PART, NAME=BOX", *_deck(mesh).splitlines(), "*END PART", "*ASSEMBLY, NAME=A"]
+    lines += ["*INSTANCE, NAME=B-1, PART=BOX", "*END INSTANCE", "*INSTANCE, NAME=B-2, PART=BOX"]
+    lines += ["50., 0., 0.", "50., 0., 0., 50., 0., 1., 90.", "*END INSTANCE"]
+    lines += ["*NSET, NSET=FOOT, INSTANCE=B-2", "FOOT", "*NSET, NSET=BOTH", "B-1.FOOT, FOOT, B-2.3"]
+    lines += ["*SURFACE, NAME=SKIN", "B-2.FIRST, S1", "*SURFACE, TYPE=NODE, NAME=END", "B-1.FOOT"]
+    return "\n".join([*lines, "*END ASSEMBLY"]) + "\n"
 
 
 def _msh(mesh) -> str:

@@ -49,7 +49,9 @@ from ccfem.cli.options import (
     Stiffness,
     Strategies,
     Strategy,
+    StressArray,
     StressFile,
+    StressStep,
     StressUnit,
     VirtualTest,
 )
@@ -409,6 +411,8 @@ def compare(
     backend: Backend = "auto",
     stress: StressFile = None,
     stress_unit: StressUnit = None,
+    stress_array: StressArray = None,
+    stress_step: StressStep = None,
     pictures: Pictures = False,
     drawings: Drawings = None,
     details: Details = False,
@@ -425,7 +429,9 @@ def compare(
         parameters = parameters_by_strategy(set_ or ())
         cut = layers_of(layers, heights, slicing)
         several = None if slicings is None else slicings_of(slicings)
-        given = foreign_stress(stress, stress_unit, refine)
+        given = foreign_stress(
+            stress, refine, unit=stress_unit, array=stress_array, step=stress_step
+        )
         if drawings is not None and slicings is not None:
             raise InputError("--drawings works with one slicing only; got --slicings: drop one")
         part = load(case, set_case, refine, machine, set_machine, set_fibre)
@@ -472,6 +478,8 @@ def plan(
     support: PrintedSupport = False,
     stress: StressFile = None,
     stress_unit: StressUnit = None,
+    stress_array: StressArray = None,
+    stress_step: StressStep = None,
     pictures: Pictures = False,
     drawings: Drawings = None,
     details: Details = False,
@@ -489,7 +497,9 @@ def plan(
 
         parameters = parameters_by_strategy(set_ or (), strategy)
         cut = layers_of(layers, heights, slicing)
-        given = foreign_stress(stress, stress_unit, refine)
+        given = foreign_stress(
+            stress, refine, unit=stress_unit, array=stress_array, step=stress_step
+        )
         part = load(case, set_case, refine, machine, set_machine, set_fibre)
         part, strand = calibrated(part, virtual_test, calibration)
         return Request.of(

@@ -155,13 +155,23 @@ StressFile = Annotated[
         "--stress",
         metavar="FILE",
         help="Plan and evaluate on the stress of another program on the same mesh: .vtu with an "
-        "array named stress, .frd of CalculiX, or .csv by element or node.",
+        "array of tensors, .frd of CalculiX, or .csv by element or node.",
     ),
 ]
 StressUnit = Annotated[
     str | None,
     typer.Option(
         "--stress-unit", metavar="UNIT", help="MPa, Pa, .., where the file does not say it."
+    ),
+]
+StressArray = Annotated[
+    str | None,
+    typer.Option("--stress-array", metavar="NAME", help="Array of a .vtu file; default stress."),
+]
+StressStep = Annotated[
+    int | None,
+    typer.Option(
+        "--stress-step", metavar="NUMBER", help="Step of a .frd file with stress of several."
     ),
 ]
 SetOfStrategies = Annotated[

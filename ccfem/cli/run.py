@@ -123,17 +123,24 @@ def slicings_of(text: str) -> tuple[str, ...]:
     return split(text)
 
 
-def foreign_stress(path: Path | None, unit: str | None, refine: bool) -> Any:
-    """Stress of another program to plan on; None for the part's own."""
+def foreign_stress(path: Path | None, refine: bool, **how: Any) -> Any:
+    """Stress of another program to plan on; None for the part's own.
+
+    Parameters
+    ----------
+    **how : str, int or None
+        Unit, array and step: see `ccfem.comparison.request.ForeignStress`.
+    """
     from ccfem.comparison.request import ForeignStress
 
     if path is None:
-        if unit is not None:
-            raise InputError("--stress-unit belongs to --stress; got no file: name it")
+        for name, value in how.items():
+            if value is not None:
+                raise InputError(f"--stress-{name} belongs to --stress; got no file: name it")
         return None
     if refine:
         raise InputError("--refine changes the mesh that the file of --stress is on: drop one")
-    return ForeignStress(path, unit)
+    return ForeignStress(path, **how)
 
 
 @dataclass(frozen=True)

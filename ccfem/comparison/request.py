@@ -48,13 +48,16 @@ class ForeignStress:
     path : path
     unit : str, optional
         Unit of the stress, if the file does not state it.
-    array : str, default "stress"
-        Name of the array in a ``.vtu`` file.
+    array : str, optional
+        Name of the array in a ``.vtu`` file; default ``stress``.
+    step : int, optional
+        Step in a ``.frd`` file, needed where several have stress.
     """
 
     path: str | os.PathLike[str]
     unit: str | None = None
-    array: str = "stress"
+    array: str | None = None
+    step: int | None = None
 
 
 @dataclass(frozen=True)

@@ -436,6 +436,8 @@ def test_bad_parts_end_in_one_line(ccfem, folder, text, message):
         # Words that make no sense are refused before a part is read, which may take minutes.
         (["gone.toml", "--layers", "2", "--heights", "1"], "got --layers and --heights"),
         (["gone.toml", "--stress-unit", "MPa"], "got no file: name it"),
+        (["gone.toml", "--stress-step", "2"], "--stress-step belongs to --stress; got no file"),
+        (["gone.toml", "--stress-array", "S"], "--stress-array belongs to --stress; got no file"),
         (["gone.toml", "--set", "zigzag.spacing"], "expected NAME=VALUE"),
         (["gone.toml", "--slicings", "planar:z", "--drawings", "svg"], "one slicing only"),
         (

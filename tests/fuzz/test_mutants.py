@@ -13,7 +13,7 @@ from ccfem.body.files import read_mesh
 from ccfem.body.mesh import box_mesh
 
 COUNTS = {
-    **dict.fromkeys(("part.toml", "box.inp", "box.tet", "box.npz"), 40),
+    **dict.fromkeys(("part.toml", "box.inp", "scopes.inp", "box.tet", "box.npz"), 40),
     **dict.fromkeys(("stress.frd", "stress.csv", "paths.csv", "paths.txt"), 40),
     **dict.fromkeys(("box.vtu", "box.stl", "box.msh", "stress.vtu"), 1),
 }

@@ -1,12 +1,14 @@
-"""What every reader does with the cells it found: tetrahedra of one order, or an error."""
+"""What every reader does with cells and groups of facets: tetrahedra of one order, and patches."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from os import PathLike
 
 import numpy as np
 
 from ccfem.base.arrays import IntArray
 from ccfem.base.errors import InputError
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.geometry.facets import are_among, facet_keys
 
 _SOLIDS = ("tetra", "hexahedron", "wedge", "pyramid", "polyhedron", "voxel")
 
@@ -42,6 +44,22 @@ def tetrahedra(blocks: Iterable[tuple[str, IntArray]], path: str | PathLike[str]
             f"{held}: mesh it again with one kind"
         )
     raise InputError(
-        f"{path} holds no tetrahedra; it has {held}: mesh the volume with tetrahedra, or give a "
-        "closed surface as STL, OBJ or PLY"
+        f"{path} holds no tetrahedra; it has {held}: mesh the volume with tetrahedra (in Gmsh make "
+        "it a Physical Volume, too), or give a closed surface as STL, OBJ or PLY"
+    )
+
+
+def outside(mesh: TetMesh) -> IntArray:
+    """Boundary facets (b, 3), outward, of a mesh in which cells may be given twice."""
+    _, first = np.unique(facet_keys(mesh.corners)[0], return_index=True)
+    if len(first) == len(mesh.cells):
+        return mesh.boundary
+    return TetMesh(mesh.points, mesh.cells[np.sort(first)]).boundary
+
+
+def with_groups(mesh: TetMesh, groups: Mapping[str, IntArray]) -> TetMesh:
+    """Return the mesh with groups of facets (k, 3) as patches: those on the boundary, or none."""
+    border = outside(mesh)
+    return mesh.with_patches(
+        {name: border[are_among(border, facets)] for name, facets in groups.items()}
     )

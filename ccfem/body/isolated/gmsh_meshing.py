@@ -22,13 +22,14 @@ def cad_volume(path: str, size: float, scale: float) -> dict[str, Any]:
     """Tetrahedra in the solids of a CAD file.
 
     Returns ``points``, ``cells``, ``triangles`` of the outside with the number of the face of
-    each, ``face`` from 1, and the ``names`` of the faces, empty where they have none.
+    each, ``face`` from 1 in the order of the file, and the ``names`` of all its faces and
+    ``solids``, empty where they have none.
     """
     with _model() as gmsh:
-        names, tags = _solids(gmsh, path)
+        given = _solids(gmsh, path)
         _sizes(gmsh, size / scale)
         gmsh.model.mesh.generate(3)
-        return {**_mesh(gmsh, scale), **_faces(gmsh, tags, names)}
+        return {**_mesh(gmsh, scale), **_faces(gmsh, path, *given)}
 
 
 def cad_surface(path: str, size: float, scale: float) -> dict[str, Any]:
@@ -37,11 +38,11 @@ def cad_surface(path: str, size: float, scale: float) -> dict[str, Any]:
     A size of 0 takes a thirtieth of the part.
     """
     with _model() as gmsh:
-        names, tags = _solids(gmsh, path)
+        given = _solids(gmsh, path)
         low, high = np.reshape(gmsh.model.getBoundingBox(-1, -1), (2, 3))
         _sizes(gmsh, size / scale or float(np.linalg.norm(high - low)) / 30.0, turn=2 * _ROUND)
         gmsh.model.mesh.generate(2)
-        return {**_mesh(gmsh, scale), **_faces(gmsh, tags, names)}
+        return {**_mesh(gmsh, scale), **_faces(gmsh, path, *given)}
 
 
 def fill(
@@ -99,8 +100,8 @@ def _model() -> Iterator[Any]:
         gmsh.finalize()
 
 
-def _solids(gmsh: Any, path: str) -> tuple[dict[int, str], list[int]]:
-    """Read a CAD file: names of its faces, and the faces on the outside of its solids."""
+def _solids(gmsh: Any, path: str) -> tuple[dict[int, str], list[str]]:
+    """Read a CAD file, with its solids joined: names of their faces by tag, and of the solids."""
     try:
         gmsh.model.occ.importShapes(path, highestDimOnly=False)
         gmsh.model.occ.synchronize()
@@ -114,15 +115,18 @@ def _solids(gmsh: Any, path: str) -> tuple[dict[int, str], list[int]]:
         raise InputError(
             f"{path} holds no solid: sew its faces to a solid in the program that made it"
         )
-    if len(solids) > 1:  # solids that touch get one mesh; their faces are counted anew
-        gmsh.model.occ.fragment(solids[:1], solids[1:])
-        gmsh.model.occ.synchronize()
     for entity in [e for e in gmsh.model.getEntities(2) if not len(_above(gmsh, e))]:
         gmsh.model.removeEntities([entity], recursive=True)
-    outside = gmsh.model.getBoundary(gmsh.model.getEntities(3), combined=True, oriented=False)
-    tags = sorted({abs(tag) for _, tag in outside})
-    names = {tag: gmsh.model.getEntityName(2, tag).rpartition("/")[2] for tag in tags}
-    return names, tags
+    faces = {tag: _name(gmsh, 2, tag) for _, tag in gmsh.model.getEntities(2)}
+    names = [_name(gmsh, 3, tag) for _, tag in solids]
+    if len(solids) > 1:  # solids that touch get one mesh
+        gmsh.model.occ.fragment(solids[:1], solids[1:])
+        gmsh.model.occ.synchronize()
+    return faces, names
+
+
+def _name(gmsh: Any, dimension: int, tag: int) -> str:
+    return str(gmsh.model.getEntityName(dimension, tag).rpartition("/")[2])
 
 
 def _above(gmsh: Any, entity: tuple[int, int]) -> Any:
@@ -167,17 +171,55 @@ def _mesh(gmsh: Any, scale: float) -> dict[str, Any]:
     }
 
 
-def _faces(gmsh: Any, tags: list[int], names: dict[int, str]) -> dict[str, Any]:
-    """Triangles of the faces, the number of the face of each, and the names of the faces."""
+def _faces(gmsh: Any, path: str, faces: dict[int, str], solids: list[str]) -> dict[str, Any]:
+    """Triangles of the outside, the number in the file of the face of each, and all names."""
     nodes = np.sort(gmsh.model.mesh.getNodes()[0])
-    facets, number = [], []
-    for k, tag in enumerate(tags, 1):
+    outside = gmsh.model.getBoundary(gmsh.model.getEntities(3), combined=True, oriented=False)
+    rows = {}
+    for tag in sorted({abs(tag) for _, tag in outside}):
         _, corners = gmsh.model.mesh.getElementsByType(2, tag)
-        rows = np.searchsorted(nodes, corners.astype(np.int64)).reshape(-1, 3)
-        facets.append(rows)
-        number.append(np.full(len(rows), k))
+        rows[tag] = np.searchsorted(nodes, corners.astype(np.int64)).reshape(-1, 3)
+    number = {tag: k for k, tag in enumerate(faces, 1)}
+    if len(solids) > 1:
+        number = _numbers(gmsh, path, number, [tag for tag in rows if len(rows[tag])])
     return {
-        "triangles": np.concatenate(facets),
-        "face": np.concatenate(number),
-        "names": np.array([names[tag] for tag in tags]),
+        "triangles": np.concatenate(list(rows.values())),
+        "face": np.concatenate([np.full(len(rows[tag]), number.get(tag, 0)) for tag in rows]),
+        "names": np.array(list(faces.values())),
+        "solids": np.array(solids),
     }
+
+
+def _numbers(gmsh: Any, path: str, known: dict[int, int], tags: list[int]) -> dict[int, int]:
+    """Numbers in the file of faces of joined solids, by the numbers of its faces by their tags.
+
+    Joining makes faces anew. Each is a part of that face of the file that a point inside it is on.
+    """
+    places = []
+    for tag in tags:
+        _, corners = gmsh.model.mesh.getElementsByType(2, tag)
+        middle = np.mean([gmsh.model.mesh.getNode(node)[0] for node in corners[:3]], axis=0)
+        places.append(np.array(gmsh.model.getClosestPoint(2, tag, middle)[0]))
+    joined = gmsh.model.getCurrent()
+    gmsh.model.add("as in the file")
+    gmsh.model.occ.importShapes(path, highestDimOnly=False)
+    gmsh.model.occ.synchronize()
+    boxes = {tag: np.reshape(gmsh.model.getBoundingBox(2, tag), (2, 3)) for tag in known}
+    near = 1e-4 * float(np.ptp(np.concatenate(list(boxes.values())), axis=0).max())
+    numbers = {}
+    for tag, place in zip(tags, places, strict=True):
+        off = {}
+        for given, (low, high) in boxes.items():
+            if (place >= low - near).all() and (place <= high + near).all():
+                nearest, at = gmsh.model.getClosestPoint(2, given, place)
+                if gmsh.model.isInside(2, given, at, parametric=True):
+                    off[given] = float(np.linalg.norm(nearest - place))
+        if not off:
+            at = ", ".join(f"{x:.4g}" for x in place)
+            raise InputError(
+                f"{path}: joining its solids made a face at ({at}) that none of them had: join "
+                "them in the program that made them"
+            )
+        numbers[tag] = known[min(off, key=off.__getitem__)]
+    gmsh.model.setCurrent(joined)
+    return numbers

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 _NODES = {5: 3, 10: 4, 22: 6, 24: 10}
 """Nodes of the cells whose nodes are wanted, by VTK's number of their type."""
+_LAGRANGE = {(69, 3): 5, (69, 6): 22, (71, 4): 10, (71, 10): 24}
+"""Types of the same cells, by that of Lagrange cells, as DOLFINx writes them, and their nodes."""
 
 
 def read_grid(path: str) -> dict[str, Any]:
@@ -22,11 +24,13 @@ def read_grid(path: str) -> dict[str, Any]:
     if grid.GetPoints() is None or not grid.GetNumberOfCells():
         raise ValueError("no points or no cells")
     arrays: dict[str, Any] = {"points": vtk_to_numpy(grid.GetPoints().GetData())}
-    types = vtk_to_numpy(grid.GetCellTypesArray())
+    types = vtk_to_numpy(grid.GetCellTypesArray()).copy()
     offsets = vtk_to_numpy(grid.GetCells().GetOffsetsArray()).astype(np.int64)
     nodes = vtk_to_numpy(grid.GetCells().GetConnectivityArray()).astype(np.int64)
     if len(offsets) != len(types) + 1:
         raise ValueError("cells do not fit their types")
+    for (kind, count), same in _LAGRANGE.items():
+        types[(types == kind) & (np.diff(offsets) == count)] = same
     arrays["types"] = types
     for kind in np.unique(types).tolist():
         arrays[f"cells:{kind}"] = _node_table(nodes, offsets, types == kind, _NODES.get(kind, 0))

@@ -42,6 +42,8 @@ class MeshReport:
         The longest of these moves.
     dropped : int
         Facets of patches that are not on the boundary: taken out.
+    empty : tuple of str
+        Patches that have no facet on the boundary: left as they are.
     coincident : int
         Nodes that lie on another one: merged where asked for.
     merged : bool
@@ -66,6 +68,7 @@ class MeshReport:
     moved: int = 0
     farthest: float = 0.0
     dropped: int = 0
+    empty: tuple[str, ...] = ()
     coincident: int = 0
     merged: bool = False
     hanging: int = 0
@@ -88,6 +91,10 @@ class MeshReport:
                 f"by up to {self.farthest:.3g} mm: mesh curved walls finer where that is too far",
             ),
             (self.dropped, f"{self.dropped} patch facets were not on the boundary: left out"),
+            (
+                self.empty,
+                f"patches without a facet on the boundary: {', '.join(self.empty)}",
+            ),
             (self.coincident, f"{self.coincident} nodes lie on another one: {together}"),
             (
                 self.hanging,
@@ -152,6 +159,7 @@ def check_mesh(mesh: TetMesh, merge: bool = False) -> tuple[TetMesh, MeshReport]
         )
     groups = {name: leader[f] if merged else f for name, f in _checked_patches(mesh).items()}
     patches, dropped = _patches(mended, groups, cells[~keep][:, :4])
+    empty = tuple(sorted(name for name, facets in patches.items() if not len(facets)))
     still = np.zeros(len(points), dtype=bool)
     still[mended.cells] = True
     report = MeshReport(
@@ -164,6 +172,7 @@ def check_mesh(mesh: TetMesh, merge: bool = False) -> tuple[TetMesh, MeshReport]
         moved=moved,
         farthest=farthest,
         dropped=dropped,
+        empty=empty,
         coincident=coincident,
         merged=merged,
         hanging=len(hanging),

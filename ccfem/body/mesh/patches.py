@@ -306,15 +306,6 @@ def match_boundary(mesh: Bounded, facets: IntArray) -> IntArray:
     return mesh.boundary[are_among(mesh.boundary, facets)]
 
 
-def with_groups(mesh: BoundedT, groups: Mapping[str, IntArray]) -> BoundedT:
-    """Return the mesh with groups of facets (k, 3) as patches, as far as they are on the boundary.
-
-    Groups without a boundary facet give no patch.
-    """
-    patches = {name: match_boundary(mesh, facets) for name, facets in groups.items()}
-    return mesh.with_patches({name: facets for name, facets in patches.items() if len(facets)})
-
-
 def unit_vector(value: str | ArrayLike, what: str) -> FloatArray:
     """Make a unit vector (3,) of "x", "-y", ... or of a vector that is not zero.
 

@@ -19,6 +19,10 @@ from ccfem.body.mesh.smooth_faces import given_faces, round_walls
 from ccfem.body.meshing.volume import check_edge_length, fidelity
 
 SUFFIXES = (".brep", ".iges", ".igs", ".step", ".stp")
+_NO_NAME = "Open CASCADE STEP translator"
+"""Beginning of the names that Open CASCADE gives to solids that have none."""
+_LISTED = 8
+"""Solids that a message lists."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +35,14 @@ class CadSurface:
         Number of the face of each triangle, from 1.
     names : tuple of str
         Of the faces; empty where the file has none.
+    solids : tuple of str
+        Names of the solids; empty where the file has none.
     """
 
     surface: Surface
     face: IntArray
     names: tuple[str, ...]
+    solids: tuple[str, ...] = ("",)
 
 
 def is_cad(path: str | os.PathLike[str]) -> bool:
@@ -63,21 +70,22 @@ def read_cad(path: str | os.PathLike[str], scale: float = 1.0, size: float = 0.0
     made = _made("cad_surface", path, size, scale)
     names = tuple(str(name) for name in made["names"])
     surface = Surface(*_used(made["points"], made["triangles"]))
-    return CadSurface(surface, made["face"], names)
+    solids = tuple(str(name) for name in made["solids"])
+    return CadSurface(surface, made["face"], names, solids)
 
 
 def mesh_cad(
     path: str | os.PathLike[str], edge_length: float, scale: float = 1.0
-) -> tuple[TetMesh, str]:
+) -> tuple[TetMesh, tuple[str, ...]]:
     """Fill the solids of a CAD file with tetrahedra.
 
     Returns
     -------
     mesh : TetMesh
         With the faces as patches: ``face_1``, ``face_2``, ... in the order of the file, and under
-        their names where they have some.
-    about : str
-        How well it fits.
+        their names where they have some. Faces between solids that touch are none.
+    about : tuple of str
+        How well it fits, and that several solids are joined.
     """
     fine = read_cad(path, scale)
     check_edge_length(fine.surface, edge_length)
@@ -94,11 +102,25 @@ def mesh_cad(
     groups: dict[str, list[IntArray]] = {}
     for k, name in enumerate(made["names"].tolist(), 1):
         facets = match_boundary(mesh, made["triangles"][made["face"] == k])
+        if not len(facets):
+            continue
         for label in filter(None, (face_name(k), name)):
             groups.setdefault(label, []).append(facets)
     mesh = mesh.with_patches({name: np.concatenate(those) for name, those in groups.items()})
     mesh = check_mesh(mesh)[0]
-    return mesh, fidelity(fine.surface, mesh).about("Gmsh")
+    return mesh, (fidelity(fine.surface, mesh).about("Gmsh"), *_about_solids(fine.solids))
+
+
+def _about_solids(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Say that several solids became one part."""
+    if len(names) == 1:
+        return ()
+    known = [name for name in dict.fromkeys(names) if name and not name.startswith(_NO_NAME)]
+    listed = ", ".join(known[:_LISTED]) + (", ..." if len(known) > _LISTED else "")
+    return (
+        f"{len(names)} solids in the file{f' ({listed})' if listed else ''}, of one material and "
+        "joined where they touch: give one that is a part of its own as a file of its own",
+    )
 
 
 def _made(function: str, path: str | os.PathLike[str], size: float, scale: float) -> dict[str, Any]:

@@ -64,8 +64,7 @@ def mesh_body(
 
     def make() -> tuple[TetMesh, tuple[str, ...]]:
         if is_cad(path):
-            mesh, about = mesh_cad(path, edge_length, scale)
-            return mesh, (about,)
+            return mesh_cad(path, edge_length, scale)
         surface = read_surface(path, scale)
         if before is not None:
             before(surface)
@@ -76,7 +75,7 @@ def mesh_body(
                 "; fTetWild gives a different mesh each time, so this one is stored on this "
                 "machine for reuse"
             )
-        return with_faces_of(surface, mesh, angle), (about,)
+        return with_faces_of(surface, mesh, angle), (about, *fit.doubts)
 
     asked: dict[str, object] = {
         "edge_length": float(edge_length),
@@ -91,7 +90,7 @@ def mesh_body(
 # Meshes that were made before, kept by what they were made of.
 
 
-_FORMAT = 3
+_FORMAT = 4
 """Raised when meshing changes, or what is said of it: meshes of before are made anew."""
 _MOST = 100
 """Meshes that are kept; the ones not used for longest go."""

@@ -23,6 +23,8 @@ from ccfem.geometry.locate import nearest_on_triangles
 
 _VOLUME = 0.02
 """Share of the volume that may be lost or gained."""
+_FAR = 4.0
+"""Deviation over the mesher's envelope from which a shape may be lost."""
 _FINEST = 0.001
 """Distance, mm, below which none is told from zero."""
 
@@ -36,11 +38,18 @@ class Fidelity:
     volume : float
         Volume of the mesh less that of the surface, over the latter.
     deviation : float, mm
-        Farthest that a node of one boundary lies from the other one.
+        Farthest that a node of the mesh lies from the surface, or a corner or the middle of a
+        triangle of the surface from the boundary of the mesh.
+    overlap : float
+        Share of the surface's volume that its shells hold twice: the mesh has it once.
+    envelope : float, mm
+        Distance from the surface that the mesher takes for none; 0 for one that takes none.
     """
 
     volume: float
     deviation: float
+    overlap: float = 0.0
+    envelope: float = 0.0
 
     @property
     def good(self) -> bool:
@@ -56,14 +65,91 @@ class Fidelity:
         )
         return text if self.good else f"{text}: shorten edge_length to keep the shape"
 
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """One line for each shape of the surface that the mesh may not have."""
+        overlap = (
+            f"shells of the surface overlap in {self.overlap:.1%} of their volume and are united: "
+            "where one within another is a cavity, turn its triangles round"
+        )
+        lost = (
+            f"parts of the surface lie up to {self.deviation:.3g} mm from the mesh: gaps and walls "
+            f"thinner than {2.0 * self.envelope:.2g} mm may be lost: widen them, or take mesher = "
+            "'gmsh'"
+        )
+        far = 0.0 < _FAR * self.envelope < self.deviation
+        return (*([overlap] if self.overlap else []), *([lost] if far else []))
 
-def fidelity(surface: Surface, mesh: TetMesh) -> Fidelity:
-    """Compare a mesh with the surface that it was made from."""
+
+def fidelity(
+    surface: Surface, mesh: TetMesh, overlap: float = 0.0, envelope: float = 0.0
+) -> Fidelity:
+    """Compare a mesh with the surface that it was made from, some of it inside its other shells."""
     shell = np.unique(mesh.boundary)
-    out = _distance(surface.points, surface.triangles, mesh.points[shell])
-    back = _distance(mesh.points, mesh.boundary, surface.points[np.unique(surface.triangles)])
-    change = float(mesh.volumes.sum()) / surface.volume - 1.0
-    return Fidelity(change, max(out, back))
+    deviation = _distance(surface.points, surface.triangles, mesh.points[shell])
+    if not overlap:
+        nodes = surface.points[np.unique(surface.triangles)]
+        middles = surface.points[surface.triangles].mean(axis=1)
+        places = np.concatenate([nodes, middles])
+        deviation = max(deviation, _distance(mesh.points, mesh.boundary, places))
+    change = float(mesh.volumes.sum()) / (surface.volume * (1.0 - overlap)) - 1.0
+    return Fidelity(change, deviation, overlap, envelope)
+
+
+_RAYS = 128
+"""Rays along each side of the bounding box, by which overlapping shells are looked for."""
+_SHIFT = np.array([0.4142, 0.2679])
+"""Place of a ray between the lines of their grid: not where edges and diagonals are likely."""
+_AT_ONCE = 2_000_000
+"""Rays and triangles that are looked at together."""
+_NO_OVERLAP = 1e-3
+"""Share of the volume below which rays that hit an edge twice may have made it up."""
+
+
+def overlap_of(surface: Surface) -> float:
+    """Share of the volume of a surface that its shells hold twice, from rays along z.
+
+    Along a ray the winding number rises by one where it enters a shell and falls where it leaves.
+    """
+    low, high = surface.points.min(axis=0)[:2], surface.points.max(axis=0)[:2]
+    corners = surface.points[surface.triangles]
+    grid = (corners[..., :2] - low) / (high - low) * _RAYS - _SHIFT  # rays at whole numbers
+    first = np.ceil(grid.min(axis=1)).astype(np.int64)
+    count = np.maximum(np.floor(grid.max(axis=1)).astype(np.int64) - first + 1, 0)
+    pairs = count.prod(axis=1)
+    rays, heights, steps = [], [], []
+    for chunk in np.split(
+        np.arange(len(pairs)), np.flatnonzero(np.diff(np.cumsum(pairs) // _AT_ONCE)) + 1
+    ):
+        triangle = np.repeat(chunk, pairs[chunk])
+        k = np.arange(len(triangle)) - np.repeat(
+            np.cumsum(pairs[chunk]) - pairs[chunk], pairs[chunk]
+        )
+        ray = first[triangle] + np.stack([k // count[triangle, 1], k % count[triangle, 1]], axis=1)
+        a, b, c = np.moveaxis(grid[triangle], 1, 0)
+        weights = np.stack(
+            [_cross(b - ray, c - ray), _cross(c - ray, a - ray), _cross(a - ray, b - ray)], axis=1
+        )
+        size = weights.sum(axis=1)
+        hit = (size != 0.0) & (weights * np.sign(size)[:, None] >= 0.0).all(axis=1)
+        rays.append(ray[hit] @ [_RAYS, 1])
+        heights.append(
+            np.einsum("ij,ij->i", weights[hit], corners[triangle[hit], :, 2]) / size[hit]
+        )
+        steps.append(-np.sign(size[hit]))  # a facet that looks down is where a ray upward enters
+    ray, height, step = map(np.concatenate, (rays, heights, steps))
+    through = np.bincount(ray, weights=step)[ray] == 0.0  # others hit an edge once or three times
+    ray, height, step = ray[through], height[through], step[through]
+    order = np.lexsort([height, ray])
+    winding = np.cumsum(step[order])[:-1]
+    length = np.where(np.diff(ray[order]) == 0, np.diff(height[order]), 0.0)
+    whole = float(winding @ length)
+    share = 1.0 - float(length[winding > 0.5].sum()) / whole if whole > 0.0 else 0.0
+    return share if share > _NO_OVERLAP else 0.0
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
 def _distance(points: FloatArray, triangles: IntArray, queries: FloatArray) -> float:
@@ -152,7 +238,8 @@ def fill(
             "itself, and that the edge length suits its thickness"
         )
     mesh = on_round_walls(TetMesh(made["points"], made["cells"]), surface, _ENVELOPE)
-    fit = fidelity(surface, mesh)
+    envelope = _ENVELOPE * float(np.linalg.norm(np.ptp(surface.points, axis=0)))
+    fit = fidelity(surface, mesh, overlap_of(surface), envelope)
     if abs(fit.volume) > _LOST:
         raise InputError(
             f"the mesh of the surface has {1.0 + fit.volume:.1%} of its volume: shorten "

@@ -80,7 +80,7 @@ def patch_facets(mesh: CellMesh | LoadedBody, name: str) -> IntArray:
     """Facets of a patch, which must not be empty."""
     facets = mesh.patch(name)
     if not len(facets):
-        raise InputError(f"patch '{name}' is empty: no boundary facet matches its rule")
+        raise InputError(f"patch '{name}' is empty: no boundary facet is in it")
     return facets
 
 

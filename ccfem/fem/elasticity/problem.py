@@ -168,7 +168,7 @@ class Problem(Shown):
         for kind in (*self.all_supports, *loads):
             for name in patches_of(kind):
                 if not len(self.mesh.patch(name)):
-                    raise InputError(f"patch '{name}' is empty: no boundary facet matches its rule")
+                    raise InputError(f"patch '{name}' is empty: no boundary facet is in it")
         for name in self.case_supports:
             check_known("load case", name, self.loads)
         for name, factors in self.combinations.items():

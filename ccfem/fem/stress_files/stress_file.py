@@ -5,7 +5,8 @@ import math
 import os
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +47,8 @@ class StressData:
         Of the stress, as the file says; empty where it does not.
     nodes, cells : (n,) and (c,) int array, or None
         Numbers by which the file calls its nodes and cells; None where it counts them from 0.
+    chosen : str
+        Which of several results of the file it is.
     """
 
     points: FloatArray | None
@@ -55,6 +58,7 @@ class StressData:
     unit: str = ""
     nodes: IntArray | None = None
     cells: IntArray | None = None
+    chosen: str = ""
 
     def __post_init__(self) -> None:
         freeze(self, points=float, corners=int, nodal=float, cell=float, nodes=int, cells=int)
@@ -97,8 +101,9 @@ def read_stress(
     path: str | os.PathLike[str],
     mesh: TetMesh,
     unit: str | None = None,
-    array: str = "stress",
+    array: str | None = None,
     held_or_loaded: tuple[str, ...] = (),
+    step: int | None = None,
 ) -> GivenStress:
     """Read stress from a file and map it to a mesh.
 
@@ -113,10 +118,13 @@ def read_stress(
     unit : str, optional
         Pa, kPa, MPa, N/mm^2 or GPa; needed where the file does not say. A ``.frd`` never does: its
         stress is taken for MPa, since its nodes have to lie where those of the part do, in mm.
-    array : str, default "stress"
-        Name of the stress in a ``.vtu`` file.
+    array : str, optional
+        Name of the stress in a ``.vtu`` file; default ``stress``.
     held_or_loaded : tuple of str
         As in `GivenStress`.
+    step : int, optional
+        Step of a ``.frd`` file, whose last increment is read; needed where several have stress.
+        Modes are no such step: their stress has no size.
 
     Returns
     -------
@@ -127,22 +135,29 @@ def read_stress(
     Raises
     ------
     InputError
-        For another format, a missing unit or component, stress on another mesh, and stress that is
-        not finite or larger than in any solid.
+        For another format, a missing unit or component, an array or a step that the file lacks,
+        stress on another mesh, and stress that is not finite or larger than in any solid.
     """
     path = existing_file(path, "stress file")
     suffix = path.suffix.lower()
+    for option, value, only in (("array", array, ".vtu"), ("step", step, ".frd")):
+        if value is not None and suffix != only:
+            raise InputError(
+                f"only {only} files have the {option} {shown(str(value))} of a stress to choose; "
+                f"got {path}: leave --stress-{option} out"
+            )
     if suffix == ".vtu":
         data = vtu_stress(path, array)
     elif suffix == ".frd":
-        data = frd_stress(path)
+        data = frd_stress(path, step)
     elif suffix == ".csv":
         data = table_stress(path)
     else:
         raise InputError(f"stress is read from .vtu, .frd or .csv; got {path}: convert it")
-    assumed = ""
+    assumed = [data.chosen] if data.chosen else []
     if suffix == ".frd" and unit is None:
-        unit, assumed = "MPa", f"the stress of {path.name} is taken for MPa, as its nodes are in mm"
+        unit = "MPa"
+        assumed.append(f"the stress of {path.name} is taken for MPa, as its nodes are in mm")
     unit = _unit(path, data.unit, unit)
     factor = _MPA[unit.lower()]
     _check_values(path, data, unit)
@@ -152,7 +167,7 @@ def read_stress(
         factor * from_voigt(cell),
         factor * from_voigt(nodal),
         held_or_loaded,
-        assumed=assumed,
+        assumed="; ".join(assumed),
     )
 
 
@@ -370,13 +385,51 @@ _STARTS = (13, 25, 37, 49, 61, 73)
 """Columns where the values of a node begin, twelve wide each."""
 
 
-def frd_stress(path: Path) -> StressData:
-    """Stress of the last step of a file that CalculiX wrote with ``*NODE FILE`` and ``*EL FILE``.
+@dataclass(frozen=True)
+class _Result:
+    """Stress of one increment or mode, as lines, with its step and its time or frequency."""
+
+    step: int
+    value: float
+    is_mode: bool
+    lines: list[str]
+
+    @classmethod
+    def of(cls, heading: list[str], lines: list[str]) -> "_Result":
+        """Take step, value and kind of a result from the lines 1PSTEP and 100C above it."""
+        step, value, kind = 1, 0.0, 0
+        for line in heading:
+            if line.split()[:1] == ["1PSTEP"]:
+                step = int(line.split()[-1])
+            elif line.lstrip().startswith("100C"):
+                value, kind = float(line[12:24].strip() or 0.0), int(line[56:58].strip() or 0)
+        # Of a buckling step the first result is the stress before, at the value 0.
+        return cls(step, value, kind == _FREQUENCY or (kind == _BUCKLING and value != 0.0), lines)
+
+    def __str__(self) -> str:
+        kind = "mode" if self.is_mode else "time"
+        return f"step {self.step} ({kind} {self.value:.6g})"
+
+
+_FREQUENCY, _BUCKLING = 2, 4
+"""Kinds of analysis in the line 100C whose results may be modes."""
+_LISTED = 8
+"""Results that a message lists."""
+
+
+def frd_stress(path: Path, step: int | None = None) -> StressData:
+    """Stress in a file that CalculiX wrote with ``*NODE FILE`` and ``*EL FILE``.
+
+    Parameters
+    ----------
+    step : int, optional
+        Its last increment is read; needed where several steps have stress.
 
     Raises
     ------
     InputError
-        When the file has no tetrahedra or no stress, or other elements besides, or is cut off.
+        When the file has no tetrahedra or no stress of that step, or other elements besides, or is
+        cut off.
     """
     try:
         lines = path.read_text(encoding="ascii", errors="replace").splitlines()
@@ -384,35 +437,68 @@ def frd_stress(path: Path) -> StressData:
         raise InputError(f"expected a result file of CalculiX at {path}: {error}") from None
     points: dict[int, list[float]] = {}
     cells: list[list[int]] = []
-    stress: dict[int, list[float]] = {}
-    names: list[str] = []
-    for block, body in _result_blocks(lines, path):
-        try:
+    results: list[_Result] = []
+    for block, heading, body in _result_blocks(lines, path):
+        with _as_written(block, path):
             if block == "2C":
                 points = _node_rows(body, 3)
             elif block == "3C":
                 cells = _cells(body, path)
             elif block == "STRESS":
-                names = [line.split()[1] for line in body if line.startswith(" -5")]
-                stress = _node_rows([line for line in body if line.startswith(" -1")], 6)
-        except (ValueError, IndexError) as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(
-                f"{path}: the block {block} is not as CalculiX writes it in ASCII ({error}): write "
-                "the file with ccx and its default output"
-            ) from None
+                results.append(_Result.of(heading, body))
     if not points or not cells:
         raise InputError(f"{path} has no mesh of tetrahedra: give the .frd file of a ccx run")
-    if not stress:
-        raise InputError(f"{path} has no stress: ask ccx for it with *EL FILE and S")
+    result = _of_step(results, step, path)
+    with _as_written("STRESS", path):
+        names = [line.split()[1] for line in result.lines if line.startswith(" -5")]
+        stress = _node_rows([line for line in result.lines if line.startswith(" -1")], 6)
     order = component_order(names[:6], f"{path}: the block STRESS")
-    return _mapped(points, cells, stress, order, path)
+    data = _mapped(points, cells, stress, order, path)
+    chosen = f"of {path.name} the stress of {result} is taken" if len(results) > 1 else ""
+    return replace(data, chosen=chosen)
 
 
-def _result_blocks(lines: list[str], path: Path) -> Iterator[tuple[str, list[str]]]:
-    """Nodes (2C), elements (3C), and results by their name, each with its lines."""
+@contextmanager
+def _as_written(block: str, path: Path) -> Iterator[None]:
+    """Turn what goes wrong with the columns of a block into one line."""
+    try:
+        yield
+    except (ValueError, IndexError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(
+            f"{path}: the block {block} is not as CalculiX writes it in ASCII ({error}): write "
+            "the file with ccx and its default output"
+        ) from None
+
+
+def _of_step(results: list[_Result], step: int | None, path: Path) -> _Result:
+    """Last result of a step that is no mode; of the only one where no step is given."""
+    listed = list(dict.fromkeys(map(str, results)))
+    held = ", ".join(listed[:_LISTED]) + (", ..." if len(listed) > _LISTED else "")
+    last = {result.step: result for result in results if not result.is_mode}
+    if not results:
+        raise InputError(f"{path} has no stress: ask ccx for it with *EL FILE and S")
+    if not last:
+        raise InputError(
+            f"{path} has the stress of modes only, which has no size: {held}: give results of loads"
+        )
+    if step is None and len(last) > 1:
+        raise InputError(
+            f"{path} has the stress of several steps: {held}: choose a step with --stress-step"
+        )
+    if step is not None and step not in last:
+        raise InputError(
+            f"{path} has no stress of loads in step {step}; it has that of {held}: choose another "
+            "step with --stress-step"
+        )
+    return last[next(iter(last)) if step is None else step]
+
+
+def _result_blocks(lines: list[str], path: Path) -> Iterator[tuple[str, list[str], list[str]]]:
+    """Nodes (2C), elements (3C), and results by their name, with the lines before and in them."""
     name = ""
+    heading: list[str] = []
     body: list[str] = []
     for line in lines:
         key = line.strip()
@@ -421,10 +507,12 @@ def _result_blocks(lines: list[str], path: Path) -> Iterator[tuple[str, list[str
         elif line.startswith(" -4"):
             name, body = key.split()[1] if len(key.split()) > 1 else "", []
         elif line.startswith(" -3") and name:
-            yield name, body
-            name = ""
+            yield name, heading, body
+            name, heading = "", []
         elif name:
             body.append(line)
+        else:
+            heading.append(line)
     if name:
         raise InputError(f"{path} is cut off in its block {name}: copy it again, or run ccx again")
 
@@ -504,19 +592,22 @@ def vtk_tensors(tensors: FloatArray) -> FloatArray:
     return to_voigt(tensors)[:, [COMPONENTS.index(component) for component in VTK_COMPONENTS]]
 
 
-def vtu_stress(path: Path, array: str) -> StressData:
+def vtu_stress(path: Path, array: str | None = None) -> StressData:
     """Stress at the nodes and in the cells of a grid, as far as it has an array of that name.
+
+    Without a name it is the array ``stress``.
 
     Arrays of nine components are full tensors, row by row; those of six must name their components
     (xx, yy, zz, yz, xz, xy in any order, as xx, Sxx or S11).
     """
     grid = read_grid(path)
-    nodal, cell = (_tensors(grid, where, array, path) for where in ("point", "cell"))
+    name = "stress" if array is None else array
+    nodal, cell = (_tensors(grid, where, name, path) for where in ("point", "cell"))
     if nodal is None and cell is None:
         known = sorted({*grid.point, *grid.cell})
         raise InputError(
-            f"{path} has no array '{array}'; there are: {', '.join(known) or 'none'}: name the "
-            "one that holds the stress"
+            f"{path} has no array {shown(name)}; there are: {', '.join(known) or 'none'}: name the "
+            "one that holds the stress with --stress-array"
         )
     tetrahedra = [nodes for kind, nodes in grid.cells.items() if kind in (10, 24)]
     if len(tetrahedra) != 1 or len(tetrahedra[0]) != len(grid.types):

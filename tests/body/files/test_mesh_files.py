@@ -11,6 +11,7 @@ from ccfem.base.errors import InputError
 from ccfem.body.files import read_mesh, whole_file, write_mesh
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.patches import Plane, match_boundary
+from ccfem.geometry.facets import are_among
 
 MIDDLE = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]]
 
@@ -94,7 +95,7 @@ def test_other_programs_read_a_written_grid(tmp_path, box, order):
 @pytest.mark.parametrize("binary", [0, 1])
 @pytest.mark.parametrize("order", [1, 2])
 def test_gmsh_files(tmp_path, version, binary, order):
-    """Files that Gmsh itself writes, with a group on two faces and one without a name."""
+    """Files that Gmsh itself writes: a group on two faces, one without a name, a name twice."""
     gmsh = pytest.importorskip("gmsh")
     path = tmp_path / "part.msh"
     gmsh.initialize(interruptible=False)
@@ -102,7 +103,7 @@ def test_gmsh_files(tmp_path, version, binary, order):
         gmsh.option.setNumber("General.Terminal", 0)
         volume = gmsh.model.occ.addBox(0, 0, 0, 2, 1, 1)
         gmsh.model.occ.synchronize()
-        gmsh.model.addPhysicalGroup(3, [volume], 7, "solid")
+        gmsh.model.addPhysicalGroup(3, [volume], 7, "left end")
         gmsh.model.addPhysicalGroup(2, [1], 1, "left end")
         gmsh.model.addPhysicalGroup(2, [1, 2], 3, "both")
         gmsh.model.addPhysicalGroup(2, [2], 42)
@@ -112,6 +113,8 @@ def test_gmsh_files(tmp_path, version, binary, order):
         gmsh.option.setNumber("Mesh.MshFileVersion", version)
         gmsh.option.setNumber("Mesh.Binary", binary)
         gmsh.write(str(path))
+        gmsh.model.removePhysicalGroups([(3, 7)])
+        gmsh.write(str(tmp_path / "hollow.msh"))
     finally:
         gmsh.finalize()
     mesh = read_mesh(path)
@@ -127,6 +130,8 @@ def test_gmsh_files(tmp_path, version, binary, order):
     assert facets_as_set(mesh.patches["both"]) == facets_as_set(np.concatenate([left, right]))
     if version == 2.2:
         assert facets_as_set(mesh.patches["42"]) == facets_as_set(right)
+    with pytest.raises(InputError, match=r"holds no tetrahedra; it has \d+ triangle.*Physical Vol"):
+        read_mesh(tmp_path / "hollow.msh")
 
 
 def test_gmsh_writes_abaqus(tmp_path):
@@ -152,93 +157,6 @@ def test_gmsh_writes_abaqus(tmp_path):
     assert facets_as_set(mesh.patches["Left"]) == facets_as_set(Plane("x", "min")(mesh))
 
 
-DECK = """*Heading
-two tetrahedra on the triangle 20 30 40, nodes numbered with gaps
-** a comment
-*Part, name=PART-1
-*Node, nset=ALL
-10, -1., 0., 0.
-20,  0., 0., 0.
-30,  0., 1., 0.
-40,  0., 0., 1.
-50,  1.,
-0., 0.
-*Element, type=C3D4, elset=SOLID
-1, 20, 30, 40, 50
-2, 20, 40, 30, 10
-*Nset, nset="Slope", internal
-30, 40, 50
-*Nset, nset=Even, generate
-10, 40, 10
-*Elset, elset=_Front_S3, internal, instance=PART-1-1
- 1,
-*Elset, elset=Pair
- 1, 2
-*Elset, elset=Nested
- Pair
-*Element, type=S3, elset=Skin
-7, 20, 30, 50
-*Surface, type=ELEMENT, name=Front
-_Front_S3, S3
-*Surface, type=ELEMENT, name=Direct
-1, S4
-Nested, S2
-*Surface, type=NODE, name=ByNode
-Slope,
-*End Part
-*Material, name=steel
-*Elastic
-210000., 0.3
-"""
-
-
-def test_abaqus_sets_and_surfaces(tmp_path):
-    """Faces by the Abaqus manual: S1 = 1 2 3, S2 = 1 4 2, S3 = 2 4 3, S4 = 3 4 1 of a cell."""
-    path = tmp_path / "part.inp"
-    path.write_text(DECK)
-    mesh = read_mesh(path)
-    label = {x: k for k, x in enumerate((10, 20, 30, 40, 50))}
-
-    def facets(*triples):
-        return {frozenset(label[x] for x in triple) for triple in triples}
-
-    expected = {
-        "Front": facets((30, 50, 40)),
-        "Direct": facets((40, 50, 20), (20, 50, 30), (20, 10, 40)),
-        "ByNode": facets((30, 40, 50)),
-        "Slope": facets((30, 40, 50)),
-        "Even": facets((10, 20, 30), (10, 20, 40), (10, 30, 40)),
-        "Skin": facets((20, 30, 50)),
-        "ALL": facets_as_set(mesh.boundary),
-    }
-    assert {name: facets_as_set(f) for name, f in mesh.patches.items()} == expected
-    assert mesh.volumes.sum() == pytest.approx(2 / 6)
-    assert mesh.points[label[50]].tolist() == [1, 0, 0]
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (("1, 20, 30, 40, 50", "1, 20, 30, 40, 60"), "names node 60, which"),
-        (("C3D4", "C3D8R"), "holds no tetrahedra; it has"),
-        (("C3D4", "B31"), "holds no tetrahedra"),
-        (("*Part, name=PART-1", "*Part, name=A\n*Part, name=B"), "holds 2 parts"),
-        (("20,  0., 0., 0.", "20,  0., 0."), "line 5: .NODE does not read"),
-        (("20,  0., 0., 0.", "20,  0., here, 0."), "line 5: .NODE does not read"),
-        (("20,  0., 0., 0.", "10,  0., 0., 0."), "gives a node twice"),
-        (("*Heading", "*Include, input=other.inp"), "not followed"),
-        (("20,  0., 0., 0.", "20,  0., nan, 0."), "NaN or infinity"),
-    ],
-)
-def test_bad_abaqus_decks(tmp_path, change, message):
-    path = tmp_path / "part.inp"
-    path.write_text(DECK.replace(*change))
-    with pytest.raises(InputError, match=message) as caught:
-        read_mesh(path)
-    assert "part.inp" in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
 def test_vtu_of_other_programs(tmp_path, box):
     """Triangles with a number in a cell array become patches; single precision is read."""
     left, right = box.patches["left"], box.patches["right"]
@@ -253,6 +171,43 @@ def test_vtu_of_other_programs(tmp_path, box):
     assert facets_as_set(mesh.patches["1"]) == facets_as_set(left)
     assert facets_as_set(mesh.patches["2"]) == facets_as_set(right)
     assert np.array_equal(match_boundary(mesh, right), mesh.patches["2"])
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_lagrange_cells_of_low_order_are_the_usual_ones(tmp_path, box, order):
+    """As DOLFINx writes them; VTK itself takes the nodes of both for the same places."""
+    mesh = box if order == 1 else box.quadratic()
+    left = mesh.patches["left"]
+    grid = pyvista.UnstructuredGrid({69: left, 71: mesh.cells}, np.array(mesh.points))
+    numbers = np.repeat([4, 0], [len(left), len(mesh.cells)])
+    grid.cell_data["patch"] = numbers if grid.celltypes[0] == 69 else numbers[::-1]
+    grid.save(tmp_path / "part.vtu")
+    volumes = grid.compute_cell_sizes().cell_data["Volume"][grid.celltypes == 71]
+    found = read_mesh(tmp_path / "part.vtu")
+    assert np.array_equal(found.cells, mesh.cells)
+    np.testing.assert_allclose(found.volumes, volumes)
+    assert facets_as_set(found.patches["4"]) == facets_as_set(left)
+
+
+@pytest.mark.parametrize("suffix", ["msh", "vtu"])
+def test_cells_that_are_given_twice_keep_their_patches(tmp_path, box, suffix):
+    left, path = box.patches["left"], tmp_path / f"part.{suffix}"
+    cells = [("triangle", left), ("tetra", np.concatenate([box.cells, box.cells[::-1]]))]
+    numbers = [np.full(len(nodes), 7) for _, nodes in cells]
+    data = {"gmsh:physical": numbers, "gmsh:geometrical": numbers}
+    mesh = meshio.Mesh(box.points, cells, cell_data=data)
+    mesh.write(path, **({"file_format": "gmsh22", "binary": False} if suffix == "msh" else {}))
+    with pytest.warns(UserWarning, match=f"{len(box.cells)} cells repeated another: taken out"):
+        found = read_mesh(path)
+    assert facets_as_set(found.patches["7"]) == facets_as_set(left)
+    assert np.array_equal(found.cells, box.cells)
+
+
+def test_a_group_inside_the_part_is_named(tmp_path, box):
+    between = box.facets[~are_among(box.facets, box.boundary)][:2]
+    write_mesh(box.with_patches({"core": between}), tmp_path / "part.vtu")
+    with pytest.warns(UserWarning, match="patches without a facet on the boundary: core"):
+        assert len(read_mesh(tmp_path / "part.vtu").patches["core"]) == 0
 
 
 GOOD_TET = "4 vertices\n1 tets\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n4 0 1 2 3\n"

@@ -159,7 +159,7 @@ def test_arrays_of_other_programs(field, tmp_path):
     np.testing.assert_allclose(given.stress, field.stress, rtol=1e-12, atol=1e-12)
     with pytest.raises(InputError, match="does not say the unit of its stress"):
         read_stress(tmp_path / "full.vtu", mesh, array="S")
-    with pytest.raises(InputError, match=r"has no array 'stress'; there are: S"):
+    with pytest.raises(InputError, match=r"no array 'stress'; there are: S: .* --stress-array"):
         read_stress(tmp_path / "full.vtu", mesh, "MPa")
     with pytest.raises(InputError, match="unit of stress must be"):
         read_stress(tmp_path / "full.vtu", mesh, "psi", "S")
@@ -365,6 +365,89 @@ def test_spoiled_results_are_one_line(tmp_path, results, old, new, said):
     with pytest.raises(InputError, match=said) as refused:
         read_stress(tmp_path / "part.frd", results[1])
     assert "\n" not in str(refused.value)
+
+
+def steps(text, *headings):
+    """Result file with the stress of several steps: k times the first, below these headings.
+
+    As CalculiX 2.20 writes them: 1PSTEP with step last, 100C with time or frequency and kind.
+    """
+    start = text.index(" -4  STRESS")
+    first, rest = text[:start], text[start : text.index(" 9999")]
+    blocks = []
+    for k, (step, value, kind) in enumerate(headings, 1):
+        blocks.append(f"    1PSTEP{k:26d}{1:12d}{step:12d}          ")
+        blocks.append(
+            f"  100CL  {100 + k:3d}{value:12.5E}{273:12d}{'':20s}{kind:2d}{k:5d}{'':10s} 1"
+        )
+        blocks.append(re.sub(
+            r"^( -1.{10})(.*)$",
+            lambda row, k=k: row[1] + "".join(
+                f"{k * float(row[2][c : c + 12]):12.5E}" for c in range(0, 72, 12)
+            ),
+            rest.rstrip(),
+            flags=re.M,
+        ))  # fmt: skip
+    return "\n".join([first.rstrip(), *blocks, " 9999"]) + "\n"
+
+
+STATIC, FREQUENCY, BUCKLING = 0, 2, 4
+
+
+@pytest.mark.parametrize(
+    ("headings", "step", "times", "said"),
+    [
+        (((1, 1.0, STATIC),), None, 1, "^the stress of part.frd is taken for MPa"),
+        (
+            ((1, 1.0, STATIC), (2, 2.0, STATIC)),
+            None,
+            0,
+            r"steps: step 1 .time 1., step 2 .time 2.: ",
+        ),
+        (
+            ((1, 1.0, STATIC), (2, 2.0, STATIC)),
+            1,
+            1,
+            r"of part.frd the stress of step 1 .time 1. is",
+        ),
+        (((1, 1.0, STATIC), (2, 2.0, STATIC)), 2, 2, "the stress of step 2"),
+        (
+            ((1, 1.0, STATIC), (2, 2.0, STATIC)),
+            3,
+            0,
+            r"no stress of loads in step 3; .* choose anoth",
+        ),
+        (((1, 0.5, STATIC), (1, 1.0, STATIC)), None, 2, r"the stress of step 1 .time 1. is taken"),
+        (((1, 1.0, STATIC), (2, 318.0, FREQUENCY)), None, 1, "the stress of step 1"),
+        (((1, 1.0, STATIC), (2, 318.0, FREQUENCY)), 2, 0, r"step 2 .mode 318.: choose another"),
+        (((1, 318.0, FREQUENCY),), None, 0, r"modes only, which has no size: step 1 .mode 318."),
+        (((1, 0.0, BUCKLING), (1, 15.3, BUCKLING)), None, 1, r"the stress of step 1 .time 0."),
+    ],
+)
+def test_stress_of_several_steps(tmp_path, results, headings, step, times, said):
+    text, mesh, stress = results
+    path = tmp_path / "part.frd"
+    path.write_text(steps(text, *headings))
+    if times == 0:
+        with pytest.raises(InputError, match=said) as refused:
+            read_stress(path, mesh, step=step)
+        assert "\n" not in str(refused.value)
+        return
+    given = read_stress(path, mesh, step=step)
+    np.testing.assert_allclose(to_voigt(given.nodal), times * stress, rtol=2e-5)
+    assert re.search(said, given.assumed)
+
+
+def test_what_a_file_has_no_choice_of_is_refused(tmp_path, results, field, written):
+    (tmp_path / "part.frd").write_text(results[0])
+    with pytest.raises(
+        InputError, match=r"only \.vtu files .* array 'S' .* leave --stress-array out"
+    ):
+        read_stress(tmp_path / "part.frd", results[1], array="S")
+    with pytest.raises(
+        InputError, match=r"only \.frd files .* step '2' .* leave --stress-step out"
+    ):
+        read_stress(written, field.mesh, step=2)
 
 
 def test_a_result_file_must_be_one(tmp_path):

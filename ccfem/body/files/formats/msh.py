@@ -6,10 +6,9 @@ import numpy as np
 
 from ccfem.base.arrays import IntArray
 from ccfem.base.errors import InputError
-from ccfem.body.files.cells import tetrahedra
+from ccfem.body.files.cells import tetrahedra, with_groups
 from ccfem.body.isolated.process import ChildError, read_isolated
 from ccfem.body.mesh import TetMesh
-from ccfem.body.mesh.patches import with_groups
 
 
 def read(path: Path) -> TetMesh:
@@ -26,7 +25,8 @@ def read(path: Path) -> TetMesh:
         arrays = read_isolated("gmsh_files:read", path)
     except ChildError as error:
         raise InputError(
-            f"{path} is not a Gmsh mesh that can be read ({error}): save it again as version 4.1"
+            f"{path} is not a Gmsh mesh that can be read ({error}): save it again as version 4.1, "
+            "without all elements (Mesh.SaveAll = 0)"
         ) from None
     parts = {name: name.split(":", 2) for name in arrays}
     blocks = {p[1]: (p[2], arrays[name]) for name, p in parts.items() if p[0] == "cells"}

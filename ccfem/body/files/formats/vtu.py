@@ -11,11 +11,10 @@ from numpy.typing import ArrayLike
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError
-from ccfem.body.files.cells import tetrahedra
+from ccfem.body.files.cells import tetrahedra, with_groups
 from ccfem.body.files.vtk_xml import write_vtk_xml
 from ccfem.body.isolated.process import ChildError, read_isolated
 from ccfem.body.mesh import TetMesh
-from ccfem.body.mesh.patches import with_groups
 
 _PATCH = "patch:"
 _TYPES = {
