@@ -120,7 +120,14 @@ def in_processes(
             for process, end in zip(processes, there, strict=True):
                 process.start()
                 end.close()
-        yield from _in_order(here, len(arguments), known)
+        for some, sent in zip(arguments, _in_order(here, len(arguments)), strict=True):
+            if not sent:  # it cannot be sent, as a value of a class within a function
+                yield work(*some)
+                continue
+            result, error = _Unpickler(io.BytesIO(sent), known).load()
+            if error is not None:
+                raise error
+            yield result
     finally:
         for process in processes:
             if process.pid is not None:
@@ -178,32 +185,28 @@ class _Unpickler(pickle.Unpickler):
         return self._known[identity]
 
 
-def _in_order(ends: Sequence[Connection], count: int, known: _Known) -> Iterator[Any]:
-    """Ask the processes behind some ends of pipes for each result, and yield them in order."""
+def _in_order(ends: Sequence[Connection], count: int) -> Iterator[bytes]:
+    """Ask the processes behind some ends of pipes for each outcome, and yield them in order."""
     numbers = iter(range(count))
     asked = {end: next(numbers) for end in ends}
     for end, number in asked.items():
         end.send(number)
-    outcomes: dict[int, tuple[Any, Exception | None]] = {}
+    outcomes: dict[int, bytes] = {}
     for wanted in range(count):
         while wanted not in outcomes:
             for end in cast(list[Connection], wait(list(asked))):
                 try:
-                    received = io.BytesIO(end.recv_bytes())
+                    outcomes[asked.pop(end)] = end.recv_bytes()
                 except EOFError:
                     raise RuntimeError(
                         "a process ended before its work, as where memory runs out: set "
                         "CCFEM_THREADS=1"
                     ) from None
-                outcomes[asked.pop(end)] = _Unpickler(received, known).load()
                 following = next(numbers, None)
                 if following is not None:
                     end.send(following)
                     asked[end] = following
-        result, error = outcomes.pop(wanted)
-        if error is not None:
-            raise error
-        yield result
+        yield outcomes.pop(wanted)
 
 
 def _serve(
@@ -213,7 +216,10 @@ def _serve(
     end: Connection,
     inherited: Sequence[Connection],
 ) -> None:
-    """Do what is asked for through a pipe, until its other end is closed or the parent is gone."""
+    """Do what is asked for through a pipe, until its other end is closed or the parent is gone.
+
+    An outcome is a result and an error, pickled; it is empty where it cannot be.
+    """
     # The parent says that it was stopped.
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         signal.signal(getattr(signal, name), signal.SIG_IGN)
@@ -223,13 +229,16 @@ def _serve(
     try:
         while True:
             number = end.recv()
-            sent = io.BytesIO()
             try:
-                _Pickler(sent, known).dump((work(*arguments[number]), None))
+                outcome: tuple[Any, Exception | None] = work(*arguments[number]), None
             except Exception as error:
                 error.add_note(traceback.format_exc())
-                sent = io.BytesIO()
-                _Pickler(sent, known).dump((None, error))
-            end.send_bytes(sent.getbuffer())
+                outcome = None, error
+            content = io.BytesIO()
+            try:
+                _Pickler(content, known).dump(outcome)
+            except Exception:
+                content = io.BytesIO()
+            end.send_bytes(content.getbuffer())
     except (EOFError, BrokenPipeError):
         pass

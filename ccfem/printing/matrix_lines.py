@@ -8,14 +8,13 @@ import shapely
 from scipy.spatial import Voronoi
 
 from ccfem.base.arrays import FloatArray
-from ccfem.base.parallel import in_threads
+from ccfem.base.parallel import in_processes
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.offsets import offset_rings
-from ccfem.geometry.shapes import Region, open_lines, strings
+from ccfem.geometry.shapes import Region, corners_only, open_lines, strings
 from ccfem.machine.machine import Machine
 from ccfem.paths.splitting.slabs import Slab
-from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.planar import Planar
 
 _OVERLAP = 0.25
@@ -69,26 +68,34 @@ def matrix_fills(
         fills[k] = MatrixFill()
     middles = tuple(0.5 * (slabs[k].lower + slabs[k].upper) for k in of_matrix)
 
-    def filled(layer: Layer) -> MatrixFill:
-        plane = layer.plane
-        angle = np.radians(profile.matrix_angle + profile.matrix_turn * layer.index)
-        contours = offset_rings(plane.polygon, 0.5 * width, width, width, 1)
-        inside = zigzag(plane.polygon, (1.5 - _OVERLAP) * width, width, width, float(angle))
+    layers = Planar(heights=middles).cut(mesh, frame[2]) if middles else ()
+
+    def on_bed(points: FloatArray) -> FloatArray:
+        return layers[0].plane.to_space(points) @ frame[:2].T - origin  # at any height
+
+    def filled(section: Region, angle: float) -> MatrixFill:
+        contours = offset_rings(section, 0.5 * width, width, width, 1)
+        inside = zigzag(section, (1.5 - _OVERLAP) * width, width, width, float(np.radians(angle)))
         lines = [ring for level in contours for ring in level] + inside
-        gaps, widths = gap_lines(plane.polygon, lines, width, narrow)
-
-        def on_bed(points: FloatArray) -> FloatArray:
-            return plane.to_space(points) @ frame[:2].T - origin
-
+        gaps, widths = gap_lines(section, lines, width, narrow)
         return MatrixFill(
-            shapely.transform(plane.polygon, on_bed),
+            shapely.transform(section, on_bed),
             [on_bed(line) for line in lines + gaps],
             [width] * len(lines) + widths,
         )
 
-    layers = Planar(heights=middles).cut(mesh, frame[2]) if middles else ()
-    for layer, fill in zip(layers, in_threads(filled, layers), strict=True):
-        fills[of_matrix[layer.index]] = fill
+    # Layers of equal section, filled in the same direction, are filled once.
+    asked = [
+        (
+            corners_only(layer.plane.polygon),
+            (profile.matrix_angle + profile.matrix_turn * layer.index) % 360.0,
+        )
+        for layer in layers
+    ]
+    unequal = list(dict.fromkeys(asked))
+    made = dict(zip(unequal, in_processes(filled, *zip(*unequal, strict=True)), strict=True))
+    for layer, key in zip(layers, asked, strict=True):
+        fills[of_matrix[layer.index]] = made[key]
     return fills
 
 

@@ -87,6 +87,16 @@ def test_results_refer_to_the_same_objects_and_stay_read_only(two):
                 result.notes["mesh"] = None
 
 
+def test_results_that_cannot_be_sent_are_made_here(two):
+    def work(number):
+        return lambda: (number, os.getpid())
+
+    assert [result() for result in in_processes(work, [4, 5])] == [
+        (4, os.getpid()),
+        (5, os.getpid()),
+    ]
+
+
 def test_an_error_in_a_process_says_where_it_was(two):
     def work(number):
         raise InputError(f"got {number}")

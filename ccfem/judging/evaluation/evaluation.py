@@ -10,7 +10,7 @@ import shapely
 from ccfem.base.arrays import FloatArray, IntArray, freeze
 from ccfem.base.display import Shown
 from ccfem.base.errors import InputError
-from ccfem.base.parallel import in_threads
+from ccfem.base.parallel import in_processes
 from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity import PartStress
 from ccfem.fem.materials import Material, named_material
@@ -172,7 +172,7 @@ def evaluate(
         kinds = indices.named().items()
         return {name: kind.sample(view) for name, kind in kinds if hasattr(kind, "sample")}
 
-    samples = in_threads(sampled, layers)
+    samples = list(in_processes(sampled, layers, shared=[toolpaths, stress, machine, stack]))
     basis = Basis(machine, _material(layers, stress, machine, strand or Strand()))
     rows = [_indices(sample, basis) for sample in (*samples, _pooled(samples))]
     return Evaluation(
