@@ -22,7 +22,10 @@ LATE = ("ccfem.judging.virtual_testing.equilibrium", "_bar_forces")
 @contextmanager
 def compiling_beside() -> Iterator[None]:
     """Compile in another process while the block runs, where nothing is stored yet."""
-    if is_stored() or processors() < 2 or sys.platform != "linux":
+    stored = is_stored()
+    if not stored:
+        print("ccfem: first run: compiling takes half a minute more, once", file=sys.stderr)
+    if stored or processors() < 2 or sys.platform != "linux":
         yield
         return
     process = multiprocessing.get_context("fork").Process(target=_beside, daemon=True)

@@ -5,8 +5,9 @@ import json
 import os
 import platform
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -16,6 +17,7 @@ import numpy as np
 from ccfem.base.checks import member_name
 from ccfem.base.csv_table import write_csv
 from ccfem.base.errors import spared
+from ccfem.base.parallel import in_processes
 from ccfem.base.progress import Progress, silent
 from ccfem.base.result_folder import whole_folder
 from ccfem.comparison.headline import TEST_COLUMNS, headline_values, print_values
@@ -213,20 +215,23 @@ def _stem(slicing: str, run: Run) -> str:
     return file_stem(*filter(None, (slicing, run.strategy_name)))
 
 
+_Write = Callable[[], None]
+"""Writes a file."""
+
+
 def _write_matrix(comparison: Comparison, folder: Path) -> None:
-    """Write the matrix of curved layers for robots, once for all strategies."""
+    """Write the matrix of curved layers for robots."""
     from ccfem.paths.toolpaths import MATRIX
     from ccfem.printing.export.robot_waypoints import write_robot_waypoints
     from ccfem.printing.layer_matrix import layer_matrix
 
-    file = folder / "matrix_waypoints.csv"
-    if not file.exists():
-        layers, machine = comparison.layers, comparison.case.machine
-        write_robot_waypoints(file, layer_matrix(layers, machine), layers, machine, MATRIX)
+    layers, machine = comparison.layers, comparison.case.machine
+    matrix = layer_matrix(layers, machine)
+    write_robot_waypoints(folder / "matrix_waypoints.csv", matrix, layers, machine, MATRIX)
 
 
-def _write_print(folder: Path, name: str, run: Run, comparison: Comparison) -> None:
-    """Write what a printer and a cell of robots do to print a part: one chain of moves."""
+def _files_of_print(folder: Path, name: str, run: Run, comparison: Comparison) -> list[_Write]:
+    """Files of what a printer and a cell of robots do to print a part: one chain of moves."""
     from ccfem.printing.export.gcode import gcode_of_moves
     from ccfem.printing.export.robot_cell import write_robot_cell
     from ccfem.printing.export.trim_table import write_trims
@@ -235,34 +240,46 @@ def _write_print(folder: Path, name: str, run: Run, comparison: Comparison) -> N
     assert plan is not None
     assert moves is not None
     doubts = [run.why_not] if run.why_not else []
-    text = gcode_of_moves(moves, plan, case.machine, f"{case.name}, {name}", doubts)
-    (folder / f"{name}.gcode").write_text(text, encoding="utf-8", newline="\n")
-    write_robot_cell(folder / f"{name}_cell.csv", moves)
+
+    def write_gcode() -> None:
+        text = gcode_of_moves(moves, plan, case.machine, f"{case.name}, {name}", doubts)
+        (folder / f"{name}.gcode").write_text(text, encoding="utf-8", newline="\n")
+
+    files: list[_Write] = [
+        write_gcode,
+        partial(write_robot_cell, folder / f"{name}_cell.csv", moves),
+    ]
     if len(plan.trims):
-        write_trims(folder / f"{name}_trim.csv", plan)
+        files.append(partial(write_trims, folder / f"{name}_trim.csv", plan))
+    return files
 
 
 def _write_paths(comparison: Comparison, folder: Path) -> None:
-    """Write the paths of every strategy in the formats of other programs."""
+    """Write the paths of every strategy in the formats of other programs, several at a time."""
     from ccfem.printing.export.robot_waypoints import write_robot_waypoints
     from ccfem.printing.export.vtk import write_paths
     from ccfem.printing.export.waypoints import write_waypoints
 
     runs, machine = comparison.succeeded, comparison.case.machine
-    for run in runs:
-        layers, stem = comparison.stacks[run.slicing], _stem(run.slicing, run)
-        curved = curved_layers(layers)
-        if not curved and not comparison.over_slicings:
-            write_waypoints(folder / f"{stem}_waypoints.txt", run.toolpaths, layers)
-        else:
-            write_robot_waypoints(folder / f"{stem}_waypoints.csv", run.toolpaths, layers, machine)
-        if curved and not comparison.over_slicings:
-            _write_matrix(comparison, folder)
-        if run.print_plan is not None and run.moves is not None:
-            _write_print(folder, stem, run, comparison)
     every = Toolpaths.concatenate(run.toolpaths for run in runs)
     number = np.repeat(np.arange(float(len(runs))), [len(run.toolpaths) for run in runs])
-    write_paths(every, folder / "paths.vtp", path_data={"strategy": number})
+    files: list[_Write] = []
+    for run in runs:
+        if run.print_plan is not None and run.moves is not None:
+            files += _files_of_print(folder, _stem(run.slicing, run), run, comparison)
+    if not comparison.over_slicings and runs and curved_layers(comparison.layers):
+        files.append(partial(_write_matrix, comparison, folder))
+    files.append(partial(write_paths, every, folder / "paths.vtp", path_data={"strategy": number}))
+    for run in runs:
+        layers, stem = comparison.stacks[run.slicing], _stem(run.slicing, run)
+        if comparison.over_slicings or curved_layers(layers):
+            file = folder / f"{stem}_waypoints.csv"
+            files.append(partial(write_robot_waypoints, file, run.toolpaths, layers, machine))
+        else:
+            file = folder / f"{stem}_waypoints.txt"
+            files.append(partial(write_waypoints, file, run.toolpaths, layers))
+    for _ in in_processes(lambda write: write(), files):
+        pass
 
 
 # The record of a comparison: all its numbers as a table, and what it takes to repeat it.

@@ -19,7 +19,7 @@ def nothing_stored(monkeypatch, tmp_path):
     return tmp_path
 
 
-def test_a_process_rehearses_while_nothing_is_stored(nothing_stored, monkeypatch):
+def test_a_process_rehearses_while_nothing_is_stored(nothing_stored, monkeypatch, capsys):
     done = nothing_stored / "done"
 
     def rehearsed():
@@ -34,16 +34,18 @@ def test_a_process_rehearses_while_nothing_is_stored(nothing_stored, monkeypatch
             time.sleep(0.01)
         assert process.is_alive()
     assert done.exists()
+    assert "first run: compiling" in capsys.readouterr().err
     assert multiprocessing.active_children() == []  # it ends with the block
 
 
-def test_no_process_rehearses_what_is_stored(nothing_stored, monkeypatch):
+def test_no_process_rehearses_what_is_stored(nothing_stored, capsys):
     module, name = LATE
     folder = nothing_stored / "judging"
     folder.mkdir()
     (folder / f"{module.rpartition('.')[2]}.{name}-72.py311.nbi").touch()
     with compiling_beside():
         assert multiprocessing.active_children() == []
+    assert capsys.readouterr().err == ""
 
 
 def test_no_process_rehearses_on_one_processor(nothing_stored, monkeypatch):

@@ -7,7 +7,7 @@ import numpy as np
 
 from ccfem.base.checks import check_instance
 from ccfem.base.errors import InputError
-from ccfem.base.parallel import in_threads
+from ccfem.base.parallel import in_processes, in_threads
 from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.even_steps import OFF, even_steps
 from ccfem.machine.machine import Machine
@@ -29,7 +29,7 @@ def plan(
     Parameters
     ----------
     strategy : Strategy
-        Called from several threads at once, each with a layer of its own.
+        Called from several processes, each time with a layer of its own.
     stress : PartStress
         A `StressField`, or a `GivenStress` for strategies that do not solve the part again.
 
@@ -73,7 +73,7 @@ def plan_layers(
     Parameters
     ----------
     planner : LayerPlanner
-        Called from several threads at once, each with a layer of its own.
+        Called from several processes, each time with a layer of its own.
     views : sequence of Layer
         The same layers as passed to the planner: laid flat if it works in a plane.
     fold : bool, default False
@@ -88,7 +88,7 @@ def plan_layers(
         paths = paths if view is layer else chart_of(layer).lifted(paths)
         return paths if fold else unfolded_paths(paths, None, machine)
 
-    return Toolpaths.concatenate(in_threads(planned, layers, views))
+    return Toolpaths.concatenate(in_processes(planned, layers, views, shared=[planner, stress]))
 
 
 def check_layers(strategy: Strategy, layers: Sequence[Layer], machine: Machine) -> None:
