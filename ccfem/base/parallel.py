@@ -10,6 +10,7 @@ import os
 import pickle
 import signal
 import sys
+import threading
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -82,7 +83,7 @@ def in_processes(
 
     The processes are copies of this one (fork), so that `work` may be any function; only results
     are sent. What `work` changes elsewhere is lost. On other systems than Linux, where there is one
-    processor, and within such a process it is done here, one after the other.
+    processor, in threads, and within such a process it is done here, one after the other.
 
     Parameters
     ----------
@@ -102,7 +103,10 @@ def in_processes(
     """
     arguments = list(zip(*items, strict=True))
     count = min(processors(), len(arguments))
-    if count < 2 or multiprocessing.current_process().daemon or sys.platform != "linux":
+    within = multiprocessing.current_process().daemon
+    # Forks of several threads at once disturb each other.
+    thread = threading.current_thread() is not threading.main_thread()
+    if count < 2 or within or thread or sys.platform != "linux":
         for some in arguments:
             yield work(*some)
         return

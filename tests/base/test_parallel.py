@@ -126,6 +126,18 @@ def test_processes_are_not_started_within_one(two):
     assert list(in_processes(outer, [0, 1])) == [True, True]
 
 
+def test_threads_start_no_processes(two):
+    seen = []
+
+    def work(number):
+        return os.getpid()
+
+    thread = threading.Thread(target=lambda: seen.extend(in_processes(work, [0, 1])))
+    thread.start()
+    thread.join()
+    assert seen == 2 * [os.getpid()]
+
+
 @pytest.mark.parametrize("wanted", ["0", "two", "-1", "1.5"])
 def test_the_number_of_processors_is_a_whole_number(monkeypatch, wanted):
     monkeypatch.setenv("CCFEM_THREADS", wanted)
