@@ -164,17 +164,20 @@ def evaluate(
     stack = printed(layers, build)
     upright = _upright(layers, build)
 
-    def sampled(layer: Layer) -> dict[str, Any]:
+    basis = Basis(machine, _material(layers, stress, machine, strand or Strand()))
+
+    def measured(layer: Layer) -> tuple[dict[str, Any], dict[str, float]]:
         behind = int(np.count_nonzero(late == layer.index))
         on_layer = toolpaths.on_layer(layer.index)
         below = _below(layer, layers, stress.mesh, machine)
         view = _view(on_layer, layer, stress, machine, below, behind, stack, upright)
         kinds = indices.named().items()
-        return {name: kind.sample(view) for name, kind in kinds if hasattr(kind, "sample")}
+        samples = {name: kind.sample(view) for name, kind in kinds if hasattr(kind, "sample")}
+        return samples, _indices(samples, basis)
 
-    samples = list(in_processes(sampled, layers, shared=[toolpaths, stress, machine, stack]))
-    basis = Basis(machine, _material(layers, stress, machine, strand or Strand()))
-    rows = [_indices(sample, basis) for sample in (*samples, _pooled(samples))]
+    shared = [toolpaths, stress, machine, stack]
+    samples, rows = zip(*in_processes(measured, layers, shared=shared), strict=True)
+    rows = (*rows, _in_total(samples, basis))
     return Evaluation(
         np.array([layer.index for layer in layers]),
         {column.name: np.array([row[column.name] for row in rows]) for column in COLUMNS},
@@ -265,9 +268,12 @@ def _in_space(paths: PlanePaths) -> Toolpaths:
     return Toolpaths.from_plane(lines, paths.layer, paths.closed.tolist())
 
 
-def _pooled(samples: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Join the samples of all layers."""
-    return {name: pool([sample[name] for sample in samples]) for name in samples[0]}
+def _in_total(samples: Sequence[Mapping[str, Any]], basis: Basis) -> dict[str, float]:
+    """Value of each of `COLUMNS` over all layers, joining one kind of samples at a time."""
+    values: dict[str, float] = {}
+    for name in samples[0]:
+        values |= _indices({name: pool([sample[name] for sample in samples])}, basis)
+    return values
 
 
 def _material(
@@ -281,8 +287,10 @@ def _material(
 
 
 def _indices(samples: Mapping[str, Any], basis: Basis) -> dict[str, float]:
-    """Value of each of `COLUMNS`."""
+    """Value of each of `COLUMNS` that is made of these samples."""
     values: dict[str, float] = {}
     for name, kind in indices.named().items():
-        values |= kind.indices(samples[getattr(kind, "SAMPLES", name)], basis)
+        of = getattr(kind, "SAMPLES", name)
+        if of in samples:
+            values |= kind.indices(samples[of], basis)
     return values

@@ -108,7 +108,7 @@ def gcode_of_moves(
     values["matrix_temperature"] += warm.warm_matrix if warm else 0.0
     lines.fill("start", **values, layers=len(plan.top))
     columns = (moves.event, moves.tool, moves.feed, moves.beside, speed, moves.amount)
-    rows = zip(*(column.tolist() for column in columns), start.tolist(), axes.tolist(), strict=True)
+    rows = zip(*(c.tolist() for c in columns), lines.places(moves, axes, start), strict=True)
     about = zip(
         moves.role.tolist(),
         moves.width.tolist(),
@@ -117,13 +117,13 @@ def gcode_of_moves(
         strict=True,
     )
     first = True
-    for (event, tool, feed, beside, speed, value, old, new), (role, width, height, strand) in zip(
+    for (event, tool, feed, beside, speed, value, place), (role, width, height, strand) in zip(
         rows, about, strict=True
     ):
         if event in (TRAVEL, LAY):
             if event == LAY:
                 lines.say(role, width, height)
-            lines.move(event, tool, old, new, feed, beside, speed, first)
+            lines.move(event, tool, place, feed, beside, speed, first)
             first = False
         elif event == FEED:
             lines.feed(tool, feed, beside, speed)
@@ -195,33 +195,45 @@ class _Lines:
         self.lines += [new for new, old in zip(said, self._said, strict=True) if new != old]
         self._said = said
 
+    def places(self, moves: Moves, axes: FloatArray, start: FloatArray) -> list[str]:
+        """Words of the axes that each row moves, from a start (n, k) to values (n, k).
+
+        The first move names all axes.
+        """
+        moved = axes != start
+        first = np.isin(moves.event, (TRAVEL, LAY)).argmax() if len(moves) else 0
+        moved[first : first + 1] = True
+        offset = np.zeros(axes.shape[1])
+        offset[:3] = self._offset
+        axes = axes - (moves.tool == 1)[:, None] * offset
+        # Rows that move the same axes share one format.
+        words = np.full(len(axes), "", dtype=object)
+        kind = moved @ (1 << np.arange(axes.shape[1]))
+        for number in np.unique(kind[kind > 0]).tolist():
+            rows = np.flatnonzero(kind == number)
+            own = [k for k in range(axes.shape[1]) if number >> k & 1]
+            said = " ".join(f"{self._letters[k]}%.{COORDINATE_DIGITS}f" for k in own)
+            words[rows] = [said % at for at in zip(*axes[rows][:, own].T.tolist(), strict=True)]
+        return words.tolist()
+
     def move(
         self,
         event: int,
         tool: int,
-        old: list[float],
-        new: list[float],
+        place: str,
         feed: float,
         beside: float,
         speed: float,
         first: bool,
     ) -> None:
-        """Add a move; the first one goes up before it goes sideways."""
-        if tool == 1 and any(self._offset):
-            places = [at - by for at, by in zip(new, (*self._offset, 0.0, 0.0), strict=False)]
-        else:
-            places = new
-        words = [
-            f"{axis}{place:.{COORDINATE_DIGITS}f}"
-            for axis, was, at, place in zip(self._letters, old, new, places, strict=False)
-            if first or at != was
-        ]
+        """Add a move to a place; the first one goes up before it goes sideways."""
         if first:
+            words = place.split(" ")
             self.lines.append(f"G0 {words[2]}{self._at(self.profile.lift_speed)}")
-            words = words[:2] + words[3:]
+            place = " ".join(words[:2] + words[3:])
         axes = self._fed(tool, feed, beside) if event == LAY else ""
         rapid = "G0" if event == TRAVEL else "G1"
-        self.lines.append(f"{rapid} {' '.join(words)}{axes}{self._at(speed)}")
+        self.lines.append(f"{rapid} {place}{axes}{self._at(speed)}")
 
     def feed(self, tool: int, feed: float, beside: float, speed: float) -> None:
         """Add a feed without a move."""

@@ -8,6 +8,10 @@ from ccfem.base.whole import whole_file
 from ccfem.printing.moves import CUT, EVENTS, FEED, LAY, PATH_END, PATH_START, TOOL, TRAVEL, Moves
 
 _HEADER = "path,tool,layer,x,y,z,nx,ny,nz,speed,feed,beside,width,height,event"
+_ROW = 14 * "%.8g," + "%s\n"
+
+_TOGETHER = 100_000
+"""Rows that are made at a time: a large print has millions."""
 
 
 def write_robot_cell(path: str | Path, moves: Moves) -> None:
@@ -43,20 +47,15 @@ def write_robot_cell(path: str | Path, moves: Moves) -> None:
         [moves.strand, moves.tool, moves.layer, moves.place, moves.normal, moves.speed, *share]
     )
     table = np.column_stack([table, moves.width, moves.height])
-    names = [
-        _named(event, feed, amount, tool)
-        for event, feed, amount, tool in zip(
-            moves.event.tolist(),
-            np.where(moves.feed == 0.0, moves.beside, moves.feed).tolist(),
-            moves.amount.tolist(),
-            moves.tool.tolist(),
-            strict=True,
-        )
-    ]
+    value = np.where(moves.feed == 0.0, moves.beside, moves.feed)
     with whole_file(path) as temporary, temporary.open("w", encoding="ascii") as file:
         file.write(_HEADER + "\n")
-        for row, name in zip(table.tolist(), names, strict=True):
-            file.write(",".join(f"{value:.8g}" for value in row) + f",{name}\n")
+        for first in range(0, len(moves), _TOGETHER):
+            some = slice(first, first + _TOGETHER)
+            about = (moves.event, value, moves.amount, moves.tool)
+            names = map(_named, *(column[some].tolist() for column in about))
+            rows = zip(*(column[some].tolist() for column in table.T), names, strict=True)
+            file.writelines(map(_ROW.__mod__, rows))
 
 
 def _named(event: int, feed: float, amount: float, tool: int) -> str:
