@@ -1,0 +1,3 @@
+"""Legacy VTK files (``.vtk``) of unstructured grids, as those in XML."""
+
+from ccfem.body.files.formats.vtu import read as read
