@@ -38,7 +38,7 @@ class Body:
     Attributes
     ----------
     mesh : str
-        File of tetrahedra: .tet .msh .vtu .inp .npz.
+        File of tetrahedra: .tet .msh .vtu .vtk .inp .unv .med .bdf .nas .mesh .npz.
     surface : str
         Closed surface (.stl .obj .ply) or CAD file (.step .iges .brep), filled with tetrahedra.
     planform : table
