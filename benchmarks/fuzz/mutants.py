@@ -1,6 +1,7 @@
 """Good files of every format that ccfem reads, and mutants of them; the same for the same seed."""
 
 import random
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -97,6 +98,9 @@ def good_files(folder: Path) -> list[Path]:
     (folder / "box.inp").write_text(_deck(mesh))
     (folder / "scopes.inp").write_text(_assembly(mesh))
     (folder / "box.msh").write_text(_msh(mesh))
+    with zipfile.ZipFile(folder / "box.3mf", "w") as archive:
+        archive.writestr("_rels/.rels", '<Relationship Target="/a.model" Type="a/3dmodel"/>')
+        archive.writestr("a.model", _model(shell.points.tolist(), triangles.reshape(-1, 3)))
     (folder / "box.unv").write_text(unv(mesh))
     (folder / "box.bdf").write_text(bdf(mesh))
     (folder / "box.mesh").write_text(medit(mesh))
@@ -164,6 +168,19 @@ def _msh(mesh) -> str:
         for k, (kind, tag, nodes) in enumerate(rows, 1)
     ]
     return "\n".join([*lines, "$EndElements"]) + "\n"
+
+
+def _model(points, triangles) -> str:
+    """Model of a 3MF archive with one object, placed 5 mm up."""
+    rows = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in points)
+    sides = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in triangles)
+    return (
+        '<model unit="millimeter" '
+        'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>'
+        f'<object id="1"><mesh><vertices>{rows}</vertices><triangles>{sides}</triangles></mesh>'
+        '</object></resources><build><item objectid="1" transform="1 0 0 0 1 0 0 0 1 0 0 5"/>'
+        "</build></model>"
+    )
 
 
 def unv(mesh) -> str:
