@@ -23,8 +23,8 @@ def read_grid(path: str) -> dict[str, Any]:
 
     if path.lower().endswith(".vtk"):
         legacy = vtkUnstructuredGridReader()
-        for kind in ("Scalars", "Vectors", "Tensors", "Fields"):
-            getattr(legacy, f"ReadAll{kind}On")()  # it reads the first of each otherwise
+        for attribute in ("Scalars", "Vectors", "Tensors", "Fields"):
+            getattr(legacy, f"ReadAll{attribute}On")()  # it reads the first of each otherwise
         grid = _output(legacy, path)
     else:
         grid = _output(vtkXMLUnstructuredGridReader(), path)

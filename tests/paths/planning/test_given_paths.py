@@ -64,3 +64,27 @@ def test_paths_off_the_layers_or_not_flat_are_one_line(planned):
     turned = GivenPaths(replace(paths, points=paths.points[:, [2, 0, 1]]), "mine.csv")
     with pytest.raises(InputError, match=r"mine.csv: path \d+ spans .* lies in no flat layer"):
         turned.on(planned.layers)
+
+
+def test_paths_are_moved_onto_curved_layers(bar, planned):
+    # Layers bent to z + x^2 / 200, and paths bent alike but 0.3 mm above them: their feet.
+    def bend(points):
+        return points + np.array([0.0, 0.0, 1.0]) * (points[:, :1] ** 2 / 200.0)
+
+    paths, flat = planned.runs[1].toolpaths, planned.layers
+    layers = [replace(layer, points=bend(layer.points), flat=None) for layer in flat]
+    up = np.array([0.0, 0.0, 1.0])
+    lifted = replace(paths, points=bend(paths.points + 0.3 * up), layer=0 * paths.layer)
+    moved = GivenPaths(lifted).on(layers).toolpaths
+    np.testing.assert_array_equal(moved.layer, paths.layer)
+    x, _, z = moved.points.T
+    level = np.array([1.0, 2.0, 4.0])[np.repeat(paths.layer, np.diff(paths.offsets))]
+    np.testing.assert_allclose(z - level, x**2 / 200.0, atol=0.1)  # of cells of 5 mm
+    np.testing.assert_allclose(moved.normals[:, 0] / moved.normals[:, 2], -x / 100.0, atol=0.04)
+    apart = np.linalg.norm(moved.points - lifted.points, axis=1)
+    assert (apart <= 0.3 + 1e-9).all()
+    far = replace(paths, points=bend(paths.points + 9.0 * up))
+    with pytest.raises(
+        InputError, match=r"path 0 is up to 5\.9\d* mm from the nearest of 3"
+    ):
+        GivenPaths(far).on(layers)
