@@ -113,6 +113,10 @@ def good_files(folder: Path) -> list[Path]:
     grid.cell_data["stress"] = np.ones((len(mesh.cells), 9))
     grid.field_data["unit of stress"] = np.frombuffer(b"MPa", dtype=np.uint8)
     grid.save(folder / "stress.vtu", binary=False)
+    grid.cell_data.remove("stress")
+    for name in ("xx", "yy", "zz", "xy", "xz", "yz"):
+        grid.point_data[f"Stress {name} component"] = 1e6 * mesh.points[:, 0]
+    grid.save(folder / "stress.vtk", binary=False)
     rows = [f"{x},{y},2.5,{y},0" for y in range(1, 9) for x in range(2, 19, 4)]
     (folder / "paths.csv").write_text("\n".join(["x,y,z,path,layer", *rows]) + "\n")
     rows = [f"S\nX2.0 Y{y}.0 Z2.5\nX18.0 Y{y}.5 Z2.5\nE" for y in range(1, 9)]

@@ -656,7 +656,8 @@ def _joined(grid: Grid, names: list[str], path: Path) -> Grid:
             "of cells: write them again"
         )
     joined = {"stress": np.stack([data[name] for name in names], axis=1)}
-    return replace(grid, **{where: joined, "components": {(where, "stress"): names}})
+    named = replace(grid, components={(where, "stress"): names}, point={}, cell={})
+    return replace(named, point=joined) if where == "point" else replace(named, cell=joined)
 
 
 def _text(values: NDArray[np.generic]) -> str:

@@ -84,7 +84,5 @@ def test_paths_are_moved_onto_curved_layers(bar, planned):
     apart = np.linalg.norm(moved.points - lifted.points, axis=1)
     assert (apart <= 0.3 + 1e-9).all()
     far = replace(paths, points=bend(paths.points + 9.0 * up))
-    with pytest.raises(
-        InputError, match=r"path 0 is up to 5\.9\d* mm from the nearest of 3"
-    ):
+    with pytest.raises(InputError, match=r"path 0 is up to 5\.9\d* mm from the nearest of 3"):
         GivenPaths(far).on(layers)
