@@ -116,6 +116,8 @@ def test_no_file_above_seven_hundred_lines():
 def test_no_name_twice_for_two_ideas():
     named = defaultdict(list)
     for name, path in modules().items():
+        if name.startswith("ccfem.body.files.formats."):  # named as files end
+            continue
         if path.stem != "__init__" and room(name) != "papers":  # each paper has the same shape
             named[path.stem].append(name)
     assert {stem for stem, those in named.items() if len(those) > 1} == set(TWICE)

@@ -1,6 +1,7 @@
 """Good files of every format that ccfem reads, and mutants of them; the same for the same seed."""
 
 import random
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -97,6 +98,13 @@ def good_files(folder: Path) -> list[Path]:
     (folder / "box.inp").write_text(_deck(mesh))
     (folder / "scopes.inp").write_text(_assembly(mesh))
     (folder / "box.msh").write_text(_msh(mesh))
+    with zipfile.ZipFile(folder / "box.3mf", "w") as archive:
+        archive.writestr("_rels/.rels", '<Relationship Target="/a.model" Type="a/3dmodel"/>')
+        archive.writestr("a.model", _model(shell.points.tolist(), triangles.reshape(-1, 3)))
+    (folder / "box.unv").write_text(unv(mesh))
+    (folder / "box.bdf").write_text(bdf(mesh))
+    (folder / "box.mesh").write_text(medit(mesh))
+    grid.save(folder / "box.vtk", binary=False)
     (folder / "part.toml").write_text(PART)
     (folder / "stress.frd").write_text(frd(mesh, np.tile((1.5, -2, 0.5, 0.01, 0, 3), (30, 1))))
     rows = ["element;Sxx [MPa];Syy [MPa];Szz [MPa];Syz [MPa];Sxz [MPa];Sxy [MPa]"]
@@ -105,6 +113,11 @@ def good_files(folder: Path) -> list[Path]:
     grid.cell_data["stress"] = np.ones((len(mesh.cells), 9))
     grid.field_data["unit of stress"] = np.frombuffer(b"MPa", dtype=np.uint8)
     grid.save(folder / "stress.vtu", binary=False)
+    grid.cell_data.clear()
+    grid.field_data.clear()
+    for name in ("xx", "yy", "zz", "xy", "xz", "yz"):
+        grid.point_data[f"Stress {name} component"] = 1e6 * mesh.points[:, 0]
+    grid.save(folder / "stress.vtk", binary=False)
     rows = [f"{x},{y},2.5,{y},0" for y in range(1, 9) for x in range(2, 19, 4)]
     (folder / "paths.csv").write_text("\n".join(["x,y,z,path,layer", *rows]) + "\n")
     rows = [f"S\nX2.0 Y{y}.0 Z2.5\nX18.0 Y{y}.5 Z2.5\nE" for y in range(1, 9)]
@@ -160,6 +173,70 @@ def _msh(mesh) -> str:
         for k, (kind, tag, nodes) in enumerate(rows, 1)
     ]
     return "\n".join([*lines, "$EndElements"]) + "\n"
+
+
+def _model(points, triangles) -> str:
+    """Model of a 3MF archive with one object, placed 5 mm up."""
+    rows = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in points)
+    sides = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in triangles)
+    return (
+        '<model unit="millimeter" '
+        'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>'
+        f'<object id="1"><mesh><vertices>{rows}</vertices><triangles>{sides}</triangles></mesh>'
+        '</object></resources><build><item objectid="1" transform="1 0 0 0 1 0 0 0 1 0 0 5"/>'
+        "</build></model>"
+    )
+
+
+def unv(mesh) -> str:
+    """Universal file (data sets 2411, 2412, 2467) with a group of triangles for each patch."""
+    lines = ["    -1", "  2411"]
+    for k, (x, y, z) in enumerate(mesh.points.tolist(), 1):
+        lines += [f"{k:10d}{1:10d}{1:10d}{11:10d}", f"{x:25.16E}{y:25.16E}{z:25.16E}"]
+    lines += ["    -1", "    -1", "  2412"]
+    # Nodes in the middle of sides lie between the corners that they join.
+    order = [0, 1, 2, 3] if mesh.order == 1 else [0, 4, 1, 5, 2, 6, 7, 8, 9, 3]
+    kind, number = (111 if mesh.order == 1 else 118), 0
+    for nodes in mesh.cells[:, order].tolist():
+        number += 1
+        lines.append(f"{number:10d}{kind:10d}{1:10d}{1:10d}{7:10d}{len(nodes):10d}")
+        row = "".join(f"{node + 1:10d}" for node in nodes)
+        lines += [row[start : start + 80] for start in range(0, len(row), 80)]
+    groups = ["    -1", "    -1", "  2467"]
+    for k, (name, facets) in enumerate(mesh.patches.items(), 1):
+        groups += [f"{k:10d}" + 6 * f"{0:10d}" + f"{len(facets):10d}", name]
+        members = []
+        for nodes in facets.tolist():
+            number += 1
+            lines.append(f"{number:10d}{41:10d}{1:10d}{1:10d}{7:10d}{3:10d}")
+            lines.append("".join(f"{node + 1:10d}" for node in nodes))
+            members.append(f"{8:10d}{number:10d}{0:10d}{0:10d}")
+        groups += ["".join(members[i : i + 2]) for i in range(0, len(members), 2)]
+    return "\n".join([*lines, *groups, "    -1"]) + "\n"
+
+
+def bdf(mesh) -> str:
+    """Nastran bulk data in free format: the k-th patch as triangles of property k, from 1."""
+    lines = ["BEGIN BULK"]
+    lines += [f"GRID,{k},,{x},{y},{z}" for k, (x, y, z) in enumerate(mesh.points.tolist(), 1)]
+    rows = [("CTETRA", 99, nodes) for nodes in mesh.cells.tolist()]
+    for k, facets in enumerate(mesh.patches.values(), 1):
+        rows += [("CTRIA3", k, nodes) for nodes in facets.tolist()]
+    lines += [
+        f"{kind},{k},{group},{','.join(str(node + 1) for node in nodes)}"
+        for k, (kind, group, nodes) in enumerate(rows, 1)
+    ]
+    return "\n".join([*lines, "ENDDATA"]) + "\n"
+
+
+def medit(mesh) -> str:
+    """Medit mesh: the k-th patch as triangles of reference k, from 1."""
+    lines = ["MeshVersionFormatted 2", "Dimension", "3", "Vertices", str(len(mesh.points))]
+    lines += [f"{x} {y} {z} 0" for x, y, z in mesh.points.tolist()]
+    triangles = [(*t, k) for k, those in enumerate(mesh.patches.values(), 1) for t in those + 1]
+    for what, rows in (("Triangles", triangles), ("Tetrahedra", [(*c, 9) for c in mesh.cells + 1])):
+        lines += [what, str(len(rows)), *(" ".join(map(str, row)) for row in rows)]
+    return "\n".join([*lines, "End"]) + "\n"
 
 
 def frd(mesh, stress) -> str:

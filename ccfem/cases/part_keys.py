@@ -38,9 +38,10 @@ class Body:
     Attributes
     ----------
     mesh : str
-        File of tetrahedra: .tet .msh .vtu .inp .npz.
+        File of tetrahedra: .tet .msh .vtu .vtk .inp .unv .med .bdf .nas .mesh .npz.
     surface : str
-        Closed surface (.stl .obj .ply) or CAD file (.step .iges .brep), filled with tetrahedra.
+        Closed surface (.stl .obj .ply .3mf) or CAD file (.step .iges .brep), to be filled with
+        tetrahedra.
     planform : table
         A flat part that stands on z = 0: its outline, holes, height and edge length.
     edge_length : float, mm

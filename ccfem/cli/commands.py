@@ -50,6 +50,7 @@ from ccfem.cli.options import (
     Strategies,
     Strategy,
     StressArray,
+    StressComponents,
     StressFile,
     StressStep,
     StressUnit,
@@ -413,6 +414,7 @@ def compare(
     stress_unit: StressUnit = None,
     stress_array: StressArray = None,
     stress_step: StressStep = None,
+    stress_components: StressComponents = None,
     pictures: Pictures = False,
     drawings: Drawings = None,
     details: Details = False,
@@ -430,7 +432,12 @@ def compare(
         cut = layers_of(layers, heights, slicing)
         several = None if slicings is None else slicings_of(slicings)
         given = foreign_stress(
-            stress, refine, unit=stress_unit, array=stress_array, step=stress_step
+            stress,
+            refine,
+            unit=stress_unit,
+            array=stress_array,
+            step=stress_step,
+            components=stress_components,
         )
         if drawings is not None and slicings is not None:
             raise InputError("--drawings works with one slicing only; got --slicings: drop one")
@@ -480,6 +487,7 @@ def plan(
     stress_unit: StressUnit = None,
     stress_array: StressArray = None,
     stress_step: StressStep = None,
+    stress_components: StressComponents = None,
     pictures: Pictures = False,
     drawings: Drawings = None,
     details: Details = False,
@@ -498,7 +506,12 @@ def plan(
         parameters = parameters_by_strategy(set_ or (), strategy)
         cut = layers_of(layers, heights, slicing)
         given = foreign_stress(
-            stress, refine, unit=stress_unit, array=stress_array, step=stress_step
+            stress,
+            refine,
+            unit=stress_unit,
+            array=stress_array,
+            step=stress_step,
+            components=stress_components,
         )
         part = load(case, set_case, refine, machine, set_machine, set_fibre)
         part, strand = calibrated(part, virtual_test, calibration)

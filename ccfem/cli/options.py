@@ -166,7 +166,13 @@ StressUnit = Annotated[
 ]
 StressArray = Annotated[
     str | None,
-    typer.Option("--stress-array", metavar="NAME", help="Array of a .vtu file; default stress."),
+    typer.Option("--stress-array", metavar="NAME", help="Array of a .vtu or .vtk file."),
+]
+StressComponents = Annotated[
+    str | None,
+    typer.Option(
+        "--stress-components", metavar="xx,yy,...", help="Order of six components without names."
+    ),
 ]
 StressStep = Annotated[
     int | None,

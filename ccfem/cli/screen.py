@@ -302,12 +302,12 @@ def print_solution(field: StressField, findings: Sequence[str], where: Path) -> 
     console = Console(highlight=False, emoji=False)
     sizes = np.linalg.norm(field.displacement, axis=1)
     at = ", ".join(f"{x:.4g}" for x in field.mesh.points[sizes.argmax()])
-    mises = von_mises(field.stress)
+    mises, nodal = von_mises(field.stress).max(), von_mises(field.nodal).max()
     record = field.record
     lines = [
         f"largest displacement {sizes.max():.4g} mm at ({at}) mm, strain energy "
         f"{field.strain_energy:.4g} N mm",
-        f"von Mises stress of the cells up to {mises.max():.4g} MPa",
+        f"von Mises stress up to {mises:.4g} MPa in the cells, {nodal:.4g} MPa at the nodes",
     ]
     for label, force in field.support_forces.items():
         lines.append(f"support {label}: ({', '.join(f'{x:.4g}' for x in force)}) N")

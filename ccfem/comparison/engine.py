@@ -182,7 +182,7 @@ def solved(request: Request, seconds: dict[str, float] | None = None) -> Solved:
     given, foreign, field = None, request.stress, cases.heaviest
     if foreign is not None:
         read = read_stress(foreign.path, field.mesh, foreign.unit, foreign.array,
-                           field.held_or_loaded, foreign.step)  # fmt: skip
+                           field.held_or_loaded, foreign.step, foreign.components)  # fmt: skip
         given = replace(read, material=field.material)
     if strand is None:
         return Solved(case, cases, given)

@@ -49,15 +49,18 @@ class ForeignStress:
     unit : str, optional
         Unit of the stress, if the file does not state it.
     array : str, optional
-        Name of the array in a ``.vtu`` file; default ``stress``.
+        Name of the array in a ``.vtu`` or ``.vtk`` file.
     step : int, optional
         Step in a ``.frd`` file, needed where several have stress.
+    components : str, optional
+        Order of six components without names, as ``xx,yy,zz,xy,yz,xz``.
     """
 
     path: str | os.PathLike[str]
     unit: str | None = None
     array: str | None = None
     step: int | None = None
+    components: str | None = None
 
 
 @dataclass(frozen=True)

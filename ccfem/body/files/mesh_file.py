@@ -10,9 +10,8 @@ from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
 from ccfem.base.whole import existing_file, whole_file
 from ccfem.body.files.formats import format_of, suffixes
+from ccfem.body.files.surface import is_surface
 from ccfem.body.mesh import TetMesh, check_mesh
-
-_SURFACES = (".stl", ".obj", ".ply")
 
 
 def read_mesh(path: str | os.PathLike[str], scale: float = 1.0, check: bool = True) -> TetMesh:
@@ -22,9 +21,11 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0, check: bool = Tr
     ----------
     path : path
         One of the formats in `ccfem.body.files.formats`: ``.tet``, Gmsh ``.msh`` 2.2 or 4.1
-        (physical groups of triangles become patches), ``.vtu``, Abaqus ``.inp`` (instances where
-        they are placed; surfaces, node sets and sets of triangles become patches) or ``.npz``.
-        Linear or quadratic.
+        (physical groups of triangles become patches), ``.vtu`` or legacy ``.vtk``, Abaqus ``.inp``
+        (instances where they are placed; surfaces, node sets and sets of triangles become patches),
+        ``.unv`` (groups of triangles or nodes become patches), ``.npz``, and what Gmsh reads:
+        ``.med`` (groups of triangles become patches), ``.bdf``, ``.nas`` and ``.mesh`` (numbered
+        properties and regions do). Linear or quadratic.
     scale : float, default 1
         Factor on the coordinates, to make them mm: 1000 for a file in metres.
     check : bool, default True
@@ -38,7 +39,7 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0, check: bool = Tr
     """
     path = existing_file(path, "mesh file")
     suffix = path.suffix.lower()
-    if suffix in _SURFACES:
+    if is_surface(path):
         raise InputError(
             f"{path} is a surface, not a tetrahedral mesh: read it with read_surface and fill it "
             "with tetrahedralise, or name it as surface in the part file"

@@ -1,4 +1,4 @@
-"""Closed triangulated surfaces from STL, OBJ and PLY files."""
+"""Closed triangulated surfaces from STL, OBJ, PLY and 3MF files."""
 
 import os
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from ccfem.base.errors import InputError
 from ccfem.base.whole import existing_file
 from ccfem.body.isolated.process import ChildError, read_isolated
 
-SUFFIXES = (".obj", ".ply", ".stl")
+SUFFIXES = (".3mf", ".obj", ".ply", ".stl")
 _NOTHING = 1e-12
 """Volume over area and diagonal that counts as none."""
 
@@ -78,7 +78,8 @@ def read_surface(path: str | os.PathLike[str], scale: float = 1.0) -> Surface:
     Parameters
     ----------
     path : path
-        STL, OBJ or PLY; polygons are cut into triangles, equal points merged.
+        STL, OBJ, PLY or 3MF; polygons are cut into triangles, equal points merged. Of a 3MF file
+        it is all that it builds, in mm by its unit.
     scale : float, default 1
         Factor on the coordinates, to make them mm.
 
@@ -96,7 +97,8 @@ def read_surface(path: str | os.PathLike[str], scale: float = 1.0) -> Surface:
         )
     check_number("surface scale", scale, above=0.0)
     try:
-        arrays = read_isolated("vtk_files:read_surface", path)
+        reader = "three_mf" if path.suffix.lower() == ".3mf" else "vtk_files"
+        arrays = read_isolated(f"{reader}:read_surface", path)
     except ChildError as error:
         raise InputError(
             f"{path} is not a surface that can be read: {error}: export it again as binary STL"

@@ -1,6 +1,7 @@
-"""Meshes of Gmsh, read by meshio, to plain arrays."""
+"""Meshes of Gmsh, read by meshio, and of other programs, read by Gmsh, to plain arrays."""
 
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -59,3 +60,46 @@ def _with_distinct_names(path: str) -> tuple[str, dict[str, str]]:
 
 def _by_number(row: re.Match[bytes]) -> bytes:
     return b'%d %d "%d:%d"' % (*map(int, row.groups()[:2]), *map(int, row.groups()[:2]))
+
+
+_TYPES = {2: "triangle", 9: "triangle6", 4: "tetra", 11: "tetra10", 6: "wedge", 18: "wedge15"}
+"""Cells in meshio's words by Gmsh's number of their type."""
+
+
+def read_other(path: str) -> dict[str, Any]:
+    """Points, cells and groups of triangles of a file of another program, as `read`.
+
+    Groups are called by their names, or by the number of the property or region of their
+    triangles.
+    """
+    import gmsh
+
+    # Gmsh goes by suffixes in lower case, and takes a file of another one for a script to run.
+    copy = f"copy{Path(path).suffix.lower()}"  # in the folder of this process
+    shutil.copyfile(path, copy)
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setNumber("General.NumThreads", 1)
+        gmsh.open(copy)
+        model = gmsh.model
+        nodes, points, _ = model.mesh.getNodes()
+        if not len(nodes):
+            raise ValueError("it holds no nodes")
+        order = np.argsort(nodes, kind="stable")
+        arrays: dict[str, Any] = {"points": points.reshape(-1, 3)[order]}
+        for entity in (e for e in model.getEntities() if e[0] > 1):
+            groups = model.getPhysicalGroupsForEntity(*entity)
+            names = [model.getPhysicalName(entity[0], k).strip() or str(k) for k in groups]
+            for kind, cells, corners in zip(*model.mesh.getElements(*entity), strict=True):
+                rows = np.searchsorted(nodes[order], corners).reshape(len(cells), -1)
+                if kind == 11:  # Gmsh swaps the last two mid-side nodes
+                    rows = rows[:, [*range(8), 9, 8]]
+                block = f"{entity[0]}_{entity[1]}_{kind}"
+                name = _TYPES.get(kind) or model.mesh.getElementProperties(kind)[0].lower()
+                arrays[f"cells:{block}:{name}"] = rows
+                for group in (names or [str(entity[1])]) if name.startswith("triangle") else ():
+                    arrays[f"group:{block}:{group}"] = np.arange(len(rows))
+        return arrays
+    finally:
+        gmsh.finalize()

@@ -12,15 +12,22 @@ _LAGRANGE = {(69, 3): 5, (69, 6): 22, (71, 4): 10, (71, 10): 24}
 
 
 def read_grid(path: str) -> dict[str, Any]:
-    """Points, types and nodes of cells, and data of an unstructured grid (.vtu).
+    """Points, types and nodes of cells, and data of an unstructured grid (.vtu, .vtk).
 
     Names are ``points``, ``types``, ``cells:TYPE``, ``point:NAME``, ``cell:NAME``, ``field:NAME``,
     and ``components:point:NAME`` where components have names.
     """
     from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOLegacy import vtkUnstructuredGridReader
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
-    grid = _output(vtkXMLUnstructuredGridReader(), path)
+    if path.lower().endswith(".vtk"):
+        legacy = vtkUnstructuredGridReader()
+        for attribute in ("Scalars", "Vectors", "Tensors", "Fields"):
+            getattr(legacy, f"ReadAll{attribute}On")()  # it reads the first of each otherwise
+        grid = _output(legacy, path)
+    else:
+        grid = _output(vtkXMLUnstructuredGridReader(), path)
     if grid.GetPoints() is None or not grid.GetNumberOfCells():
         raise ValueError("no points or no cells")
     arrays: dict[str, Any] = {"points": vtk_to_numpy(grid.GetPoints().GetData())}

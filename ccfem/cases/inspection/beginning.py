@@ -21,6 +21,12 @@ _PARALLEL = np.cos(np.radians(5.0))
 """Cosine of the angle up to which planes face the same way."""
 _LISTED = 40
 """Faces that are listed in a new part file."""
+_MOST_HELD = 0.5
+"""Share of the surface that may be held: beyond it the faces are too few to choose from."""
+_END = 0.15
+"""Share of the height that is held, and pulled, at the ends of such a body."""
+_CELLS = 100_000
+"""Cells up to which they are as short as walls are thick."""
 
 
 def new_part(
@@ -29,9 +35,10 @@ def new_part(
     """Write a part file for a body: its faces listed, a support and a load to be changed.
 
     The largest plane that faces down is held, with all others at its height, as the feet of a part
-    are; and the face farthest from there is pulled away with 100 N. Cells are a twenty-fifth of the
-    diagonal long. Where the lengths look like metres
-    (`BodyFaces.doubt`), the file scales them by 1000.
+    are; and the face farthest from there is pulled away with 100 N. Of a body of so few faces that
+    most of it would be held, as a scan is, the lower end is held and the upper one pulled up. Cells
+    are a twenty-fifth of the diagonal long, and no longer than walls are thick, up to about 100,000
+    of them. Where the lengths look like metres (`BodyFaces.doubt`), the file scales them by 1000.
 
     Parameters
     ----------
@@ -64,10 +71,43 @@ def new_part(
     doubt = listing.doubt
     if doubt:
         listing = faces_of(body, scale=1000.0)
-    faces, edge = listing.faces, listing.size / 25.0
+    edge = _edge_length(listing)
+    held, pulled, pull = _ends(listing, edge)
+    with whole_file(out) as temporary:
+        cells = edge if is_surface(body) or is_cad(body) else None
+        temporary.write_text(_text(body, cells, listing, held, pulled, pull, doubt), "utf-8")
+    return out
+
+
+def _edge_length(listing: BodyFaces) -> float:
+    """Length of the edges of cells, mm: see `new_part`.
+
+    A wall that is much wider than thick has a thickness of twice its volume over its surface, and a
+    regular tetrahedron a volume of its edge to the third over 6 sqrt(2).
+    """
+    a, b, c = np.moveaxis(listing.points[listing.triangles] - listing.points.mean(axis=0), 1, 0)
+    volume = abs(float(np.einsum("ij,ij->", np.cross(a, b), c))) / 6.0
+    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    shortest = np.cbrt(6.0 * np.sqrt(2.0) * volume / _CELLS)
+    return float(min(listing.size / 25.0, max(2.0 * volume / area, shortest)))
+
+
+def _ends(listing: BodyFaces, edge: float) -> tuple[list[str], list[str], list[float]]:
+    """Rules of what is held and what is pulled, and the force, N: see `new_part`."""
+    faces = listing.faces
     held = max(range(len(faces)), key=lambda k: (_faces_down(faces[k]), faces[k].area))
     feet = _beside(faces, held, 1e-3 * listing.size)
     areas = [max(faces[k].area, 1e-300) for k in feet]
+    if sum(areas) > _MOST_HELD * sum(face.area for face in faces):
+        height = listing.points[listing.triangles][..., 2]
+        low, high = float(height.min()), float(height.max())
+        depth = max(_END * (high - low), 2.0 * edge)
+        ends = (
+            ("[-inf, -inf, -inf]", f"[inf, inf, {low + depth:.4g}]"),
+            (f"[-inf, -inf, {high - depth:.4g}]", "[inf, inf, inf]"),
+        )
+        lower, upper = (['rule = "box"', f"lower = {a}", f"upper = {b}"] for a, b in ends)
+        return lower, upper, [0.0, 0.0, 100.0]
     centre = np.average([faces[k].centre for k in feet], axis=0, weights=areas)
     away = [float(np.linalg.norm(face.centre - centre)) for face in faces]
     others = [k for k in range(len(faces)) if k not in feet]
@@ -75,12 +115,7 @@ def new_part(
     pulled = max(meshable or others, key=away.__getitem__, default=0)
     pull = faces[pulled].centre - centre
     pull = 100.0 * pull / max(float(np.linalg.norm(pull)), 1e-300)
-    meshed = is_surface(body) or is_cad(body)
-    with whole_file(out) as temporary:
-        cells = edge if meshed else None
-        text = _text(body, cells, listing, feet, pulled, pull.tolist(), doubt)
-        temporary.write_text(text, encoding="utf-8")
-    return out
+    return _rule(listing, feet), _rule(listing, [pulled]), pull.tolist()
 
 
 def _beside(faces: Sequence[Face], held: int, reach: float) -> list[int]:
@@ -114,8 +149,8 @@ def _text(
     body: Path,
     edge: float | None,
     listing: BodyFaces,
-    held: Sequence[int],
-    pulled: int,
+    held: Sequence[str],
+    pulled: Sequence[str],
     pull: Sequence[float],
     doubt: str,
 ) -> str:
@@ -140,8 +175,8 @@ def _text(
         name="".join(c if c.isalnum() or c in "-_" else "_" for c in body.stem),
         body="\n".join(given),
         faces="\n".join(listed),
-        held="\n".join(_rule(listing, held)),
-        pulled="\n".join(_rule(listing, [pulled])),
+        held="\n".join(held),
+        pulled="\n".join(pulled),
         pull=", ".join(f"{x + 0.0:.1f}" for x in pull),
     )
 

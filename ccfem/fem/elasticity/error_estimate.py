@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from ccfem.base.arrays import FloatArray, IntArray, read_only, seen_only
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, seen_only
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.curved_cells import gradients_at
 from ccfem.fem.elasticity.assembly import cell_gradients
@@ -26,15 +26,15 @@ class ErrorEstimate:
     ----------
     cells : (m,) array, N mm
         Twice the energy of the error of the stress in each cell.
-    energy : float, N mm
-        Twice the energy of the stress of the cells.
+    energies : (m,) array, N mm
+        Twice the energy of the stress of each cell.
     """
 
     cells: FloatArray
-    energy: float
+    energies: FloatArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "cells", read_only(self.cells))
+        freeze(self, cells=float, energies=float)
 
     @property
     def relative(self) -> float:
@@ -42,15 +42,23 @@ class ErrorEstimate:
 
         Under forces, the energies of solution and error add up to that of the exact stress.
         """
-        error = float(self.cells.sum())
-        total = error + self.energy
+        return self.relative_in(slice(None))
+
+    def relative_in(self, cells: IntArray | BoolArray | slice) -> float:
+        """Do the same in some cells: the relative error of their stress."""
+        error = float(self.cells[cells].sum())
+        total = error + float(self.energies[cells].sum())
         return float(np.sqrt(error / total)) if total > 0.0 else 0.0
 
     def densities(self, volumes: FloatArray) -> FloatArray:
         """Energy norm of the error of each cell (m,) over that of an average cell of its volume."""
-        total = float(self.cells.sum()) + self.energy
+        total = float(self.cells.sum() + self.energies.sum())
         mean = total / float(volumes.sum())
         return np.sqrt(self.cells / volumes / mean) if mean > 0.0 else np.zeros(len(volumes))
+
+
+_FREELY = 1e-16
+"""Energy, over that of a part held against all free strain, below which stress is rounding."""
 
 
 def estimate_error(
@@ -58,6 +66,7 @@ def estimate_error(
     displacement: FloatArray,
     stiffness: FloatArray,
     free: FloatArray | None = None,
+    region: IntArray | None = None,
 ) -> ErrorEstimate:
     """Estimate the error of a displacement.
 
@@ -68,6 +77,9 @@ def estimate_error(
         In the global frame.
     free : (m, 6) array, optional
         Stress-free strain of each cell, Voigt.
+    region : (m,) int array, optional
+        Number from 0 of the material of each cell. Between materials the stress may jump, so that
+        each is recovered by itself.
     """
     stiffness = seen_only(stiffness).reshape(-1, 6, 6)
     m = len(mesh.cells)
@@ -78,7 +90,7 @@ def estimate_error(
     stress = np.empty((m, len(samples), 6))
     _stress_at(*arguments, samples, stress)
     _curved_stress(mesh, displacement, stiffness, ease, samples, stress)
-    patches = stress_patches(mesh, stress, np.trace(stiffness, axis1=1, axis2=2))
+    patches = stress_patches(mesh, stress, np.trace(stiffness, axis1=1, axis2=2), region)
     corner = stress
     if mesh.order == 2:
         # Linear in a cell, so the values at its corners determine it.
@@ -92,7 +104,10 @@ def estimate_error(
     polynomials = (patches.of_corner, patches.centre, patches.size, patches.coefficients)
     cells = (mesh.points, corners, mesh.volumes, edges)
     compare(*cells, polynomials, corner, compliance, (error, energy))
-    return ErrorEstimate(error, float(energy.sum()))
+    held = (ease[:, None] @ stiffness @ ease[:, :, None]).reshape(-1)
+    if error.sum() + energy.sum() <= _FREELY * (mesh.volumes * held).sum():
+        error, energy = np.zeros(m), np.zeros(m)
+    return ErrorEstimate(error, energy)
 
 
 @njit(cache=True)
@@ -277,7 +292,8 @@ def _compare_quadratic(
 # Superconvergent patch recovery (Zienkiewicz and Zhu, Int. J. Numer. Meth. Engng 33, 1992,
 # 1331-1364): round each corner node a polynomial of the order of the displacement, linear or
 # quadratic, is fitted to the stress at the points where that of the cells is most accurate. Cells
-# of very different stiffness are fitted separately, since the stress jumps between them.
+# of other materials, or of very different stiffness, are fitted separately, since the stress jumps
+# between them.
 
 
 _A, _B = 0.5854101966249685, 0.1381966011250105
@@ -297,7 +313,7 @@ _ALIKE = 4.0
 
 @dataclass(frozen=True)
 class Patches:
-    """Polynomials round the corner nodes, one for each kind of stiffness at a node.
+    """Polynomials round the corner nodes, one for each kind of cell at a node.
 
     Attributes
     ----------
@@ -316,7 +332,9 @@ class Patches:
     coefficients: FloatArray
 
 
-def stress_patches(mesh: TetMesh, stress: FloatArray, stiffness: FloatArray) -> Patches:
+def stress_patches(
+    mesh: TetMesh, stress: FloatArray, stiffness: FloatArray, region: IntArray | None = None
+) -> Patches:
     """Fit polynomials to the stress of the cells.
 
     Parameters
@@ -325,14 +343,18 @@ def stress_patches(mesh: TetMesh, stress: FloatArray, stiffness: FloatArray) -> 
         Voigt, at the `SAMPLES` of the cells' order.
     stiffness : (m,) or (1,) array
         How stiff each cell is.
+    region : (m,) int array, optional
+        Number from 0 of the material of each cell.
     """
     kind = np.floor(np.log(stiffness) / np.log(_ALIKE)).astype(np.int64)
-    if len(kind) == 1 or (kind == kind[0]).all():
+    kind -= kind.min()
+    if region is not None:
+        kind = kind + (int(kind.max()) + 1) * region
+    kinds = int(kind.max()) + 1
+    if (kind == kind[0]).all():
         # A polynomial for each node; nodes without cells stay empty.
         nodes, of_corner = np.arange(len(mesh.points)), mesh.corners
     else:
-        kind -= kind.min()
-        kinds = int(kind.max()) + 1
         pairs, of_corner = np.unique(mesh.corners * kinds + kind[:, None], return_inverse=True)
         nodes = pairs // kinds
     of_corner = seen_only(of_corner.reshape(-1, 4))

@@ -80,7 +80,10 @@ def patch_facets(mesh: CellMesh | LoadedBody, name: str) -> IntArray:
     """Facets of a patch, which must not be empty."""
     facets = mesh.patch(name)
     if not len(facets):
-        raise InputError(f"patch '{name}' is empty: no boundary facet is in it")
+        raise InputError(
+            f"patch '{name}' is empty: no boundary facet is in it, as of a group inside the "
+            "part: choose one of its outside"
+        )
     return facets
 
 

@@ -18,12 +18,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray
+from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.checks import BED, SPRING
 from ccfem.base.errors import InputError, SolveError
+from ccfem.base.tensor import von_mises
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.check import about_size, about_slivers
 from ccfem.body.mesh.wall_cells import coarse_wall
+from ccfem.fem.elasticity.error_estimate import ErrorEstimate
 from ccfem.fem.elasticity.held import Held, rigid_modes
 from ccfem.fem.elasticity.load_kinds import (
     Displacement,
@@ -34,7 +36,7 @@ from ccfem.fem.elasticity.load_kinds import (
     patches_of,
     sizes_of,
 )
-from ccfem.fem.elasticity.loads import nodal_forces
+from ccfem.fem.elasticity.loads import free_strain, nodal_forces
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.support_kinds import (
     AnySupport,
@@ -371,7 +373,8 @@ def about_solution(
     case: str,
     displacement: FloatArray,
     stress: FloatArray,
-    error: float,
+    nodal: FloatArray,
+    error: ErrorEstimate | None,
 ) -> tuple[str, ...]:
     """Say what of a solution lies beyond linear theory, the strength, or the cells.
 
@@ -380,30 +383,32 @@ def about_solution(
     problem : Problem
         As it was solved.
     displacement : (n, 3) array, mm
-    stress : (m, 3, 3) array, MPa
-        Of the cells.
-    error : float
-        Estimated error in energy norm.
+    stress, nodal : (m, 3, 3) and (n, 3, 3) array, MPa
+        Of the cells, and at the nodes.
+    error : ErrorEstimate, optional
+        Where it was estimated.
 
     Returns
     -------
     tuple of str
         One line each, with its cure.
     """
-    lines = [about_error(error, problem)]
+    judged, average, centroid = averaged_mises(problem, case, stress)
+    lines = [] if error is None else [_about_error(problem, case, error, nodal, judged)]
     far, size = _largest_difference(displacement), _size(problem)
     if far > _LINEAR * size and not _farthest_support_move(problem, case) > _LINEAR * size:
         lines.append(_about_far(problem, displacement, far, size))
-    lines.append(_about_strength(problem, case, stress))
+    lines.append(_about_strength(problem, average, judged, centroid))
     return tuple(line for line in lines if line)
 
 
-def _about_strength(problem: Problem, case: str, stress: FloatArray) -> str:
+def _about_strength(
+    problem: Problem, average: FloatArray, judged: IntArray, centroid: FloatArray
+) -> str:
     """Say that the averaged stress is above the strength, or the strain above linear theory."""
-    judged, average, centroid = averaged_mises(problem, case, stress)
     if not len(judged):
         return ""
-    strength, modulus = np.full(len(stress), np.inf), np.full(len(stress), np.inf)
+    strength, modulus = np.full(len(centroid), np.inf), np.full(len(centroid), np.inf)
     for material, cells in problem.materials:
         strength[cells] = material.tensile_strength or np.inf
         modulus[cells] = float(1.0 / np.linalg.inv(material.stiffness)[0, 0])
@@ -437,7 +442,8 @@ def _about_strength(problem: Problem, case: str, stress: FloatArray) -> str:
 
 
 LARGEST_ERROR = 0.1
-"""Estimated error, in energy norm, up to which cells are fine enough: 1 % of the displacement."""
+"""Estimated error, in energy norm, up to which cells are fine enough: 1 % of the displacement, and
+12 % of the stress where it peaks (measured at a hole in a plate)."""
 
 _LOCKS = 2.0 * 1.45 / (3.0 * (1.0 - 2.0 * 0.45))
 """Bulk over shear modulus above which linear cells lock: Poisson's ratio 0.45."""
@@ -456,25 +462,36 @@ def linear_locks(problem: Problem) -> bool:
     return any(incompressibility(m.stiffness) > _LOCKS for m, _ in problem.materials)
 
 
-def about_error(error: float, problem: Problem) -> str:
-    """Say what to do about an estimated error; empty if it is small enough.
+def _about_error(
+    problem: Problem, case: str, error: ErrorEstimate, nodal: FloatArray, judged: IntArray
+) -> str:
+    """Say what to do about an estimated error, in all or where the stress peaks.
 
-    Parameters
-    ----------
-    error : float
-        Energy norm of the error over that of the solution.
-    problem : Problem
-        The problem as it was solved.
+    The stress of the judged cells (k,) peaks at the node of the largest von Mises stress; its error
+    is that of the cells round this node. Empty if both errors are small enough.
     """
-    if not error > LARGEST_ERROR:
+    whole, peak, where = error.relative, 0.0, ""
+    if len(judged):
+        nodes = np.unique(problem.mesh.cells[judged])
+        mises = von_mises(nodal[nodes])
+        node = nodes[mises.argmax()]
+        peak = error.relative_in((problem.mesh.cells == node).any(axis=1))
+        at = ", ".join(f"{x:.4g}" for x in problem.mesh.points[node])
+        where = f"{peak:.0%} in the stress where it peaks, {mises.max():.4g} MPa at ({at}) mm"
+    if not max(whole, peak) > LARGEST_ERROR:
         return ""
-    cure = "use smaller cells"
-    if problem.mesh.order == 1:
-        cure = "use quadratic cells (order = 2), or smaller cells"
-    return (
-        f"the cells leave an estimated error of {error:.0%} in energy norm, about {error**2:.0%} "
-        f"of the displacement: {cure}"
-    )
+    terms, cure = [], "smaller cells"
+    if whole > LARGEST_ERROR:
+        # Neither where cells lock nor under heat does the displacement follow the energy.
+        known = not (problem.mesh.order == 1 and linear_locks(problem))
+        known &= free_strain(problem, case) is None
+        also = f", about {whole**2:.0%} of the displacement" if known else ""
+        terms.append(f"{whole:.0%} in energy norm{also}")
+    if peak > LARGEST_ERROR:
+        terms.append(where)
+        cure += " there; a sharp inner edge needs its radius" if len(terms) == 1 else ""
+    cure = f"quadratic cells (order = 2), or {cure}" if problem.mesh.order == 1 else cure
+    return f"the cells leave an estimated error of {' and of '.join(terms)}: use {cure}"
 
 
 def on_quadratic(problem: Problem) -> Problem:

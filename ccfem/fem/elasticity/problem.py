@@ -22,6 +22,7 @@ from ccfem.fem.elasticity.load_kinds import (
     patches_in_use,
     patches_of,
 )
+from ccfem.fem.elasticity.nodes import patch_facets
 from ccfem.fem.elasticity.support_kinds import AnySupport, Support as Support
 from ccfem.fem.materials import Material
 
@@ -167,8 +168,7 @@ class Problem(Shown):
         loads = (load for case in self.loads.values() for load in case)
         for kind in (*self.all_supports, *loads):
             for name in patches_of(kind):
-                if not len(self.mesh.patch(name)):
-                    raise InputError(f"patch '{name}' is empty: no boundary facet is in it")
+                patch_facets(self.mesh, name)
         for name in self.case_supports:
             check_known("load case", name, self.loads)
         for name, factors in self.combinations.items():

@@ -323,16 +323,21 @@ class StressField(Shown):
         stiffness = problem.cell_stiffness
         if problem.density is not None:
             stiffness = problem.density[:, None, None] * stiffness
+        region = np.zeros(len(self.mesh.cells), dtype=np.int64)
+        for number, (_, cells) in enumerate(problem.materials):
+            region[cells] = number
         free = free_strain(problem, self.case)
-        return estimate_error(self.mesh, self.displacement, stiffness, free)
+        return estimate_error(self.mesh, self.displacement, stiffness, free, region)
 
     @cached_property
     def findings(self) -> tuple[str, ...]:
         """Remarks on the part and its solution, one line each (`plausibility`)."""
-        problem, error, cases = self.problem, self.record.error, self.problem.factors(self.case)
+        problem, cases = self.problem, self.problem.factors(self.case)
+        error = None if np.isnan(self.record.error) else self.error
+        solution = (self.displacement, self.stress, self.nodal, error)
         return (
-            *about_problem(problem, held(problem), cases, error),
-            *about_solution(problem, self.case, self.displacement, self.stress, error),
+            *about_problem(problem, held(problem), cases, self.record.error),
+            *about_solution(problem, self.case, *solution),
         )
 
     @property

@@ -20,6 +20,8 @@ ZONE = 3.0
 
 _SPACING = 0.5
 """Largest distance, mm, between points that stand for a patch."""
+_PIECES = 100
+"""Largest number of pieces of a side: cells at facets of more than 50 mm are much larger."""
 
 
 def averaged_mises(
@@ -94,10 +96,10 @@ def _slides(mesh: TetMesh, support: AnySupport) -> bool:
 
 
 def _cover(mesh: TetMesh, name: str) -> FloatArray:
-    """Points at most half a millimetre apart on the facets of a patch."""
+    """Points on the facets of a patch, half a millimetre apart on those of up to 50 mm."""
     corners = mesh.points[mesh.patch(name)]
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    parts = np.maximum(np.ceil(edges / _SPACING), 1.0).astype(np.int64)
+    parts = np.clip(np.ceil(edges / _SPACING), 1.0, _PIECES).astype(np.int64)
     points = [corners.reshape(-1, 3)]
     for n in np.unique(parts):
         i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij")
@@ -158,7 +160,7 @@ def ball_shares(
 
 
 class _Boxes(NamedTuple):
-    """Points in boxes of a grid, whose size is the radius of the ball.
+    """Points in boxes of a grid, whose size is the radius of the ball or more.
 
     `points` (n, 3), mm, and `weights` (n,) in the order of the boxes, `order` (n,); `number` (n,)
     of the box of each in the order that they were given in; `offsets` where each box begins;
@@ -174,15 +176,20 @@ class _Boxes(NamedTuple):
     radius: float
 
 
-def _boxes(points: FloatArray, weights: FloatArray, size: float) -> _Boxes:
-    """Sort points into boxes of a given size, with a margin of empty boxes on every side."""
+_MOST_BOXES = 10_000_000
+"""Number of boxes above which they are larger than the ball: about 80 MB."""
+
+
+def _boxes(points: FloatArray, weights: FloatArray, radius: float) -> _Boxes:
+    """Sort points into boxes for a ball, with a margin of empty boxes on every side."""
     first = points.min(axis=0)
+    size = max(radius, float(np.cbrt(np.prod(np.ptp(points, axis=0)) / _MOST_BOXES)))
     box = np.floor((points - first) / size).astype(np.int64) + 1
     shape = box.max(axis=0) + 2
     number = (box[:, 0] * shape[1] + box[:, 1]) * shape[2] + box[:, 2]
     order = np.argsort(number, kind="stable")
     offsets = np.searchsorted(number[order], np.arange(int(np.prod(shape)) + 1))
-    return _Boxes(points[order], weights[order], order, number, offsets, shape, float(size))
+    return _Boxes(points[order], weights[order], order, number, offsets, shape, float(radius))
 
 
 @njit(cache=True)

@@ -49,6 +49,8 @@ class StressData:
         Numbers by which the file calls its nodes and cells; None where it counts them from 0.
     chosen : str
         Which of several results of the file it is.
+    usual : (unit, reason)
+        Unit that the program which wrote the file takes, where the file does not say it.
     """
 
     points: FloatArray | None
@@ -59,15 +61,16 @@ class StressData:
     nodes: IntArray | None = None
     cells: IntArray | None = None
     chosen: str = ""
+    usual: tuple[str, str] = ("", "")
 
     def __post_init__(self) -> None:
         freeze(self, points=float, corners=int, nodal=float, cell=float, nodes=int, cells=int)
 
 
 def component_of(name: str) -> int:
-    """Voigt component that a name like xx, Sxx, sigma_xz, S11 or SZX means; -1 for none."""
+    """Voigt component that xx, Sxx, sigma_xz, S11, SZX or Stress xx component is; -1 for none."""
     letters = re.sub(r"[^a-z0-9]", "", name.lower())
-    match = re.fullmatch(r"(?:s|sig|sigma|stress|t)?([xyz123]{2})", letters)
+    match = re.fullmatch(r"(?:s|sig|sigma|stress|t)?([xyz123]{2})(?:component)?", letters)
     if match is None:
         return -1
     pair = "".join(sorted(match[1].translate(str.maketrans("123", "xyz"))))
@@ -104,13 +107,14 @@ def read_stress(
     array: str | None = None,
     held_or_loaded: tuple[str, ...] = (),
     step: int | None = None,
+    components: str | None = None,
 ) -> GivenStress:
     """Read stress from a file and map it to a mesh.
 
     Parameters
     ----------
     path : path
-        ``.vtu``, ``.frd`` of CalculiX, or ``.csv`` by element or node
+        ``.vtu``, legacy ``.vtk``, ``.frd`` of CalculiX, or ``.csv`` by element or node
         (`ccfem.fem.stress_files.stress_file`).
     mesh : TetMesh
         Of the part. The file must have stress for each of its corners or cells: nodes are found by
@@ -119,12 +123,16 @@ def read_stress(
         Pa, kPa, MPa, N/mm^2 or GPa; needed where the file does not say. A ``.frd`` never does: its
         stress is taken for MPa, since its nodes have to lie where those of the part do, in mm.
     array : str, optional
-        Name of the stress in a ``.vtu`` file; default ``stress``.
+        Name of the stress in a ``.vtu`` or ``.vtk`` file; by default the only one that is called as
+        stress is (`STRESS_NAMES`), or the six arrays of its components.
     held_or_loaded : tuple of str
         As in `GivenStress`.
     step : int, optional
         Step of a ``.frd`` file, whose last increment is read; needed where several have stress.
         Modes are no such step: their stress has no size.
+    components : str, optional
+        Order of six components that a ``.vtu`` or ``.vtk`` file does not name, as
+        ``xx,yy,zz,xy,yz,xz``.
 
     Returns
     -------
@@ -140,24 +148,29 @@ def read_stress(
     """
     path = existing_file(path, "stress file")
     suffix = path.suffix.lower()
-    for option, value, only in (("array", array, ".vtu"), ("step", step, ".frd")):
-        if value is not None and suffix != only:
+    grids, steps = (".vtu", ".vtk"), (".frd",)
+    for option, value, only in (
+        ("array", array, grids),
+        ("step", step, steps),
+        ("components", components, grids),
+    ):
+        if value is not None and suffix not in only:
             raise InputError(
-                f"only {only} files have the {option} {shown(str(value))} of a stress to choose; "
-                f"got {path}: leave --stress-{option} out"
+                f"only {' and '.join(only)} files have the {option} {shown(str(value))} of a "
+                f"stress to choose; got {path}: leave --stress-{option} out"
             )
-    if suffix == ".vtu":
-        data = vtu_stress(path, array)
+    if suffix in grids:
+        data = grid_stress(path, array, components)
     elif suffix == ".frd":
         data = frd_stress(path, step)
     elif suffix == ".csv":
         data = table_stress(path)
     else:
-        raise InputError(f"stress is read from .vtu, .frd or .csv; got {path}: convert it")
+        raise InputError(f"stress is read from .vtu, .vtk, .frd or .csv; got {path}: convert it")
     assumed = [data.chosen] if data.chosen else []
-    if suffix == ".frd" and unit is None:
-        unit = "MPa"
-        assumed.append(f"the stress of {path.name} is taken for MPa, as its nodes are in mm")
+    if unit is None and not data.unit and data.usual[0]:
+        unit, reason = data.usual
+        assumed.append(f"the stress of {path.name} is taken for {unit}, as {reason}")
     unit = _unit(path, data.unit, unit)
     factor = _MPA[unit.lower()]
     _check_values(path, data, unit)
@@ -455,7 +468,7 @@ def frd_stress(path: Path, step: int | None = None) -> StressData:
     order = component_order(names[:6], f"{path}: the block STRESS")
     data = _mapped(points, cells, stress, order, path)
     chosen = f"of {path.name} the stress of {result} is taken" if len(results) > 1 else ""
-    return replace(data, chosen=chosen)
+    return replace(data, chosen=chosen, usual=("MPa", "its nodes are in mm"))
 
 
 @contextmanager
@@ -592,29 +605,59 @@ def vtk_tensors(tensors: FloatArray) -> FloatArray:
     return to_voigt(tensors)[:, [COMPONENTS.index(component) for component in VTK_COMPONENTS]]
 
 
-def vtu_stress(path: Path, array: str | None = None) -> StressData:
+STRESS_NAMES = ("stress", "stresses", "s", "sigma", "cauchy", "cauchy stress", "stress tensor")
+"""Names of arrays, in any case, that are taken for stress if a file has just one of them."""
+_FREECAD = "Stress xx component"
+"""Name of a component in files of FreeCAD, whose mesh is in mm and whose stress is in Pa."""
+
+
+def grid_stress(path: Path, array: str | None = None, components: str | None = None) -> StressData:
     """Stress at the nodes and in the cells of a grid, as far as it has an array of that name.
 
-    Without a name it is the array ``stress``.
-
     Arrays of nine components are full tensors, row by row; those of six must name their components
-    (xx, yy, zz, yz, xz, xy in any order, as xx, Sxx or S11).
+    (xx, yy, zz, yz, xz, xy in any order, as xx, Sxx or S11), or `components` does. Without a name
+    it is the only one of `STRESS_NAMES`, or the six arrays whose names are components.
     """
-    grid = read_grid(path)
-    name = "stress" if array is None else array
-    nodal, cell = (_tensors(grid, where, name, path) for where in ("point", "cell"))
+    grid, usual = read_grid(path), ("", "")
+    known = sorted({*grid.point, *grid.cell})
+    names = [name for name in known if name.lower() in STRESS_NAMES]
+    single = [name for name in known if component_of(name) >= 0]
+    if array is not None or "stress" in names:
+        names = [array or "stress"]
+    elif not names and single:
+        grid, names = _joined(grid, single, path), ["stress"]
+        usual = ("Pa", "FreeCAD writes it") if _FREECAD in single else usual
+    name = names[0] if len(names) == 1 else ""
+    nodal, cell = (_tensors(grid, where, name, components, path) for where in ("point", "cell"))
     if nodal is None and cell is None:
-        known = sorted({*grid.point, *grid.cell})
         raise InputError(
-            f"{path} has no array {shown(name)}; there are: {', '.join(known) or 'none'}: name the "
-            "one that holds the stress with --stress-array"
+            f"{path} has {'several arrays like' if names[1:] else 'no array'} "
+            f"{shown(array or 'stress')}; there are: {', '.join(known) or 'none'}: name the one "
+            "that holds the stress with --stress-array"
         )
     tetrahedra = [nodes for kind, nodes in grid.cells.items() if kind in (10, 24)]
     if len(tetrahedra) != 1 or len(tetrahedra[0]) != len(grid.types):
         raise InputError(f"{path}: expected tetrahedra of one kind only; mesh the part with those")
     unit = _text(grid.field.get(UNIT, np.array([])))
     corners = np.asarray(tetrahedra[0], dtype=np.int64)[:, :4]
-    return StressData(grid.points, corners, nodal, cell, unit)
+    said = name not in (array, "stress")
+    chosen = f"of {path.name} the array {shown(name)} is taken" if said else ""
+    return StressData(grid.points, corners, nodal, cell, unit, chosen=chosen, usual=usual)
+
+
+def _joined(grid: Grid, names: list[str], path: Path) -> Grid:
+    """Grid with an array ``stress`` of arrays that hold a component each."""
+    component_order(names, f"{path}: the arrays")
+    where = "point" if names[0] in grid.point else "cell"
+    data = getattr(grid, where)
+    if not all(name in data and data[name].ndim == 1 for name in names):
+        raise InputError(
+            f"{path}: the arrays {', '.join(names)} must hold a number each, all of nodes or all "
+            "of cells: write them again"
+        )
+    joined = {"stress": np.stack([data[name] for name in names], axis=1)}
+    named = replace(grid, components={(where, "stress"): names}, point={}, cell={})
+    return replace(named, point=joined) if where == "point" else replace(named, cell=joined)
 
 
 def _text(values: NDArray[np.generic]) -> str:
@@ -624,11 +667,14 @@ def _text(values: NDArray[np.generic]) -> str:
     return str(values.flat[0]) if values.size else ""
 
 
-def _tensors(grid: Grid, where: str, name: str, path: Path) -> FloatArray | None:
+def _tensors(
+    grid: Grid, where: str, name: str, components: str | None, path: Path
+) -> FloatArray | None:
     """Voigt components (k, 6) of an array; None where there is no such array."""
     data = grid.point if where == "point" else grid.cell
     if name not in data:
         return None
+    components = components or ""
     if data[name].dtype.kind not in "fiu":
         raise InputError(f"{path}: array '{name}' must hold numbers; got {data[name].dtype}")
     values = np.asarray(data[name], dtype=np.float64)
@@ -641,5 +687,14 @@ def _tensors(grid: Grid, where: str, name: str, path: Path) -> FloatArray | None
     if values.shape[1] == 9:
         full = values.reshape(-1, 3, 3)
         return to_voigt(0.5 * full + 0.5 * full.swapaxes(1, 2))
-    names = grid.components.get((where, name), [""] * 6)
+    names = grid.components.get((where, name), [])
+    if bool(names) == bool(components):
+        raise InputError(
+            f"{path}: array '{name}' names its components {', '.join(names)}: leave "
+            "--stress-components out"
+            if names
+            else f"{path}: array '{name}' has six components without names: give their order with "
+            "--stress-components, as xx,yy,zz,xy,yz,xz of ParaView or xx,yy,zz,yz,xz,xy of Voigt"
+        )
+    names = names or components.split(",")
     return values[:, component_order(names, f"{path}: array '{name}'")]

@@ -113,8 +113,9 @@ def cut_mesh(mesh: TetMesh, values: FloatArray, level: float) -> CutMesh:
     facet = _facets(mesh, np.concatenate([ends_of_node, ends])[used][kept.boundary])
     patches = {}
     for name, facets in mesh.patches.items():
-        chosen = are_among(mesh.boundary, facets)
-        patches[name] = kept.boundary[chosen[facet] & (facet >= 0)]
+        left = are_among(mesh.boundary, facets)[facet] & (facet >= 0)
+        if left.any():
+            patches[name] = kept.boundary[left]
     return CutMesh(kept.with_patches(patches), facet)
 
 

@@ -1,4 +1,7 @@
-"""Paths planned by another program, as a strategy that lays them unchanged."""
+"""Paths planned by another program, as a strategy that lays them unchanged.
+
+On curved layers they are moved onto the nearest one, which their files are near only.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -8,6 +11,7 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
+from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.strategy import Amount
 from ccfem.paths.toolpaths import Toolpaths
@@ -32,7 +36,6 @@ class GivenPaths:
     toolpaths: Toolpaths
     source: str = ""
 
-    flat_layers_only: ClassVar[bool] = True
     amount: ClassVar[Amount] = Amount("", 1.0, 1.0)
     crosses: ClassVar[bool] = True
     folds: ClassVar[bool] = True
@@ -68,7 +71,7 @@ class GivenPaths:
             raise InputError(
                 f"{self.source or 'given paths'}: path {worst} spans {high[worst] - low[worst]:.3g}"
                 " mm along the build direction, so it lies in no flat layer: give flat paths, in "
-                "the frame that they are in"
+                "the frame that they are in, or the slicing of their curved layers"
             )
         return np.asarray(0.5 * (low + high))
 
@@ -78,13 +81,15 @@ class GivenPaths:
         Parameters
         ----------
         layers : sequence of Layer
-            Flat layers.
+            Where one is curved, the points are moved onto the layer that is nearest to their path.
 
         Raises
         ------
         InputError
             When a path lies on none of them: farther from it than half its height.
         """
+        if any(layer.flat is None for layer in layers):
+            return self._on_curved(layers)
         heights = np.array([layer.plane.height for layer in layers])
         level = self._levels(layers[0].plane.frame[2])
         if not len(level):
@@ -103,3 +108,32 @@ class GivenPaths:
             )
         index = np.array([layer.index for layer in layers])[nearest]
         return replace(self, toolpaths=replace(self.toolpaths, layer=index))
+
+    def _on_curved(self, layers: Sequence[Layer]) -> "GivenPaths":
+        """Return these paths, each on the layer from which its points are least far on average."""
+        paths, start = self.toolpaths, self.toolpaths.offsets[:-1]
+        if not len(paths):
+            return self
+        size = np.diff(paths.offsets)
+        feet = [nearest_on_triangles(each.points, each.triangles, paths.points) for each in layers]
+        apart = np.stack([foot.distance for foot in feet])
+        nearest = (np.add.reduceat(apart, start, axis=1) / size).argmin(axis=0)
+        points, normals = np.empty_like(paths.points), np.empty_like(paths.points)
+        of_point = np.repeat(nearest, size)
+        for k, (layer, foot) in enumerate(zip(layers, feet, strict=True)):
+            here = of_point == k
+            a, b, c = np.moveaxis(layer.points[layer.triangles[foot.triangle[here]]], 1, 0)
+            normal = np.cross(b - a, c - a)
+            points[here] = foot.points[here]
+            normals[here] = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+        far = np.maximum.reduceat(apart[of_point, np.arange(len(of_point))], start)
+        off = far > 0.5 * np.array([layer.thickness for layer in layers])[nearest] + _SAME
+        if off.any():
+            path = int(np.flatnonzero(off)[0])
+            raise InputError(
+                f"{self.source or 'given paths'}: path {path} is up to {far[path]:.3g} mm from the "
+                f"nearest of {len(layers)} curved layers: name the frame that the paths are in, or "
+                "the slicing that they are for"
+            )
+        index = np.array([layer.index for layer in layers])[nearest]
+        return replace(self, toolpaths=replace(paths, points=points, normals=normals, layer=index))

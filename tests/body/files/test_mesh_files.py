@@ -7,9 +7,10 @@ import pytest
 import pyvista
 from hypothesis import given, settings, strategies as st
 
+from benchmarks.fuzz.mutants import bdf, medit, unv
 from ccfem.base.errors import InputError
 from ccfem.body.files import read_mesh, whole_file, write_mesh
-from ccfem.body.mesh import TetMesh
+from ccfem.body.mesh import TetMesh, box_mesh
 from ccfem.body.mesh.patches import Plane, match_boundary
 from ccfem.geometry.facets import are_among
 
@@ -232,10 +233,18 @@ GOOD_TET = "4 vertices\n1 tets\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n4 0 1 2 3\n"
         ("a.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n", "it holds no nodes"),
         ("a.vtu", "<xml/>", "not a VTK unstructured grid"),
         ("a.vtu", "<VTKFile type='UnstructuredGrid'><Unstr", "grid that can be read|no tetra"),
+        ("a.vtk", "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\n", "UNSTRUCTURED_GRID"),
+        ("a.vtk", "# vtk DataFile Version 3.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\n", "no points"),
+        ("a.unv", "something else", "holds no nodes .data set 2411."),
+        ("a.unv", "    -1\n  2411\n 1\n 1.0 x 2.0\n    -1\n", "data set 2411 is not as universal"),
+        ("a.bdf", "BEGIN BULK\nGRID,1,,0.,0.,x\nCTETRA,1,1,1,2,3,4\n", "not a mesh|no tetra"),
+        ("a.nas", "SystemCall 'touch made';", "not a mesh that Gmsh can read|no tetra"),
+        ("a.med", "\x89HDF", "not a mesh that Gmsh can read"),
+        ("a.mesh", "MeshVersionFormatted 2\nDimension\n3\nEnd\n", "it holds no nodes"),
         ("a.inp", "something else", "no .NODE"),
         ("a.inp", "*NODE\n*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n", "no .NODE with nodes"),
         ("a.npz", "PK nonsense", "not a mesh in a NumPy archive"),
-        ("a.step", "ISO-10303", "name must end in .inp, .msh, .npz, .tet, .vtu"),
+        ("a.step", "ISO-10303", r"must end in \.bdf, \.inp, \.med, \.mesh, \.msh, \.nas, "),
         ("a.stl", "solid a", "is a surface"),
         ("none/a.tet", None, "does not exist"),
     ],
@@ -249,6 +258,63 @@ def test_bad_files_are_one_line(tmp_path, name, content, message, capfd):
     assert "\n" not in str(caught.value)
     assert str(path) in str(caught.value)
     assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "order", "named"),
+    [
+        *(("box.unv", 1, True), ("box.UNV", 2, True), ("box.bdf", 1, False)),
+        *(("box.nas", 1, False), ("box.mesh", 1, False)),
+    ],
+)
+def test_meshes_of_other_programs(tmp_path, name, order, named):
+    # Written as their specifications say; groups without a name are called by their number.
+    if not named:
+        pytest.importorskip("gmsh")
+    box = box_mesh((3.0, 2.0, 1.0), (2, 2, 1))
+    box = box if order == 1 else box.quadratic()
+    path = tmp_path / name
+    writers = {".unv": unv, ".bdf": bdf, ".nas": bdf, ".mesh": medit}
+    path.write_text(writers[path.suffix.lower()](box))
+    names = dict(zip(box.patches, (box.patches if named else "123456"), strict=True))
+    patches = {names[patch]: facets for patch, facets in box.patches.items()}
+    same(read_mesh(path, check=False), TetMesh(box.points, box.cells, patches))
+
+
+def test_groups_of_nodes_in_a_universal_file(tmp_path):
+    # Two triangles of x_min, once as elements and once by their four nodes (members of kind 7).
+    box, path = box_mesh((3.0, 2.0, 1.0), (2, 1, 1)), tmp_path / "box.unv"
+    nodes = np.unique(box.patch("x_min")) + 1
+    rows = [f"{7:10d}{node:10d}{0:10d}{0:10d}" for node in nodes]
+    group = [f"{9:10d}" + 6 * f"{0:10d}" + f"{len(rows):10d}", "corners"]
+    group += ["".join(rows[i : i + 2]) for i in range(0, len(rows), 2)]
+    path.write_text(unv(box) + "\n".join(["    -1", "  2477", *group, "    -1"]) + "\n")
+    mesh = read_mesh(path)
+    assert facets_as_set(mesh.patch("corners")) == facets_as_set(box.patch("x_min"))
+    assert facets_as_set(mesh.patch("x_min")) == facets_as_set(box.patch("x_min"))
+
+
+def test_a_mesh_of_salome(tmp_path):
+    gmsh = pytest.importorskip("gmsh")
+    path = tmp_path / "box.med"
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.model.occ.addBox(0.0, 0.0, 0.0, 6.0, 3.0, 2.0)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(3, [1], name="body")
+        gmsh.model.addPhysicalGroup(2, [1], name="held")  # at x = 0
+        gmsh.model.mesh.generate(3)
+        gmsh.write(str(path))
+    finally:
+        gmsh.finalize()
+    mesh = read_mesh(path)
+    assert mesh.volumes.sum() == pytest.approx(36.0)
+    assert set(mesh.patches) == {"held"}
+    corners = mesh.points[mesh.patch("held")]
+    assert not corners[:, :, 0].any()
+    sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert 0.5 * np.linalg.norm(sides, axis=1).sum() == pytest.approx(6.0)
 
 
 def test_good_tet_reads(tmp_path):

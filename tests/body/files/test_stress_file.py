@@ -155,18 +155,81 @@ def test_arrays_of_other_programs(field, tmp_path):
     )
     grid.cell_data["S"] = 1e6 * field.stress.reshape(-1, 9)
     grid.save(tmp_path / "full.vtu")
-    given = read_stress(tmp_path / "full.vtu", mesh, "Pa", "S")
-    np.testing.assert_allclose(given.stress, field.stress, rtol=1e-12, atol=1e-12)
+    for array, said in (("S", ""), (None, "of full.vtu the array S is taken")):
+        given = read_stress(tmp_path / "full.vtu", mesh, "Pa", array)
+        np.testing.assert_allclose(given.stress, field.stress, rtol=1e-12, atol=1e-12)
+        assert given.assumed.replace("'", "") == said
     with pytest.raises(InputError, match="does not say the unit of its stress"):
         read_stress(tmp_path / "full.vtu", mesh, array="S")
-    with pytest.raises(InputError, match=r"no array 'stress'; there are: S: .* --stress-array"):
-        read_stress(tmp_path / "full.vtu", mesh, "MPa")
+    with pytest.raises(InputError, match=r"no array 'T'; there are: S: .* --stress-array"):
+        read_stress(tmp_path / "full.vtu", mesh, "MPa", "T")
     with pytest.raises(InputError, match="unit of stress must be"):
         read_stress(tmp_path / "full.vtu", mesh, "psi", "S")
     grid.cell_data["S"] = np.ones((len(mesh.cells), 6))
     grid.save(tmp_path / "unnamed.vtu")
-    with pytest.raises(InputError, match="must name the components xx, yy"):
+    with pytest.raises(InputError, match="six components without names: give their order"):
         read_stress(tmp_path / "unnamed.vtu", mesh, "MPa", "S")
+    with pytest.raises(InputError, match="must name the components xx, yy"):
+        read_stress(tmp_path / "unnamed.vtu", mesh, "MPa", "S", components="xx,yy,zz,xy,yz")
+    grid.cell_data["sigma"] = grid.cell_data["S"]
+    grid.save(tmp_path / "two.vtu")
+    with pytest.raises(InputError, match="several arrays like 'stress'; there are: S, sigma: name"):
+        read_stress(tmp_path / "two.vtu", mesh, "MPa")
+
+
+IN_VTK = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "yz": (1, 2), "xz": (0, 2)}
+
+
+def legacy(path, mesh, data):
+    """Write a legacy VTK file as text: scalars, and arrays of six without names."""
+    kind, corners = (10, 4) if mesh.order == 1 else (24, 10)
+    lines = ["# vtk DataFile Version 3.0", "results", "ASCII", "DATASET UNSTRUCTURED_GRID"]
+    lines += [f"POINTS {len(mesh.points)} double", *(" ".join(map(repr, map(float, p)))
+              for p in mesh.points)]  # fmt: skip
+    lines.append(f"CELLS {len(mesh.cells)} {(corners + 1) * len(mesh.cells)}")
+    lines += [f"{corners} {' '.join(map(str, nodes))}" for nodes in mesh.cells]
+    lines += [f"CELL_TYPES {len(mesh.cells)}", *[str(kind)] * len(mesh.cells)]
+    lines += [f"POINT_DATA {len(mesh.points)}", f"FIELD FieldData {len(data)}"]
+    for name, values in data.items():
+        rows = np.asarray(values).reshape(len(mesh.points), -1)
+        lines.append(f"{name.replace(' ', '%20')} {rows.shape[1]} {len(rows)} double")
+        lines += [" ".join(map(repr, map(float, row))) for row in rows]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def test_six_components_without_names_in_a_legacy_file(field, tmp_path):
+    # As ccx2paraview converts them: S of CalculiX in its order xx, yy, zz, xy, yz, zx.
+    path, nodal = tmp_path / "part.vtk", field.nodal
+    legacy(path, field.mesh, {"S": np.stack([nodal[:, i, j] for i, j in IN_VTK.values()], axis=1)})
+    given = read_stress(path, field.mesh, "MPa", components="xx, yy, zz, xy, yz, zx")
+    np.testing.assert_array_equal(given.nodal, nodal)
+    mesh = read_mesh(path, check=False)
+    np.testing.assert_array_equal(mesh.cells, field.mesh.cells)
+    np.testing.assert_array_equal(mesh.points, field.mesh.points)
+    path.write_text("# vtk DataFile Version 3.0\nresults\nASCII\nDATASET POLYDATA\n")
+    with pytest.raises(InputError, match="and have DATASET UNSTRUCTURED_GRID"):
+        read_mesh(path)
+
+
+@pytest.mark.parametrize("suffix", [".vtk", ".vtu"])
+def test_results_of_freecad_are_in_pascal_and_a_component_each(field, tmp_path, suffix):
+    # Their names and the factor 10^6: FemVTKTools.cpp of FreeCAD 1.0.
+    path, mesh = tmp_path / f"part{suffix}", field.mesh
+    data = {f"Stress {c} component": 1e6 * field.nodal[:, i, j] for c, (i, j) in IN_VTK.items()}
+    data |= {"Strain xx component": 0.0 * data["Stress xx component"], "von Mises Stress": data[
+        "Stress xx component"]}  # fmt: skip
+    if suffix == ".vtk":
+        legacy(path, mesh, data)
+    else:
+        grid = pyvista.UnstructuredGrid({10 if mesh.order == 1 else 24: mesh.cells}, mesh.points)
+        grid.point_data.update(data)
+        grid.save(path)
+    given = read_stress(path, mesh)
+    np.testing.assert_allclose(given.nodal, field.nodal, rtol=1e-12, atol=1e-12)
+    assert given.assumed == f"the stress of {path.name} is taken for Pa, as FreeCAD writes it"
+    given = read_stress(path, mesh, "kPa")
+    np.testing.assert_allclose(given.nodal, 1e3 * field.nodal, rtol=1e-12, atol=1e-9)
+    assert given.assumed == ""
 
 
 @pytest.mark.filterwarnings("error")
@@ -192,7 +255,7 @@ def test_stress_on_another_mesh_is_refused(written, field):
         read_stress(written, box_mesh((61.0, 24.0, 4.0), (20, 8, 2)))
     with pytest.raises(InputError, match="holds stress in MPa; got the unit Pa"):
         read_stress(written, field.mesh, "Pa")
-    with pytest.raises(InputError, match=r"read from \.vtu, \.frd or \.csv"):
+    with pytest.raises(InputError, match=r"read from \.vtu, \.vtk, \.frd or"):
         read_stress(written.rename(written.with_suffix(".odb")), field.mesh)
 
 
@@ -441,7 +504,7 @@ def test_stress_of_several_steps(tmp_path, results, headings, step, times, said)
 def test_what_a_file_has_no_choice_of_is_refused(tmp_path, results, field, written):
     (tmp_path / "part.frd").write_text(results[0])
     with pytest.raises(
-        InputError, match=r"only \.vtu files .* array 'S' .* leave --stress-array out"
+        InputError, match=r"only \.vtu and \.vtk files .* array 'S' .* leave --stress-array out"
     ):
         read_stress(tmp_path / "part.frd", results[1], array="S")
     with pytest.raises(

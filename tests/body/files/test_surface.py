@@ -1,3 +1,5 @@
+import zipfile
+
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
@@ -27,6 +29,81 @@ def test_surfaces_read(box, tmp_path, suffix):
     assert surface.volume == pytest.approx(6000.0)
     assert len(surface.triangles) == len(triangles)
     assert len(surface.points) == len(points)
+
+
+CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+PRODUCTION = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06"
+
+
+def in_3mf(path, models):
+    """Write an archive of models, of which the first is that to start from."""
+    with zipfile.ZipFile(path, "w") as archive:
+        first = next(iter(models))
+        archive.writestr(
+            "_rels/.rels",
+            f'<Relationships><Relationship Id="r" Target="/{first}" '
+            f'Type="{CORE}/3dmodel"/></Relationships>',
+        )
+        for name, (unit, objects, items) in models.items():
+            archive.writestr(
+                name,
+                f'<?xml version="1.0"?><model unit="{unit}" xmlns="{CORE}" xmlns:p="{PRODUCTION}">'
+                f"<resources>{objects}</resources><build>{items}</build></model>",
+            )
+    return path
+
+
+def mesh_object(number, points, triangles):
+    """Object of a 3MF file with a mesh."""
+    rows = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in np.asarray(points).tolist())
+    sides = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in triangles.tolist())
+    return (
+        f'<object id="{number}" type="model"><mesh><vertices>{rows}</vertices>'
+        f"<triangles>{sides}</triangles></mesh></object>"
+    )
+
+
+def test_a_3mf_file_is_what_it_builds(box, tmp_path):
+    # Boxes of 3 x 2 x 1 inch: one turned by 90 degrees about z and moved by 5 inch along x, one
+    # from another model of the archive by a component at twice its size, 10 inch up. Transforms
+    # hold rows of a matrix that points are multiplied with from the left (Core Specification 3.3).
+    points, triangles = box_surface(box)
+    other = '<object id="7"><components><component objectid="3" p:path="/3D/other.model" '
+    other += 'transform="2 0 0 0 2 0 0 0 2 0 0 10"/></components></object>'
+    items = '<item objectid="1" transform="0 1 0 -1 0 0 0 0 1 5 0 0"/><item objectid="7"/>'
+    path = in_3mf(tmp_path / "plate.3mf", {
+        "3D/3dmodel.model": ("inch", mesh_object(1, points, triangles) + other, items),
+        "3D/other.model": ("inch", mesh_object(3, points, triangles), ""),
+    })  # fmt: skip
+    surface = read_surface(path)
+    assert surface.volume == pytest.approx((6.0 + 48.0) * 25.4**3)
+    low, high = surface.points.min(axis=0) / 25.4, surface.points.max(axis=0) / 25.4
+    np.testing.assert_allclose([low, high], [[0.0, 0.0, 0.0], [6.0, 4.0, 12.0]], atol=1e-12)
+    turned = surface.points[surface.points[:, 2] < 2.0 * 25.4] / 25.4
+    np.testing.assert_allclose(turned.min(axis=0), [3.0, 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(turned.max(axis=0), [5.0, 3.0, 1.0], atol=1e-12)
+
+
+def test_3mf_files_that_cannot_be_read_are_one_line(box, tmp_path):
+    points, triangles = box_surface(box)
+    good = mesh_object(1, points, triangles)
+    loop = '<object id="1"><components><component objectid="1"/></components></object>'
+    for objects, item, said in (
+        (good, "2", "object 2 is not there"),
+        (good.replace('v1="', 'v1="99'), "1", "a triangle names a point that is not there"),
+        (good.replace('x="0.0"', 'x="wide"'), "1", "could not convert string to float"),
+        (loop, "1", "object 1 is not there, or a part of itself"),
+        ('<object id="1"/>', "1", "it builds no object with triangles"),
+    ):
+        path = in_3mf(
+            tmp_path / "a.3mf", {"3D/m.model": ("meter", objects, f'<item objectid="{item}"/>')}
+        )
+        with pytest.raises(InputError, match=f"not a surface that can be read: .*{said}") as caught:
+            read_surface(path)
+        assert "\n" not in str(caught.value)
+    path.write_text("no archive")
+    with pytest.raises(InputError, match="not a surface that can be read: File is not a zip file"):
+        read_surface(path)
 
 
 @pytest.mark.filterwarnings("error")
@@ -91,7 +168,7 @@ def test_a_turned_triangle_is_named(box):
         ("a.stl", "", "is not a surface"),
         ("a.obj", "v 0 0 0\n", "is not a surface"),
         ("a.ply", "ply\nformat ascii 1.0\n", "is not a surface"),
-        ("a.step", "", "must end in .obj, .ply, .stl"),
+        ("a.step", "", "must end in .3mf, .obj, .ply, .stl"),
         ("a.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "finite|not a surface"),
     ],
 )

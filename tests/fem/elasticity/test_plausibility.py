@@ -314,3 +314,10 @@ def test_shipped_cases_are_not_accused(name, parameters):
         assert about_problem(problem, held(problem)) == ()
     for field in solve(case.problem).values():
         assert not [line for line in field.findings if "estimated error" not in line]
+
+
+def test_a_patch_inside_the_part_is_told_from_an_unknown_one():
+    mesh = box_mesh((2.0, 1.0, 1.0), (2, 1, 1)).with_patches({"inner": np.zeros((0, 3), np.int64)})
+    for support, said in (("inner", "patch 'inner' is empty: .* group inside"), ("in", "no patch")):
+        with pytest.raises(InputError, match=said):
+            Problem(mesh, isotropic(1.0, 0.3), (Support(support),), {"pull": (pulled(1.0),)})

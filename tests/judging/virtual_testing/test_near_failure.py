@@ -151,6 +151,18 @@ def test_shares_of_balls_are_the_transpose_of_their_averages():
     assert (slopes * averages).sum() == pytest.approx((shares * values).sum(), rel=1e-12)
 
 
+@pytest.mark.parametrize("size", [8.0, 3000.0])
+def test_averages_over_balls_of_parts_of_any_size(size):
+    # Groups of points within a millimetre, in a part of 3 m as of 8 mm: beside each distance.
+    rng = np.random.default_rng(7)
+    points = (size * rng.random((60, 1, 3)) + rng.random((60, 5, 3))).reshape(-1, 3)
+    values, weights = rng.standard_normal((300, 2)), 0.1 + rng.random(300)
+    near = np.linalg.norm(points[:, None] - points, axis=2) <= 1.5
+    expected = (near * weights) @ values / (near @ weights)[:, None]
+    found = ball_averages(points, values, weights, np.arange(300), 1.5)
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
 def test_the_largest_index_counts_most_and_equal_ones_alike():
     zero = np.zeros((1, 3))
     factors = {"fibre": 2.0, "matrix": 1.0}

@@ -1,6 +1,11 @@
-"""Gmsh ``.msh`` meshes, versions 2.2 and 4.1, text or binary: meshio in a process of its own."""
+"""Gmsh ``.msh`` meshes, versions 2.2 and 4.1, text or binary: meshio in a process of its own.
 
+What Gmsh itself reads of other programs, it reads likewise.
+"""
+
+import importlib.util
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -28,6 +33,32 @@ def read(path: Path) -> TetMesh:
             f"{path} is not a Gmsh mesh that can be read ({error}): save it again as version 4.1, "
             "without all elements (Mesh.SaveAll = 0)"
         ) from None
+    return _with_groups(arrays, path)
+
+
+def read_by_gmsh(path: Path) -> TetMesh:
+    """Read a mesh of another program that Gmsh knows: MED, Nastran, Medit.
+
+    Groups of triangles become patches by their name; those of Nastran and Medit have none and are
+    called by the number of their property or region.
+    """
+    if importlib.util.find_spec("gmsh") is None:
+        raise InputError(
+            f"{path}: {path.suffix} files are read by Gmsh, which is not installed: pip install "
+            "'ccfem[cad]', or give the mesh as .msh or .vtu"
+        )
+    try:
+        arrays = read_isolated("gmsh_files:read_other", path)
+    except ChildError as error:
+        raise InputError(
+            f"{path} is not a mesh that Gmsh can read ({error}): export it again, or as .msh or "
+            ".vtu"
+        ) from None
+    return _with_groups(arrays, path)
+
+
+def _with_groups(arrays: dict[str, Any], path: Path) -> TetMesh:
+    """Mesh with patches of arrays as `ccfem.body.isolated.gmsh_files` returns them."""
     parts = {name: name.split(":", 2) for name in arrays}
     blocks = {p[1]: (p[2], arrays[name]) for name, p in parts.items() if p[0] == "cells"}
     mesh = TetMesh(arrays["points"][:, :3], tetrahedra(blocks.values(), path))

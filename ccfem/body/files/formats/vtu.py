@@ -1,4 +1,4 @@
-"""VTK unstructured grids (``.vtu``): read by VTK in a process of its own."""
+"""VTK unstructured grids (``.vtu``, legacy ``.vtk``): read by VTK in a process of its own."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -86,10 +86,14 @@ def read_grid(path: Path) -> Grid:
     """Read an unstructured grid."""
     with path.open("rb") as file:
         start = file.read(4096)
-    if b"<VTKFile" not in start or b"UnstructuredGrid" not in start:
-        raise InputError(
-            f"{path} is not a VTK unstructured grid: it must hold <VTKFile type='UnstructuredGrid'>"
-        )
+    if path.suffix.lower() == ".vtk":
+        marks, must = (b"# vtk DataFile", b"UNSTRUCTURED_GRID"), "begin with '# vtk DataFile' and "
+        must += "have DATASET UNSTRUCTURED_GRID"
+    else:
+        marks = (b"<VTKFile", b"UnstructuredGrid")
+        must = "hold <VTKFile type='UnstructuredGrid'>"
+    if not all(mark in start for mark in marks):
+        raise InputError(f"{path} is not a VTK unstructured grid: it must {must}")
     try:
         arrays = read_isolated("vtk_files:read_grid", path)
     except ChildError as error:
