@@ -333,8 +333,11 @@ class Request:
                 )
             return cls(case, strategies, named_slicings(slicings), amount, **more)
         given = [strategy for strategy in strategies.values() if isinstance(strategy, GivenPaths)]
-        if given and layers is None:
-            layers = tuple(given[0].heights(plane_frame(case.build)[2]).tolist())
+        up = plane_frame(case.build)[2]
+        # Paths that are not flat belong to the part's own layers where these are curved.
+        flat = isinstance(case.slicing, Planar) or all(paths.are_flat(up) for paths in given)
+        if given and layers is None and flat:
+            layers = tuple(given[0].heights(up).tolist())
         slicing = Slicing(None if layers is None else as_slicer(layers))
         return cls(case, strategies, {"": slicing}, amount, **more)
 

@@ -59,13 +59,24 @@ class GivenPaths:
         """
         return np.unique(self._levels(np.asarray(direction, dtype=np.float64)).round(3))
 
+    def are_flat(self, direction: FloatArray) -> bool:
+        """Whether every path lies in a plane across a direction, (3,)."""
+        low, high = self._reach(direction)
+        return bool((high - low <= 2.0 * _SAME).all())
+
+    def _reach(self, direction: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest place of each path along a direction, mm."""
+        paths, start = self.toolpaths, self.toolpaths.offsets[:-1]
+        level = paths.points @ direction
+        if not len(paths):
+            return level, level
+        return np.minimum.reduceat(level, start), np.maximum.reduceat(level, start)
+
     def _levels(self, direction: FloatArray) -> FloatArray:
         """Height of each path, mm."""
-        paths, start = self.toolpaths, self.toolpaths.offsets[:-1]
-        if not len(paths):
-            return np.zeros(0)
-        level = paths.points @ direction
-        low, high = np.minimum.reduceat(level, start), np.maximum.reduceat(level, start)
+        low, high = self._reach(direction)
+        if not len(low):
+            return low
         worst = int((high - low).argmax())
         if high[worst] - low[worst] > 2.0 * _SAME:
             raise InputError(

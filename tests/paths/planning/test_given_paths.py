@@ -8,10 +8,12 @@ import pytest
 import ccfem
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import box_mesh
+from ccfem.comparison.request import Request
 from ccfem.fem.elasticity import Force, Problem, Support
 from ccfem.fem.materials import isotropic
 from ccfem.paths.planning import GivenPaths
 from ccfem.printing.export.path_table import read_paths
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.slicing.slicers.surfaces import Surfaces
 from ccfem.strategies import create
 
@@ -123,3 +125,9 @@ def test_paths_on_curved_layers_are_judged(tmp_path):
     assert run.evaluation.total["fibre_length"] == pytest.approx(6.0 * length, rel=1e-4)
     with pytest.raises(InputError, match=r"lies in no flat layer: .* slicing of their curved"):
         ccfem.compare(case, given, strand=None)
+    # Where the part's own layers are curved, those are meant; flat paths say their heights.
+    sliced = replace(case, slicing=Surfaces(str(tmp_path)))
+    assert Request.of(sliced, given).slicings[""].slicer is None
+    paths = given["given"].toolpaths
+    low = GivenPaths(replace(paths, points=paths.points * [1.0, 1.0, 0.0] + [0.0, 0.0, 0.5]))
+    assert Request.of(sliced, {"low": low}).slicings[""].slicer == Planar(heights=(0.5,))
