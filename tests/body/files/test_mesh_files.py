@@ -253,6 +253,8 @@ def test_bad_files_are_one_line(tmp_path, name, content, message, capfd):
     path = tmp_path / name
     if content is not None:
         path.write_text(content)
+    if path.suffix in (".bdf", ".nas", ".med", ".mesh"):
+        pytest.importorskip("gmsh")
     with pytest.raises(InputError, match=message) as caught:
         read_mesh(path)
     assert "\n" not in str(caught.value)

@@ -117,6 +117,7 @@ def test_a_slit_that_is_closed_is_said():
     assert 4.0 * fit.envelope < fit.deviation < 2.1
     (said,) = fit.doubts
     assert said.endswith("thinner than 0.34 mm may be lost: widen them, or take mesher = 'gmsh'")
+    pytest.importorskip("gmsh")
     mesh, fit, who = fill(surface, 6.0)
     assert (who, fit.doubts) == ("Gmsh", ())
     assert mesh.volumes.sum() == pytest.approx(surface.volume)
