@@ -98,7 +98,7 @@ def in_processes(
     ------
     Exception
         The first that `work` raises, in the order of the items.
-    RuntimeError
+    InputError
         When a process ends before its work, as where memory runs out.
     """
     arguments = list(zip(*items, strict=True))
@@ -202,9 +202,9 @@ def _in_order(ends: Sequence[Connection], count: int) -> Iterator[bytes]:
                 try:
                     outcomes[asked.pop(end)] = end.recv_bytes()
                 except EOFError:
-                    raise RuntimeError(
+                    raise InputError(
                         "a process ended before its work, as where memory runs out: set "
-                        "CCFEM_THREADS=1"
+                        "CCFEM_THREADS=1, which needs less"
                     ) from None
                 following = next(numbers, None)
                 if following is not None:

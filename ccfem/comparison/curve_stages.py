@@ -67,9 +67,7 @@ def along_curve(
         asked = _asked(reach, lengths)
         tell(f"planning {reach.run.name} along the curve")
         planned = _planned(reach, asked, part)
-        done = in_processes(
-            lambda run: tested(evaluated(run, part), part), planned, shared=[part, tested]
-        )
+        done = in_processes(judged, planned, shared=[part, tested])
         points[reach.run.name] = tuple(zip(asked, done, strict=True))
     return Curve(lengths, points)
 

@@ -18,6 +18,7 @@ from threadpoolctl import threadpool_limits
 
 from ccfem.base.checks import refuse_keywords
 from ccfem.base.errors import InputError
+from ccfem.base.parallel import processors
 from ccfem.base.progress import Progress, silent
 from ccfem.cases.case import Case
 from ccfem.cases.load_cases import weighted_cases
@@ -237,6 +238,7 @@ def answer(
         When the solve misses its tolerance.
     """
     seconds: dict[str, float] = {}
+    processors()  # a wrong number is refused here, not as the failure of a strategy
     progress(f"solving {request.case.name}", 0.0)
     basis = solved(request, seconds) if known is None else known
     refused: dict[str, str] = {}

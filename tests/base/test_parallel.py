@@ -112,7 +112,7 @@ def test_a_process_that_is_killed_is_named(two):
             os.kill(os.getpid(), 9)
         return number
 
-    with pytest.raises(RuntimeError, match="a process ended before its work"):
+    with pytest.raises(InputError, match="a process ended before its work"):
         list(in_processes(work, [0, 1, 2]))
 
 

@@ -587,3 +587,11 @@ def test_results_are_the_same_for_any_number_of_processors(monkeypatch):
             one.tested.bracket.tension.solution.displacement,
             two.tested.bracket.tension.solution.displacement,
         )
+
+
+def test_a_wrong_number_of_processors_is_refused_before_anything_is_solved(monkeypatch):
+    monkeypatch.setenv("CCFEM_THREADS", "two")
+    said = []
+    with pytest.raises(InputError, match="CCFEM_THREADS is a whole number, 1 or more; got 'two'"):
+        compare(strip(), ["zigzag"], progress=lambda what, share: said.append(what))
+    assert said == []
