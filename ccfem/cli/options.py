@@ -154,8 +154,8 @@ StressFile = Annotated[
     typer.Option(
         "--stress",
         metavar="FILE",
-        help="Plan and evaluate on the stress of another program on the same mesh: .vtu with an "
-        "array of tensors, .frd of CalculiX, or .csv by element or node.",
+        help="Plan and evaluate on the stress of another program on the same mesh: .vtu or .vtk "
+        "with an array of tensors, .frd of CalculiX, or .csv by element or node.",
     ),
 ]
 StressUnit = Annotated[
