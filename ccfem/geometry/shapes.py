@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.arrays import FloatArray, IntArray, repeated
 from ccfem.geometry.polylines import pack
 
 Region: TypeAlias = shapely.Polygon | shapely.MultiPolygon
@@ -34,6 +34,28 @@ def open_lines(shapes: shapely.Geometry | Shapes) -> list[FloatArray]:
             if part.geom_type == "LineString" and part.length > 0.0
         ]
     return lines
+
+
+def bends(line: FloatArray, kept: IntArray, tolerance: float) -> IntArray:
+    """Points of a polyline (n, 2), n > 1, between which it is straight to a tolerance, mm.
+
+    Parameters
+    ----------
+    kept : (k,) int array
+        Inner points that stay whatever the line does there, in their order.
+
+    Returns
+    -------
+    (m,) int array
+        Indices of points: both ends, those kept, and the bends between them.
+    """
+    first, last = np.append(0, kept), np.append(kept, len(line) - 1)
+    piece, number = repeated(last - first + 1)
+    index = first[piece] + number
+    # The index of a point rides along as its third coordinate.
+    drawn = shapely.linestrings(np.column_stack([line[index], index]), indices=piece)
+    simple = shapely.simplify(drawn, tolerance, preserve_topology=False)
+    return np.unique(shapely.get_coordinates(simple, include_z=True)[:, 2].astype(np.int64))
 
 
 # Sections reduced to their corners, so that equal layers of a part are exactly equal.

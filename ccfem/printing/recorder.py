@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray
+from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.geometry.polylines import subdivide
+from ccfem.geometry.shapes import bends
 from ccfem.machine.machine import Machine
 from ccfem.printing.laid_layer import COORDINATE_DIGITS
 from ccfem.printing.moves import FEED, LAY, TRAVEL, Moves, role
@@ -11,6 +12,8 @@ from ccfem.printing.moves import FEED, LAY, TRAVEL, Moves, role
 _FEED_DIGITS = 5
 """Decimals of what is fed, mm."""
 _SAME = 1e-9
+_STRAIGHT = 1.5 * 10.0**-COORDINATE_DIGITS
+"""Distance from a straight line, mm, within which rounded points lie on it."""
 _LEVEL = 0.1
 """Cosine of the tilt below which a head's own axis leads too far aside to leave along it."""
 
@@ -117,13 +120,18 @@ class Recorder:
         what: str,
         beside: FloatArray | None = None,
     ) -> None:
-        """Move along a line (n, 3) from its start, feeding so much per mm of each step (n - 1,)."""
-        index = np.arange(len(line) - 1)
-        if len(feed) and feed.max() > 0.0:
+        """Move along a line (n, 3) from its start, feeding so much per mm of each step (n - 1,).
+
+        Steps on one straight line that are laid alike are one move, as far as firmware can feed.
+        """
+        alike = [speeds, feed, widths, heights, *([] if beside is None else [beside])]
+        kept = _ends_of_moves(line, normals, np.column_stack(alike))
+        line, normals, index = line[kept], normals[kept], kept[:-1]
+        if len(index) and feed.max() > 0.0:
             ends, longest = np.array([0, len(line)]), self.machine.gcode.longest_feed
             line, _, step = subdivide(line, ends, longest / float(feed.max()))
             line = line.round(COORDINATE_DIGITS)
-            normals, index = normals[step], step[:-1]
+            normals, index = normals[step], index[step[:-1]]
         steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
         # Rounded in sum, so that no feed is lost however short the steps are.
         fed = np.diff(np.append(0.0, np.cumsum(feed[index] * steps)).round(_FEED_DIGITS))
@@ -184,3 +192,14 @@ class Recorder:
         names = ["tool", "feed", "beside", "speed", "width", "height", "amount", "role", "layer"]
         columns = dict(zip([*names, "strand"], table[:, 7:].T, strict=True))
         return Moves(event=table[:, 0], place=table[:, 1:4], normal=table[:, 4:7], **columns)
+
+
+def _ends_of_moves(line: FloatArray, normals: FloatArray, alike: FloatArray) -> IntArray:
+    """Points of a line (n, 3) where a move ends: its bends, and where values (n - 1, k) change.
+
+    Lines that are not level keep all points: the head turns along them.
+    """
+    if (normals[:, 2] < 1.0 - _SAME).any() or np.ptp(line[:, 2]) > 0.0:
+        return np.arange(len(line))
+    changes = np.flatnonzero((alike[1:] != alike[:-1]).any(axis=1)) + 1
+    return bends(line[:, :2], changes, _STRAIGHT)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 
 from ccfem.machine import Machine
 from ccfem.printing.moves import FEED, LAY
@@ -45,3 +46,32 @@ def test_the_melt_stands_at_the_nozzle_where_a_line_begins(retract, tool_retract
         before = event
     assert begins == 4
     assert drawn == pytest.approx(-retract)
+
+
+def test_steps_on_a_straight_line_are_one_move():
+    """A quarter circle between two straight lines, in steps of about half a millimetre."""
+    machine = Machine()
+    arc = np.linspace(0.0, 0.5 * np.pi, 61)
+    plane = np.concatenate(
+        [
+            np.column_stack([np.linspace(-40.0, 0.0, 81)[:-1], np.zeros(80)]),
+            np.column_stack([20.0 * np.sin(arc), 20.0 - 20.0 * np.cos(arc)]),
+            np.column_stack([np.full(80, 20.0), np.linspace(20.0, 60.0, 81)[1:]]),
+        ]
+    )
+    path = np.column_stack([plane, np.full(len(plane), 0.4)]).round(3)
+    speeds = np.full(len(path) - 1, 10.0)
+    speeds[20:] = 12.0
+    up, full = np.broadcast_to([0.0, 0.0, 1.0], path.shape), np.ones(len(speeds))
+    recorder = Recorder(machine)
+    recorder.travel(path[0], up[0])
+    recorder.lay(path, up, speeds, 0.05 * full, full, 0.4 * full, "fibre")
+    moves = recorder.moves()
+    laid = moves.event == LAY
+    # The arc needs its points; the lines around it are three moves, one of them slower.
+    assert laid.sum() == pytest.approx(60 + 3, abs=1)
+    assert moves.speed[laid][0] == 10.0
+    assert moves.length[laid][0] == pytest.approx(10.0)
+    walked = shapely.LineString(np.vstack([path[0], moves.place[laid]])[:, :2])
+    assert shapely.hausdorff_distance(walked, shapely.LineString(path[:, :2])) < 2e-3
+    assert moves.feed[laid].sum() == pytest.approx(0.05 * walked.length, abs=1e-4)
