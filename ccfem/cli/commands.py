@@ -26,6 +26,7 @@ from ccfem.cli.options import (
     Curve,
     Details,
     Drawings,
+    EveryLayer,
     Fibre,
     FibreInAll,
     Force,
@@ -54,6 +55,7 @@ from ccfem.cli.options import (
     StressFile,
     StressStep,
     StressUnit,
+    TestOrNot,
     VirtualTest,
 )
 from ccfem.cli.part_commands import add_part_commands
@@ -403,6 +405,7 @@ def compare(
     paths_frame: PathsFrame = None,
     curve: Curve = None,
     virtual_test: VirtualTest = True,
+    every_layer: EveryLayer = False,
     load_case: LoadCase = None,
     refine: Refine = False,
     calibration: Calibration = None,
@@ -457,6 +460,7 @@ def compare(
             stress=given,
             backend=backend,
             curve=curve,
+            every_layer=every_layer,
         )
 
     run(case, ask, Output(out, force, pictures, drawings_of(drawings), "", details))
@@ -473,7 +477,8 @@ def plan(
     slicing: Slicing = None,
     fibre_per_layer: Fibre = None,
     stiffness: Stiffness = None,
-    virtual_test: VirtualTest = True,
+    virtual_test: TestOrNot = None,
+    every_layer: EveryLayer = False,
     load_case: LoadCase = None,
     refine: Refine = False,
     calibration: Calibration = None,
@@ -501,7 +506,7 @@ def plan(
     """
 
     def ask() -> Any:
-        from ccfem.comparison.request import Request, named_strategies
+        from ccfem.comparison.request import LONGEST_TEST, Request, named_strategies
 
         parameters = parameters_by_strategy(set_ or (), strategy)
         cut = layers_of(layers, heights, slicing)
@@ -514,7 +519,8 @@ def plan(
             components=stress_components,
         )
         part = load(case, set_case, refine, machine, set_machine, set_fibre)
-        part, strand = calibrated(part, virtual_test, calibration)
+        part, strand = calibrated(part, virtual_test is not False, calibration)
+        untold = virtual_test is None and stiffness is None and load_case != "all"
         return Request.of(
             part,
             named_strategies(part, (strategy,), parameters),
@@ -528,6 +534,8 @@ def plan(
             backend=backend,
             print_plans=gcode,
             support=support,
+            every_layer=every_layer,
+            longest_test=LONGEST_TEST if untold else float("inf"),
         )
 
     output = Output(out, force, pictures, drawings_of(drawings), f"-{strategy}", details)

@@ -104,6 +104,22 @@ VirtualTest = Annotated[
         help="Re-solve the part with the fibres of each strategy in it.",
     ),
 ]
+TestOrNot = Annotated[
+    bool | None,
+    typer.Option(
+        "--virtual-test/--no-virtual-test",
+        help="Re-solve the part with the fibres in it; by default up to 3 km of fibre.",
+        show_default=False,
+    ),
+]
+EveryLayer = Annotated[
+    bool,
+    typer.Option(
+        "--every-layer",
+        help="Take every index on all layers; by default those that some layers tell (angles, "
+        "distances, coverage) on 60, evenly spread, where there are more.",
+    ),
+]
 Refine = Annotated[
     bool,
     typer.Option(

@@ -102,12 +102,16 @@ class Solved:
         Stress of another program to plan and evaluate on.
     tests : Tests, optional
         None if nothing is tested.
+    every_layer, longest_test
+        As of `Request`.
     """
 
     case: Case
     cases: WeightedCases
     given: GivenStress | None = None
     tests: Tests | None = None
+    every_layer: bool = False
+    longest_test: float = float("inf")
 
     @property
     def field(self) -> StressField:
@@ -151,7 +155,7 @@ class Solved:
         strand = None if self.tests is None else self.tests.strand
         said = slicer_remarks(chosen, stress)
         stack = tuple(layers)
-        about = (strand, case.build, below, propped, said)
+        about = (strand, case.build, below, propped, said, self.every_layer, self.longest_test)
         return Part(stress, stack, case.machine, self.cases, *about)
 
 
@@ -186,7 +190,7 @@ def solved(request: Request, seconds: dict[str, float] | None = None) -> Solved:
                            field.held_or_loaded, foreign.step, foreign.components)  # fmt: skip
         given = replace(read, material=field.material)
     if strand is None:
-        return Solved(case, cases, given)
+        return Solved(case, cases, given, None, request.every_layer)
     alternative = None
     if case.alternative_supports and len(cases) == 1:
         with timed(seconds, "solve, alternative supports"):
@@ -195,7 +199,7 @@ def solved(request: Request, seconds: dict[str, float] | None = None) -> Solved:
         if len(cases) > 1:
             specimens(cases, backend)  # one factorisation for all
         tests = Tests.of(field, alternative, strand, backend)
-    return Solved(case, cases, given, tests)
+    return Solved(case, cases, given, tests, request.every_layer, request.longest_test)
 
 
 def otherwise_held(case: Case, field: StressField, backend: str) -> StressField:

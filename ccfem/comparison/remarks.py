@@ -103,6 +103,12 @@ def _about(run: Run, wanted: Wanted, bounded: bool) -> list[str]:
         lines += run.strands.warnings
     if run.empty_layers and run.evaluation is not None:
         lines.append(f"no fibre on {run.empty_layers} of {len(run.evaluation.layers)} layers")
+    if run.evaluation is not None and run.evaluation.taken_on_some:
+        count, some = len(run.evaluation.layers), run.evaluation.taken_on_some
+        lines.append(
+            f"angles, distances and coverage are those of {some} of {count} layers, evenly "
+            "spread: --every-layer takes all"
+        )
     if run.note:
         placed = ", so it is placed below those that lay it" if off_length(run, wanted) else ""
         lines.append(f"{run.note}{placed}")
@@ -159,7 +165,7 @@ def _about_crossings(evaluation: Evaluation, meant: bool, bounded: bool) -> list
 def _about_open(evaluation: Evaluation) -> list[str]:
     """Name the layers that are left open by strands meant to fill a section, and how much."""
     cover = evaluation.values["coverage"][:-1]
-    open_ = np.flatnonzero(cover < _FULL)
+    open_ = np.flatnonzero(cover < _FULL)  # none of those where it was not taken
     if not len(open_):
         return []
     named = ", ".join(str(evaluation.layers[k]) for k in open_[:_NAMED])
@@ -185,9 +191,9 @@ def open_remarks(runs: Sequence[Run], layers: Sequence[Layer], width: float) -> 
         if run.evaluation is None or not _filling(run):
             continue
         cover = run.evaluation.values["coverage"][:-1]
-        worst = int(run.evaluation.layers[int(cover.argmin())])
+        worst = int(run.evaluation.layers[int(np.nanargmin(cover))])
         layer = next(candidate for candidate in layers if candidate.index == worst)
-        if cover.min() >= _FULL or layer.flat is None:
+        if np.nanmin(cover) >= _FULL or layer.flat is None:
             continue
         left = open_places(plane_paths(run.toolpaths, layer), width)
         largest = ", ".join(

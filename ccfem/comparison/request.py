@@ -147,6 +147,10 @@ Amount = Natural | Shortest | PerLayer | InAll | Stiffness | Spread
 
 SHORTEST = Shortest()
 
+LONGEST_TEST = 3e6
+"""Length of fibre, mm, up to which `ccfem plan` tests a plan virtually without being asked to: such
+a test takes about as long as the rest."""
+
 Wanted = float | InAll | None
 """Length of fibre that runs are held to: mm per layer, in total, or None if each lays its own."""
 
@@ -202,6 +206,11 @@ class Request:
         Also plan the print of the whole part, matrix and fibre, for every run.
     support : bool, default False
         Also print support below the part.
+    every_layer : bool, default False
+        Take all indices on every layer. By default those that some layers tell are taken on 60
+        layers, evenly spread, where there are more.
+    longest_test : float, mm, default infinite
+        Length of fibre above which a plan is not tested virtually.
 
     Raises
     ------
@@ -221,6 +230,8 @@ class Request:
     bound: bool = True
     print_plans: bool = False
     support: bool = False
+    every_layer: bool = False
+    longest_test: float = float("inf")
 
     def __post_init__(self) -> None:
         freeze(self, strategies=dict, slicings=dict)

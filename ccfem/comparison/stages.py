@@ -53,6 +53,9 @@ _UNLIKE = 1.3
 """Factor on the least length of all, on a few layers, above which a strategy is not planned to its
 own amount."""
 
+_MOST_LAYERS = 60
+"""Layers on which indices are taken that some of more layers tell."""
+
 _TOLERANCE = 1e-6
 """Relative residual of the virtual tests: the error of the stiffness is of its square."""
 
@@ -83,6 +86,10 @@ class Part:
         Printed below curved layers.
     propped : bool
         Whether support is printed below what flat layers would lay in air.
+    every_layer : bool
+        Whether all indices are taken on every layer.
+    longest_test : float, mm
+        Length of fibre above which a run is not tested virtually.
     remarks : tuple of str
         Of the slicer, one line each.
     """
@@ -96,6 +103,8 @@ class Part:
     support: SupportLayers | None = None
     propped: bool = False
     remarks: tuple[str, ...] = ()
+    every_layer: bool = False
+    longest_test: float = float("inf")
 
     @property
     def flat_layers(self) -> tuple[Layer, ...]:
@@ -114,6 +123,10 @@ class Part:
         layers = () if self.propped else self.flat_layers
         air = in_air(self.stress.mesh, self.machine, layers)
         return tuple(filter(None, (self.refusal, air)))
+
+    def tests(self, run: Run) -> bool:
+        """Whether a run is tested virtually."""
+        return self.strand is not None and run.toolpaths.lengths.sum() <= self.longest_test
 
     @property
     def several_cases(self) -> bool:
@@ -342,13 +355,14 @@ def evaluated(run: Run, part: Part) -> Run:
         return replace(run, failure=why)
 
     def work() -> Run:
-        evaluation = evaluate(
-            run.toolpaths, part.layers, part.stress, part.machine, part.strand, part.build
-        )
+        most = None if part.every_layer else _MOST_LAYERS
+        about = (part.layers, part.stress, part.machine, part.strand, part.build, most)
+        evaluation = evaluate(run.toolpaths, *about)
         # Who planned given paths is not known: their folds are no published pattern.
         given = isinstance(run.strategy, GivenPaths)
         by_design = not given and may_fold(run.strategy)
-        rules = strand_verdict(run.toolpaths, part.layers, part.machine, by_design)
+        what = (run.toolpaths, part.layers, part.machine, by_design)
+        rules = strand_verdict(*what, with_parts=part.tests(run))
         reasons = [
             *filter(None, [run.unprinted]),
             *part.why_not_printable,
@@ -426,6 +440,11 @@ def with_test(run: Run, part: Part, tests: Tests, span: Sequence[float] = RHO_SP
         return replace(run, untested=tests.refused)
     if run.evaluation is None:
         return run
+    if not part.tests(run):
+        metres = run.toolpaths.lengths.sum() / 1000.0
+        most = part.longest_test / 1000.0
+        why = f"{metres:.0f} m of fibre, above {most:.0f} m only by --virtual-test"
+        return replace(run, untested=why)
 
     def work() -> Run:
         mesh = tests.models[0][0].unreinforced.mesh

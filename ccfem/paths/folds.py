@@ -14,6 +14,7 @@ vertex spreads its turn as if a curve had been there. Planners are strict: they 
 it is, in a window that is `MARGIN` times as long, so that whoever counts folds finds none.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -146,6 +147,18 @@ class Folds:
         folded = np.zeros(len(self.lengths))
         np.add.at(folded, self.line, self.stop - self.start)
         return folded
+
+
+def joined_folds(of: Sequence[Folds]) -> Folds:
+    """Folds of several lots of polylines as those of all, lot after lot."""
+    number = np.cumsum([0, *(len(one.lengths) for one in of)])
+    return Folds(
+        np.concatenate([one.line + first for one, first in zip(of, number, strict=False)]),
+        *(
+            np.concatenate([getattr(one, name) for one in of])
+            for name in ("start", "stop", "lengths", "closed")
+        ),
+    )
 
 
 def folds(

@@ -170,7 +170,13 @@ class Toolpaths(Shown):
 
     def select(self, wanted: BoolArray) -> "Toolpaths":
         """Only the paths where the (K,) mask `wanted` is true."""
-        mask = np.repeat(np.asarray(wanted, dtype=bool), np.diff(self.offsets))
+        wanted = np.asarray(wanted, dtype=bool)
+        if wanted.all():
+            return self
+        chosen = np.flatnonzero(wanted)
+        if len(chosen) and chosen[-1] - chosen[0] + 1 == len(chosen):
+            return self._between(int(chosen[0]), int(chosen[-1]) + 1)
+        mask = np.repeat(wanted, np.diff(self.offsets))
         sizes = np.diff(self.offsets)[wanted]
         return replace(
             self,
@@ -181,6 +187,21 @@ class Toolpaths(Shown):
             kind=self.kind[wanted],
             closed=self.closed[wanted],
             link=self.link[mask],
+        )
+
+    def _between(self, first: int, last: int) -> "Toolpaths":
+        """Paths one after the other, which share their memory with all."""
+        paths = slice(first, last)
+        points = slice(int(self.offsets[first]), int(self.offsets[last]))
+        return replace(
+            self,
+            points=self.points[points],
+            normals=self.normals[points],
+            offsets=self.offsets[first : last + 1] - self.offsets[first],
+            layer=self.layer[paths],
+            kind=self.kind[paths],
+            closed=self.closed[paths],
+            link=self.link[points],
         )
 
     def on_layer(self, index: int) -> "Toolpaths":

@@ -211,12 +211,23 @@ def test_parts_of_strands_are_found_once_a_run(monkeypatch):
     """By the rules for strands; the virtual test takes them from there."""
     counted = []
 
-    def parts(*about):
-        counted.append(about)
-        return strand_parts(*about)
+    def parts(toolpaths, *about):
+        counted.append(len(toolpaths))
+        return strand_parts(toolpaths, *about)
 
     monkeypatch.setattr("ccfem.judging.evaluation.strand_rules.strand_parts", parts)
     monkeypatch.setattr("ccfem.judging.virtual_testing.strands.strand_parts", None)
     done = answer(Request.of(case_on("chen2021"), ["concentric"], natural=True, bound=False))
-    assert len(counted) == 1
+    assert sum(counted) == len(done.runs[0].toolpaths)
     assert done.runs[0].tested.bracket.tension.ratio > 1.0
+
+
+def test_plans_of_much_fibre_are_tested_on_demand():
+    asked = Request.of(case_on("chen2021"), ["concentric"], natural=True, longest_test=1e3)
+    done = answer(asked)
+    (run,) = done.runs
+    assert run.evaluation is not None
+    assert run.tested is None
+    assert run.untested.endswith("m of fibre, above 1 m only by --virtual-test")
+    assert not done.bounds
+    assert run.strand_verdict.parts is None

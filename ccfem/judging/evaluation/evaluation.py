@@ -1,13 +1,14 @@
 """The evaluator: every index of a set of paths, for each layer and in total."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
 
-from ccfem.base.arrays import FloatArray, IntArray, freeze
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.base.display import Shown
 from ccfem.base.errors import InputError
 from ccfem.base.parallel import in_processes
@@ -70,10 +71,10 @@ class Evaluation(Shown):
     layers : (L,) int array
         Index of each layer.
     values : mapping of column name to (L + 1,) array
-        One value a layer, then the total. NaN only where `Column.range` says so; `COLUMNS` says
-        what each value is.
-    samples : tuple of L FibreSamples
-        Of each layer.
+        One value a layer, then the total. NaN only where `Column.range` says so, and on layers
+        where an index was not taken; `COLUMNS` says what each value is.
+    samples : tuple of FibreSamples
+        Of the layers where every index was taken.
     """
 
     layers: IntArray
@@ -93,6 +94,11 @@ class Evaluation(Shown):
     def total(self) -> Mapping[str, float]:
         """Each index of the whole part."""
         return {name: float(column[-1]) for name, column in self.values.items()}
+
+    @property
+    def taken_on_some(self) -> int:
+        """Number of layers on which every index was taken; 0 where it was on all."""
+        return len(self.samples) if len(self.samples) < len(self.layers) else 0
 
     def of_layer(self, index: int) -> Mapping[str, float]:
         """Each index of one layer.
@@ -130,6 +136,7 @@ def evaluate(
     machine: Machine,
     strand: Strand | None = None,
     build: Sequence[float] | None = None,
+    most: int | None = None,
 ) -> Evaluation:
     """Evaluate the fibre paths of a part.
 
@@ -149,6 +156,10 @@ def evaluate(
     build : sequence of 3 floats, optional
         Build direction. The head's tilt on curved layers is measured from it, and flat layers
         normal to it serve for comparison (`across_flat`). Default: mean normal of the layers.
+    most : int, optional
+        Layers, evenly spread over the stack, on which indices are taken that some layers of many
+        tell: means and quantiles of angles, distances and coverage. Sums, and all that the limits
+        of a machine bound, are always of all layers. Default: all layers.
 
     Raises
     ------
@@ -163,26 +174,51 @@ def evaluate(
     late = fibre[fibre < np.maximum.accumulate(fibre)]
     stack = printed(layers, build)
     upright = _upright(layers, build)
+    whole = _spread_over(len(layers), most)
+    area = np.array([float(layer.areas.sum()) for layer in layers])
+    material = _material(layers, stress, machine, strand or Strand())
+    basis = Basis(machine, material)
+    sampled = 1.0 if whole.all() else float(area[whole].sum() / area.sum())
 
-    basis = Basis(machine, _material(layers, stress, machine, strand or Strand()))
-
-    def measured(layer: Layer) -> tuple[dict[str, Any], dict[str, float]]:
+    def measured(layer: Layer, every: bool) -> tuple[dict[str, Any], dict[str, float]]:
         behind = int(np.count_nonzero(late == layer.index))
         on_layer = toolpaths.on_layer(layer.index)
         below = _below(layer, layers, stress.mesh, machine)
         view = _view(on_layer, layer, stress, machine, below, behind, stack, upright)
-        kinds = indices.named().items()
-        samples = {name: kind.sample(view) for name, kind in kinds if hasattr(kind, "sample")}
+        samples = {name: kind.sample(view) for name, kind in _sampled(every).items()}
         return samples, _indices(samples, basis)
 
     shared = [toolpaths, stress, machine, stack]
-    samples, rows = zip(*in_processes(measured, layers, shared=shared), strict=True)
-    rows = (*rows, _in_total(samples, basis))
+    results = in_processes(measured, layers, whole.tolist(), shared=shared)
+    samples, rows = zip(*results, strict=True)
+    rows = (*rows, _in_total(samples, replace(basis, sampled=sampled)))
+    nan = float("nan")
     return Evaluation(
         np.array([layer.index for layer in layers]),
-        {column.name: np.array([row[column.name] for row in rows]) for column in COLUMNS},
-        tuple(FibreSamples(sample["curvature"], sample["alignment"]) for sample in samples),
+        {column.name: np.array([row.get(column.name, nan) for row in rows]) for column in COLUMNS},
+        tuple(
+            FibreSamples(of_layer["curvature"], of_layer["alignment"])
+            for of_layer, every in zip(samples, whole, strict=True)
+            if every
+        ),
     )
+
+
+def _spread_over(count: int, most: int | None) -> BoolArray:
+    """Mask of some of the layers of a stack, evenly spread, the first and the last among them."""
+    chosen = np.zeros(count, dtype=bool)
+    wanted = count if most is None else min(most, count)
+    chosen[np.linspace(0, count - 1, wanted).round().astype(np.int64)] = True
+    return chosen
+
+
+def _sampled(every: bool) -> dict[str, ModuleType]:
+    """Return the indices that take samples of a layer: all, or those that need every layer."""
+    return {
+        name: kind
+        for name, kind in indices.named().items()
+        if hasattr(kind, "sample") and (every or not getattr(kind, "ON_SOME_LAYERS", False))
+    }
 
 
 def _check_layers(toolpaths: Toolpaths, layers: Sequence[Layer]) -> None:
@@ -272,7 +308,8 @@ def _in_total(samples: Sequence[Mapping[str, Any]], basis: Basis) -> dict[str, f
     """Value of each of `COLUMNS` over all layers, joining one kind of samples at a time."""
     values: dict[str, float] = {}
     for name in samples[0]:
-        values |= _indices({name: pool([sample[name] for sample in samples])}, basis)
+        of_layers = [sample[name] for sample in samples if name in sample]
+        values |= _indices({name: pool(of_layers)}, basis)
     return values
 
 

@@ -250,10 +250,19 @@ class LayerPaths:
 
 @dataclass(frozen=True)
 class Basis:
-    """What indices refer to: the machine, and the material of a part that is full of strands."""
+    """What indices refer to.
+
+    Attributes
+    ----------
+    material : Material
+        Of a part that is full of strands.
+    sampled : float, default 1
+        Share of the layers' area on which samples were taken.
+    """
 
     machine: Machine
     material: Material
+    sampled: float = 1.0
 
 
 # What an index is: name, unit, formula and range, for tables and their glossaries.

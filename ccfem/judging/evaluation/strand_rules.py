@@ -11,14 +11,16 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, in_brief
+from ccfem.base.parallel import in_processes
 from ccfem.geometry.polylines import point_at
-from ccfem.judging.virtual_testing.strand_room import StrandParts, strand_parts
+from ccfem.judging.virtual_testing.strand_room import StrandParts, joined_parts, strand_parts
 from ccfem.machine.machine import Machine
-from ccfem.paths.folds import WINDOW
+from ccfem.paths.folds import WINDOW, Folds, joined_folds
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
@@ -83,7 +85,11 @@ class StrandVerdict:
 
 
 def strand_verdict(
-    toolpaths: Toolpaths, layers: Sequence[Layer], machine: Machine, folds_by_design: bool = False
+    toolpaths: Toolpaths,
+    layers: Sequence[Layer],
+    machine: Machine,
+    folds_by_design: bool = False,
+    with_parts: bool = True,
 ) -> StrandVerdict:
     """Hold every strand against the rules.
 
@@ -94,26 +100,78 @@ def strand_verdict(
     folds_by_design : bool, default False
         Whether the strategy's published pattern turns more tightly than the machine's radius: its
         folds carry nothing, but are no reason to refuse the plan.
+    with_parts : bool, default True
+        Whether the verdict keeps the parts of the strands: some 100 bytes for each quarter of a
+        fibre width.
     """
     fibre = toolpaths.of_kind(FIBRE)
-    parts = strand_parts(toolpaths, machine, layers)
-    folded = () if folds_by_design else _folded(fibre, parts, machine)
-    held = () if folds_by_design else _not_held(fibre, parts, machine)
-    count, places = int((parts.folds.counts > 0).sum()), len(parts.folds.line)
+    strands = _looked_at(fibre, layers, machine, with_parts)
+    folds = strands.folds
+    folded = () if folds_by_design else _folded(fibre, folds, machine)
+    held = () if folds_by_design else _not_held(fibre, folds, machine)
+    count, places = int((folds.counts > 0).sum()), len(folds.line)
     remark = ""
     if count:
         design = ", as its pattern is published," if folds_by_design else ""
         remark = (
             f"{count} of {len(fibre)} strands turn back on themselves in {places} places{design} "
             f"by more than 90 degrees within {WINDOW * machine.minimum_radius:.3g} mm: "
-            f"{parts.folds.folded.sum():.0f} mm of fibre in these folds carry nothing"
+            f"{folds.folded.sum():.0f} mm of fibre in these folds carry nothing"
         )
-    return StrandVerdict((*folded, *held, *_outside(fibre, parts)), remark, parts)
+    return StrandVerdict((*folded, *held, *_outside(strands)), remark, strands.parts)
 
 
-def _folded(fibre: Toolpaths, parts: StrandParts, machine: Machine) -> tuple[BrokenRule, ...]:
+class _Strands(NamedTuple):
+    """What the rules look at.
+
+    `folds` of the strands; the share of the width of each that lies `outside` the part, (n,), and
+    the `place` where most does, (n, 3), mm; and their `parts`, if kept.
+    """
+
+    folds: Folds
+    outside: FloatArray
+    place: FloatArray
+    parts: StrandParts | None
+
+
+def _looked_at(
+    fibre: Toolpaths, layers: Sequence[Layer], machine: Machine, with_parts: bool
+) -> _Strands:
+    """Look at all strands: layer by layer where strands of one cannot touch those of another."""
+
+    def one(some: Toolpaths, on: Sequence[Layer]) -> _Strands:
+        parts = strand_parts(some, machine, on)
+        line, length, first = parts.beads.line, parts.beads.length, parts.beads.first
+        away = np.where(parts.link, 0.0, 1.0 - parts.inside)
+        area = np.bincount(line, length, len(some))
+        share = np.bincount(line, length * away, len(some)) / np.maximum(area, 1e-300)
+        place = np.zeros((len(some), 3))
+        for k in np.flatnonzero(share > OUTSIDE).tolist():
+            most = first[k] + int(away[first[k] : first[k + 1]].argmax())
+            place[k] = parts.beads.middle[most]
+        return _Strands(parts.folds, share, place, parts if with_parts else None)
+
+    flat = sorted(layer.plane.height for layer in layers if layer.flat is not None)
+    near = np.diff(flat).min(initial=np.inf) < machine.strand_height * (1.0 - _ROUNDING)
+    if len(flat) < max(len(layers), 2) or near or (np.diff(fibre.layer) < 0).any():
+        return one(fibre, layers)
+    own = [layer for layer in layers if layer.index in fibre.layer]
+    own.sort(key=lambda layer: layer.index)
+    each = [fibre.on_layer(layer.index) for layer in own]
+    looked = list(in_processes(one, each, [[layer] for layer in own], shared=[fibre]))
+    if not looked:
+        return one(fibre, layers)
+    kept = [strands.parts for strands in looked if strands.parts is not None]
+    return _Strands(
+        joined_folds([strands.folds for strands in looked]),
+        np.concatenate([strands.outside for strands in looked]),
+        np.concatenate([strands.place for strands in looked]),
+        joined_parts(kept) if with_parts else None,
+    )
+
+
+def _folded(fibre: Toolpaths, folds: Folds, machine: Machine) -> tuple[BrokenRule, ...]:
     """Strands without a run of the cutter's length free of folds."""
-    folds = parts.folds
     least = machine.shortest_strand
     free = folds.longest_free
     short = np.flatnonzero((folds.counts > 0) & (free < least * (1.0 - _ROUNDING)))
@@ -137,9 +195,9 @@ def _folded(fibre: Toolpaths, parts: StrandParts, machine: Machine) -> tuple[Bro
     )
 
 
-def _not_held(fibre: Toolpaths, parts: StrandParts, machine: Machine) -> tuple[BrokenRule, ...]:
+def _not_held(fibre: Toolpaths, folds: Folds, machine: Machine) -> tuple[BrokenRule, ...]:
     """Strands that fold before they hold, behind their start or before their cut."""
-    folds, held, tail = parts.folds, machine.held_length, machine.tail
+    held, tail = machine.held_length, machine.tail
     size = folds.lengths[folds.line]
     near = np.zeros(len(size), dtype=bool)
     # Printed forwards, and backwards: the order of printing decides.
@@ -165,26 +223,19 @@ def _not_held(fibre: Toolpaths, parts: StrandParts, machine: Machine) -> tuple[B
     )
 
 
-def _outside(fibre: Toolpaths, parts: StrandParts) -> tuple[BrokenRule, ...]:
+def _outside(strands: _Strands) -> tuple[BrokenRule, ...]:
     """Strands of which too much lies outside the part."""
-    line, length = parts.beads.line, parts.beads.length
-    away = np.where(parts.link, 0.0, 1.0 - parts.inside)
-    area = np.bincount(line, length, len(fibre))
-    share = np.bincount(line, length * away, len(fibre)) / np.maximum(area, 1e-300)
+    share = strands.outside
     wide = np.flatnonzero(share > OUTSIDE)
     if not len(wide):
         return ()
     order = wide[np.argsort(-share[wide], kind="stable")]
-    places = []
-    for k in order.tolist():
-        first, last = parts.beads.first[k : k + 2]
-        places.append(parts.beads.middle[first + int(away[first:last].argmax())])
     return (
         _broken(
             "outside",
             order,
-            np.array(places),
-            f"{len(order)} of {len(fibre)} strands lie outside the part by more than "
+            strands.place[order],
+            f"{len(order)} of {len(share)} strands lie outside the part by more than "
             f"{OUTSIDE:.0%} of their width; the worst by {share[order[0]]:.0%}",
         ),
     )

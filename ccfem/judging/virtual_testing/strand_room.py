@@ -21,7 +21,7 @@ from ccfem.geometry.polylines import arc_lengths
 from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
 from ccfem.paths.fields.chart import chart_of
-from ccfem.paths.folds import Folds, folds_in
+from ccfem.paths.folds import Folds, folds_in, joined_folds
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
@@ -136,6 +136,28 @@ def strand_parts(
             inside[mine] = width_inside(*plane, machine.fibre_width, _section(layer))
     folds = folds_in(fibre, machine)
     return StrandParts(parts, link, inside, folds, _folded(folds, parts.line, arc))
+
+
+def joined_parts(of: Sequence[StrandParts]) -> StrandParts:
+    """Parts of several lots of fibre paths as those of all, lot after lot."""
+    lines = np.cumsum([0, *(len(parts.folds.lengths) for parts in of)])
+    count = np.cumsum([0, *(len(parts.link) for parts in of)])
+    columns = zip(*(parts.beads[2:] for parts in of), strict=True)
+    beads_of_all = Beads(
+        np.concatenate([parts.beads.line + k for parts, k in zip(of, lines, strict=False)]),
+        np.append(
+            np.concatenate([p.beads.first[:-1] + k for p, k in zip(of, count, strict=False)]),
+            count[-1],
+        ),
+        *(np.concatenate(column) for column in columns),
+    )
+    return StrandParts(
+        beads_of_all,
+        np.concatenate([parts.link for parts in of]),
+        np.concatenate([parts.inside for parts in of]),
+        joined_folds([parts.folds for parts in of]),
+        np.concatenate([parts.folded for parts in of]),
+    )
 
 
 def _section(layer: Layer) -> Region:

@@ -382,6 +382,8 @@ class FibrePlaces:
             parts = parts[~shapely.is_empty(shapely.buffer(parts, -0.5 * machine.fibre_width))]
         if not len(parts):
             return None
+        if not self.regions and len(parts) == shapely.get_num_geometries(layer.plane.polygon):
+            return layer
         return cut_layer(layer, shapely.multipolygons(list(parts)), mesh)
 
     def _fibre_region(self, layer: Layer, mesh: TetMesh) -> Region:

@@ -123,11 +123,12 @@ def printed_strands(
     if not (flat and process.short == "matrix" and machine.strand_height >= low):
         cut_off += sum(line_length(piece.line) for piece in short)
         short = []
+    whole = len(long) == len(fibre) and sum(len(p.line) for p in long) == len(fibre.points)
     by_matrix = _toolpaths(short, fibre, MATRIX)
     warnings = [*_about_short(by_matrix, cut_off), *warnings]
-    return PrintedStrands(
-        _toolpaths(long, fibre, FIBRE), by_matrix, cut_off, removed, tuple(warnings)
-    )
+    unchanged = whole and abs(cut_off) < _NOTHING and not removed
+    printed = fibre if unchanged else _toolpaths(long, fibre, FIBRE)
+    return PrintedStrands(printed, by_matrix, cut_off, removed, tuple(warnings))
 
 
 def _check_fibre(fibre: Toolpaths, layers: Sequence[Layer], machine: Machine) -> None:

@@ -291,3 +291,31 @@ def test_fibre_over_a_gap_lies_on_nothing(make_part):
         )
     on_bed = part.paths([[5.0, 20.0], [55.0, 20.0]])
     assert evaluate(on_bed, part.layers, part.stress, MACHINE).total["free_span"] == 0.0
+
+
+def test_of_many_layers_some_tell_angles_and_distances(make_part):
+    """What limits bound and what adds up is of all layers; the rest is that of the sample."""
+    part = make_part(bent, count=5)
+    lines = [WAVE, RING, OUT, SHORT]
+    paths = Toolpaths.concatenate(
+        part.paths(*lines[: 1 + k % 4], layer=k) for k in range(len(part.layers))
+    )
+    whole = evaluate(paths, part.layers, part.stress, MACHINE)
+    some = evaluate(paths, part.layers, part.stress, MACHINE, most=3)
+    assert (whole.taken_on_some, some.taken_on_some) == (0, 3)
+    sampled = ("angle_mean", "coverage", "spacing_50", "border_50", "sinuosity", "least_angle")
+    chosen = [0, 2, 4]
+    for name in NAMES:
+        taken = some.values[name]
+        if np.isnan(taken[[1, 3]]).all() and not np.isnan(whole.values[name][[1, 3]]).all():
+            np.testing.assert_array_equal(taken[chosen], whole.values[name][chosen])
+        else:
+            np.testing.assert_array_equal(taken, whole.values[name])
+            assert name not in sampled
+    kept = [part.layers[k] for k in chosen]
+    of_sample = Toolpaths.concatenate(paths.on_layer(layer.index) for layer in kept)
+    alone = evaluate(of_sample, kept, part.stress, MACHINE)
+    for name in sampled[:-1]:
+        assert some.total[name] == pytest.approx(alone.total[name])
+    # Layers are equal here: gaps of five are five thirds of those of three.
+    assert some.total["gap_area"] == pytest.approx(alone.total["gap_area"] * 5.0 / 3.0)

@@ -143,3 +143,25 @@ def test_parts_know_their_strand():
     assert parts.beads.length.sum() == pytest.approx(90.0)
     assert parts.inside.min() == 1.0
     assert not parts.folded.any()
+
+
+def test_layer_by_layer_says_what_all_at_once_do():
+    layers = Planar(heights=(0.5, 1.5)).cut(MESH)
+    rows = [[[10.0, y], [90.0, y]] for y in (10.0, 10.6, 39.9)]
+    both = Toolpaths.concatenate(
+        Toolpaths.from_plane([np.array(line) for line in lines], layer)
+        for layer, lines in zip(layers, ([*rows, serpentine(15.5)], rows[1:]), strict=True)
+    )
+    done = strand_verdict(both, layers, MACHINE)
+    at_once = strand_parts(both, MACHINE, layers)
+    for mine, theirs in zip(done.parts.beads, at_once.beads, strict=True):
+        np.testing.assert_allclose(mine, theirs, atol=1e-12)
+    for name in ("link", "inside", "folded"):
+        np.testing.assert_array_equal(getattr(done.parts, name), getattr(at_once, name))
+    np.testing.assert_array_equal(done.parts.folds.line, at_once.folds.line)
+    assert [(rule.rule, rule.strands.tolist()) for rule in done.broken] == [
+        ("folds", [3]),
+        ("outside", [2, 5]),
+    ]
+    assert done.broken[1].places[:, 2] == pytest.approx([0.5, 1.5])
+    assert strand_verdict(both, layers, MACHINE, with_parts=False).parts is None

@@ -6,6 +6,8 @@ A module has
 * ``sample(paths)``, which takes the samples of one layer from `LayerPaths`: a dataclass of arrays,
   which are joined over the layers; or ``SAMPLES``, the name of the module whose samples it takes;
 * ``indices(samples, basis)``, the value of each index by name, of one layer or of all together;
+* ``ON_SOME_LAYERS``, true where they are means and quantiles that some layers of many tell, and no
+  limit of a machine bounds them; default false;
 * ``PLACE``, a number that says where its columns stand in tables; default behind all others.
 
 Modules of other packages are found by entry points of the group ``ccfem.indices``. Nothing is

@@ -15,6 +15,9 @@ from ccfem.slicing.layers.layer import LayerStress
 PLACE = 40
 """Of these columns in tables: the smaller, the farther to the left."""
 
+ON_SOME_LAYERS = True
+"""Of a stack of many layers some are enough."""
+
 
 _ANGLES = (10, 20, 30)
 

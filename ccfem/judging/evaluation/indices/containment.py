@@ -6,8 +6,7 @@ import numpy as np
 import shapely
 
 from ccfem.base.arrays import FloatArray
-from ccfem.geometry.polylines import sample_midpoints
-from ccfem.geometry.shapes import INSIDE, TOLERANCE, Region, Shapes, section_places
+from ccfem.geometry.shapes import TOLERANCE, Region, Shapes
 from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, PlanePaths
 
 PLACE = 100
@@ -29,79 +28,33 @@ COLUMNS = (
         "layer, to 0.0001 mm; 0 where outside_length is 0.",
         ">= 0, 0 is best",
     ),
-    *(
-        Column(
-            f"border_{share}",
-            "mm",
-            f"Distance from the border of the section that {100 - share} % of the length of the "
-            "fibre's axis in the section, links included, exceeds (sampled every fibre width).",
-            ">= 0; NaN without fibre",
-        )
-        for share in (1, 50)
-    ),
 )
-
-
-_SHARES = np.array([0.01, 0.5]) * (1.0 - 1e-9)
-"""Shares of `border_1` and `border_50`, slightly reduced: ties go to the smaller distance."""
 
 
 @dataclass(frozen=True)
 class ContainmentSamples:
-    """Fibre outside the section of a layer, and distances from its border, mm.
-
-    Attributes
-    ----------
-    length, depth : (1,) arrays
-        Length outside, and largest distance outside.
-    border, step : (s,) arrays
-        Distance of samples in the section from its border, and the length that each stands for.
-    """
+    """Length of fibre outside the section of a layer, and its largest distance, (1,) each, mm."""
 
     length: FloatArray
     depth: FloatArray
-    border: FloatArray
-    step: FloatArray
 
 
-def sample_containment(paths: PlanePaths, step: float = 1.0) -> ContainmentSamples:
-    """Compare the fibre axis of a layer, without its width, with the polygon of the layer.
-
-    Links count for the distances from the border only.
-
-    Parameters
-    ----------
-    step : float, mm
-        Distance of the samples along the fibre.
-    """
+def sample_containment(paths: PlanePaths) -> ContainmentSamples:
+    """Compare the fibre axis of a layer, without its width and links, with the layer's polygon."""
     section = paths.layer.plane.polygon
-    border = _border(paths.in_part, section, step)
     paths = paths.strands
     if not len(paths):
-        return ContainmentSamples(np.zeros(1), np.zeros(1), *border)
+        return ContainmentSamples(np.zeros(1), np.zeros(1))
     grown = section.buffer(TOLERANCE, quad_segs=2)
     shapely.prepare(grown)
     index = np.repeat(np.arange(len(paths)), np.diff(paths.offsets))
     lines = shapely.linestrings(paths.points, indices=index)
     # Segment by segment: the difference of a whole path would merge parts that lie on each other.
-    segments = np.stack(_segments(lines[~shapely.covers(grown, lines)]), axis=1)
-    pieces = shapely.linestrings(segments) if len(segments) else np.zeros(0, dtype=object)
+    steps = np.stack(segments(lines[~shapely.covers(grown, lines)]), axis=1)
+    pieces = shapely.linestrings(steps) if len(steps) else np.zeros(0, dtype=object)
     outside = shapely.difference(pieces[~shapely.covers(grown, pieces)], grown)
     length = float(shapely.length(outside).sum())
-    return ContainmentSamples(np.array([length]), np.array([_depth(outside, section)]), *border)
-
-
-def _border(paths: PlanePaths, section: Region, step: float) -> tuple[FloatArray, FloatArray]:
-    """Distance of samples in the section from its border, and their lengths, mm."""
-    points, _, length, _ = sample_midpoints(paths.points, paths.offsets, step)
-    inside = section_places(points, section) == INSIDE
-    points, length = points[inside], length[inside]
-    if not len(points):
-        return np.zeros(0), np.zeros(0)
-    start, end = _segments(shapely.boundary(section))
-    tree = shapely.STRtree(shapely.linestrings(np.stack([start, end], axis=1)))
-    edge = tree.nearest(shapely.points(points))
-    return _to_edges(points, start[edge], end[edge]), length
+    return ContainmentSamples(np.array([length]), np.array([_depth(outside, section)]))
 
 
 def _depth(lines: Shapes, section: Region) -> float:
@@ -111,18 +64,18 @@ def _depth(lines: Shapes, section: Region) -> float:
     values at both ends is therefore a bound for the piece; the edge nearest to the middle is used.
     Pieces that cannot exceed the largest distance found are dropped, the others halved.
     """
-    a, b = _segments(lines)
+    a, b = segments(lines)
     if not len(a):
         return 0.0
-    start, end = _segments(shapely.boundary(section))
+    start, end = segments(shapely.boundary(section))
     tree = shapely.STRtree(shapely.linestrings(np.stack([start, end], axis=1)))
     best = 0.0
     while len(a):
         middle = 0.5 * (a + b)
         edge = tree.nearest(shapely.points(middle))
         near, far = start[edge], end[edge]
-        best = max(best, float(_to_edges(middle, near, far).max()))
-        bound = np.maximum(_to_edges(a, near, far), _to_edges(b, near, far))
+        best = max(best, float(to_edges(middle, near, far).max()))
+        bound = np.maximum(to_edges(a, near, far), to_edges(b, near, far))
         left = bound > best + TOLERANCE
         a, b = (
             np.concatenate([a[left], middle[left]]),
@@ -131,14 +84,14 @@ def _depth(lines: Shapes, section: Region) -> float:
     return best
 
 
-def _segments(lines: shapely.Geometry | Shapes) -> tuple[FloatArray, FloatArray]:
-    """First and last points, (s, 2) each, of all segments of lines."""
+def segments(lines: shapely.Geometry | Shapes) -> tuple[FloatArray, FloatArray]:
+    """First and last points, (s, 2) each, of all segments of lines, one after the other."""
     points, index = shapely.get_coordinates(shapely.get_parts(lines), return_index=True)
     same = index[1:] == index[:-1]
     return points[:-1][same], points[1:][same]
 
 
-def _to_edges(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+def to_edges(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
     """Distance of each point (s, 2) from its own edge."""
     along, to = end - start, points - start
     square = np.maximum(np.einsum("ij,ij->i", along, along), 1e-300)
@@ -151,20 +104,12 @@ def containment_indices(samples: ContainmentSamples) -> dict[str, float]:
     return {
         "outside_length": float(samples.length.sum()),
         "outside_depth": float(samples.depth.max()) if len(samples.depth) else 0.0,
-        **_border_indices(samples),
     }
-
-
-def _border_indices(samples: ContainmentSamples) -> dict[str, float]:
-    if not samples.step.sum() > 0.0:
-        return dict.fromkeys(("border_1", "border_50"), float("nan"))
-    quantiles = np.quantile(samples.border, _SHARES, weights=samples.step, method="inverted_cdf")
-    return dict(zip(("border_1", "border_50"), quantiles.tolist(), strict=True))
 
 
 def sample(paths: LayerPaths) -> ContainmentSamples:
     """Take the samples of one layer."""
-    return sample_containment(paths.plane, paths.machine.fibre_width)
+    return sample_containment(paths.plane)
 
 
 def indices(samples: ContainmentSamples, _: Basis) -> dict[str, float]:

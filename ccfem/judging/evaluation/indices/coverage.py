@@ -15,6 +15,9 @@ from ccfem.slicing.layers.layer import LayerStress
 PLACE = 90
 """Of these columns in tables: the smaller, the farther to the left."""
 
+ON_SOME_LAYERS = True
+"""Of a stack of many layers some are enough."""
+
 
 _SAMPLES = (
     "the section, sampled on a square grid of a fifth of a fibre width, that lies within half a "
@@ -204,8 +207,8 @@ def _paint_paths(
                     covered[i, j] = True
 
 
-def coverage_indices(samples: CoverageSamples) -> dict[str, float]:
-    """Values of `COLUMNS`."""
+def coverage_indices(samples: CoverageSamples, sampled: float = 1.0) -> dict[str, float]:
+    """Values of `COLUMNS`, from samples of this share of the layers' area."""
     tension, covered = samples.tension, samples.covered
     if not len(tension):
         return {column.name: float("nan") for column in COLUMNS}
@@ -219,7 +222,7 @@ def coverage_indices(samples: CoverageSamples) -> dict[str, float]:
     values = {
         "coverage": float(covered.mean()),
         "overfill": float(samples.laid.sum() / samples.area.sum()),
-        "gap_area": float(samples.gap.sum()),
+        "gap_area": float(samples.gap.sum()) / sampled,
         "coverage_stress": float(tension[covered].sum()) / total if total > 0.0 else float("nan"),
     }
     quartiles = [*limits[:4], limits[-1]]
@@ -235,6 +238,6 @@ def sample(paths: LayerPaths) -> CoverageSamples:
     return sample_coverage(paths.plane, paths.layer_stress, paths.machine.fibre_width)
 
 
-def indices(samples: CoverageSamples, _: Basis) -> dict[str, float]:
+def indices(samples: CoverageSamples, basis: Basis) -> dict[str, float]:
     """Value of each of `COLUMNS`."""
-    return coverage_indices(samples)
+    return coverage_indices(samples, basis.sampled)

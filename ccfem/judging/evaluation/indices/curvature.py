@@ -14,6 +14,9 @@ PLACE = 30
 """Of these columns in tables: the smaller, the farther to the left."""
 
 
+_TURNS = (45, 90)
+"""Turns, degrees, that are counted."""
+
 _SIMPLIFY = 0.02
 """Tolerance, in resampling steps, of the simplification before vertices are counted. It removes
 points on straight stretches, which are no turns of the planner."""
@@ -76,7 +79,7 @@ class CurvatureSamples:
     native : (n,) array, 1/mm
         At the vertices of the simplified paths.
     turns : (v,) array, radians
-        Turning angles at the vertices as planned.
+        Turning angles at the vertices as planned, those above 45 degrees.
     length : (1,) array, mm
         Of the fibre.
     """
@@ -107,10 +110,11 @@ def sample_curvature(paths: PlanePaths, step: float) -> CurvatureSamples:
     Curvature from the planned points themselves would depend on how densely they lie.
     """
     lines = paths.in_part
+    turns = turning_angles(paths.points, paths.offsets, paths.closed)
     return CurvatureSamples(
         curvature_samples(lines.points, lines.offsets, lines.closed, step),
         _native(lines, step),
-        turning_angles(paths.points, paths.offsets, paths.closed),
+        turns[turns > np.radians(_TURNS[0])],
         np.array([paths.lengths.sum()]),
     )
 
@@ -153,7 +157,7 @@ def curvature_indices(samples: CurvatureSamples, machine: Machine) -> dict[str, 
     for name, bend in (("", curvature), ("_native", samples.native)):
         ok = bend * machine.minimum_radius < 1.0
         values[f"curvature_ok{name}"] = float(ok.mean()) if len(ok) else np.nan
-    for degrees in (45, 90):
+    for degrees in _TURNS:
         count = float((samples.turns > np.radians(degrees) + 1e-9).sum())
         values[f"turns_{degrees}"] = count / metres if metres > 0.0 else np.nan
     return values

@@ -22,6 +22,9 @@ _BANDS = (
 )
 _NONE = "NaN without fibre"
 
+_DECIMALS = 9
+"""Decimals of numbers of strands and fractions: values that differ less are the same."""
+
 COLUMNS = (
     Column(
         "on_fibre",
@@ -89,16 +92,19 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class RoomSamples:
-    """Parts of the strands of a layer, about a quarter of a width long, and unsupported runs.
+    """What the strands of a layer have of room, part by part, and unsupported runs.
 
     Attributes
     ----------
-    length, alone, every, fill, stack : (s,) arrays
-        As of `ccfem.geometry.beads.Beads`.
-    inside : (s,) array in [0, 1]
-        Share of the width that lies in the section.
-    fraction : (s,) array
-        Fibre volume fraction.
+    length : (1,) array, mm
+        Of the fibre.
+    on, across, outside : (1,) arrays, mm
+        Length that lies on other fibre of its direction, across other fibre, and, by the width of
+        the strand, outside the section.
+    stack, stack_length : (a,) arrays, 1 and mm
+        Numbers of strands above each other, and the length with each.
+    fraction, fraction_length : (b,) arrays, 1 and mm
+        Fibre volume fractions, and the length with each.
     free : (f,) array, mm
         Lengths of the runs that lie on nothing.
     overlap : (1,) array, mm^2
@@ -110,12 +116,13 @@ class RoomSamples:
     """
 
     length: FloatArray
-    alone: FloatArray
-    every: FloatArray
-    fill: FloatArray
+    on: FloatArray
+    across: FloatArray
+    outside: FloatArray
     stack: FloatArray
-    inside: FloatArray
+    stack_length: FloatArray
     fraction: FloatArray
+    fraction_length: FloatArray
     free: FloatArray
     overlap: FloatArray
     fibre: FloatArray
@@ -143,20 +150,30 @@ def sample_room(
     room = beads(flat, up, lines.offsets, lines.closed, same, width, machine.strand_height)
     inside = width_inside(room.middle[:, :2], room.direction[:, :2], width, layer.plane.polygon)
     height = max(layer.thickness, 1e-300)
+    fraction = room.fill * machine.filament_area / (width * height)
+
+    def with_it(share: FloatArray) -> FloatArray:
+        return np.array([float(room.length @ share)])
+
     return RoomSamples(
-        room.length,
-        room.alone,
-        room.every,
-        room.fill,
-        room.stack,
-        inside,
-        room.fill * machine.filament_area / (width * height),
+        np.array([float(room.length.sum())]),
+        with_it(1.0 - room.alone),
+        with_it(room.alone - room.every),
+        with_it(1.0 - inside),
+        *_lengths_of(room.stack, room.length),
+        *_lengths_of(fraction, room.length),
         _free_runs(paths, 0.5 * width, below),
-        np.array([width * float((room.length * (1.0 - room.every)).sum())]),
-        np.array([machine.filament_area * float((room.length * inside).sum())]),
+        width * with_it(1.0 - room.every),
+        machine.filament_area * with_it(inside),
         np.array([float(layer.areas.sum()) * layer.thickness]),
         np.array([float(late)]),
     )
+
+
+def _lengths_of(values: FloatArray, length: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the different values, to rounding, and the length with each."""
+    different, number = np.unique(values.round(_DECIMALS), return_inverse=True)
+    return different, np.bincount(number, length, len(different)).astype(np.float64)
 
 
 def _free_runs(paths: PlanePaths, reach: float, below: Region | None) -> FloatArray:
@@ -186,26 +203,25 @@ def _runs(paths: PlanePaths, reach: float, below: Region | None, link: bool) -> 
 
 def room_indices(samples: RoomSamples) -> dict[str, float]:
     """Values of `COLUMNS`."""
-    length = samples.length
-    total = float(length.sum())
+    total = float(samples.length.sum())
 
-    def mean(values: FloatArray) -> float:
-        return float(length @ values) / total if total > 0.0 else float("nan")
+    def share(length: FloatArray) -> float:
+        return float(length.sum()) / total if total > 0.0 else float("nan")
 
-    def most(values: FloatArray) -> float:
+    def most(values: FloatArray, length: FloatArray) -> float:
         if not total > 0.0:
             return float("nan")
         return float(np.quantile(values, 0.99, weights=length, method="inverted_cdf"))
 
     volume = float(samples.volume.sum())
     return {
-        "on_fibre": mean(1.0 - samples.alone),
-        "across_fibre": mean(samples.alone - samples.every),
+        "on_fibre": share(samples.on),
+        "across_fibre": share(samples.across),
         "overlap_area": float(samples.overlap.sum()),
-        "stack_99": most(samples.stack),
+        "stack_99": most(samples.stack, samples.stack_length),
         "fibre_fraction": float(samples.fibre.sum()) / volume if volume > 0.0 else float("nan"),
-        "fibre_fraction_99": most(samples.fraction),
-        "outside_width": mean(1.0 - samples.inside),
+        "fibre_fraction_99": most(samples.fraction, samples.fraction_length),
+        "outside_width": share(samples.outside),
         "free_span": float(samples.free.max(initial=0.0)),
         "free_length": float(samples.free.sum()),
         "out_of_order": float(samples.late.sum()),

@@ -12,6 +12,9 @@ from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, Plan
 PLACE = 20
 """Of these columns in tables: the smaller, the farther to the left."""
 
+ON_SOME_LAYERS = True
+"""Of a stack of many layers some are enough."""
+
 
 TOLERANCES = (0.001, 0.8, 1.0, 1.2)
 """Tolerances of the simplification in bead widths (Plocher et al. 2022; unit not stated there)."""

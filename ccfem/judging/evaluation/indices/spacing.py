@@ -15,6 +15,9 @@ from ccfem.machine.machine import Machine
 PLACE = 70
 """Of these columns in tables: the smaller, the farther to the left."""
 
+ON_SOME_LAYERS = True
+"""Of a stack of many layers some are enough."""
+
 
 _FORMULA = (
     "of the distance from the fibre (without links outside the section or over a void), sampled "

@@ -16,6 +16,9 @@ from ccfem.slicing.layers.layer import Layer
 PLACE = 150
 """Of these columns in tables: the smaller, the farther to the left."""
 
+ON_SOME_LAYERS = True
+"""Of a stack of many layers some are enough."""
+
 
 _STEPS = 8
 """Steps on a quarter turn between the planes that are tried for the best."""

@@ -46,15 +46,3 @@ def test_beyond_two_hundredths_of_a_millimetre(framed):
     length, depth = indices(framed.plane([[10, 15.02], [50, 15.02]], [[2, 2], [58, 2]]))
     assert length == pytest.approx(20.0, abs=3e-4)
     assert depth == pytest.approx(0.02, abs=1e-4)
-
-
-def test_distance_from_the_border(pulled):
-    """Two strands of the same length, 2 and 7 mm from the long side of the plate."""
-    values = containment_indices(
-        sample_containment(pulled.plane([[10, 2], [50, 2]], [[10, 33], [50, 33]]))
-    )
-    assert values["border_1"] == pytest.approx(2.0)
-    assert values["border_50"] == pytest.approx(2.0)
-    deep = containment_indices(sample_containment(pulled.plane([[20, 20], [40, 20]])))
-    assert deep["border_50"] == pytest.approx(20.0)
-    assert np.isnan(containment_indices(sample_containment(pulled.plane()))["border_1"])
