@@ -49,7 +49,7 @@ from ccfem.cases.part_loads import (
     weights_of,
 )
 from ccfem.cases.part_tables import check_strategies, material_of, named_table, rules_of
-from ccfem.fem.elasticity.load_kinds import Load, PointForce, SurfaceLoad, patches_in_use
+from ccfem.fem.elasticity.load_kinds import Load, SurfaceLoad, patches_in_use, patches_of
 from ccfem.fem.elasticity.loads import nodal_forces
 from ccfem.fem.elasticity.nodes import LoadedBody
 from ccfem.fem.elasticity.problem import Problem, Region
@@ -379,7 +379,7 @@ def check_before_meshing(
             with mistakes.noted():
                 held(_Outline(shell, shell, together, loads))
     for load in chain.from_iterable(loads.values()):
-        if isinstance(load, SurfaceLoad) and not isinstance(load, PointForce):
+        if isinstance(load, SurfaceLoad) and patches_of(load):
             with mistakes.noted():
                 nodal_forces(shell, load)
     mistakes.complain()
