@@ -16,6 +16,7 @@ from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.curved_cells import (
     CELL_POINTS,
     CELL_WEIGHTS,
+    EDGES,
     STRAIGHT,
     facet_integrals,
     gradients_at,
@@ -390,6 +391,18 @@ def temperature_change(mesh: TetMesh, load: Temperature) -> FloatArray:
     return result
 
 
+_PRODUCTS = (np.ones((4, 4)) + np.eye(4)) / 20.0
+"""Integrals of the products of two barycentric coordinates over a cell of unit volume."""
+_MOMENTS = np.concatenate(
+    [(np.eye(4) - 1.0) / 60.0, (1.0 + (np.arange(4)[:, None, None] == EDGES).any(axis=2)) / 30.0],
+    axis=1,
+)
+"""Those of a barycentric coordinate and a quadratic shape function."""
+_TO_LINEAR = np.linalg.solve(_PRODUCTS, _MOMENTS)
+"""Corner values (4, 10) of the linear function that is nearest to a quadratic one in a cell: both
+give the same forces, since strains are linear there."""
+
+
 def free_strain(problem: Problem, case: str) -> FloatArray | None:
     """Free thermal strain (m, 4, 6) at the corners of each cell, linear between; None without heat.
 
@@ -406,7 +419,7 @@ def free_strain(problem: Problem, case: str) -> FloatArray | None:
         for load in problem.loads.get(name, ()):
             if isinstance(load, Temperature):
                 change += factor * temperature_change(mesh, load)
-    if not change[mesh.corners].any():
+    if not change[mesh.cells].any():
         return None
     result = np.empty((len(mesh.cells), 4, 6))
     for material, cells in problem.materials:
@@ -419,8 +432,10 @@ def free_strain(problem: Problem, case: str) -> FloatArray | None:
         if problem.axes is not None:
             axes = problem.axes[cells]
             strain = axes @ strain @ np.swapaxes(axes, 1, 2)
-        by_degree = strain_to_voigt(strain).reshape(-1, 1, 6)
-        result[cells] = change[mesh.corners[cells]][:, :, None] * by_degree
+        at_corners = change[mesh.cells[cells]]
+        if mesh.order == 2:
+            at_corners = at_corners @ _TO_LINEAR.T
+        result[cells] = at_corners[:, :, None] * strain_to_voigt(strain).reshape(-1, 1, 6)
     return result
 
 
