@@ -125,6 +125,14 @@ def numbers(items: Sequence[str], count: int) -> list[float]:
     raise InputError(f"expected finite numbers; got {shown(', '.join(items))}: correct them")
 
 
+def check_count(items: Sequence[str], most: int) -> None:
+    """Refuse a line with more items than are followed."""
+    if any(items[most:]):
+        raise InputError(
+            f"a line has at most {most} items here; got {shown(', '.join(items))}: {TAKE_OUT}"
+        )
+
+
 def check_parameters(block: Block, *known: str) -> None:
     """Refuse parameters of a keyword that are not followed."""
     unknown = sorted(set(block.parameters) - set(known))

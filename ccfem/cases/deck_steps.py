@@ -22,7 +22,13 @@ from ccfem.body.files.cells import outside
 from ccfem.body.files.deck import FACES, Block, element_faces
 from ccfem.body.files.formats.inp import surface_facets
 from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.cases.deck_materials import TAKE_OUT, DeckReading, check_parameters, numbers
+from ccfem.cases.deck_materials import (
+    TAKE_OUT,
+    DeckReading,
+    check_count,
+    check_parameters,
+    numbers,
+)
 from ccfem.fem.elasticity.load_kinds import Vector
 from ccfem.geometry.facets import are_among
 
@@ -68,6 +74,8 @@ _HELD = {
 _ROTATIONS = 6
 """Last degree of freedom that is a displacement or a rotation."""
 _FACE = {"P1": "S1", "P2": "S2", "P3": "S3", "P4": "S4"}
+_NUMBERS = {"GRAV": 4, "CENTRIF": 7}
+"""Numbers of loads on the volume that have more than one."""
 BODY = {"BX": 0, "BY": 1, "BZ": 2}
 
 
@@ -318,6 +326,7 @@ class DeckSteps:
         """Components that the lines of a *BOUNDARY hold."""
         for number, items in self.reading.lines(block):
             with self.reading.noted(block, number):
+                check_count(items, 4)
                 nodes = self.reading.nodes(items[0])
                 kind = items[1].upper() if len(items) > 1 else ""
                 value = 0.0
@@ -346,6 +355,7 @@ class DeckSteps:
         """Read the forces of the lines of a *CLOAD."""
         for number, items in self.reading.lines(block):
             with self.reading.noted(block, number):
+                check_count(items, 3)
                 nodes = self.reading.nodes(items[0])
                 component, value = numbers(items[1:3], 2)
                 if component not in (1.0, 2.0, 3.0):
@@ -392,6 +402,7 @@ class DeckSteps:
         for number, items in self.reading.lines(block):
             with self.reading.noted(block, number):
                 label = items[1].upper() if len(items) > 1 else ""
+                check_count(items, 2 + _NUMBERS.get(label, 4 if label == "TRVEC" else 1))
                 rest = [factor * numbers(items[2:], 1)[0], *numbers(items[3:], 6)]
                 # An element that is named twice is loaded twice.
                 again = 0 if items[0].isdecimal() else number
@@ -448,7 +459,7 @@ class DeckSteps:
             known = ", ".join((*_FACE, *BODY, "GRAV", "CENTRIF"))
             raise InputError(f"{shown(label)} is not followed; there are {known}: {TAKE_OUT}")
         cells = self.reading.cells(names)[1] if names[0] else np.arange(len(self.mesh.cells))
-        given = {"GRAV": 4, "CENTRIF": 7}.get(label, 1)
+        given = _NUMBERS.get(label, 1)
         new = BodyLoad(label, cells, tuple(rest[:given]), now, line)
         kept = []
         for old in bodies:

@@ -1,11 +1,11 @@
 """Whole analyses from decks: bars whose answers are known, CalculiX, and what is refused."""
 
 import shutil
-import subprocess
 
 import numpy as np
 import pytest
 
+from benchmarks.calculix import compared
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import box_mesh
 from ccfem.cases.part_file import read_part
@@ -387,7 +387,7 @@ def test_a_deck_of_quadratic_cells_stays_quadratic(tmp_path):
 
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
 @pytest.mark.parametrize("mesh", [BOX, BOX.quadratic()], ids=["linear", "quadratic"])
-def test_displacements_are_those_of_calculix(tmp_path, mesh):
+def test_displacement_stress_and_reactions_are_those_of_calculix(tmp_path, mesh):
     constants = "*MATERIAL, NAME=W\n*ELASTIC, TYPE=ENGINEERING CONSTANTS\n"
     constants += "4000., 1000., 500., .3, .2, .1, 300., 250.,\n200.\n*DENSITY\n2.E-9\n"
     constants += "*EXPANSION, TYPE=ORTHO\n1.E-4, 2.E-4, 3.E-4\n"
@@ -399,23 +399,11 @@ def test_displacements_are_those_of_calculix(tmp_path, mesh):
     faces = lines[lines.index("*SURFACE") :].splitlines()[1:3]
     pressure = "*DLOAD\n" + "".join(line.replace("S", "P") + ", 3.\n" for line in faces)
     pressure += "Eall, GRAV, 1.E6, 0., 1., 2.\nEall, CENTRIF, 1.E6, 1., 2., 3., 1., 1., 0.\n"
-    printed = "*NODE PRINT, NSET=Nall\nU\n"
     text = lines + constants + start + "*BOUNDARY\nfoot, 1, 2\ny0, 2, 2, .01\ncorner, 3\n"
-    text += step(pressure + "*CLOAD\ntip, 3, .5\ntip, 3, .25\n" + printed) + step(
-        "*CLOAD\ntip, 3, -.5\n" + printed
-    )
-    text += step(warm + printed)
+    text += step(pressure + "*CLOAD\ntip, 3, .5\ntip, 3, .25\n")
+    text += step("*CLOAD\ntip, 3, -.5\n") + step(warm)
     (tmp_path / "deck.inp").write_text(text)
-    subprocess.run(["ccx", "deck"], cwd=tmp_path, check=True, capture_output=True, timeout=60)
-    blocks = (tmp_path / "deck.dat").read_text().split("displacements")[1:]
-    table = [
-        [line.split() for line in block.splitlines()[1:] if len(line.split()) == 4]
-        for block in blocks
-    ]
-    order = "order = 1\n" if mesh.order == 1 else "order = 2\n"
-    (tmp_path / "part.toml").write_text(f'mesh = "deck.inp"\nanalysis = "deck"\n{order}')
-    fields = solve(read_part(tmp_path / "part.toml").problem)
-    for rows_of, field in zip(table, fields.values(), strict=True):
-        wanted = np.array(rows_of, dtype=float)[:, 1:]
-        size = np.abs(wanted).max()
-        np.testing.assert_allclose(field.displacement, wanted, atol=2e-3 * size)
+    rows_of = compared(tmp_path / "deck.inp")
+    assert [row.split(" | ")[0] for row in rows_of] == ["step_1", "step_2", "step_3"]
+    for row in rows_of:
+        assert all(float(part.rstrip("%")) < 0.2 for part in row.split(" | ")[2:])

@@ -496,6 +496,7 @@ def _model(scopes: dict[str, Scope]) -> Model:
     flat = np.repeat(
         [kind.startswith("triangle") for kind, _ in blocks], [len(at) for _, at in blocks]
     )
+    flat = flat.astype(bool)  # also where there are none
     for known in (rows[ELEMENTS, name] for name in scopes):
         again = np.flatnonzero(np.diff(known.labels) == 0)
         differ = (nodes[known.rows[again]] != nodes[known.rows[again + 1]]).any(axis=1)
