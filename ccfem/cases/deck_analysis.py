@@ -250,8 +250,8 @@ class _Conversion:
             force[nodes, c] = np.where(since[nodes, c] < load.step, 0.0, force[nodes, c])
             force[nodes, c] += load.value
             since[nodes, c] = load.step
-        loaded = force.any(axis=1)
-        if loaded.any():
+        loaded = np.flatnonzero(force.any(axis=1))
+        if len(loaded):
             vectors = tuple((x, y, z) for x, y, z in force[loaded].tolist())
             yield NodeForces(self._places(loaded), vectors)
 

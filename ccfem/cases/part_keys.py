@@ -19,6 +19,7 @@ from ccfem.body.mesh.patches import Vector
 from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.body.meshing import extrude, faces_of_body, mesh_body
+from ccfem.body.meshing.cad import Joined, is_cad
 from ccfem.body.meshing.volume import Mesher
 from ccfem.fem.elasticity.problem import Order
 
@@ -54,6 +55,9 @@ class Body:
         Linear (1) or quadratic cells (2), or what the estimated error of linear ones calls for.
     mesher : str
         What fills a surface; "auto" is Gmsh where it is installed and works.
+    joined : str
+        What becomes of solids of a CAD file that touch: "glued" to one part, or "separate" pieces
+        that pass no force there.
     """
 
     mesh: str | None = None
@@ -64,6 +68,7 @@ class Body:
     merge_nodes: bool = False
     order: Order = "auto"
     mesher: Mesher = "auto"
+    joined: Joined = "glued"
 
     def check(self, folder: Path) -> None:
         """Raise on keys that do not go together, and on files that do not exist."""
@@ -81,6 +86,11 @@ class Body:
             )
         if self.planform is not None and self.scale != 1.0:
             mistakes.lines.append("scale goes with mesh or surface: leave it out of a planform")
+        if self.joined != "glued" and not (self.surface is not None and is_cad(self.surface)):
+            mistakes.lines.append(
+                "joined goes with a CAD file of several solids as surface: leave it out (pieces of "
+                "a mesh are joined by merge_nodes)"
+            )
         if self.planform is not None:
             with mistakes.noted():
                 from_table(_Planform, self.planform, "planform")
@@ -100,7 +110,7 @@ class Body:
         self.check(folder)
         if self.surface is None:
             return numbered_faces(self.read(folder)[0], angle)
-        return faces_of_body(folder / self.surface, self.scale, angle)
+        return faces_of_body(folder / self.surface, self.scale, angle, self.joined)
 
     def read(
         self,
@@ -123,7 +133,8 @@ class Body:
             mesh, report = check_mesh(mesh, merge=self.merge_nodes)
         elif self.surface is not None and self.edge_length is not None:
             file = folder / self.surface
-            mesh, made = mesh_body(file, self.edge_length, self.scale, self.mesher, before, angle)
+            how = (self.edge_length, self.scale, self.mesher, before, angle, self.joined)
+            mesh, made = mesh_body(file, *how)
             mesh, report = check_mesh(mesh)
         else:
             mesh, report = check_mesh(_extruded(self))

@@ -55,9 +55,9 @@ def read(part: str | os.PathLike[str] | Case, **parameters: Any) -> Case:
     >>> read("bar", element_size=4.0)
     Case bar: Tensile bar, 125 x 25 x 5 mm, pulled at its ends
     """
-    deck = isinstance(part, str | os.PathLike) and is_analysis(part)
-    named = isinstance(part, str) and not part.endswith(".toml") and not {"/", "\\"} & set(part)
-    if named and not deck:
+    deck = not isinstance(part, Case) and is_analysis(part)
+    path = isinstance(part, str) and (part.endswith(".toml") or {"/", "\\"} & set(part))
+    if isinstance(part, str) and not path and not deck:
         return create_case(part, **parameters)
     if parameters:
         raise InputError(
@@ -65,8 +65,9 @@ def read(part: str | os.PathLike[str] | Case, **parameters: Any) -> Case:
         )
     if isinstance(part, Case):
         return part
-    path = Path(part)
-    return part_case({"mesh": path.name, "analysis": "deck"}, path) if deck else read_part(path)
+    if deck:
+        return part_case({"mesh": Path(part).name, "analysis": "deck"}, Path(part))
+    return read_part(Path(part))
 
 
 def is_analysis(path: str | os.PathLike[str]) -> bool:

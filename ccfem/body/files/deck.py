@@ -246,8 +246,8 @@ def _read_block(deck: Deck, block: Block) -> None:
                 scope.add(NODES, parameters["NSET"], Members(NODES, labels))
         case "ELEMENT":
             if not _read_elements(scope, block):
-                kind = parameters.get("TYPE", "").upper()
-                deck.bare[kind] = deck.bare.get(kind, 0) + len(lines)
+                of_type = parameters.get("TYPE", "").upper()
+                deck.bare[of_type] = deck.bare.get(of_type, 0) + len(lines)
         case "NSET":
             members = [_members(NODES, block)]
             if "ELSET" in parameters:
