@@ -39,6 +39,7 @@ from ccfem.body.mesh.tet_mesh import CellMesh, TetMesh
 from ccfem.body.meshing.cad import is_cad
 from ccfem.body.meshing.volume import check_edge_length
 from ccfem.cases.case import Case, check_name
+from ccfem.cases.deck_analysis import read_analysis
 from ccfem.cases.part_fibre import fibre_of, patches_of_fibre
 from ccfem.cases.part_keys import Part
 from ccfem.cases.part_loads import (
@@ -49,7 +50,7 @@ from ccfem.cases.part_loads import (
     weights_of,
 )
 from ccfem.cases.part_tables import check_strategies, material_of, named_table, rules_of
-from ccfem.fem.elasticity.load_kinds import Load, PointForce, SurfaceLoad, patches_in_use
+from ccfem.fem.elasticity.load_kinds import Load, SurfaceLoad, patches_in_use, patches_of
 from ccfem.fem.elasticity.loads import nodal_forces
 from ccfem.fem.elasticity.nodes import LoadedBody
 from ccfem.fem.elasticity.problem import Problem, Region
@@ -130,7 +131,7 @@ def part_case(content: TomlTable, path: Path, mesh: TetMesh | None = None) -> Ca
         given.slicing = slicing_of(part)
     with mistakes.noted():
         given.machine = machine_from(part.machine)
-    if "material" not in unread:
+    if "material" not in unread and part.analysis is None:
         with mistakes.noted():
             given.material = material_of(part.material)
     if part.fibre is not None:
@@ -138,17 +139,27 @@ def part_case(content: TomlTable, path: Path, mesh: TetMesh | None = None) -> Ca
             given.fibre = fibre_of(part.fibre, path.parent)
     check_strategies(part.strategies, mistakes)
     rules = rules_of(part.patches, mistakes)
-    readable = "supports" not in unread
-    supports, case_supports = (
-        supports_of(part.supports, part.loads, mistakes) if readable else ((), {})
-    )
-    others = alternative_supports_of(part.alternative_supports, mistakes)
-    loads = loads_of(part.loads, mistakes) if "loads" not in unread else {}
-    combinations = combinations_of(part.combinations, part.loads, mistakes)
-    weights = weights_of(part.weights, {**part.loads, **part.combinations}, mistakes)
-    regions = region_rules_of(part.regions, mistakes)
     with mistakes.noted():
         part.check(path.parent)
+    deck, names = None, part.loads
+    if part.analysis is None:
+        readable = "supports" not in unread
+        supports, case_supports = (
+            supports_of(part.supports, part.loads, mistakes) if readable else ((), {})
+        )
+        loads = loads_of(part.loads, mistakes) if "loads" not in unread else {}
+    else:
+        mistakes.complain()
+        assert part.mesh is not None
+        deck = read_analysis(path.parent / part.mesh, part.scale, part.step)
+        supports, case_supports = deck.supports, dict(deck.case_supports)
+        loads = names = dict(deck.loads)
+        if part.order == 1 and deck.mesh.order == 2:
+            mistakes.lines.append("order = 1 goes with a deck of linear cells: leave it out")
+    others = alternative_supports_of(part.alternative_supports, mistakes)
+    combinations = combinations_of(part.combinations, names, mistakes)
+    weights = weights_of(part.weights, {**names, **part.combinations}, mistakes)
+    regions = region_rules_of(part.regions, mistakes)
     mistakes.complain()
 
     rules, angle = _on_body(rules, part, path.parent, mistakes)
@@ -162,7 +173,8 @@ def part_case(content: TomlTable, path: Path, mesh: TetMesh | None = None) -> Ca
 
     findings: tuple[str, ...] = ()
     if mesh is None:
-        mesh, findings = part.read(path.parent, before, angle)
+        known = None if deck is None else deck.mesh
+        mesh, findings = part.read(path.parent, before, angle, known)
     for patch, rule in rules.items():
         with mistakes.noted():
             mesh = patches_from_rules(mesh, {patch: rule})
@@ -173,15 +185,19 @@ def part_case(content: TomlTable, path: Path, mesh: TetMesh | None = None) -> Ca
     held = (*supports, *others, *chain.from_iterable(case_supports.values()))
     bare = without_faces(mesh, (*rules, *near, *patches_in_use(held, loads)))
     x, y, z = given.build.tolist()
+    material, cells, axes = (
+        (given.material, regions_of(bare, regions), None) if deck is None else deck.on_cells(bare)
+    )
     return Case(
         name=name,
         title=part.title or name,
         problem=Problem(
             bare,
-            given.material,
+            material,
             supports,
             loads,
-            regions=regions_of(bare, regions),
+            axes=axes,
+            regions=cells,
             combinations=combinations,
             order=part.order,
             case_supports=case_supports,
@@ -191,7 +207,7 @@ def part_case(content: TomlTable, path: Path, mesh: TetMesh | None = None) -> Ca
         machine=given.machine,
         parameters=part.strategies,
         source=part.source,
-        findings=(*findings, *about_patches(bare, rules)),
+        findings=(*findings, *(deck.remarks if deck else ()), *about_patches(bare, rules)),
         alternative_supports=others,
         fibre=given.fibre,
         weights=weights,
@@ -379,7 +395,7 @@ def check_before_meshing(
             with mistakes.noted():
                 held(_Outline(shell, shell, together, loads))
     for load in chain.from_iterable(loads.values()):
-        if isinstance(load, SurfaceLoad) and not isinstance(load, PointForce):
+        if isinstance(load, SurfaceLoad) and patches_of(load):
             with mistakes.noted():
                 nodal_forces(shell, load)
     mistakes.complain()

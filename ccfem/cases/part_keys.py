@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import shapely
 
 from ccfem.base.checks import check_number
-from ccfem.base.errors import InputError, Mistakes
+from ccfem.base.errors import InputError, Mistakes, shown
 from ccfem.base.toml import from_table
 from ccfem.base.whole import existing_file
 from ccfem.body.files import Surface, read_mesh
@@ -19,6 +19,7 @@ from ccfem.body.mesh.patches import Vector
 from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.body.meshing import extrude, faces_of_body, mesh_body
+from ccfem.body.meshing.cad import Joined, is_cad
 from ccfem.body.meshing.volume import Mesher
 from ccfem.fem.elasticity.problem import Order
 
@@ -54,6 +55,9 @@ class Body:
         Linear (1) or quadratic cells (2), or what the estimated error of linear ones calls for.
     mesher : str
         What fills a surface; "auto" is Gmsh where it is installed and works.
+    joined : str
+        What becomes of solids of a CAD file that touch: "glued" to one part, or "separate" pieces
+        that pass no force there.
     """
 
     mesh: str | None = None
@@ -64,6 +68,7 @@ class Body:
     merge_nodes: bool = False
     order: Order = "auto"
     mesher: Mesher = "auto"
+    joined: Joined = "glued"
 
     def check(self, folder: Path) -> None:
         """Raise on keys that do not go together, and on files that do not exist."""
@@ -81,6 +86,11 @@ class Body:
             )
         if self.planform is not None and self.scale != 1.0:
             mistakes.lines.append("scale goes with mesh or surface: leave it out of a planform")
+        if self.joined != "glued" and not (self.surface is not None and is_cad(self.surface)):
+            mistakes.lines.append(
+                "joined goes with a CAD file of several solids as surface: leave it out (pieces of "
+                "a mesh are joined by merge_nodes)"
+            )
         if self.planform is not None:
             with mistakes.noted():
                 from_table(_Planform, self.planform, "planform")
@@ -100,29 +110,31 @@ class Body:
         self.check(folder)
         if self.surface is None:
             return numbered_faces(self.read(folder)[0], angle)
-        return faces_of_body(folder / self.surface, self.scale, angle)
+        return faces_of_body(folder / self.surface, self.scale, angle, self.joined)
 
     def read(
         self,
         folder: Path,
         before: Callable[[Surface], None] | None = None,
         angle: float = FEATURE_ANGLE,
+        known: TetMesh | None = None,
     ) -> tuple[TetMesh, tuple[str, ...]]:
         """Mesh of the part, checked, and what was found in it; files are relative to a folder.
 
         `before` is called with a surface that has to be meshed; the feature angle between its
-        faces is in degrees.
+        faces is in degrees. A mesh that is known, in mm, takes the place of that of the file.
         """
         self.check(folder)
         made: tuple[str, ...] = ()
         if self.mesh is not None:
-            mesh = read_mesh(folder / self.mesh, self.scale, check=False)
+            mesh = known or read_mesh(folder / self.mesh, self.scale, check=False)
             if self.order == 1 and mesh.order == 2:
                 mesh = mesh.linear()
             mesh, report = check_mesh(mesh, merge=self.merge_nodes)
         elif self.surface is not None and self.edge_length is not None:
             file = folder / self.surface
-            mesh, made = mesh_body(file, self.edge_length, self.scale, self.mesher, before, angle)
+            how = (self.edge_length, self.scale, self.mesher, before, angle, self.joined)
+            mesh, made = mesh_body(file, *how)
             mesh, report = check_mesh(mesh)
         else:
             mesh, report = check_mesh(_extruded(self))
@@ -199,6 +211,10 @@ class Part(Body):
     ----------
     material : str or table
         A name of the table of materials, or moduli.
+    analysis : "deck", optional
+        Take supports, loads, materials and regions over from the deck that is the mesh.
+    step : str, optional
+        The static step of the deck that is taken; by default all, a load case each.
     supports : tuple of tables
         What holds the part; at least one. With ``case`` one holds in these load cases alone.
     loads : dict
@@ -239,6 +255,8 @@ class Part(Body):
     """
 
     material: str | dict[str, Any] | None = None
+    analysis: Literal["deck"] | None = None
+    step: str | None = None
     supports: tuple[dict[str, Any], ...] = ()
     loads: dict[str, Any] = field(default_factory=dict)
     alternative_supports: tuple[dict[str, Any], ...] = ()
@@ -256,3 +274,28 @@ class Part(Body):
     patches: dict[str, Any] = field(default_factory=dict)
     machine: dict[str, Any] = field(default_factory=dict)
     strategies: dict[str, Any] = field(default_factory=dict)
+
+    def check(self, folder: Path) -> None:
+        """Raise as `Body.check`, and on keys that a deck brings with its analysis."""
+        mistakes = Mistakes()
+        with mistakes.noted():
+            super().check(folder)
+        if self.analysis is None and self.step is not None:
+            mistakes.lines.append('step goes with analysis = "deck": add it, or leave step out')
+        if self.analysis == "deck":
+            if self.mesh is None or Path(self.mesh).suffix.lower() != ".inp":
+                mistakes.lines.append(
+                    'analysis = "deck" goes with mesh, a deck of Abaqus or CalculiX (.inp); got '
+                    f"{shown(self.mesh)}: name one"
+                )
+            given = [key for key in _IN_DECK if getattr(self, key)]
+            if given:
+                mistakes.lines.append(
+                    f'with analysis = "deck" the deck gives {", ".join(_IN_DECK)}; got '
+                    f"{' and '.join(given)} in the part file: leave out one or the other"
+                )
+        mistakes.complain()
+
+
+_IN_DECK = ("material", "regions", "supports", "loads")
+"""Keys that a deck brings."""

@@ -7,8 +7,9 @@ from typing import Any
 
 from ccfem.base import plugins
 from ccfem.base.errors import InputError
+from ccfem.body.files.deck import has_steps
 from ccfem.cases.case import Case
-from ccfem.cases.part_file import read_part
+from ccfem.cases.part_file import part_case, read_part
 from ccfem.cases.shipped import shipped_cases
 
 
@@ -39,7 +40,8 @@ def read(part: str | os.PathLike[str] | Case, **parameters: Any) -> Case:
     Parameters
     ----------
     part : str, path or Case
-        A part file (``hook.toml``), the name of a case (``"loop"``), or a case, returned as it is.
+        A part file (``hook.toml``), a deck with its analysis (``hook.inp``), the name of a case
+        (``"loop"``), or a case, returned as it is.
     **parameters
         Parameters of a case by name, as ``element_size=3.0``.
 
@@ -53,10 +55,22 @@ def read(part: str | os.PathLike[str] | Case, **parameters: Any) -> Case:
     >>> read("bar", element_size=4.0)
     Case bar: Tensile bar, 125 x 25 x 5 mm, pulled at its ends
     """
-    if isinstance(part, str) and not part.endswith(".toml") and not {"/", "\\"} & set(part):
+    deck = not isinstance(part, Case) and is_analysis(part)
+    path = isinstance(part, str) and (part.endswith(".toml") or {"/", "\\"} & set(part))
+    if isinstance(part, str) and not path and not deck:
         return create_case(part, **parameters)
     if parameters:
         raise InputError(
             f"parameters are for cases by name; '{part}' is a part file: change the file"
         )
-    return part if isinstance(part, Case) else read_part(Path(part))
+    if isinstance(part, Case):
+        return part
+    if deck:
+        return part_case({"mesh": Path(part).name, "analysis": "deck"}, Path(part))
+    return read_part(Path(part))
+
+
+def is_analysis(path: str | os.PathLike[str]) -> bool:
+    """Whether a file is a deck (.inp) with a step, which is a part by itself."""
+    path = Path(path)
+    return path.suffix.lower() == ".inp" and path.is_file() and has_steps(path)

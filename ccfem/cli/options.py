@@ -221,8 +221,8 @@ Paths = Annotated[
     typer.Option(
         "--paths",
         metavar="FILE,..",
-        help="Paths of other programs, judged beside the strategies: waypoints, or CSV with "
-        "x,y,z,path,layer.",
+        help="Paths of other programs, judged beside the strategies: waypoints, CSV with "
+        "x,y,z,path,layer, or a folder of strands on curved layers (.obj, .txt, a file a layer).",
     ),
 ]
 PathsFrame = Annotated[

@@ -81,8 +81,11 @@ def _refuse_body(name: str) -> None:
     from ccfem.body.files.formats import suffixes
     from ccfem.body.files.surface import is_surface
     from ccfem.body.meshing.cad import is_cad
+    from ccfem.cases.reading import is_analysis
 
     body = Path(name)
+    if is_analysis(body):
+        return
     if is_surface(body) or is_cad(body) or body.suffix.lower() in suffixes():
         raise InputError(
             f"{name} is a body without material, loads and supports; a part file (TOML) adds "

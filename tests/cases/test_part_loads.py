@@ -20,11 +20,14 @@ from ccfem.comparison.plot.part_picture import support_marks
 from ccfem.fem.elasticity import (
     Bearing,
     BodyForce,
+    Centrifugal,
     Displacement,
     EdgeSupport,
     Force,
     Foundation,
     Gravity,
+    NodeForces,
+    NodeSupport,
     Pin,
     PointForce,
     PointSpring,
@@ -103,6 +106,11 @@ kind = "point"
 point = [0, 0, 0]
 components = "z"
 [[supports]]
+kind = "nodes"
+name = "ends"
+points = [[0, 0, 0], [0, 2, 0]]
+components = "z"
+[[supports]]
 kind = "sliding"
 patch = "y_max"
 normal = "-y"
@@ -143,6 +151,7 @@ normal = "-y"
         Support("x_min", "x"),
         EdgeSupport(("x_min", "y_min"), "y"),
         PointSupport((0.0, 0.0, 0.0), "z"),
+        NodeSupport("ends", ((0.0, 0.0, 0.0), (0.0, 2.0, 0.0)), "z"),
         SlidingSupport("y_max", "-y", 0.1),
         RigidPatch("x_max", "", "x", angle=(1.0, 0.0, 0.0), centre=(20.0, 1.0, 0.5)),
         Pin("z_min", (10.0, 1.0, 0.0), (0.0, 0.0, 2.0), slides=True),
@@ -333,6 +342,8 @@ def test_every_kind_is_weighed_on_a_surface_before_it_is_meshed():
         Traction("right", (1.0, 0.0, 0.0)),
         Pressure("right", 1.0),
         PointForce((20.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        NodeForces(((20.0, 0.0, 0.0), (20.0, 2.0, 0.0)), ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))),
+        Centrifugal(10.0, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
         BodyForce((0.0, 0.0, -1.0)),
         Gravity((0.0, 0.0, -9810.0)),
         Temperature(20.0),
@@ -342,6 +353,7 @@ def test_every_kind_is_weighed_on_a_surface_before_it_is_meshed():
     others = (
         EdgeSupport(("left", "below")),
         PointSupport((20.0, 0.0, 0.0)),
+        NodeSupport("tip", ((20.0, 0.0, 0.0),)),
         SlidingSupport("below"),
         RigidPatch("right"),
         Pin("right", (20.0, 1.0, 0.5), "z"),

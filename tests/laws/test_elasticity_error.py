@@ -323,7 +323,7 @@ def fine_at_the_hole(p):
 
 @pytest.mark.parametrize(
     ("edge", "order", "poor"),
-    [(10.0, 2, True), (6.0, 2, False), (4.0, "auto", True), (4.0, 2, False), (None, 1, False)],
+    [(10.0, 2, True), (6.0, 2, False), (4.0, "auto", True), (4.0, 2, False), (None, 1, True)],
 )
 def test_the_peak_at_a_hole_is_right_or_said_to_be_poor(edge, order, poor):
     # Howland (1930), Heywood (1952): 3.03 for a hole of a tenth of the width. Off by 8, 1, 15, 2
@@ -333,13 +333,11 @@ def test_the_peak_at_a_hole_is_right_or_said_to_be_poor(edge, order, poor):
     field = plate_with_a_hole(mesh, order)
     off = abs(von_mises(field.nodal).max() / 30.3 - 1.0)
     assert field.record.error < 0.04
-    assert (off > 0.06) == poor
-    lines = [line for line in field.findings if "where it peaks" in line]
-    assert bool(lines) == poor
-    if poor:
-        said, at = re.fullmatch(r"\D*(\d+)% in the stress .* at \((.*)\) mm: .*", lines[0]).groups()
-        assert 0.7 * off <= float(said) / 100.0 <= 2.2 * off
-        assert at.startswith("0, 5, ")
+    assert (off > 0.03) == poor
+    (line,) = (line for line in field.findings if "where it peaks" in line)
+    said, at = re.fullmatch(r"\D*(\d+)% in the stress .* at \((.*)\) mm: .*", line).groups()
+    assert 0.7 * off <= float(said) / 100.0 <= (2.2 * off if poor else 0.1)
+    assert np.linalg.norm(np.array(at.split(", "), dtype=float)[:2] - [0.0, 5.0]) < 0.5
 
 
 def test_locked_cells_make_no_claim_about_the_displacement():
@@ -380,7 +378,7 @@ def test_slender_parts_are_right_by_default(size):
     assert tip == pytest.approx(sag_of_a_beam(size), rel=0.03)
     assert field.mesh.order == 2
     assert "linear ones leave an estimated error of" in field.record.order_because
-    assert not field.findings
+    assert not [line for line in field.findings if "where it peaks" not in line]
 
 
 def test_linear_cells_in_bending_are_a_finding_with_its_cure():

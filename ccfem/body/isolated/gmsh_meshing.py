@@ -18,31 +18,31 @@ _GROWTH = 0.4
 """Growth of the edges with the distance from a round wall."""
 
 
-def cad_volume(path: str, size: float, scale: float) -> dict[str, Any]:
-    """Tetrahedra in the solids of a CAD file.
+def cad_volume(path: str, size: float, scale: float, joined: str) -> dict[str, Any]:
+    """Tetrahedra in the solids of a CAD file, "glued" where they touch or "separate".
 
     Returns ``points``, ``cells``, ``triangles`` of the outside with the number of the face of
     each, ``face`` from 1 in the order of the file, and the ``names`` of all its faces and
     ``solids``, empty where they have none.
     """
     with _model() as gmsh:
-        given = _solids(gmsh, path)
+        given = _solids(gmsh, path, joined)
         _sizes(gmsh, size / scale)
         gmsh.model.mesh.generate(3)
-        return {**_mesh(gmsh, scale), **_faces(gmsh, path, *given)}
+        return {**_mesh(gmsh, scale), **_faces(gmsh, path, *given, joined)}
 
 
-def cad_surface(path: str, size: float, scale: float) -> dict[str, Any]:
+def cad_surface(path: str, size: float, scale: float, joined: str) -> dict[str, Any]:
     """Triangles on the outside of the solids of a CAD file; as `cad_volume` without cells.
 
     A size of 0 takes a thirtieth of the part.
     """
     with _model() as gmsh:
-        given = _solids(gmsh, path)
+        given = _solids(gmsh, path, joined)
         low, high = np.reshape(gmsh.model.getBoundingBox(-1, -1), (2, 3))
         _sizes(gmsh, size / scale or float(np.linalg.norm(high - low)) / 30.0, turn=2 * _ROUND)
         gmsh.model.mesh.generate(2)
-        return {**_mesh(gmsh, scale), **_faces(gmsh, path, *given)}
+        return {**_mesh(gmsh, scale), **_faces(gmsh, path, *given, joined)}
 
 
 def fill(
@@ -100,8 +100,8 @@ def _model() -> Iterator[Any]:
         gmsh.finalize()
 
 
-def _solids(gmsh: Any, path: str) -> tuple[dict[int, str], list[str]]:
-    """Read a CAD file, with its solids joined: names of their faces by tag, and of the solids."""
+def _solids(gmsh: Any, path: str, joined: str) -> tuple[dict[int, str], list[str]]:
+    """Read a CAD file, its solids joined or not: names of their faces by tag, and of the solids."""
     try:
         gmsh.model.occ.importShapes(path, highestDimOnly=False)
         gmsh.model.occ.synchronize()
@@ -119,7 +119,13 @@ def _solids(gmsh: Any, path: str) -> tuple[dict[int, str], list[str]]:
         gmsh.model.removeEntities([entity], recursive=True)
     faces = {tag: _name(gmsh, 2, tag) for _, tag in gmsh.model.getEntities(2)}
     names = [_name(gmsh, 3, tag) for _, tag in solids]
-    if len(solids) > 1:  # solids that touch get one mesh
+    shared = [tag for tag in faces if len(_above(gmsh, (2, tag))) > 1]
+    if shared and joined == "separate":
+        raise InputError(
+            f"{path}: {len(shared)} faces belong to two solids each, so these are one in the file: "
+            "export them as solids of their own, or leave out joined"
+        )
+    if len(solids) > 1 and joined == "glued":  # solids that touch get one mesh
         gmsh.model.occ.fragment(solids[:1], solids[1:])
         gmsh.model.occ.synchronize()
     return faces, names
@@ -171,7 +177,9 @@ def _mesh(gmsh: Any, scale: float) -> dict[str, Any]:
     }
 
 
-def _faces(gmsh: Any, path: str, faces: dict[int, str], solids: list[str]) -> dict[str, Any]:
+def _faces(
+    gmsh: Any, path: str, faces: dict[int, str], solids: list[str], joined: str
+) -> dict[str, Any]:
     """Triangles of the outside, the number in the file of the face of each, and all names."""
     nodes = np.sort(gmsh.model.mesh.getNodes()[0])
     outside = gmsh.model.getBoundary(gmsh.model.getEntities(3), combined=True, oriented=False)
@@ -180,7 +188,7 @@ def _faces(gmsh: Any, path: str, faces: dict[int, str], solids: list[str]) -> di
         _, corners = gmsh.model.mesh.getElementsByType(2, tag)
         rows[tag] = np.searchsorted(nodes, corners.astype(np.int64)).reshape(-1, 3)
     number = {tag: k for k, tag in enumerate(faces, 1)}
-    if len(solids) > 1:
+    if len(solids) > 1 and joined == "glued":
         number = _numbers(gmsh, path, number, [tag for tag in rows if len(rows[tag])])
     return {
         "triangles": np.concatenate(list(rows.values())),

@@ -213,15 +213,6 @@ def integrals(nodes: FloatArray) -> FloatArray:
     return np.asarray(np.sum(parts, axis=0))
 
 
-def gradient_integrals(nodes: FloatArray) -> FloatArray:
-    """Integrals (m, 10, 3), mm^2, of the gradients of the shape functions over cells."""
-    points = zip(CELL_WEIGHTS, CELL_POINTS, strict=True)
-    parts = [
-        w / 6.0 * jacobians(nodes, at)[:, None, None] * gradients_at(nodes, at) for w, at in points
-    ]
-    return np.asarray(np.sum(parts, axis=0))
-
-
 def facet_integrals(nodes: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Integrals of the shape functions over quadratic facets with nodes (k, 6, 3).
 

@@ -3,7 +3,7 @@
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -18,6 +18,8 @@ from ccfem.body.mesh.patches import face_name, match_boundary
 from ccfem.body.mesh.smooth_faces import given_faces, round_walls
 from ccfem.body.meshing.volume import check_edge_length, fidelity
 
+Joined = Literal["glued", "separate"]
+"""What becomes of solids that touch: one, or pieces that pass no force there."""
 SUFFIXES = (".brep", ".iges", ".igs", ".step", ".stp")
 _NO_NAME = "Open CASCADE STEP translator"
 """Beginning of the names that Open CASCADE gives to solids that have none."""
@@ -50,7 +52,9 @@ def is_cad(path: str | os.PathLike[str]) -> bool:
     return Path(path).suffix.lower() in SUFFIXES
 
 
-def read_cad(path: str | os.PathLike[str], scale: float = 1.0, size: float = 0.0) -> CadSurface:
+def read_cad(
+    path: str | os.PathLike[str], scale: float = 1.0, size: float = 0.0, joined: Joined = "glued"
+) -> CadSurface:
     """Read the outside of a CAD file as triangles.
 
     Parameters
@@ -61,13 +65,15 @@ def read_cad(path: str | os.PathLike[str], scale: float = 1.0, size: float = 0.0
         Factor on the coordinates.
     size : float, mm, default 0
         Of the triangles; 0 for a thirtieth of the part.
+    joined : {"glued", "separate"}, default "glued"
+        Whether solids that touch become one, or keep faces of their own there.
 
     Raises
     ------
     InputError
         When the file is missing or holds no solid, or Gmsh is not installed.
     """
-    made = _made("cad_surface", path, size, scale)
+    made = _made("cad_surface", path, size, scale, joined)
     names = tuple(str(name) for name in made["names"])
     surface = Surface(*_used(made["points"], made["triangles"]))
     solids = tuple(str(name) for name in made["solids"])
@@ -75,7 +81,10 @@ def read_cad(path: str | os.PathLike[str], scale: float = 1.0, size: float = 0.0
 
 
 def mesh_cad(
-    path: str | os.PathLike[str], edge_length: float, scale: float = 1.0
+    path: str | os.PathLike[str],
+    edge_length: float,
+    scale: float = 1.0,
+    joined: Joined = "glued",
 ) -> tuple[TetMesh, tuple[str, ...]]:
     """Fill the solids of a CAD file with tetrahedra.
 
@@ -83,13 +92,13 @@ def mesh_cad(
     -------
     mesh : TetMesh
         With the faces as patches: ``face_1``, ``face_2``, ... in the order of the file, and under
-        their names where they have some. Faces between solids that touch are none.
+        their names where they have some. Faces between solids that are glued are none.
     about : tuple of str
-        How well it fits, and that several solids are joined.
+        How well it fits, and whether several solids are joined.
     """
-    fine = read_cad(path, scale)
+    fine = read_cad(path, scale, joined=joined)
     check_edge_length(fine.surface, edge_length)
-    made = _made("cad_volume", path, edge_length, scale)
+    made = _made("cad_volume", path, edge_length, scale, joined)
     if not len(made["cells"]):
         raise InputError(f"{path}: Gmsh left no cells in its solids: shorten edge_length")
     faces = given_faces(
@@ -108,22 +117,28 @@ def mesh_cad(
             groups.setdefault(label, []).append(facets)
     mesh = mesh.with_patches({name: np.concatenate(those) for name, those in groups.items()})
     mesh = check_mesh(mesh)[0]
-    return mesh, (fidelity(fine.surface, mesh).about("Gmsh"), *_about_solids(fine.solids))
+    return mesh, (fidelity(fine.surface, mesh).about("Gmsh"), *_about_solids(fine.solids, joined))
 
 
-def _about_solids(names: tuple[str, ...]) -> tuple[str, ...]:
-    """Say that several solids became one part."""
+def _about_solids(names: tuple[str, ...], joined: Joined) -> tuple[str, ...]:
+    """Say what became of several solids."""
     if len(names) == 1:
         return ()
     known = [name for name in dict.fromkeys(names) if name and not name.startswith(_NO_NAME)]
     listed = ", ".join(known[:_LISTED]) + (", ..." if len(known) > _LISTED else "")
-    return (
-        f"{len(names)} solids in the file{f' ({listed})' if listed else ''}, of one material and "
-        "joined where they touch: give one that is a part of its own as a file of its own",
-    )
+    if joined == "glued":
+        said = (
+            "of one material and joined where they touch: set joined = 'separate' for pieces that "
+            "pass no force there"
+        )
+    else:
+        said = "each a piece of its own that passes no force where they touch: hold each of them"
+    return (f"{len(names)} solids in the file{f' ({listed})' if listed else ''}, {said}",)
 
 
-def _made(function: str, path: str | os.PathLike[str], size: float, scale: float) -> dict[str, Any]:
+def _made(
+    function: str, path: str | os.PathLike[str], size: float, scale: float, joined: Joined
+) -> dict[str, Any]:
     """Call Gmsh with a CAD file."""
     path = existing_file(path, "CAD file")
     if not is_cad(path):
@@ -135,7 +150,11 @@ def _made(function: str, path: str | os.PathLike[str], size: float, scale: float
     full = str(path.absolute())
     try:
         return in_own_process(
-            f"gmsh_meshing:{function}", path=full, size=float(size), scale=float(scale)
+            f"gmsh_meshing:{function}",
+            path=full,
+            size=float(size),
+            scale=float(scale),
+            joined=joined,
         )
     except ChildError as error:
         if "gmsh" in str(error) and "module" in str(error):

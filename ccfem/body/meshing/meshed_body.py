@@ -23,7 +23,7 @@ from ccfem.body.mesh.face_places import BodyFaces
 from ccfem.body.mesh.patches import face_name
 from ccfem.body.mesh.round_walls import RoundWall
 from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE, given_faces, smooth_faces
-from ccfem.body.meshing.cad import is_cad, mesh_cad, read_cad
+from ccfem.body.meshing.cad import Joined, is_cad, mesh_cad, read_cad
 from ccfem.body.meshing.volume import Mesher, fill
 
 
@@ -34,6 +34,7 @@ def mesh_body(
     mesher: Mesher = "auto",
     before: Callable[[Surface], None] | None = None,
     angle: float = FEATURE_ANGLE,
+    joined: Joined = "glued",
 ) -> tuple[TetMesh, tuple[str, ...]]:
     """Mesh a file of a closed surface (STL, OBJ, PLY) or of solids (STEP, IGES, BREP).
 
@@ -48,6 +49,8 @@ def mesh_body(
         Called with the surface before it is meshed, to complain early.
     angle : float, degrees
         Feature angle between the faces of a surface.
+    joined : {"glued", "separate"}, default "glued"
+        What becomes of solids of a CAD file that touch.
 
     Returns
     -------
@@ -64,7 +67,7 @@ def mesh_body(
 
     def make() -> tuple[TetMesh, tuple[str, ...]]:
         if is_cad(path):
-            return mesh_cad(path, edge_length, scale)
+            return mesh_cad(path, edge_length, scale, joined)
         surface = read_surface(path, scale)
         if before is not None:
             before(surface)
@@ -82,6 +85,7 @@ def mesh_body(
         "scale": float(scale),
         "mesher": mesher,
         "angle": float(angle),
+        "joined": joined,
         "suffix": Path(path).suffix.lower(),
     }
     return kept(path.read_bytes(), asked, make)
@@ -90,7 +94,7 @@ def mesh_body(
 # Meshes that were made before, kept by what they were made of.
 
 
-_FORMAT = 4
+_FORMAT = 5
 """Raised when meshing changes, or what is said of it: meshes of before are made anew."""
 _MOST = 100
 """Meshes that are kept; the ones not used for longest go."""
@@ -179,7 +183,10 @@ def _write(path: Path, mesh: TetMesh, findings: tuple[str, ...]) -> None:
 
 
 def faces_of_body(
-    path: str | os.PathLike[str], scale: float = 1.0, angle: float = FEATURE_ANGLE
+    path: str | os.PathLike[str],
+    scale: float = 1.0,
+    angle: float = FEATURE_ANGLE,
+    joined: Joined = "glued",
 ) -> BodyFaces:
     """Faces of a closed surface, or of a CAD file as it has them, numbered before any meshing.
 
@@ -191,12 +198,14 @@ def faces_of_body(
         Factor on the coordinates.
     angle : float, degrees
         Feature angle, of a surface.
+    joined : {"glued", "separate"}, default "glued"
+        As in `mesh_body`.
     """
     if not is_cad(path):
         surface = read_surface(path, scale)
         faces = smooth_faces(surface.points, surface.triangles, angle)
         return BodyFaces(surface.points, surface.triangles, faces)
-    cad = read_cad(path, scale)
+    cad = read_cad(path, scale, joined=joined)
     points, triangles = cad.surface.points, cad.surface.triangles
     rows = {k: np.flatnonzero(cad.face == k) for k in np.unique(cad.face).tolist()}
     names = tuple(cad.names[k - 1] for k in rows)

@@ -16,12 +16,11 @@ from ccfem.cases.case import Case
 from ccfem.cases.reading import read
 from ccfem.fem.elasticity.held import Held
 from ccfem.fem.elasticity.load_kinds import (
-    BodyForce,
     Displacement,
-    Gravity,
     Load,
     SurfaceLoad,
     Temperature,
+    VolumeLoad,
     in_words,
     kind_of,
     patches_of,
@@ -157,7 +156,7 @@ def load_row(problem: Problem, case: str, load: Load, held: Held | None) -> Load
     if isinstance(load, SurfaceLoad):
         forces = nodal_forces(problem.mesh, load)
     else:
-        assert isinstance(load, BodyForce | Gravity)
+        assert isinstance(load, VolumeLoad)
         forces = volume_forces(problem, load)
     sizes = np.linalg.norm(forces, axis=1)
     middle = sizes @ problem.mesh.points / sizes.sum()

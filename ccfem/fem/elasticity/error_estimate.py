@@ -75,15 +75,15 @@ def estimate_error(
     displacement : (n, 3) array, mm
     stiffness : (6, 6) or (m, 6, 6) array, MPa
         In the global frame.
-    free : (m, 6) array, optional
-        Stress-free strain of each cell, Voigt.
+    free : (m, 4, 6) array, optional
+        Stress-free strain at the corners of each cell, Voigt, linear between them.
     region : (m,) int array, optional
         Number from 0 of the material of each cell. Between materials the stress may jump, so that
         each is recovered by itself.
     """
     stiffness = seen_only(stiffness).reshape(-1, 6, 6)
     m = len(mesh.cells)
-    ease = seen_only(np.zeros((1, 6)) if free is None else free)
+    ease = seen_only(np.zeros((1, 4, 6)) if free is None else free)
     gradients, edges = cell_gradients(mesh), np.asarray(TetMesh.edges)
     arguments = (mesh.cells, gradients, seen_only(displacement), stiffness, ease, edges)
     samples = SAMPLES[mesh.order]
@@ -104,7 +104,7 @@ def estimate_error(
     polynomials = (patches.of_corner, patches.centre, patches.size, patches.coefficients)
     cells = (mesh.points, corners, mesh.volumes, edges)
     compare(*cells, polynomials, corner, compliance, (error, energy))
-    held = (ease[:, None] @ stiffness @ ease[:, :, None]).reshape(-1)
+    held = (ease @ stiffness * ease).sum(axis=2).mean(axis=1)
     if error.sum() + energy.sum() <= _FREELY * (mesh.volumes * held).sum():
         error, energy = np.zeros(m), np.zeros(m)
     return ErrorEstimate(error, energy)
@@ -153,10 +153,13 @@ def _stress_at(
             strain[3] = slope[1, 2] + slope[2, 1]
             strain[4] = slope[0, 2] + slope[2, 0]
             strain[5] = slope[0, 1] + slope[1, 0]
+            for a in range(4):
+                for i in range(6):
+                    strain[i] -= at[q, a] * ease[a, i]
             for i in range(6):
                 total = 0.0
                 for j in range(6):
-                    total += c[i, j] * (strain[j] - ease[j])
+                    total += c[i, j] * strain[j]
                 result[cell, q, i] = total
 
 
@@ -177,7 +180,7 @@ def _curved_stress(
     ease = free[rows] if len(free) > 1 else free
     for q, place in enumerate(at):
         gradient = np.swapaxes(u, 1, 2) @ gradients_at(nodes, place)
-        result[rows, q] = times(law, voigt_strain(gradient) - ease)
+        result[rows, q] = times(law, voigt_strain(gradient) - place @ ease)
 
 
 @njit(cache=True)

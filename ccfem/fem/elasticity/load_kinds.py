@@ -5,7 +5,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ccfem.base.checks import ACCELERATION, FORCE, MASS_DENSITY, TRACTION, WARMTH, Range
+from ccfem.base.errors import InputError
+from ccfem.base.formula import check_formula
 
 Vector = tuple[float, float, float]
 
@@ -55,6 +59,27 @@ class PointForce:
 
 
 @dataclass(frozen=True)
+class NodeForces:
+    """Forces, N, at the mesh nodes nearest to points, mm, of the part.
+
+    Attributes
+    ----------
+    points, vectors : tuple of tuples of 3 floats
+        A point, mm, and its force, N.
+    """
+
+    points: tuple[Vector, ...]
+    vectors: tuple[Vector, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.points) != len(self.vectors) or not self.points:
+            raise InputError(
+                f"forces at nodes need points and as many vectors; got {len(self.points)} and "
+                f"{len(self.vectors)}: give a vector a point"
+            )
+
+
+@dataclass(frozen=True)
 class BodyForce:
     """A force on every volume of the part, N/mm^3."""
 
@@ -78,10 +103,59 @@ class Gravity:
 
 
 @dataclass(frozen=True)
-class Temperature:
-    """A change of temperature, K, of the whole part; its materials need an expansion."""
+class Centrifugal:
+    """The inertia forces of a part that turns steadily about an axis.
 
-    change: float
+    Attributes
+    ----------
+    speed : float, rad/s
+    point : tuple of 3 floats, mm
+        On the axis.
+    axis : tuple of 3 floats
+        Its direction, of any length.
+    mass_density : float, g/cm^3, optional
+        Of the whole part; by default each material's own.
+    """
+
+    speed: float
+    point: Vector
+    axis: Vector
+    mass_density: float | None = None
+
+    def __post_init__(self) -> None:
+        if not 0.0 < np.linalg.norm(self.axis) < np.inf:
+            raise InputError(
+                f"the axis of a centrifugal load must have a length; got {self.axis}: give its "
+                "direction, as [0, 0, 1]"
+            )
+
+
+@dataclass(frozen=True)
+class Temperature:
+    """A change of temperature, K, of the part; its materials need an expansion.
+
+    Attributes
+    ----------
+    change : float, str or tuple of floats, K
+        Of the whole part; or a formula in x, y and z, mm (`ccfem.base.formula`); or the change at
+        each of some points, between which it is linear (outside them that of the nearest counts).
+    points : tuple of tuples of 3 floats, mm
+        These points; none for the other two.
+    """
+
+    change: float | str | tuple[float, ...]
+    points: tuple[Vector, ...] = ()
+
+    def __post_init__(self) -> None:
+        if isinstance(self.change, str):
+            check_formula(self.change)
+        count = len(self.change) if isinstance(self.change, tuple) else 0
+        if count != len(self.points) or self.change == ():
+            raise InputError(
+                "a temperature has one change or formula, or a list of changes with a point each; "
+                f"got {count} changes in a list and {len(self.points)} points: give a point a "
+                "change"
+            )
 
 
 @dataclass(frozen=True)
@@ -95,8 +169,9 @@ class Displacement:
     vector: Vector
 
 
-SurfaceLoad = Force | Traction | Pressure | Bearing | PointForce
-Load = SurfaceLoad | BodyForce | Gravity | Temperature | Displacement
+SurfaceLoad = Force | Traction | Pressure | Bearing | PointForce | NodeForces
+VolumeLoad = BodyForce | Gravity | Centrifugal
+Load = SurfaceLoad | VolumeLoad | Temperature | Displacement
 
 
 def kind_of(value: object) -> str:
@@ -116,8 +191,14 @@ def sizes_of(load: Load) -> tuple[tuple[str, float, Range], ...]:
         if load.mass_density is not None:
             weight.append(("mass density of gravity", load.mass_density, MASS_DENSITY))
         return tuple(weight)
+    if isinstance(load, Centrifugal) and load.mass_density is not None:
+        return (("mass density of the centrifugal load", load.mass_density, MASS_DENSITY),)
     if isinstance(load, Temperature):
-        return (("change of temperature", load.change, WARMTH),)
+        if isinstance(load.change, str):
+            return ()
+        return (("change of temperature", float(max(np.ravel(load.change), key=abs)), WARMTH),)
+    if isinstance(load, NodeForces):
+        return ((in_words(load), float(max(np.ravel(load.vectors), key=abs)), FORCE),)
     if isinstance(load, Pressure):
         return ((in_words(load), load.magnitude, TRACTION),)
     if isinstance(load, Force | Bearing | PointForce | Traction):
@@ -135,7 +216,11 @@ def patches_of(kind: Any) -> tuple[str, ...]:
 
 def points_of(kind: Any) -> tuple[Vector, ...]:
     """Points that a load or a support acts at, by their own coordinates."""
-    return (kind.point,) if hasattr(kind, "point") and not patches_of(kind) else ()
+    if isinstance(kind, Temperature | Centrifugal) or patches_of(kind):
+        return ()
+    if hasattr(kind, "points"):
+        return tuple(kind.points)
+    return (kind.point,) if hasattr(kind, "point") else ()
 
 
 def patches_in_use(

@@ -5,25 +5,41 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import LinearNDInterpolator
+from scipy.spatial import QhullError, cKDTree
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError
+from ccfem.base.formula import formula_values
 from ccfem.base.tensor import strain_to_voigt
 from ccfem.body.mesh import TetMesh
-from ccfem.body.mesh.curved_cells import STRAIGHT, facet_integrals, gradient_integrals, integrals
+from ccfem.body.mesh.curved_cells import (
+    CELL_POINTS,
+    CELL_WEIGHTS,
+    EDGES,
+    STRAIGHT,
+    facet_integrals,
+    gradients_at,
+    integrals,
+    jacobians,
+    shape_values,
+)
 from ccfem.fem.elasticity.assembly import cell_gradients
 from ccfem.fem.elasticity.load_kinds import (
     Bearing,
     BodyForce,
+    Centrifugal,
     Displacement,
     Force,
     Gravity,
     Load,
+    NodeForces,
     PointForce,
     Pressure,
     SurfaceLoad,
     Temperature,
     Traction,
+    VolumeLoad,
     sizes_of,
 )
 from ccfem.fem.elasticity.nodes import (
@@ -31,6 +47,7 @@ from ccfem.fem.elasticity.nodes import (
     SupportedProblem,
     facet_normals,
     nearest_node,
+    nearest_nodes,
     patch_facets,
 )
 from ccfem.fem.elasticity.problem import Problem
@@ -175,19 +192,27 @@ def _point(mesh: LoadedBody, load: PointForce) -> FloatArray:
     return result
 
 
+def _nodes(mesh: LoadedBody, load: NodeForces) -> FloatArray:
+    result = np.zeros(mesh.points.shape)
+    vectors = np.asarray(load.vectors)[:, : mesh.points.shape[1]]
+    np.add.at(result, nearest_nodes(mesh, load.points, "a force"), vectors)
+    return result
+
+
 _KINDS: dict[type, Callable[..., FloatArray]] = {
     Force: _force,
     Traction: _traction,
     Pressure: _pressure,
     Bearing: _bearing,
     PointForce: _point,
+    NodeForces: _nodes,
 }
 
 
 def check_load(load: Load) -> None:
     """Refuse a load that is not finite, absurdly large, or zero; displacements may be zero."""
     for value in vars(load).values():
-        if value is None or isinstance(value, str):
+        if value is None or isinstance(value, str) or value == ():
             continue
         if not np.isfinite(value).all():
             raise InputError(f"a load must be finite; got {load}: correct its numbers")
@@ -196,9 +221,10 @@ def check_load(load: Load) -> None:
                 f"numbers of a load must be at most {_LARGEST:g} (N, MPa, mm); got {load}: correct "
                 "its numbers"
             )
-    sizes = ("vector", "magnitude", "acceleration", "change")
+    sizes = ("vector", "vectors", "magnitude", "acceleration", "speed", "change")
     size = next(getattr(load, name) for name in sizes if hasattr(load, name))
-    if np.max(np.abs(size)) < _SMALLEST and not isinstance(load, Displacement):
+    may_be_none = isinstance(load, Displacement) or isinstance(size, str)
+    if not may_be_none and np.max(np.abs(size)) < _SMALLEST:
         raise InputError(f"a load must not be zero; got {load}: give it a size or leave it out")
     for what, value, bounds in sizes_of(load):
         bounds.check(what, value)
@@ -235,7 +261,7 @@ def load_case(problem: SupportedProblem, name: str) -> FloatArray:
         check_load(load)
         if isinstance(load, SurfaceLoad):
             parts.append(nodal_forces(problem.body, load))
-        elif isinstance(load, BodyForce | Gravity):
+        elif isinstance(load, VolumeLoad):
             assert isinstance(problem, Problem)
             parts.append(volume_forces(problem, load))
     heat = any(isinstance(load, Temperature) for load in loads)
@@ -271,12 +297,16 @@ def load_cases(problem: SupportedProblem) -> dict[str, FloatArray]:
 # Loads in the volume of a part: body forces, weight, and heat.
 
 
+_CORNERS = 4
+"""Number of points up to which nothing is between them that the nearest would not tell."""
+_AT_POINT = 1e-9
+"""Distance of a node from a point, over the reach of all points, that counts as none."""
 _TONNES = 1e-9
 """Tonnes per mm^3 in a gram per cm^3; a tonne times a mm/s^2 is a newton."""
 
 
-def volume_forces(problem: Problem, load: BodyForce | Gravity) -> FloatArray:
-    """Find the forces at the nodes (n, 3), N, that do the same work as a body force or a weight.
+def volume_forces(problem: Problem, load: VolumeLoad) -> FloatArray:
+    """Find the forces at the nodes (n, 3), N, that do the same work as a load in the volume.
 
     Raises
     ------
@@ -284,6 +314,8 @@ def volume_forces(problem: Problem, load: BodyForce | Gravity) -> FloatArray:
         For a weight where a material has no mass density and none is given.
     """
     mesh = problem.mesh
+    if isinstance(load, Centrifugal):
+        return _centrifugal_forces(problem, load)
     if isinstance(load, BodyForce):
         force = np.tile(np.asarray(load.vector, dtype=np.float64), (len(mesh.cells), 1))
     else:
@@ -293,14 +325,37 @@ def volume_forces(problem: Problem, load: BodyForce | Gravity) -> FloatArray:
     volumes = mesh.volumes[:, None] * shares
     if len(mesh.curved):
         volumes[mesh.curved] = integrals(mesh.points[mesh.cells[mesh.curved]])
+    return _summed(mesh, force[:, None] * volumes[:, :, None])
+
+
+def _summed(mesh: TetMesh, forces: FloatArray) -> FloatArray:
+    """Sum (n, 3) of the forces (m, q, 3) at the nodes of each cell."""
     result = np.zeros(mesh.points.shape)
     for k in range(3):
-        weights = force[:, k, None] * volumes
-        result[:, k] = np.bincount(mesh.cells.reshape(-1), weights.reshape(-1), len(result))
+        weights = forces[..., k].reshape(-1)
+        result[:, k] = np.bincount(mesh.cells.reshape(-1), weights, len(result))
     return result
 
 
-def _mass_density(problem: Problem, load: Gravity) -> FloatArray:
+def _centrifugal_forces(problem: Problem, load: Centrifugal) -> FloatArray:
+    """``int N rho speed^2 r dV`` with the radius r from the axis, by quadrature in each cell."""
+    mesh = problem.mesh
+    axis = np.asarray(load.axis) / np.linalg.norm(load.axis)
+    arm = mesh.points - np.asarray(load.point)
+    radius = (arm - np.outer(arm @ axis, axis))[mesh.cells]
+    size = _TONNES * _mass_density(problem, load) * load.speed**2
+    forces = np.zeros(radius.shape)
+    for weight, at in zip(CELL_WEIGHTS, CELL_POINTS, strict=True):
+        values = at if mesh.order == 1 else shape_values(at)
+        volume = np.array(mesh.volumes)
+        if len(mesh.curved):
+            volume[mesh.curved] = jacobians(mesh.points[mesh.cells[mesh.curved]], at) / 6.0
+        here = (weight * size * volume)[:, None] * np.einsum("a,mai->mi", values, radius)
+        forces += values[:, None] * here[:, None]
+    return _summed(mesh, forces)
+
+
+def _mass_density(problem: Problem, load: Gravity | Centrifugal) -> FloatArray:
     """Mass density (m,), g/cm^3; the density of a cell, where the part has one, scales it."""
     factor = np.ones(len(problem.mesh.cells)) if problem.density is None else problem.density
     if load.mass_density is not None:
@@ -308,16 +363,48 @@ def _mass_density(problem: Problem, load: Gravity) -> FloatArray:
     result = np.empty(len(factor))
     for material, cells in problem.materials:
         if material.mass_density is None:
+            what = "gravity" if isinstance(load, Gravity) else "a centrifugal load"
             raise InputError(
-                f"gravity needs the mass density of material '{material.name}', g/cm^3, which has "
+                f"{what} needs the mass density of material '{material.name}', g/cm^3, which has "
                 "none: give mass_density to the load or to the material"
             )
         result[cells] = material.mass_density
     return factor * result
 
 
+def temperature_change(mesh: TetMesh, load: Temperature) -> FloatArray:
+    """Change of temperature (n,), K, at the nodes of a mesh."""
+    if isinstance(load.change, str):
+        return formula_values(load.change, mesh.points)
+    if not isinstance(load.change, tuple):
+        return np.full(len(mesh.points), load.change)
+    points, change = np.asarray(load.points), np.asarray(load.change)
+    away, at = cKDTree(points).query(mesh.points)
+    result = change[at]
+    between = away > _AT_POINT * max(float(np.ptp(points, axis=0).max()), 1e-300)
+    if between.any() and len(points) > _CORNERS:
+        try:
+            inside = LinearNDInterpolator(points, change)(mesh.points[between])
+            result[between] = np.where(np.isnan(inside), result[between], inside)
+        except QhullError:  # points in one plane span no volume to be linear in
+            pass
+    return result
+
+
+_PRODUCTS = (np.ones((4, 4)) + np.eye(4)) / 20.0
+"""Integrals of the products of two barycentric coordinates over a cell of unit volume."""
+_MOMENTS = np.concatenate(
+    [(np.eye(4) - 1.0) / 60.0, (1.0 + (np.arange(4)[:, None, None] == EDGES).any(axis=2)) / 30.0],
+    axis=1,
+)
+"""Those of a barycentric coordinate and a quadratic shape function."""
+_TO_LINEAR = np.linalg.solve(_PRODUCTS, _MOMENTS)
+"""Corner values (4, 10) of the linear function that is nearest to a quadratic one in a cell: both
+give the same forces, since strains are linear there."""
+
+
 def free_strain(problem: Problem, case: str) -> FloatArray | None:
-    """Free thermal strain (m, 6) of each cell; None without heat.
+    """Free thermal strain (m, 4, 6) at the corners of each cell, linear between; None without heat.
 
     Voigt, with engineering shear, in the global frame; of a load case or a combination.
 
@@ -326,26 +413,29 @@ def free_strain(problem: Problem, case: str) -> FloatArray | None:
     InputError
         When a material has no expansion.
     """
-    change = sum(
-        factor * load.change
-        for name, factor in problem.factors(case).items()
-        for load in problem.loads.get(name, ())
-        if isinstance(load, Temperature)
-    )
-    if not change:
+    mesh = problem.mesh
+    change = np.zeros(len(mesh.points))
+    for name, factor in problem.factors(case).items():
+        for load in problem.loads.get(name, ()):
+            if isinstance(load, Temperature):
+                change += factor * temperature_change(mesh, load)
+    if not change[mesh.cells].any():
         return None
-    result = np.empty((len(problem.mesh.cells), 6))
+    result = np.empty((len(mesh.cells), 4, 6))
     for material, cells in problem.materials:
         if material.expansion is None:
             raise InputError(
                 f"a change of temperature needs the expansion of material '{material.name}', 1/K, "
                 "which has none: give it one"
             )
-        strain = change * np.diag(material.expansion)
+        strain = np.diag(material.expansion)
         if problem.axes is not None:
             axes = problem.axes[cells]
             strain = axes @ strain @ np.swapaxes(axes, 1, 2)
-        result[cells] = strain_to_voigt(strain)
+        at_corners = change[mesh.cells[cells]]
+        if mesh.order == 2:
+            at_corners = at_corners @ _TO_LINEAR.T
+        result[cells] = at_corners[:, :, None] * strain_to_voigt(strain).reshape(-1, 1, 6)
     return result
 
 
@@ -356,26 +446,53 @@ def heat_forces(problem: Problem, case: str) -> FloatArray:
         return np.zeros(problem.mesh.points.shape)
     stress = times(problem.cell_stiffness, free)
     if problem.density is not None:
-        stress = stress * problem.density[:, None]
+        stress = stress * problem.density[:, None, None]
     return strain_forces(problem.mesh, stress)
 
 
 def strain_forces(mesh: TetMesh, stress: FloatArray) -> FloatArray:
-    """Find the forces at the nodes (n, 3), N, of a constant stress (m, 6), MPa, in each cell.
+    """Find the forces at the nodes (n, 3), N, of a stress in each cell.
 
     They are ``int B^T s dV``: the effect of an initial stress -s on the part.
+
+    Parameters
+    ----------
+    stress : (m, 6) or (m, 4, 6) array, MPa
+        Voigt; constant in each cell, or at its corners and linear between.
     """
-    s = stress[:, [0, 5, 4, 5, 1, 3, 4, 3, 2]].reshape(-1, 3, 3)
+    corner = stress if stress.ndim == 3 else stress[:, None]
+    s = corner[..., [0, 5, 4, 5, 1, 3, 4, 3, 2]].reshape(*corner.shape[:2], 3, 3)
     gradients = cell_gradients(mesh)
     volumes = signed_volumes(mesh.points, mesh.corners)[:, None, None]
-    nodes, forces = mesh.cells, volumes * (gradients @ s)
+    mean = s.mean(axis=1)
+    forces = volumes * (gradients @ mean)
     if mesh.order == 2:
         # Gradients of corner functions have mean zero, those of a midpoint that of its corners.
         i, j = mesh.edges.T
         forces = np.concatenate([np.zeros_like(forces), forces[:, i] + forces[:, j]], axis=1)
-        curved = gradient_integrals(mesh.points[mesh.cells[mesh.curved]])
-        forces[mesh.curved] = curved @ s[mesh.curved]
-    result = np.zeros(mesh.points.shape)
-    for k in range(3):
-        result[:, k] = np.bincount(nodes.reshape(-1), forces[..., k].reshape(-1), len(result))
-    return result
+        if stress.ndim == 3:
+            # The integrals of (4 L_i - 1) s and of 4 L_j s beyond those of the mean stress.
+            off = volumes[:, None] * (s - mean[:, None]) / 5.0
+            forces[:, :4] += _row_times(gradients, off)
+            forces[:, 4:] += _row_times(gradients[:, i], off[:, j])
+            forces[:, 4:] += _row_times(gradients[:, j], off[:, i])
+        if len(mesh.curved):
+            forces[mesh.curved] = _curved_strain_forces(mesh, s[mesh.curved])
+    return _summed(mesh, forces)
+
+
+def _row_times(gradients: FloatArray, stress: FloatArray) -> FloatArray:
+    """Products (m, q, 3) of gradients (m, q, 3) and stresses (m, q, 3, 3)."""
+    return np.asarray(np.einsum("maj,majk->mak", gradients, stress))
+
+
+def _curved_strain_forces(mesh: TetMesh, stress: FloatArray) -> FloatArray:
+    """Do the same, (c, 10, 3), in the cells with curved sides, of a stress (c, 1 or 4, 3, 3)."""
+    nodes = mesh.points[mesh.cells[mesh.curved]]
+    forces = np.zeros(nodes.shape)
+    for weight, at in zip(CELL_WEIGHTS, CELL_POINTS, strict=True):
+        shares = at if stress.shape[1] == 4 else np.ones(1)
+        here = np.einsum("a,maij->mij", shares, stress)
+        volume = weight / 6.0 * jacobians(nodes, at)
+        forces += volume[:, None, None] * (gradients_at(nodes, at) @ here)
+    return forces

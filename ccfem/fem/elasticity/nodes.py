@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError
@@ -72,6 +73,8 @@ class SupportedProblem(Protocol):
         ...
 
 
+_SAME = 1e-9
+"""Distance of two places over the size of the part that counts as none."""
 _COARSE = 50.0
 """Feature angle, degrees, at which a bore of 8 facets is a round wall, and a hexagon is none."""
 
@@ -103,27 +106,47 @@ def edge_nodes(mesh: CellMesh, names: tuple[str, str]) -> IntArray:
     return common
 
 
-def nearest_node(mesh: CellMesh | LoadedBody, point: Sequence[float], what: str) -> int:
-    """Node of some cell that is nearest to a point of the part.
+def nearest_nodes(
+    mesh: CellMesh | LoadedBody, points: Sequence[Sequence[float]], what: str
+) -> IntArray:
+    """Nodes (k,) of some cells that are nearest to points (k, 3) of the part.
 
     Raises
     ------
     InputError
-        When the point is farther from it than the cells there are long, that is outside the part.
+        When a point is farther from it than the cells there are long, that is outside the part, or
+        when two nodes lie there, as on both sides of a slit.
     """
     used = np.unique(mesh.cells)
-    wanted = np.asarray(point, dtype=np.float64)[: mesh.points.shape[1]]
-    distance = np.linalg.norm(mesh.points[used] - wanted, axis=1)
-    node = int(used[distance.argmin()])
-    near = mesh.cells[(mesh.cells == node).any(axis=1)]
-    reach = float(np.linalg.norm(mesh.points[near] - mesh.points[node], axis=2).max())
-    if not distance.min() <= reach:
-        at = ", ".join(f"{x:.4g}" for x in mesh.points[node])
+    wanted = np.asarray(points, dtype=np.float64)[:, : mesh.points.shape[1]]
+    tree = cKDTree(mesh.points[used])
+    distance, at = tree.query(wanted)
+    size = float(np.linalg.norm(np.ptp(mesh.points[used], axis=0)))
+    nodes = used[at]
+    for k in np.flatnonzero(~(distance <= _SAME * size)).tolist():
+        node = nodes[k]
+        near = mesh.cells[(mesh.cells == node).any(axis=1)]
+        reach = float(np.linalg.norm(mesh.points[near] - mesh.points[node], axis=2).max())
+        if not distance[k] <= reach:
+            place = ", ".join(f"{x:.4g}" for x in mesh.points[node])
+            raise InputError(
+                f"{what} at {tuple(float(x) for x in points[k])} mm lies {distance[k]:.4g} mm from "
+                f"the nearest node, ({place}), where cells are {reach:.4g} mm long: give a point "
+                "of the part"
+            )
+    several = tree.query_ball_point(mesh.points[nodes], _SAME * size, return_length=True) > 1
+    if several.any():
+        place = ", ".join(f"{x:.4g}" for x in mesh.points[nodes[several.argmax()]])
         raise InputError(
-            f"{what} at {tuple(float(x) for x in point)} mm lies {distance.min():.4g} mm from the "
-            f"nearest node, ({at}), where cells are {reach:.4g} mm long: give a point of the part"
+            f"{what} acts at ({place}) mm, where two nodes lie, as on both sides of a slit: merge "
+            "them (merge_nodes = true), or take another point"
         )
-    return node
+    return nodes
+
+
+def nearest_node(mesh: CellMesh | LoadedBody, point: Sequence[float], what: str) -> int:
+    """Node of some cell that is nearest to a point of the part: see `nearest_nodes`."""
+    return int(nearest_nodes(mesh, [point], what)[0])
 
 
 def facet_normals(mesh: LoadedBody, facets: IntArray, places: FloatArray) -> FloatArray:

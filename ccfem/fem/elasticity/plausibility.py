@@ -445,6 +445,11 @@ LARGEST_ERROR = 0.1
 """Estimated error, in energy norm, up to which cells are fine enough: 1 % of the displacement, and
 12 % of the stress where it peaks (measured at a hole in a plate)."""
 
+LARGEST_PEAK_ERROR = 0.03
+"""Estimated error of the largest stress from which there is a remark. On NAFEMS LE1 and LE11 and
+holes in plates, of 2 to 24 %, it was that of this stress within a factor of about three, and all
+that were off by more than 3 % were above."""
+
 _LOCKS = 2.0 * 1.45 / (3.0 * (1.0 - 2.0 * 0.45))
 """Bulk over shear modulus above which linear cells lock: Poisson's ratio 0.45."""
 
@@ -478,7 +483,7 @@ def _about_error(
         peak = error.relative_in((problem.mesh.cells == node).any(axis=1))
         at = ", ".join(f"{x:.4g}" for x in problem.mesh.points[node])
         where = f"{peak:.0%} in the stress where it peaks, {mises.max():.4g} MPa at ({at}) mm"
-    if not max(whole, peak) > LARGEST_ERROR:
+    if whole <= LARGEST_ERROR and peak <= LARGEST_PEAK_ERROR:
         return ""
     terms, cure = [], "smaller cells"
     if whole > LARGEST_ERROR:
@@ -487,7 +492,7 @@ def _about_error(
         known &= free_strain(problem, case) is None
         also = f", about {whole**2:.0%} of the displacement" if known else ""
         terms.append(f"{whole:.0%} in energy norm{also}")
-    if peak > LARGEST_ERROR:
+    if peak > LARGEST_PEAK_ERROR:
         terms.append(where)
         cure += " there; a sharp inner edge needs its radius" if len(terms) == 1 else ""
     cure = f"quadratic cells (order = 2), or {cure}" if problem.mesh.order == 1 else cure

@@ -78,11 +78,11 @@ def cell_stress(
     ----------
     displacement : (n, 3) array, mm
     stiffness : (6, 6) or (m, 6, 6) array, MPa
-    free : (m, 6) array, optional
-        Stress-free strain of each cell, Voigt, such as thermal strain.
+    free : (m, 4, 6) array, optional
+        Stress-free strain at the corners of each cell, Voigt, such as thermal strain.
     """
     strain = cell_strain(mesh, displacement)
-    return from_voigt(times(stiffness, strain if free is None else strain - free))
+    return from_voigt(times(stiffness, strain if free is None else strain - free.mean(axis=1)))
 
 
 def nodal_stress(
@@ -103,11 +103,11 @@ def nodal_stress(
     m, q = mesh.cells.shape
     if mesh.order == 1:
         strain = cell_strain(mesh, displacement)
-        stress = times(stiffness, strain if free is None else strain - free)
+        stress = times(stiffness, strain if free is None else strain - free.mean(axis=1))
         entries = np.repeat(np.arange(m), q)
     else:
         strain = strain_at_nodes(mesh, displacement)
-        stress = times(stiffness, strain if free is None else strain - free[:, None])
+        stress = times(stiffness, strain if free is None else strain - NODES @ free)
         stress = stress.reshape(-1, 6)
         entries = np.arange(m * q)
     weights = np.repeat(mesh.volumes, q)

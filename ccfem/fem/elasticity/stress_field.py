@@ -17,13 +17,14 @@ from ccfem.body.mesh.curved_cells import shape_values
 from ccfem.fem.elasticity.error_estimate import ErrorEstimate, estimate_error
 from ccfem.fem.elasticity.load_kinds import patches_in_use
 from ccfem.fem.elasticity.loads import free_strain
-from ccfem.fem.elasticity.nodes import edge_nodes, nearest_node, patch_nodes
+from ccfem.fem.elasticity.nodes import edge_nodes, nearest_node, nearest_nodes, patch_nodes
 from ccfem.fem.elasticity.plausibility import about_problem, about_solution
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.recovery import cell_strain, nodal_stress
 from ccfem.fem.elasticity.support_kinds import (
     AnySupport,
     EdgeSupport,
+    NodeSupport,
     PointSpring,
     PointSupport,
     RigidPatch,
@@ -229,6 +230,8 @@ def _claim(mesh: TetMesh, support: AnySupport) -> tuple[str, IntArray, IntArray]
     if isinstance(support, EdgeSupport):
         label = f"edge of {support.patches[0]} and {support.patches[1]}"
         return label, edge_nodes(mesh, support.patches), components
+    if isinstance(support, NodeSupport):
+        return support.name, nearest_nodes(mesh, support.points, "a support"), components
     if isinstance(support, PointSupport | PointSpring):
         node = nearest_node(mesh, support.point, "a support")
         at = ", ".join(f"{x:.6g}" for x in support.point)

@@ -82,6 +82,31 @@ class PointSupport:
 
 
 @dataclass(frozen=True)
+class NodeSupport:
+    """Components held at the mesh nodes nearest to points, mm, of the part.
+
+    Attributes
+    ----------
+    name : str
+        What its force is called in results.
+    points : tuple of tuples of 3 floats, mm
+    components : str, default "xyz"
+    value : tuple of 3 floats, mm, default zero
+    """
+
+    name: str
+    points: tuple[Vector, ...]
+    components: str = "xyz"
+    value: Vector = _ZERO
+
+    def __post_init__(self) -> None:
+        _check_components(self, self.components, f"nodes '{self.name}'")
+        if not self.points:
+            raise InputError(f"the support at nodes '{self.name}' has no point: give some")
+        _check_finite(self, "points")
+
+
+@dataclass(frozen=True)
 class SlidingSupport:
     """A patch that slides without friction: only motion normal to its surface is held.
 
@@ -264,6 +289,7 @@ AnySupport = (
     Support
     | EdgeSupport
     | PointSupport
+    | NodeSupport
     | SlidingSupport
     | PressingSupport
     | RigidPatch

@@ -19,6 +19,7 @@ from ccfem.fem.elasticity.nodes import (
     edge_nodes,
     facet_normals,
     nearest_node,
+    nearest_nodes,
     patch_facets,
     patch_nodes,
     patch_normals,
@@ -28,6 +29,7 @@ from ccfem.fem.elasticity.support_kinds import (
     AnySupport,
     EdgeSupport,
     Foundation,
+    NodeSupport,
     Pin,
     PointSpring,
     PointSupport,
@@ -253,6 +255,11 @@ def _point(collected: _Collected, support: PointSupport, move: Sequence[float] |
     collected.components(node, support.components, support.value, f"the point {support.point}")
 
 
+def _nodes(collected: _Collected, support: NodeSupport, move: Sequence[float] | None) -> None:
+    nodes = nearest_nodes(collected.mesh, support.points, f"the support '{support.name}'")
+    collected.components(nodes, support.components, support.value, f"nodes '{support.name}'")
+
+
 def _sliding(collected: _Collected, support: SlidingSupport, move: Sequence[float] | None) -> None:
     nodes = patch_nodes(collected.mesh, support.patch)
     if support.normal is None:
@@ -323,6 +330,7 @@ _KINDS: dict[type, Callable[..., None]] = {
     Support: _patch,
     EdgeSupport: _edge,
     PointSupport: _point,
+    NodeSupport: _nodes,
     SlidingSupport: _sliding,
     PressingSupport: _pressing,
     RigidPatch: _rigid,

@@ -147,7 +147,10 @@ class System:
         if free is not None:
             stress = times(scaled, free)
             energy -= float(np.vdot(displacement, strain_forces(mesh, stress)))
-            energy += 0.5 * float(np.einsum("m,mi,mi->", mesh.volumes, stress, free))
+            # The mean over a cell of a product of two quantities that are linear in it.
+            both = np.einsum("mai,mai->m", stress, free)
+            both += np.einsum("mi,mi->m", stress.sum(axis=1), free.sum(axis=1))
+            energy += 0.5 * float(mesh.volumes @ both) / 20.0
         return StressField(
             problem=problem,
             case=case,

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ccfem.base.arrays import FloatArray, freeze, in_brief, read_only
 from ccfem.base.errors import InputError
 from ccfem.fem.elasticity import Pressure, Support
-from ccfem.fem.elasticity.load_kinds import SurfaceLoad, patches_in_use
+from ccfem.fem.elasticity.load_kinds import NodeForces, SurfaceLoad, patches_in_use
 from ccfem.fem.plates.mesh import PlaneMesh, Sheet
 
 
@@ -71,7 +71,10 @@ class PlaneProblem:
                     "z zero"
                 )
         for load in (load for case in self.loads.values() for load in case):
-            if not isinstance(load, Pressure) and load.vector[2] != 0.0:
+            if isinstance(load, Pressure):
+                continue
+            vectors = load.vectors if isinstance(load, NodeForces) else (load.vector,)
+            if any(vector[2] != 0.0 for vector in vectors):
                 raise InputError(
                     f"a plane problem is loaded in its plane; got {load}: give component z zero"
                 )

@@ -10,7 +10,8 @@ from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, in_brief
 from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
 from ccfem.base.tensor import rotate_stiffness
-from ccfem.fem.elasticity.problem import Order, PointForce, Problem
+from ccfem.fem.elasticity.load_kinds import points_of
+from ccfem.fem.elasticity.problem import Order, Problem
 from ccfem.fem.plates.problem import PlaneProblem, fitted_harmonics, rotate_plane, turned_by
 
 _APART = "falls apart between its loads and supports"
@@ -195,7 +196,7 @@ def anchors(problem: PlaneProblem | Problem, without: Sequence[str] = ()) -> lis
     mesh, used = problem.mesh, np.unique(problem.mesh.cells)
     nodes = [np.unique(mesh.patch(k)) for k in problem.held_or_loaded if k not in without]
     for load in (load for case in problem.loads.values() for load in case):
-        if isinstance(load, PointForce):
-            away = mesh.points[used] - load.point[: mesh.points.shape[1]]
+        for point in points_of(load):
+            away = mesh.points[used] - point[: mesh.points.shape[1]]
             nodes.append(used[[np.linalg.norm(away, axis=1).argmin()]])
     return nodes

@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 
+from ccfem.base.errors import InputError
 from ccfem.body.meshing.cad import mesh_cad, read_cad
+from ccfem.cases.inspection import check
+from ccfem.cases.part_keys import Body
+from ccfem.fem.elasticity import solve
 
 gmsh = pytest.importorskip("gmsh")
 
@@ -71,3 +75,35 @@ def test_one_solid_is_no_matter(step):
     mesh, said = mesh_cad(step((0, 0, 0, 10, 10, 10)), 4.0)
     assert len(said) == 1
     assert len(mesh.patches) == 6
+
+
+def test_separate_solids_keep_their_faces_and_pass_no_force(step, tmp_path):
+    path = step((0, 0, 0, 10, 10, 10), (10, 0, 0, 10, 10, 10))
+    part = f'''
+surface = "{path.name}"
+edge_length = 5.0
+joined = "separate"
+order = 2
+material = {{ modulus = 1000.0, poisson = 0.0 }}
+[[supports]]
+patch = "face_1"
+[[supports]]
+patch = "face_8"
+[[loads.pull]]
+kind = "force"
+patch = "face_2"
+vector = [200, 0, 0]
+'''
+    (tmp_path / "part.toml").write_text(part)
+    checked = check(tmp_path / "part.toml")
+    assert "2 pieces" in checked.known
+    assert any("each a piece of its own that passes no force" in line for line in checked.warnings)
+    case = checked.case
+    assert set(case.body.numbers) == set(range(1, 13))
+    # The first box is stretched by F L / E A; the second one stays as it is. Glued, half as much.
+    field = solve(case.problem)["pull"]
+    end = np.isclose(field.mesh.points[:, 0], 20.0)
+    assert field.on("face_2").displacement[:, 0] == pytest.approx(200.0 * 10.0 / (1000.0 * 100.0))
+    np.testing.assert_allclose(field.displacement[end], 0.0, atol=1e-12)
+    with pytest.raises(InputError, match="joined goes with a CAD file"):
+        Body(mesh="a.msh", joined="separate").check(tmp_path)

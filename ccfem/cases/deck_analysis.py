@@ -1,0 +1,334 @@
+"""The analysis of an Abaqus or CalculiX deck as the values that a part file makes.
+
+Each static step (`ccfem.cases.deck_steps`) is a load case; sets that are held become patches where
+their nodes make facets, and nodes elsewhere; sections (`ccfem.cases.deck_materials`) are regions.
+What cannot be taken over is a mistake, with its line.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.errors import InputError, known_names, shown
+from ccfem.body.files.deck import read_deck
+from ccfem.body.files.formats.inp import mesh_of
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.cases.deck_materials import TAKE_OUT, CellMaterials, DeckMaterials, DeckReading
+from ccfem.cases.deck_steps import BODY, DeckSteps, FaceLoad, State
+from ccfem.fem.elasticity.load_kinds import (
+    BodyForce,
+    Centrifugal,
+    Gravity,
+    Load,
+    NodeForces,
+    Pressure,
+    Temperature,
+    Traction,
+    Vector,
+)
+from ccfem.fem.elasticity.problem import Region
+from ccfem.fem.elasticity.support_kinds import AnySupport, NodeSupport, Support
+from ccfem.fem.materials import Material
+from ccfem.geometry.facets import are_among, facet_keys
+
+_SAME = 1e-9
+"""Difference of loads, over their size, that counts as rounding."""
+
+
+@dataclass(frozen=True)
+class DeckAnalysis:
+    """A deck as values of a part.
+
+    Attributes
+    ----------
+    mesh : TetMesh
+        In mm, as it stands in the deck, with patches of its sets, supports and loads.
+    materials : CellMaterials
+    supports, case_supports, loads
+        As in `ccfem.fem.elasticity.problem.Problem`; a load case a static step.
+    remarks : tuple of str
+        What was left out, with its line.
+    """
+
+    mesh: TetMesh
+    materials: CellMaterials
+    supports: tuple[AnySupport, ...]
+    case_supports: Mapping[str, tuple[AnySupport, ...]]
+    loads: Mapping[str, tuple[Load, ...]]
+    remarks: tuple[str, ...]
+
+    def on_cells(self, mesh: TetMesh) -> tuple[Material, tuple[Region, ...], FloatArray | None]:
+        """Material, regions and axes of the cells of its mesh, mended or made quadratic."""
+        _, at = cKDTree(self.mesh.centres).query(mesh.centres)
+        first, *others = self.materials.materials
+        number, axes = self.materials.number[at], self.materials.axes
+        chosen = [np.flatnonzero(number == k) for k in range(1, len(others) + 1)]
+        regions = (Region(x, cells) for x, cells in zip(others, chosen, strict=True) if len(cells))
+        return first, tuple(regions), None if axes is None else axes[at]
+
+
+def read_analysis(path: Path, scale: float = 1.0, step: str | None = None) -> DeckAnalysis:
+    """Read a deck with its analysis.
+
+    Parameters
+    ----------
+    path : Path
+        An ``.inp`` file.
+    scale : float, default 1
+        Unit of length of the deck, mm; forces are in N and times in s.
+    step : str, optional
+        The step that is taken, by its name or as ``step_2``; default all static ones.
+
+    Raises
+    ------
+    InputError
+        With a line for everything that cannot be taken over.
+    """
+    model, deck = read_deck(path)
+    reading = DeckReading(model, deck, scale)
+    steps, known = DeckSteps(reading, mesh_of(model, path)), DeckMaterials(reading)
+    for block, scope in deck.rest:
+        if block.keyword in DeckMaterials.KEYWORDS:
+            known.take(block, scope)
+        else:
+            with reading.noted(block):
+                steps.take(block)
+    steps.end_step()
+    materials = known.of_cells(steps.mesh.centres)
+    for kind, count in deck.bare.items():
+        what = f"elements {kind or 'without type'}, which have no volume"
+        reading.remarks.append(f"{path}: {count} lines of {what}, are left out")
+    conversion = _Conversion(steps, known.expand)
+    cases = conversion.chosen(step, path)
+    reading.mistakes.complain()
+    assert materials is not None
+    if any(isinstance(load, Temperature) for _, loads in cases.values() for load in loads):
+        materials = materials.with_expansion()
+    first = next(iter(cases.values()))[0]
+    shared = tuple(s for s in first if all(s in supports for supports, _ in cases.values()))
+    own = {
+        name: tuple(s for s in supports if s not in shared) for name, (supports, _) in cases.items()
+    }
+    mesh = conversion.mesh
+    return DeckAnalysis(
+        TetMesh(mesh.points * scale, mesh.cells, mesh.patches),
+        materials,
+        shared,
+        {name: supports for name, supports in own.items() if supports},
+        {name: loads for name, (_, loads) in cases.items()},
+        tuple(reading.remarks),
+    )
+
+
+class _Conversion:
+    """What acts in the steps of a deck as supports and loads of a part.
+
+    Attributes
+    ----------
+    expand : bool
+        Whether some material grows by heat.
+    """
+
+    def __init__(self, steps: DeckSteps, expand: bool) -> None:
+        self.steps, self.reading, self.mesh, self.expand = steps, steps.reading, steps.mesh, expand
+        self._patches = dict(steps.mesh.patches)
+
+    def chosen(
+        self, wanted: str | None, path: Path
+    ) -> dict[str, tuple[tuple[AnySupport, ...], tuple[Load, ...]]]:
+        """Supports and loads of the static steps that do something, or of the one that is named.
+
+        Raises
+        ------
+        InputError
+            When there is none.
+        """
+        steps = [step for step in self.steps.ended if step.static]
+        names = [step.name for step in self.steps.ended]
+        if wanted is not None:
+            known = [x for x in steps if wanted.upper() in (x.name.upper(), f"STEP_{x.number}")]
+            if not known:
+                self.reading.mistakes.complain()
+                raise InputError(
+                    f"{path} has no static step {shown(wanted)}; its steps are "
+                    f"{known_names(wanted, names) or 'none'}"
+                )
+            steps = known[:1]
+        cases: dict[str, tuple[tuple[AnySupport, ...], tuple[Load, ...]]] = {}
+        for step in steps:
+            with self.reading.noted(step.block):
+                supports, moves = self._supports(step.state)
+                loads = self._loads(step.state)
+                if not loads and not moves:
+                    self.reading.remark(step.block, f"'{step.name}' has no load and is left out")
+                    continue
+                name = step.name if step.name not in cases else f"{step.name} ({step.number})"
+                cases[name] = supports, loads
+        if not cases:
+            self.reading.mistakes.complain()
+            raise InputError(
+                f"{path} has no static step with a load; its steps are {', '.join(names) or 'none'}"
+                ": write one, or give supports and loads in the part file"
+            )
+        self.mesh = self.mesh.with_patches(self._patches)
+        return cases
+
+    def _supports(self, state: State) -> tuple[tuple[AnySupport, ...], bool]:
+        """Supports that act, and whether one of them moves.
+
+        The nodes of each set are held as patches where they make facets, the others as nodes.
+        """
+        fixed = np.zeros((len(self.mesh.points), 3), dtype=bool)
+        value = np.zeros(fixed.shape)
+        for hold in state.holds:
+            for c in map("xyz".index, hold.components):
+                fixed[hold.nodes, c], value[hold.nodes, c] = True, hold.value
+        groups: dict[tuple[str, int, float], list[IntArray]] = {}
+        for hold in state.holds:
+            for c in map("xyz".index, hold.components):
+                key = (hold.title, c, hold.value)
+                groups.setdefault(key, []).append(hold.nodes[value[hold.nodes, c] == hold.value])
+        # Components that hold the same nodes of a set make one support.
+        joined: dict[tuple[str, bytes], dict[int, float]] = {}
+        for (title, c, at), parts in groups.items():
+            chosen = np.unique(np.concatenate(parts))
+            if len(chosen):
+                joined.setdefault((title, chosen.tobytes()), {})[c] = at
+        nodes = self.mesh.facet_nodes(self.steps.border)
+        supports: list[AnySupport] = []
+        for (title, chosen_bytes), values in joined.items():
+            inside = np.zeros(len(fixed), dtype=bool)
+            inside[np.frombuffer(chosen_bytes, dtype=np.int64)] = True
+            letters = "".join("xyz"[c] for c in sorted(values))
+            x, y, z = (values.get(c, 0.0) for c in range(3))
+            facets = self.steps.border[inside[nodes].all(axis=1)]
+            if len(facets):
+                supports.append(Support(self._patch(title, facets), letters, (x, y, z)))
+                inside[self.mesh.facet_nodes(facets)] = False
+            if inside.any():
+                supports.append(NodeSupport(title, self._places(inside), letters, (x, y, z)))
+        return tuple(dict.fromkeys(supports)), bool(value[fixed].any())
+
+    def _places(self, chosen: BoolArray | IntArray) -> tuple[Vector, ...]:
+        """Places of nodes, mm."""
+        return tuple(
+            (x, y, z) for x, y, z in (self.mesh.points[chosen] * self.reading.scale).tolist()
+        )
+
+    def _patch(self, title: str, facets: IntArray) -> str:
+        """Name of the patch of some facets: one of the deck's own sets, or a new one."""
+        for name in (title, *self._patches):
+            known = self._patches.get(name, facets[:0])
+            if len(known) == len(facets) and are_among(known, facets).all():
+                return name
+        name, count = title, 1
+        while len(self._patches.get(name, ())):
+            count += 1
+            name = f"{title} ({count})"
+        self._patches[name] = facets
+        return name
+
+    def _loads(self, state: State) -> tuple[Load, ...]:
+        """Find the loads that act."""
+        return (
+            *self._forces(state),
+            *self._on_faces(state),
+            *self._in_volume(state),
+            *self._heat(state),
+        )
+
+    def _forces(self, state: State) -> Iterator[Load]:
+        """Sum up the forces at nodes: those of a step replace those of the steps before."""
+        force = np.zeros((len(self.mesh.points), 3))
+        since = np.zeros(force.shape, dtype=np.int64)
+        for load in state.nodes:
+            c, nodes = load.component, load.nodes
+            force[nodes, c] = np.where(since[nodes, c] < load.step, 0.0, force[nodes, c])
+            force[nodes, c] += load.value
+            since[nodes, c] = load.step
+        loaded = np.flatnonzero(force.any(axis=1))
+        if len(loaded):
+            vectors = tuple((x, y, z) for x, y, z in force[loaded].tolist())
+            yield NodeForces(self._places(loaded), vectors)
+
+    def _on_faces(self, state: State) -> Iterator[Load]:
+        """Pressures and tractions, one of each size on a patch; those on one set add up."""
+        sums: dict[tuple[str, bytes, Vector | None], tuple[FaceLoad, float]] = {}
+        for load in state.faces:
+            (keys,) = facet_keys(load.facets)
+            key = (load.title, np.sort(keys, kind="stable").tobytes(), load.vector)
+            sums[key] = load, sums.get(key, (load, 0.0))[1] + load.size
+        for load, size in sums.values():
+            if not size:
+                continue
+            patch = self._patch(load.title, load.facets)
+            if load.vector is None:
+                yield Pressure(patch, size)
+            else:
+                x, y, z = (size * part for part in load.vector)
+                yield Traction(patch, (x, y, z))
+
+    def _in_volume(self, state: State) -> Iterator[Load]:
+        """Weight, forces of the volume and centrifugal loads, which the whole part must bear."""
+        scale = self.reading.scale
+        pull = np.zeros((len(self.mesh.cells), 3))
+        force = np.zeros(pull.shape)
+        turning: dict[tuple[float, ...], FloatArray] = {}
+        for load in state.bodies:
+            size, *rest = load.numbers
+            if load.label == "GRAV":
+                length = float(np.linalg.norm(rest))
+                if size and not length:
+                    raise InputError(f"GRAV of line {load.line} has no direction: give it one")
+                pull[load.cells] += size * np.asarray(rest) / (length or 1.0)
+            elif load.label == "CENTRIF":
+                turning.setdefault(tuple(rest), np.zeros(len(pull)))[load.cells] += size
+            else:
+                force[load.cells, BODY[load.label]] += size
+        sums = [("GRAV", pull), ("BX, BY and BZ", force)]
+        sums += [("CENTRIF", squares[:, None]) for squares in turning.values()]
+        for what, whole in sums:
+            if np.ptp(whole, axis=0).max() > _SAME * np.abs(whole).max():
+                raise InputError(
+                    f"{what} acts on a part of the cells, and loads of the volume are followed "
+                    f"where they are the same on all: {TAKE_OUT}"
+                )
+        if pull.any():
+            x, y, z = (pull[0] * scale * 1e-3).tolist()
+            yield Gravity((x, y, z))
+        if force.any():
+            x, y, z = (force[0] * scale**-3).tolist()
+            yield BodyForce((x, y, z))
+        for (px, py, pz, *axis), squares in turning.items():
+            if not squares[0] >= 0.0:
+                raise InputError("CENTRIF takes the square of a speed, above 0: correct it")
+            if squares[0]:
+                u, v, w = axis
+                point = (px * scale, py * scale, pz * scale)
+                yield Centrifugal(float(np.sqrt(squares[0])), point, (u, v, w))
+
+    def _heat(self, state: State) -> Iterator[Load]:
+        """Change of temperature, uniform or at the nodes."""
+        if state.warmth is None:
+            return
+        start = (
+            np.zeros(len(self.mesh.points)) if self.steps.initial is None else self.steps.initial
+        )
+        if np.isnan(start[self.steps.in_cell]).any():
+            raise InputError("*INITIAL CONDITIONS gives no temperature to some nodes: give one")
+        change = np.where(np.isnan(state.warmth), start, state.warmth) - start
+        if self.steps.initial is None and np.isnan(state.warmth[self.steps.in_cell]).any():
+            raise InputError("*TEMPERATURE leaves nodes out, and no *INITIAL CONDITIONS: give both")
+        change = change[self.steps.in_cell]
+        if not change.any():
+            return
+        if not self.expand:
+            self.reading.remarks.append("*TEMPERATURE is left out: no material has *EXPANSION")
+        elif np.ptp(change) == 0.0:
+            yield Temperature(float(change[0]))
+        else:
+            yield Temperature(tuple(change.tolist()), self._places(self.steps.in_cell))
