@@ -95,7 +95,7 @@ _HOMES = {
 _PACKAGES = frozenset(
     {
         *("base", "body", "cases", "comparison", "fem", "geometry", "judging", "machine"),
-        *("papers", "paths", "printing", "slicing", "strategies"),
+        *("papers", "paths", "printing", "slicing", "strategies", "workbench"),
     }
 )
 """Wings, available without a separate import."""

@@ -44,7 +44,7 @@ def imports() -> dict[str, set[str]]:
 
 WINGS = (
     *("base", "geometry", "body", "fem", "machine", "slicing", "paths", "judging", "strategies"),
-    *("printing", "cases", "comparison", "papers", "cli"),
+    *("printing", "cases", "comparison", "workbench", "papers", "cli"),
 )
 """The packages below ccfem, each above all that it imports.
 
