@@ -92,7 +92,7 @@ def test_wings_stand_in_their_order():
 
 
 def test_the_core_does_not_draw():
-    drawing = {"comparison", "cli", "papers"}
+    drawing = {"comparison", "workbench", "cli", "papers"}
     plot = "ccfem.comparison.plot"
     wanted = {name for name, those in imports().items() if any(o.startswith(plot) for o in those)}
     assert {room(name) for name in wanted} <= drawing

@@ -95,7 +95,6 @@ def faces_of_part(path: str | os.PathLike[str], angle: float = FEATURE_ANGLE) ->
 
     The feature angle is in degrees.
     """
-
     return _of_file(path, lambda content, path: faces_of_content(content, path.parent, angle))
 
 

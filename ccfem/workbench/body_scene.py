@@ -191,21 +191,45 @@ def cones(tips: FloatArray, outward: FloatArray, size: float) -> tuple[FloatArra
     return points.reshape(-1, 3), triangles.reshape(-1, 3)
 
 
-def arrow(place: PatchPlace, vector: FloatArray, length: float) -> tuple[FloatArray, bool]:
-    """Tail and tip (2, 3), mm, of the arrow of a force on a patch, outside of the part if it can.
+def arrow(
+    place: PatchPlace, vector: FloatArray, length: float, body: FloatArray
+) -> tuple[FloatArray, bool]:
+    """Tail and tip (2, 3), mm, of the arrow of a force on a patch, outside of the part.
 
     Also returns whether its tail is the free end: where the force presses on the patch.
+
+    Parameters
+    ----------
+    vector : (3,) array
+    length : float, mm
+        Of the arrow.
+    body : (t, 3, 3) array, mm
+        Corners of the triangles of the part.
     """
-    size = float(np.linalg.norm(vector))
-    along = vector / max(size, 1e-300) * length
-    centre, normal = place.centre, place.normal
-    presses = float(normal @ along) < -0.2 * length
-    ends = (centre - along, centre) if presses else (centre, centre + along)
-    return np.stack(ends), presses
+    along = vector / max(float(np.linalg.norm(vector)), 1e-300)
+    presses = float(place.normal @ along) < -0.2
+    free = -along if presses else along
+    near = place.centre + _way_out(place.centre, free, body) * free
+    ends = np.stack([near, near + length * free])
+    return (ends[::-1] if presses else ends), presses
+
+
+def _way_out(start: FloatArray, along: FloatArray, body: FloatArray) -> float:
+    """Distance, mm, along a unit vector beyond which no triangle (t, 3, 3) is met."""
+    a, b, c = np.moveaxis(body, 1, 0)
+    across = np.cross(along, c - a)
+    scale = np.einsum("ij,ij->i", b - a, across)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        first = np.einsum("ij,ij->i", start - a, across) / scale
+        turned = np.cross(start - a, b - a)
+        second = turned @ along / scale
+        far = np.einsum("ij,ij->i", c - a, turned) / scale
+        met = (first >= 0.0) & (second >= 0.0) & (first + second <= 1.0) & (far > 0.0)
+    return float(far[met].max(initial=0.0))
 
 
 def snapped(direction: FloatArray) -> FloatArray:
-    """Unit vector along a direction, or along an axis that is within 6 degrees."""
+    """Return the unit vector along a direction, or along an axis that is within 6 degrees."""
     unit = direction / max(float(np.linalg.norm(direction)), 1e-300)
     axis = int(np.argmax(np.abs(unit)))
     if abs(unit[axis]) > _SNAP:

@@ -87,7 +87,7 @@ class ChildRun:
     """
 
     def __init__(
-        self, arguments: Sequence[str], folder: Path, changed: Callable[[RunState], None]
+        self, arguments: Sequence[str], folder: Path, changed: Callable[[RunState], object]
     ) -> None:
         self.state = RunState(shlex.join(["ccfem", *arguments]))
         self._changed = changed

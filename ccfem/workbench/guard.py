@@ -161,12 +161,12 @@ class Guard:
             process_request = functools.partial(process, process_request)
             return unguarded(*arguments, process_request=process_request, **options)
 
-        sockets.serve = serve  # type: ignore[assignment, misc]
+        sockets.serve = serve
         try:
             with contextlib.redirect_stdout(io.StringIO()):
                 yield
         finally:
-            sockets.serve = unguarded  # type: ignore[misc]
+            sockets.serve = unguarded
         if not guarded:
             raise RuntimeError("this version of viser starts its server in another way")
 
@@ -202,7 +202,7 @@ def _page() -> bytes:
     )
 
 
-def limit_uploads(server: Any, refuse: Callable[[str], None]) -> None:
+def limit_uploads(server: Any, refuse: Callable[[str], object]) -> None:
     """Refuse files above `UPLOAD_LIMIT` when they are announced and as they come; share nothing.
 
     Parameters

@@ -4,7 +4,8 @@ import threading
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
-Item, Result = TypeVar("Item"), TypeVar("Result")
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 _QUIET = 0.25
 """Seconds for which nothing new must come before the work begins."""
@@ -22,7 +23,7 @@ class Newest(Generic[Item, Result]):
     """
 
     def __init__(
-        self, work: Callable[[Item], Result], done: Callable[[Item, Result], None]
+        self, work: Callable[[Item], Result], done: Callable[[Item, Result], object]
     ) -> None:
         self._work, self._done = work, done
         self._asked: list[Item] = []

@@ -124,7 +124,7 @@ class RunResults:
         return Pieces(ends.reshape(-1, 2, 3), force[start], link[start] > 0)
 
     def caption(self, name: str, layer: int) -> str:
-        """What the report says below a layer of a strategy."""
+        """Words of the report below a layer of a strategy."""
         return str(self._laid(name, layer)["caption"])
 
     def _laid(self, name: str, layer: int) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The newest of what is asked is worked on; a run tells how far it is, and leaves nothing behind."""
+"""The newest of what is asked is worked on; a run says how far it is, and leaves nothing."""
 
 import os
 import signal

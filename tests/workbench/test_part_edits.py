@@ -67,7 +67,7 @@ def holes_of(plate, radius):
     ("change", "after"),
     [
         (valued(("edge_length",), 2.5), lambda c: c | {"edge_length": 2.5}),
-        (valued(("machine", "profile"), "aura_like"), lambda c: c | {"machine": {"profile": "aura_like"}}),
+        (valued(("machine", "lift"), 2), lambda c: c | {"machine": {"lift": 2}}),
         (valued(("title",), None), lambda c: c),
         (
             valued(("loads", "lift", 0, "vector"), [0.0, -9.0, 0.0]),
