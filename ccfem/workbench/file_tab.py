@@ -19,15 +19,14 @@ class FileTab:
             self.files = gui.add_dropdown("In this folder", (_NOTHING, *files))
             self.cases = gui.add_dropdown("Cases of ccfem", (_NOTHING, *cases))
             for choice in (self.files, self.cases):
-                choice.on_update(page.on(self._open, choice))
+                choice.on_update(page.on_value(self._open, choice))
             upload = gui.add_upload_button(
                 "Upload a body or a part file", hint="STEP, STL, mesh or TOML, up to 200 MB."
             )
-            upload.on_upload(page.on(lambda: self._upload(upload.value)))
+            upload.on_upload(page.on_value(self._upload))
         self._said = gui.add_html("")
 
-    def _open(self, choice: Any) -> None:
-        name = choice.value
+    def _open(self, choice: Any, name: str) -> None:
         if name != _NOTHING:
             choice.value = _NOTHING
             self.page.open(name)

@@ -78,11 +78,11 @@ class LoadsTab:
         self._faces = gui.add_dropdown(
             "Face", [_NO_FACE], hint="Or click it in the picture; with Shift one more."
         )
-        self._faces.on_update(page.on(self._choose))
+        self._faces.on_update(page.on_value(self._choose))
         more = gui.add_button_group("Choose", ["Same radius", "Same plane", "None"])
-        more.on_click(page.on(lambda: self._choose_more(more.value)))
+        more.on_click(page.on_value(self._choose_more))
         holds = gui.add_button_group("Support", ["Hold", "Roll"])
-        holds.on_click(page.on(lambda: self._support(holds.value)))
+        holds.on_click(page.on_value(self._support))
         with gui.add_folder("Load"):
             self.kind = gui.add_dropdown("Kind", list(_KINDS))
             self.kind.on_update(page.on(self._show_kind))
@@ -117,11 +117,10 @@ class LoadsTab:
         self._faces.options = (_NO_FACE, *named)
         self._faces.value = _NO_FACE
 
-    def _choose(self) -> None:
-        if self._faces.value != _NO_FACE:
-            number = int(self._faces.value.partition(":")[0])
+    def _choose(self, name: str) -> None:
+        if name != _NO_FACE:
             self._faces.value = _NO_FACE
-            self.page.choose(number, True)
+            self.page.choose(int(name.partition(":")[0]), True)
 
     def _choose_more(self, how: str) -> None:
         page, listing = self.page, self.page.bench.listing
@@ -216,16 +215,15 @@ class LoadsTab:
                 )
                 x, y, z = vector.tolist()
                 field: Any = gui.add_vector3(f"Vector{unit}", (x, y, z), step=1.0)
-                field.on_update(page.on(self._change, entry.keys, "vector", field))
+                field.on_update(page.on_value(self._change, entry.keys, "vector"))
                 self._fields[entry.keys] = field
             elif isinstance(magnitude, int | float):
                 field = gui.add_number("Pressure, MPa", float(magnitude), step=0.1)
-                field.on_update(page.on(self._change, entry.keys, "magnitude", field))
+                field.on_update(page.on_value(self._change, entry.keys, "magnitude"))
                 self._fields[entry.keys] = field
             remove = gui.add_button("Remove", color="gray", hint=entry.title)
             remove.on_click(page.on(page.edit, removed(entry.keys)))
 
-    def _change(self, keys: Sequence[str | int], key: str, field: Any) -> None:
-        value = field.value
+    def _change(self, keys: Sequence[str | int], key: str, value: Any) -> None:
         plain = [float(x) for x in value] if isinstance(value, tuple) else float(value)
         self.page.edit(valued((*keys, key), plain), f"{keys} {key}")

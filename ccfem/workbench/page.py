@@ -125,6 +125,18 @@ class Page:
 
         return heed
 
+    def on_value(self, what: Callable[..., None], *arguments: Any) -> Callable[[Any], Any]:
+        """Return a callback as `on` does, that passes on the value as it is when that comes.
+
+        Until it is acted on, what is shown meanwhile may have set the field to something else.
+        """
+
+        async def heed(event: Any) -> None:
+            if event.client_id is not None:
+                self.act(what, *arguments, event.target.value)
+
+        return heed
+
     def say(self, text: str) -> None:
         """Show a line at the top; an empty one takes it away."""
         self.message.content = f'<p class="ccfem message" role="alert">{escaped(text)}</p>'
@@ -157,12 +169,12 @@ class Page:
     def _build(self) -> None:
         server, gui = self.server, self.server.gui
         gui.configure_theme(
-            control_layout="fixed",
             control_width="large",
             show_logo=False,
             show_share_button=False,
             brand_color=(0, 98, 155),
         )
+        gui.main_panel.dock_right()
         gui.set_panel_label("ccfem")
         server.scene.configure_default_lights(False)
         server.scene.configure_environment_map(None)
@@ -174,12 +186,12 @@ class Page:
         self.heading = gui.add_html("")
         self.message = gui.add_html("", visible=False)
         undoing = gui.add_button_group("History", ["Undo", "Redo"])
-        undoing.on_click(self.on(lambda: self.step(-1 if undoing.value == "Undo" else 1)))
+        undoing.on_click(self.on_value(lambda how: self.step(-1 if how == "Undo" else 1)))
         for label, key, steps in (("Undo", "Z", -1), ("Redo", "Y", 1)):
             command = gui.add_command(label, hotkey=key, modifier="cmd/ctrl")
             command.on_trigger(self.on(self.step, steps))
         self.view = gui.add_button_group("View", ["Part", "Fibre"])
-        self.view.on_click(self.on(self._turn_view))
+        self.view.on_click(self.on_value(lambda how: self.show_fibre(how == "Fibre")))
         tabs = gui.add_tab_group()
         with tabs.add_tab("Loads"):
             self.loads = LoadsTab(self)
@@ -253,9 +265,6 @@ class Page:
         cameras = [client.camera for client in self.server.get_clients().values()]
         for camera in (self.server.initial_camera, *cameras):
             camera.position, camera.look_at = tuple(place), tuple(centre)
-
-    def _turn_view(self) -> None:
-        self.show_fibre(self.view.value == "Fibre")
 
     def show_fibre(self, fibre: bool) -> None:
         """Show the strands of the last run in place of the part, or the part."""

@@ -83,6 +83,8 @@ def valued(keys: Keys, value: Any) -> Change:
             at = at[key]
         if value is not None:
             at[keys[-1]] = _like(content, value)
+            if _is_text(content) and isinstance(value, Mapping):
+                at[keys[-1]].add(tomlkit.nl())
         elif keys[-1] in at:
             del at[keys[-1]]
 

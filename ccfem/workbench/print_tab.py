@@ -34,17 +34,17 @@ class PrintTab:
             (self.layers, self._layers),
             (self.cells, self._cells),
         ):
-            field.on_update(page.on(self._edit, change, field))
+            field.on_update(page.on_value(self._edit, change))
         with gui.add_folder("Fibre only near chosen faces", expand_by_default=False):
             self.within = gui.add_number("Within, mm", 6.0, min=0.1, step=0.5)
             near = gui.add_button_group("Fibre", ["Near the chosen faces", "Everywhere"])
-            near.on_click(page.on(lambda: self._near(near.value)))
+            near.on_click(page.on_value(self._near))
         self._said = gui.add_html("")
 
-    def _edit(self, change: Any, field: Any) -> None:
-        made = change(field.value)
+    def _edit(self, change: Any, value: Any) -> None:
+        made = change(value)
         if made is not None:
-            self.page.edit(made, f"print {id(field)}")
+            self.page.edit(made, f"print {change}")
 
     def _machine(self, name: str) -> Change:
         if name != _STANDARD:

@@ -22,6 +22,9 @@ class Tabbed(Protocol):
     def on(self, what: Callable[..., None], *arguments: Any) -> Callable[[Any], Any]:
         """Return a callback of viser that does something."""
 
+    def on_value(self, what: Callable[..., None], *arguments: Any) -> Callable[[Any], Any]:
+        """Return a callback of viser that does something with the value of its field."""
+
     def say(self, text: str) -> None:
         """Show a line at the top."""
 
