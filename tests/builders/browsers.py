@@ -6,7 +6,8 @@ import shutil
 import pytest
 
 OPTIONS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-NAMELESS = """[...document.querySelectorAll('select, input:not([type=hidden], [type=file]), button')].filter(
+NAMELESS = """[...document.querySelectorAll('select, input, button')].filter(
+    (each) => !['hidden', 'file'].includes(each.type)).filter(
     (each) => !each.labels?.length && !each.getAttribute('aria-label') && !each.textContent.trim()
       || each.tagName === 'SELECT' && !each.labels?.length && !each.getAttribute('aria-label')
 ).length"""
