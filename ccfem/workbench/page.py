@@ -261,7 +261,7 @@ class Page:
     def look_at(self, low: FloatArray, high: FloatArray) -> None:
         """Look at a box from the front, above."""
         centre, size = 0.5 * (low + high), float(np.linalg.norm(high - low))
-        place = centre + 1.25 * size * np.array([-0.45, -0.75, 0.5])
+        place = centre + 1.05 * size * np.array([-0.45, -0.75, 0.5])
         cameras = [client.camera for client in self.server.get_clients().values()]
         for camera in (self.server.initial_camera, *cameras):
             camera.position, camera.look_at = tuple(place), tuple(centre)
