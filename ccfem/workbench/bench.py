@@ -96,6 +96,12 @@ class Bench:
         """What it says."""
         return content_of(self.text)
 
+    @property
+    def _there(self) -> Opened:
+        if self.opened is None:
+            raise InputError("there is no part: open one under “Part file”")
+        return self.opened
+
     # Opening.
 
     def offered(self) -> list[str]:
@@ -172,8 +178,7 @@ class Bench:
         """Faces of the body of the part file that is shown."""
         body = _body_of(self.content)
         if self._listing is None or self._listing[0] != body:
-            assert self.opened is not None
-            self._listing = (body, self._faces(self.text, self.opened.home))
+            self._listing = (body, self._faces(self.text, self._there.home))
         return self._listing[1]
 
     def _faces(self, text: str, home: Path) -> BodyFaces:
@@ -208,10 +213,9 @@ class Bench:
                 raise
 
     def _save(self) -> None:
-        assert self.opened is not None
         if self._saved is None:
-            self._saved = self._free(self.opened.stem, self.text)
-        text = rebased(self.text, self.opened.home, self.results)
+            self._saved = self._free(self._there.stem, self.text)
+        text = rebased(self.text, self._there.home, self.results)
         self._write(self._saved, text.encode())
 
     def _free(self, stem: str, text: str) -> Path:
@@ -236,9 +240,9 @@ class Bench:
 
     def part_file(self) -> Path:
         """File that holds what is shown: the one that was opened, or the one in ``results``."""
-        assert self.opened is not None
-        if self.opened.file is not None and self.text == self.opened.text:
-            return self.opened.file
+        opened = self._there
+        if opened.file is not None and self.text == opened.text:
+            return opened.file
         if self._saved is None:
             self._save()
         assert self._saved is not None
@@ -255,10 +259,10 @@ class Bench:
 
     def check(self, text: str) -> tuple[Check | None, Said]:
         """Check a text as ``ccfem check`` does: what is known of it, and the lines to be said."""
-        assert self.opened is not None
+        opened = self._there
         try:
-            check_files(text, self.opened.home, [self.folder])
-            case = part_case(content_of(text), self.opened.home / f"{self.opened.stem}.toml")
+            check_files(text, opened.home, [self.folder])
+            case = part_case(content_of(text), opened.home / f"{opened.stem}.toml")
             checked = check(case)
         except InputError as error:
             return None, tuple(("mistake", line) for line in error.mistakes)

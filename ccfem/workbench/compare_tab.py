@@ -93,8 +93,6 @@ class CompareTab:
 
     def _begin(self, arguments: list[str]) -> None:
         page = self.page
-        if page.bench.opened is None:
-            raise InputError("there is no part: open one under “Part file”")
         if self.run is not None and self.run.state.running:
             raise InputError("a run is going on: stop it first")
         page.say("")

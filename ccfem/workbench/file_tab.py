@@ -46,7 +46,9 @@ class FileTab:
     def show(self) -> None:
         """Show the part file."""
         bench = self.page.bench
-        self.files.options = (_NOTHING, *bench.offered())
+        offered = (_NOTHING, *bench.offered())
+        if self.files.options != offered:
+            self.files.options = offered
         if bench.opened is None:
             self._said.content = ""
             return

@@ -26,6 +26,7 @@ _KINDS = {
     "pull or push (force)": "force",
     "bearing of a pin": "bearing",
     "pressure": "pressure",
+    "weight of the whole part": "gravity",
 }
 _FORCE = 100.0
 """Force, N, that is proposed."""
@@ -165,18 +166,21 @@ class LoadsTab:
 
     def _load(self) -> None:
         page, kind = self.page, _KINDS[self.kind.value]
-        text, patch = patch_of(page.bench.text, page.bench.listing, page.chosen)
+        text, table = page.bench.text, dict[str, Any](kind=kind)
+        if kind != "gravity":
+            text, table["patch"] = patch_of(text, page.bench.listing, page.chosen)
         if kind == "pressure":
-            table = {"kind": kind, "patch": patch, "magnitude": self.pressure.value}
-        else:
-            table = {"kind": kind, "patch": patch, "vector": [float(x) for x in self.vector.value]}
+            table["magnitude"] = float(self.pressure.value)
+        elif kind != "gravity":
+            table["vector"] = [float(x) for x in self.vector.value]
         name = self.case.value.strip() or "load"
         page.chosen = []
         page.edit(edited(text, appended(("loads", name), table)))
 
     def _show_kind(self) -> None:
-        pressure = _KINDS[self.kind.value] == "pressure"
-        self.pressure.visible, self.vector.visible = pressure, not pressure
+        kind = _KINDS[self.kind.value]
+        self.pressure.visible = kind == "pressure"
+        self.vector.visible = kind in ("force", "bearing")
 
     # What is there.
 

@@ -77,6 +77,7 @@ class Page:
         self.checked: Check | None = None
         self._checked_text, self._said = "", Said()
         self._faces: dict[int, Any] = {}
+        self.body: Any = None
         self._listing: Any = None
         self._drawn: list[Any] = []
         self._acts = ThreadPoolExecutor(1, "page")
@@ -261,7 +262,7 @@ class Page:
     def look_at(self, low: FloatArray, high: FloatArray) -> None:
         """Look at a box from the front, above."""
         centre, size = 0.5 * (low + high), float(np.linalg.norm(high - low))
-        place = centre + 1.05 * size * np.array([-0.45, -0.75, 0.5])
+        place = centre + 1.05 * size * np.array([-0.6, -0.7, 0.5])
         cameras = [client.camera for client in self.server.get_clients().values()]
         for camera in (self.server.initial_camera, *cameras):
             camera.position, camera.look_at = tuple(place), tuple(centre)
@@ -270,7 +271,8 @@ class Page:
         """Show the strands of the last run in place of the part, or the part."""
         fibre = fibre and self.compare.results is not None
         self.view.value = "Fibre" if fibre else "Part"
-        self.body.visible = not fibre
+        if self.body is not None:
+            self.body.visible = not fibre
         box = self.compare.shown(fibre)
         if box is None:
             self.look()

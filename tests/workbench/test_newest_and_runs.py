@@ -71,6 +71,10 @@ def test_a_stopped_run_leaves_no_process(tmp_path, monkeypatch, manner):
     assert alive(child)
     run.stop()
     assert not alive(run._process.pid)
+    for _ in range(500):  # until the system has taken it away
+        if not alive(child):
+            break
+        threading.Event().wait(0.01)
     assert not alive(child)
     assert run.state.complaint == "stopped"
     assert run.state.code in (-signal.SIGTERM, -signal.SIGKILL)

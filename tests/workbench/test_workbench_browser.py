@@ -184,7 +184,7 @@ def test_a_run_is_stopped_found_again_and_shown(work):
     group = compare.run._process.pid
     view.button("Stop")
     wait(view, lambda: not compare.run.state.running)
-    assert not alive(group)
+    wait(view, lambda: not alive(group), 5)
     view.tab.get_by_text("stopped", exact=True).wait_for(timeout=5000)
     assert not (bench.results / "bar").exists()
     # A page that is closed leaves the run going; opened again it shows it.
@@ -224,6 +224,10 @@ def test_the_same_by_hand_is_the_same_byte_for_byte(work):
         assert by_page == (folder / "by_hand" / name).read_bytes(), name
 
 
+def bar_file(folder):
+    return (folder / "bar.stl").read_bytes()
+
+
 def test_two_visits_see_one_part_and_texts_of_files_are_texts(work):
     (work.bench.folder / "hand.toml").write_text(BY_HAND)
     first, second = work.first, work.visit(390, 800)
@@ -236,6 +240,12 @@ def test_two_visits_see_one_part_and_texts_of_files_are_texts(work):
     # 390 px: nothing is cut off to the right.
     wide = "document.documentElement.scrollWidth - window.innerWidth"
     assert second.tab.evaluate(wide) <= 0
+    # A body that is uploaded is opened, and kept in results.
+    upload = {"name": "up.stl", "mimeType": "", "buffer": bar_file(work.bench.folder)}
+    first.tab.locator('input[type="file"]').set_input_files(files=[upload])
+    first.tab.get_by_role("heading", name="up", exact=True).wait_for(timeout=10_000)
+    assert (work.bench.results / "uploads/up.stl").exists()
+    work.page.act(work.page.open, "hand.toml").result()
     # A file that is no body is one line, and changes nothing.
     (work.bench.folder / "wrong.stl").write_text("no body")
     work.page.act(work.page.file.show).result()
