@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from ccfem.papers.reproduce import reproduce
     from ccfem.paths.planning import plan
     from ccfem.slicing.slicers import slice
+    from ccfem.workbench.opening import open
 
 __all__ = [
     "Case",
@@ -55,6 +56,7 @@ __all__ = [
     "compare",
     "evaluate",
     "faces",
+    "open",
     "plan",
     "read",
     "reproduce",
@@ -81,6 +83,7 @@ _HOMES = {
     "compare": "comparison",
     "evaluate": "judging.evaluation",
     "faces": "cases.inspection",
+    "open": "workbench",
     "plan": "paths.planning",
     "read": "cases",
     "reproduce": "papers.reproduce",
@@ -95,7 +98,7 @@ _HOMES = {
 _PACKAGES = frozenset(
     {
         *("base", "body", "cases", "comparison", "fem", "geometry", "judging", "machine"),
-        *("papers", "paths", "printing", "slicing", "strategies"),
+        *("papers", "paths", "printing", "slicing", "strategies", "workbench"),
     }
 )
 """Wings, available without a separate import."""

@@ -44,7 +44,7 @@ def imports() -> dict[str, set[str]]:
 
 WINGS = (
     *("base", "geometry", "body", "fem", "machine", "slicing", "paths", "judging", "strategies"),
-    *("printing", "cases", "comparison", "papers", "cli"),
+    *("printing", "cases", "comparison", "workbench", "papers", "cli"),
 )
 """The packages below ccfem, each above all that it imports.
 
@@ -92,7 +92,7 @@ def test_wings_stand_in_their_order():
 
 
 def test_the_core_does_not_draw():
-    drawing = {"comparison", "cli", "papers"}
+    drawing = {"comparison", "workbench", "cli", "papers"}
     plot = "ccfem.comparison.plot"
     wanted = {name for name, those in imports().items() if any(o.startswith(plot) for o in those)}
     assert {room(name) for name in wanted} <= drawing

@@ -96,11 +96,12 @@ def faces_of_part(path: str | os.PathLike[str], angle: float = FEATURE_ANGLE) ->
 
     The feature angle is in degrees.
     """
+    return _of_file(path, lambda content, path: faces_of_content(content, path.parent, angle))
 
-    def faces(content: TomlTable, path: Path) -> BodyFaces:
-        return _readable(content, Mistakes())[0].faces(path.parent, angle)
 
-    return _of_file(path, faces)
+def faces_of_content(content: TomlTable, folder: Path, angle: float = FEATURE_ANGLE) -> BodyFaces:
+    """Faces of the body of a part file's content, whose paths start from a folder."""
+    return _readable(content, Mistakes())[0].faces(folder, angle)
 
 
 def _of_file(path: str | os.PathLike[str], take: Callable[[Mapping[str, Any], Path], T]) -> T:

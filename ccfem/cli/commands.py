@@ -246,6 +246,7 @@ CALLS = {
     "solve": "ccfem.solve(CASE.problem)",
     "calibrate": "ccfem.calibrate(PROBLEM, CURVE)",
     "reproduce": "ccfem.reproduce(PAPER, PART)",
+    "open": "ccfem.open(BODY)",
     "new": "ccfem.cases.inspection.new_part(BODY)",
     "example": "ccfem.cases.inspection.write_example(NAME)",
     "cite": "ccfem.comparison.bibtex(ccfem.comparison.cited([METHOD]))",

@@ -1,4 +1,4 @@
-"""Commands round a part: ``mesh``, ``new``, ``example``, ``cite``, ``solve``."""
+"""Commands round a part: ``open``, ``mesh``, ``new``, ``example``, ``cite``, ``solve``."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +15,28 @@ _Out = Annotated[
     typer.Option("--out", metavar="PART.toml", parser=path_of, help="File that is written."),
 ]
 _Force = Annotated[bool, typer.Option("--force", help="Replace a file that is there.")]
+
+
+def _open(
+    what: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="BODY_OR_PART_OR_CASE",
+            help="Body (.step, .stl, mesh), part file (.toml) or case; by default one is chosen on "
+            "the page.",
+        ),
+    ] = None,
+    port: Annotated[
+        int, typer.Option(metavar="N", help="Port on this machine; default any that is free.")
+    ] = 0,
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Show the page in the browser.")
+    ] = True,
+) -> None:
+    """Open the workbench in a browser: set up a part by clicks, check, compare, take away."""
+    from ccfem.workbench.opening import serve
+
+    serve(what, port, browser)
 
 
 def _new(
@@ -120,6 +142,7 @@ def _solve(
 
 
 _COMMANDS: dict[str, Callable[..., None]] = {
+    "open": _open,
     "mesh": _mesh,
     "new": _new,
     "example": _example,

@@ -339,14 +339,24 @@ def _test_values(run: Run) -> dict[str, float]:
 def cell_text(run: Run, head: Headline) -> tuple[str, str]:
     """Text of a cell of the headline table, and what to add to it in smaller letters."""
     values = headline_values(run)
-    value = values.get(head.column, np.nan)
-    if not np.isfinite(value):
-        return "–", ""
+    text = value_text(values, head)
+    beside = "" if text == _NONE or head.column == "printable" else head.column
+    return text, _beside(run, beside, values)
+
+
+_NONE = "–"
+
+
+def value_text(values: Mapping[str, float | None], head: Headline) -> str:
+    """Text of a value of the headline table; a dash where there is none."""
+    value = values.get(head.column)
+    if value is None or not np.isfinite(value):
+        return _NONE
     if head.column == "printable":
-        return ("yes" if run.printable else "no"), ""
+        return "yes" if value else "no"
     if head.column in ("print_time_nearest", "whole_print_time"):
         value /= 60.0
-    return head.pattern.format(value), _beside(run, head.column, values)
+    return head.pattern.format(value)
 
 
 def _beside(run: Run, column: str, values: Mapping[str, float]) -> str:

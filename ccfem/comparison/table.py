@@ -33,7 +33,7 @@ _OWN = {
 """Meaning of columns that are no index of their own."""
 
 
-_FIRST = (
+FIRST_COLUMNS = (
     "printable",
     "stiffness_ratio_tension",
     "share_of_gain",
@@ -155,7 +155,7 @@ def headline_table(runs: Sequence[Run], wanted: Wanted, over_slicings: bool = Fa
         else:
             rows.append((run.name, cells, ""))
     about = {column.name: f"{column.formula} {column.range}." for column in _columns()}
-    hidden = {head.column for head in heads} - {*_FIRST}
+    hidden = {head.column for head in heads} - {*FIRST_COLUMNS}
     hidden |= set() if over_slicings else {"interlayer_load"}
     # The time of the whole print holds that of the fibre.
     hidden |= {"print_time_nearest"} if "whole_print_time" in known else set()

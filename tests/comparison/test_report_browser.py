@@ -1,12 +1,11 @@
 """The report in a browser: headless Chromium, driven by Playwright."""
 
 import io
-import os
-import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from browsers import NAMELESS, started
 
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
@@ -19,13 +18,6 @@ from ccfem.slicing.slicers import Planar
 from ccfem.strategies import Concentric, Zigzag
 
 EVIL = "<script>window.broken = 1</script>"
-
-
-def browser_path() -> str:
-    """Where a Chromium is; empty where none is."""
-    names = ("chromium", "chromium-browser", "google-chrome")
-    found = [os.environ.get("CCFEM_CHROMIUM", ""), *(shutil.which(name) or "" for name in names)]
-    return next((path for path in found if path), "")
 
 
 @pytest.fixture(scope="session")
@@ -50,12 +42,8 @@ def report(tmp_path_factory):
 def page(report):
     """The report, open; what it said and asked for is kept in ``said`` and ``asked``."""
     sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    path = browser_path()
-    if not path:
-        pytest.skip("there is no browser: install chromium, or name one by CCFEM_CHROMIUM")
-    options = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
     with sync_api.sync_playwright() as program:
-        browser = program.chromium.launch(executable_path=path, args=options)
+        browser = started(program)
         page = browser.new_page(viewport={"width": 1200, "height": 500})
         page.said, page.asked = [], []
         page.on("pageerror", lambda error: page.said.append(str(error)))
@@ -171,10 +159,6 @@ def test_words_stand_out_and_everything_has_a_name_and_a_place(page):
     assert low == []
 
 
-NAMELESS = """[...document.querySelectorAll('select, input, button')].filter(
-    (each) => !each.labels?.length && !each.getAttribute('aria-label') && !each.textContent.trim()
-      || each.tagName === 'SELECT' && !each.labels?.length && !each.getAttribute('aria-label')
-).length"""
 CONTRASTS = """(() => {
   const parts = (css) => css.match(/[\\d.]+/g).map(Number);
   const light = (css) => parts(css).slice(0, 3).map((v) => v / 255)

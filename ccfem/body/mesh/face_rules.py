@@ -179,9 +179,9 @@ class Holes:
     def __call__(self, mesh: Bounded) -> IntArray:
         """Boundary facets (k, 3) of the walls."""
         faces = numbered_faces(mesh, self.angle).faces
-        walls = [face for face in faces if face.kind == "cylinder" and face.hollow]
-        chosen = [face for face in walls if self._fits(face)]
+        chosen = self.walls(faces)
         if not chosen:
+            walls = [face for face in faces if _is_hole(face)]
             there = "; ".join(face.about for face in walls[:6]) or "none"
             raise InputError(
                 f"no hole has radius {self.radius:g} mm"
@@ -189,6 +189,10 @@ class Holes:
                 "take one of these radii, or a larger tolerance"
             )
         return mesh.boundary[np.sort(np.concatenate([face.facets for face in chosen]))]
+
+    def walls(self, faces: Iterable[Face]) -> list[Face]:
+        """Return those of some faces that are such walls."""
+        return [face for face in faces if _is_hole(face) and self._fits(face)]
 
     def _fits(self, face: Face) -> bool:
         tolerance = 0.02 * self.radius if self.tolerance is None else self.tolerance
@@ -198,6 +202,10 @@ class Holes:
             return True
         across = np.cross(face.direction, unit_vector(self.axis, "holes axis"))
         return float(np.linalg.norm(across)) <= _PARALLEL
+
+
+def _is_hole(face: Face) -> bool:
+    return face.kind == "cylinder" and face.hollow
 
 
 def numbered_faces(mesh: Bounded, angle: float = FEATURE_ANGLE) -> BodyFaces:

@@ -71,7 +71,7 @@ def new_part(
     doubt = listing.doubt
     if doubt:
         listing = faces_of(body, scale=1000.0)
-    edge = _edge_length(listing)
+    edge = usual_edge_length(listing)
     held, pulled, pull = _ends(listing, edge)
     with whole_file(out) as temporary:
         cells = edge if is_surface(body) or is_cad(body) else None
@@ -79,7 +79,7 @@ def new_part(
     return out
 
 
-def _edge_length(listing: BodyFaces) -> float:
+def usual_edge_length(listing: BodyFaces) -> float:
     """Length of the edges of cells, mm: see `new_part`.
 
     A wall that is much wider than thick has a thickness of twice its volume over its surface, and a

@@ -1,0 +1,86 @@
+"""Stills of the workbench for its page of the documentation: an L bracket, from STEP to strands.
+
+Run ``python -m benchmarks.workbench_stills``; it needs the extras cad and ui, Playwright, and a
+Chromium (CCFEM_CHROMIUM, or ``chromium`` on the path).
+"""
+
+import io
+import os
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from benchmarks.studies.own_parts import l_bracket
+from ccfem.workbench.bench import Bench
+from ccfem.workbench.page import Page
+
+FOLDER = Path(__file__).parent.parent / "docs" / "pictures" / "workbench"
+_OPTIONS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+
+
+def main(folder: Path = FOLDER) -> None:
+    """Write the stills into a folder."""
+    from playwright.sync_api import sync_playwright
+
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as work, sync_playwright() as program:
+        l_bracket(Path(work) / "l_bracket.step")
+        bench = Bench(Path(work))
+        bench.open("l_bracket.step")
+        page = Page(bench)
+        path = os.environ.get("CCFEM_CHROMIUM") or shutil.which("chromium")
+        browser = program.chromium.launch(executable_path=path, args=_OPTIONS)
+        tab = browser.new_page(viewport={"width": 1180, "height": 760})
+        tab.goto(page.link)
+        tab.get_by_role("button", name="Close").click(timeout=60_000)
+
+        def still(name: str) -> None:
+            page.act(lambda: None).result()
+            tab.mouse.move(5, 5)
+            tab.wait_for_timeout(2500)
+            _write(tab.screenshot(), folder / f"{name}.png")
+
+        holes = [
+            number
+            for number, face in zip(bench.listing.numbers, bench.listing.faces, strict=True)
+            if face.hollow
+        ]
+        eye = max(holes, key=lambda number: bench.listing.face(number).radius)
+        bolts = [number for number in holes if number != eye]
+        page.act(page.choose_all, bolts)
+        still("faces")
+        tab.get_by_role("button", name="Hold").first.click()
+        page.act(lambda: None).result()
+        page.act(page.choose, eye, False).result()
+        tab.get_by_label("Force, N", exact=True).first.fill("0")
+        tab.get_by_role("button", name="Add load").click()
+        page.act(lambda: None).result()
+        page.drawn.wait(60)
+        still("loads")
+        tab.get_by_role("tab", name="Compare").click()
+        tab.get_by_label("isocurve", exact=True).click()
+        tab.get_by_label("contour_zigzag", exact=True).click()
+        tab.get_by_role("button", name="Compare", exact=True).click()
+        tab.wait_for_timeout(500)
+        assert page.compare.run is not None
+        page.compare.run.wait()
+        still("fibre")
+        tab.get_by_role("tab", name="Part file").click()
+        page.act(page.show_fibre, False)
+        still("part_file")
+        browser.close()
+        page.close()
+
+
+def _write(data: bytes, file: Path) -> None:
+    """Write a screenshot with few colours, which makes it a third as large."""
+    from PIL import Image
+
+    picture: Any = Image.open(io.BytesIO(data)).convert("RGB")
+    picture.quantize(128).save(file, optimize=True)
+
+
+if __name__ == "__main__":
+    main(*map(Path, sys.argv[1:]))

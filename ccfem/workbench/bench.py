@@ -1,0 +1,304 @@
+"""What is on the bench: a part file as text with its history, and the body that it is of.
+
+Nothing is read outside the folder where the workbench was started, and nothing written outside
+``results/`` there.
+"""
+
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ccfem.base.checks import check_known
+from ccfem.base.errors import InputError, SolveError
+from ccfem.base.whole import existing_file, text_of, whole_file
+from ccfem.body.files.formats import suffixes
+from ccfem.body.files.mesh_file import write_mesh
+from ccfem.body.files.surface import is_surface
+from ccfem.body.mesh.face_places import BodyFaces
+from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE
+from ccfem.body.meshing.cad import is_cad
+from ccfem.cases.inspection import Check, check, faces
+from ccfem.cases.part_file import faces_of_content, part_case
+from ccfem.cases.part_writing import part_text
+from ccfem.cases.reading import create_case, named_cases
+from ccfem.cases.stored import data_folder
+from ccfem.workbench.part_edits import (
+    Change,
+    History,
+    begun,
+    check_files,
+    check_inside,
+    content_of,
+    edited,
+    files_in,
+    rebased,
+    valued,
+)
+
+UPLOADS = "uploads"
+"""Folder in ``results/`` for files that were uploaded."""
+_LISTED = 100
+"""Files that are offered."""
+
+Said = tuple[tuple[str, str], ...]
+"""What a check says: kind and line of each."""
+
+
+@dataclass(frozen=True)
+class Opened:
+    """What was opened.
+
+    Attributes
+    ----------
+    stem : str
+        Name of the part file, without ``.toml``.
+    home : Path
+        Folder that paths in the text start from.
+    file : Path, optional
+        The part file that was opened; none for a body.
+    text : str
+        The part file as it was opened.
+    """
+
+    stem: str
+    home: Path
+    file: Path | None
+    text: str
+
+
+class Bench:
+    """A folder, and the part that is being worked on.
+
+    Parameters
+    ----------
+    folder : Path
+        What lies in it may be read.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder.resolve()
+        self.results = self.folder / "results"
+        self.opened: Opened | None = None
+        self.history = History(("",))
+        self._saved: Path | None = None
+        self._listing: tuple[Any, BodyFaces] | None = None
+
+    @property
+    def text(self) -> str:
+        """The part file that is shown."""
+        return self.history.text
+
+    @property
+    def content(self) -> Mapping[str, Any]:
+        """What it says."""
+        return content_of(self.text)
+
+    @property
+    def _there(self) -> Opened:
+        if self.opened is None:
+            raise InputError("there is no part: open one under “Part file”")
+        return self.opened
+
+    # Opening.
+
+    def offered(self) -> list[str]:
+        """Files of the folder that can be opened, and earlier part files of the workbench."""
+        found = [path for path in sorted(self.folder.iterdir()) if _is_body(path)]
+        tables = [*sorted(self.folder.glob("*.toml")), *sorted(self.results.glob("*.toml"))]
+        found += [path for path in tables if _looks_like_part(path)]
+        return [path.relative_to(self.folder).as_posix() for path in found[:_LISTED]]
+
+    def open(self, what: str | os.PathLike[str]) -> None:
+        """Open a body, a part file, or a case by name.
+
+        Raises
+        ------
+        InputError
+            For what cannot be read, or lies elsewhere; what was on the bench stays.
+        """
+        name = os.fspath(what)
+        if not Path(name).suffix and not {"/", "\\"} & set(name):
+            check_known("case", name, named_cases(), "or name a file")
+            name = str(self._write_case(name))
+        path = check_inside(self.folder / name, [self.folder])
+        shown = path.relative_to(self.folder)
+        if path.suffix == ".toml":
+            text = text_of(path, "part file")
+            listing = self._faces(text, path.parent)
+            opened = Opened(path.stem, path.parent, path, text)
+        elif _is_body(path):
+            existing_file(path, "the body")
+            listing = faces(path)
+            text = begun(shown.as_posix(), listing)
+            stem = re.sub(r"[^\w-]+", "_", path.stem) or "part"
+            opened = Opened(stem, self.folder, None, text)
+        else:
+            raise InputError(
+                f"{shown} is no body and no part file: name a STEP, STL or mesh file, a part file "
+                "(.toml) or a case"
+            )
+        self.opened, self.history = opened, History((text,))
+        self._saved, self._listing = None, (_body_of(content_of(text)), listing)
+
+    def _write_case(self, name: str) -> Path:
+        """Part file of a case in ``results``, with its mesh."""
+        shipped = data_folder() / f"{name}.toml"
+        if shipped.exists():
+            text = shipped.read_text(encoding="utf-8")
+            for keys, file in files_in(content_of(text)).items():
+                self._write(self.results / Path(file).name, (shipped.parent / file).read_bytes())
+                text = edited(text, valued(keys, Path(file).name))
+        else:
+            case = create_case(name)
+            text = part_text(case, f"{name}.vtu")
+            self.results.mkdir(exist_ok=True)
+            write_mesh(case.problem.mesh, self.results / f"{name}.vtu")
+        path = self._free(name, text)
+        self._write(path, text.encode())
+        return path
+
+    def upload(self, name: str, content: bytes) -> str:
+        """Keep a file that was uploaded; returns what opens it."""
+        plain = re.sub(r"[^\w.-]+", "_", Path(name.replace("\\", "/")).name).lstrip(".")
+        if not plain or not (_is_body(Path(plain)) or plain.endswith(".toml")):
+            raise InputError(
+                f"{name} is no body and no part file: upload a STEP, STL or mesh file, or a .toml"
+            )
+        path = self.results / UPLOADS / plain
+        self._write(path, content)
+        return path.relative_to(self.folder).as_posix()
+
+    # Faces.
+
+    @property
+    def listing(self) -> BodyFaces:
+        """Faces of the body of the part file that is shown."""
+        body = _body_of(self.content)
+        if self._listing is None or self._listing[0] != body:
+            self._listing = (body, self._faces(self.text, self._there.home))
+        return self._listing[1]
+
+    def _faces(self, text: str, home: Path) -> BodyFaces:
+        check_files(text, home, [self.folder])
+        content = content_of(text)
+        return faces_of_content(content, home, _body_of(content)[-1])
+
+    # Editing.
+
+    def edit(self, change: Change | str, field: str = "") -> None:
+        """Change the part file, or put a text in its place, and save it in ``results``.
+
+        Raises
+        ------
+        InputError
+            Where that cannot be; then nothing is changed.
+        """
+        text = change if isinstance(change, str) else edited(self.text, change)
+        self._show(self.history.after(text, field))
+
+    def step(self, steps: int) -> None:
+        """Undo steps, below 0, or redo them."""
+        self._show(self.history.moved(steps))
+
+    def _show(self, history: History) -> None:
+        before, self.history = self.history, history
+        if history.text != before.text:
+            try:
+                self._save()
+            except InputError:
+                self.history = before
+                raise
+
+    def _save(self) -> None:
+        if self._saved is None:
+            self._saved = self._free(self._there.stem, self.text)
+        text = rebased(self.text, self._there.home, self.results)
+        self._write(self._saved, text.encode())
+
+    def _free(self, stem: str, text: str) -> Path:
+        """Part file in ``results`` of a name, or that with a number, that replaces no other."""
+        count, name = 1, stem
+        while True:
+            path = self.results / f"{name}.toml"
+            mine = self.opened is not None and path == self.opened.file
+            if mine or not path.exists() or path.read_bytes() == text.encode():
+                return path
+            count += 1
+            name = f"{stem}-{count}"
+
+    def _write(self, path: Path, content: bytes) -> None:
+        """Write a file in ``results``."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        check_inside(path.parent, [self.results])
+        with whole_file(path) as temporary:
+            temporary.write_bytes(content)
+
+    # Checking and running.
+
+    def part_file(self) -> Path:
+        """File that holds what is shown: the one that was opened, or the one in ``results``."""
+        opened = self._there
+        if opened.file is not None and self.text == opened.text:
+            return opened.file
+        if self._saved is None:
+            self._save()
+        assert self._saved is not None
+        return self._saved
+
+    def part_argument(self) -> str:
+        """Name of that file from the folder, as a command takes it."""
+        return self.part_file().relative_to(self.folder).as_posix()
+
+    @property
+    def name(self) -> str:
+        """Name of the part, which the folder of its results has."""
+        return str(self.content.get("name") or self.part_file().stem)
+
+    def check(self, text: str) -> tuple[Check | None, Said]:
+        """Check a text as ``ccfem check`` does: what is known of it, and the lines to be said."""
+        opened = self._there
+        try:
+            check_files(text, opened.home, [self.folder])
+            case = part_case(content_of(text), opened.home / f"{opened.stem}.toml")
+            checked = check(case)
+        except InputError as error:
+            return None, tuple(("mistake", line) for line in error.mistakes)
+        except (SolveError, ArithmeticError, MemoryError) as error:
+            return None, (("mistake", str(error)),)
+        lines = {
+            "mistake": checked.mistakes,
+            "cannot be planned": checked.not_planned,
+            "not printable": checked.not_printable,
+            "warning": checked.warnings,
+            "known": checked.facts,
+        }
+        return checked, tuple((kind, line) for kind, those in lines.items() for line in those)
+
+
+def _is_body(path: Path) -> bool:
+    return is_surface(path) or is_cad(path) or path.suffix.lower() in suffixes()
+
+
+def _looks_like_part(path: Path) -> bool:
+    """Whether a TOML file names a body."""
+    try:
+        content = content_of(text_of(path, "part file"))
+    except InputError:
+        return False
+    return bool(content.keys() & {"mesh", "surface", "planform"})
+
+
+def _body_of(content: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Return what the faces of a part file depend on, the feature angle last."""
+    keys = ("mesh", "surface", "planform", "scale", "merge_nodes")
+    tables = content.get("patches")
+    rules = tables.values() if isinstance(tables, Mapping) else ()
+    angles = [
+        float(rule["angle"])
+        for rule in rules
+        if isinstance(rule, Mapping) and isinstance(rule.get("angle"), int | float)
+    ]
+    return (*(content.get(key) for key in keys), (angles or [FEATURE_ANGLE])[0])

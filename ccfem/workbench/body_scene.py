@@ -1,0 +1,237 @@
+"""What is drawn of a body before it is meshed: faces, borders, and symbols of what acts on them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.errors import InputError, Mistakes
+from ccfem.body.mesh.face_places import BodyFaces
+from ccfem.body.mesh.face_rules import Faces, Holes
+from ccfem.body.mesh.smooth_faces import Face
+from ccfem.cases.inspection import Check
+from ccfem.cases.part_tables import rules_of
+
+_MANY = 64
+"""Triangles from which on a plane is drawn by its outline."""
+_SNAP = np.cos(np.radians(6.0))
+"""Cosine of the angle to an axis within which a dragged direction takes that axis."""
+
+
+@dataclass(frozen=True)
+class FaceMesh:
+    """A face as it is drawn: points (n, 3), mm, and triangles (t, 3) of them, outward."""
+
+    number: int
+    points: FloatArray
+    triangles: IntArray
+
+
+def face_meshes(listing: BodyFaces) -> list[FaceMesh]:
+    """Meshes of all faces; a plane of many triangles has only those that its outline needs."""
+    meshes = []
+    for number, face in zip(listing.numbers, listing.faces, strict=True):
+        used, triangles = np.unique(listing.triangles[face.facets], return_inverse=True)
+        points, triangles = listing.points[used], triangles.reshape(-1, 3)
+        fewer = None
+        if face.kind == "plane" and len(triangles) > _MANY:
+            fewer = _outlined(points, triangles, face)
+        meshes.append(FaceMesh(number, *(fewer or (points, triangles))))
+    return meshes
+
+
+def _outlined(
+    points: FloatArray, triangles: IntArray, face: Face
+) -> tuple[FloatArray, IntArray] | None:
+    """Fewest triangles of a plane; None where they do not cover it."""
+    across = np.eye(3)[np.argmin(np.abs(face.direction))]
+    first = np.cross(across, face.direction)
+    first /= np.linalg.norm(first)
+    frame = np.stack([first, np.cross(face.direction, first)])
+    plane = points @ frame.T
+    outline = shapely.build_area(shapely.multilinestrings(plane[_rim(triangles)]))
+    parts = shapely.get_parts(shapely.constrained_delaunay_triangles(outline))
+    corners = shapely.get_coordinates(shapely.orient_polygons(parts)).reshape(-1, 4, 2)[:, :3]
+    if abs(shapely.area(parts).sum() - face.area) > 1e-3 * face.area:
+        return None
+    unique, rows = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
+    height = float(np.mean(points @ face.direction))
+    return unique @ frame + height * face.direction, rows.reshape(-1, 3)
+
+
+def _rim(triangles: IntArray) -> IntArray:
+    """Edges (k, 2) that one triangle alone has."""
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    unique, count = np.unique(edges, axis=0, return_counts=True)
+    return np.asarray(unique[count == 1])
+
+
+def borders(listing: BodyFaces) -> FloatArray:
+    """Borders between faces, (k, 2, 3), mm."""
+    rims = [_rim(listing.triangles[face.facets]) for face in listing.faces]
+    if not rims:
+        return np.zeros((0, 2, 3))
+    return np.asarray(listing.points[np.unique(np.concatenate(rims), axis=0)])
+
+
+# Patches: which faces they are, or which triangles.
+
+
+@dataclass(frozen=True)
+class PatchPlace:
+    """Where a patch lies.
+
+    Attributes
+    ----------
+    corners : (k, 3, 3) array, mm
+        Of its triangles.
+    numbers : tuple of int
+        Faces that it is made of; empty where it is none.
+    """
+
+    corners: FloatArray
+    numbers: tuple[int, ...] = ()
+
+    @property
+    def _across(self) -> FloatArray:
+        a, b, c = np.moveaxis(self.corners, 1, 0)
+        return np.asarray(0.5 * np.cross(b - a, c - a))
+
+    @property
+    def centre(self) -> FloatArray:
+        """Centre (3,) of the area, mm."""
+        areas = np.linalg.norm(self._across, axis=1)
+        return np.asarray(areas @ self.corners.mean(axis=1) / max(float(areas.sum()), 1e-300))
+
+    @property
+    def normal(self) -> FloatArray:
+        """Mean outward normal (3,) by area: of length 1 of a plane, 0 of a whole round wall."""
+        areas = np.linalg.norm(self._across, axis=1)
+        return np.asarray(self._across.sum(axis=0) / max(float(areas.sum()), 1e-300))
+
+    def spots(self, count: int) -> tuple[FloatArray, FloatArray]:
+        """Up to some places (m, 3), mm, spread over the patch, and outward unit normals there."""
+        middles, normals = self.corners.mean(axis=1), self._across
+        chosen: list[int] = []
+        away = np.full(len(middles), np.inf)
+        while len(chosen) < min(count, len(middles)):
+            chosen.append(int(np.argmax(np.round(away, 6))))
+            away = np.minimum(away, np.linalg.norm(middles - middles[chosen[-1]], axis=1))
+        sizes = np.linalg.norm(normals[chosen], axis=1)
+        return middles[chosen], normals[chosen] / np.maximum(sizes, 1e-300)[:, None]
+
+
+def patch_places(
+    content: Mapping[str, Any], listing: BodyFaces, checked: Check | None
+) -> dict[str, PatchPlace]:
+    """Places of the patches of a part file, as far as they are known.
+
+    Those by rules for faces are known at once; others, and groups of a mesh file, when the part has
+    been checked.
+    """
+    places = {}
+    if checked is not None:
+        mesh = checked.case.problem.mesh
+        places = {
+            name: PatchPlace(mesh.points[facets[:, :3]])
+            for name, facets in mesh.patches.items()
+            if len(facets)
+        }
+    tables = content.get("patches")
+    for name, rule in rules_of(tables if isinstance(tables, Mapping) else {}, Mistakes()).items():
+        try:
+            if isinstance(rule, Faces):
+                numbers = rule.numbers_on(listing)
+            elif isinstance(rule, Holes):
+                chosen = {id(wall) for wall in rule.walls(listing.faces)}
+                pairs = zip(listing.numbers, listing.faces, strict=True)
+                numbers = tuple(k for k, face in pairs if id(face) in chosen)
+            else:
+                continue
+        except InputError:  # the check says so
+            continue
+        rows = [listing.face(number).facets for number in numbers]
+        if rows:
+            corners = listing.points[listing.triangles[np.concatenate(rows)]]
+            places[name] = PatchPlace(corners, numbers)
+    return places
+
+
+# Symbols, and the direction of an arrow that is dragged.
+
+
+def cones(tips: FloatArray, outward: FloatArray, size: float) -> tuple[FloatArray, IntArray]:
+    """Cones that stand on a surface with their tips, as points and triangles.
+
+    Parameters
+    ----------
+    tips, outward : (m, 3) arrays
+        Tips, mm, and unit vectors from there to the middles of the bases.
+    size : float, mm
+        Height.
+    """
+    count, sides = len(tips), 8
+    helper = np.eye(3)[np.argmin(np.abs(outward), axis=1)]
+    first = np.cross(outward, helper)
+    first /= np.maximum(np.linalg.norm(first, axis=1), 1e-300)[:, None]
+    second = np.cross(outward, first)
+    turn = 2.0 * np.pi * np.arange(sides) / sides
+    ring = (tips + size * outward)[:, None] + 0.4 * size * (
+        np.cos(turn)[:, None] * first[:, None] + np.sin(turn)[:, None] * second[:, None]
+    )
+    points = np.concatenate([tips[:, None], (tips + size * outward)[:, None], ring], axis=1)
+    a, b = 2 + np.arange(sides), 2 + (np.arange(sides) + 1) % sides
+    side = np.stack([np.zeros(sides, dtype=int), b, a], axis=1)
+    base = np.stack([np.ones(sides, dtype=int), a, b], axis=1)
+    one = np.concatenate([side, base])
+    triangles = (np.arange(count) * (sides + 2))[:, None, None] + one
+    return points.reshape(-1, 3), triangles.reshape(-1, 3)
+
+
+def arrow(
+    place: PatchPlace, vector: FloatArray, length: float, body: FloatArray
+) -> tuple[FloatArray, bool]:
+    """Tail and tip (2, 3), mm, of the arrow of a force on a patch, outside of the part.
+
+    Also returns whether its tail is the free end: where the force presses on the patch.
+
+    Parameters
+    ----------
+    vector : (3,) array
+    length : float, mm
+        Of the arrow.
+    body : (t, 3, 3) array, mm
+        Corners of the triangles of the part.
+    """
+    along = vector / max(float(np.linalg.norm(vector)), 1e-300)
+    presses = float(place.normal @ along) < -0.2
+    free = -along if presses else along
+    near = place.centre + _way_out(place.centre, free, body) * free
+    ends = np.stack([near, near + length * free])
+    return (ends[::-1] if presses else ends), presses
+
+
+def _way_out(start: FloatArray, along: FloatArray, body: FloatArray) -> float:
+    """Distance, mm, along a unit vector beyond which no triangle (t, 3, 3) is met."""
+    a, b, c = np.moveaxis(body, 1, 0)
+    across = np.cross(along, c - a)
+    scale = np.einsum("ij,ij->i", b - a, across)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        first = np.einsum("ij,ij->i", start - a, across) / scale
+        turned = np.cross(start - a, b - a)
+        second = turned @ along / scale
+        far = np.einsum("ij,ij->i", c - a, turned) / scale
+        met = (first >= 0.0) & (second >= 0.0) & (first + second <= 1.0) & (far > 0.0)
+    return float(far[met].max(initial=0.0))
+
+
+def snapped(direction: FloatArray) -> FloatArray:
+    """Return the unit vector along a direction, or along an axis that is within 6 degrees."""
+    unit = direction / max(float(np.linalg.norm(direction)), 1e-300)
+    axis = int(np.argmax(np.abs(unit)))
+    if abs(unit[axis]) > _SNAP:
+        return np.asarray(np.sign(unit[axis]) * np.eye(3)[axis])
+    return np.asarray(unit)

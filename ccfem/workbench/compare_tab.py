@@ -1,0 +1,304 @@
+"""The tab for runs: strategies to tick, progress and stop, the table, and strands by layer."""
+
+import inspect
+import mimetypes
+import shlex
+from typing import Any
+
+import numpy as np
+
+from ccfem import strategies as strategy_modules
+from ccfem.base.arrays import FloatArray
+from ccfem.base.errors import InputError
+from ccfem.comparison.plot.colours import LINK, OUTLINE, scale
+from ccfem.comparison.request import STRATEGIES
+from ccfem.workbench.child_run import ChildRun, RunState
+from ccfem.workbench.guard import Served, escaped
+from ccfem.workbench.result_views import Pieces, RunResults, read_results
+from ccfem.workbench.tab import Tabbed, table_html
+
+_NO_ONE, _FIRST, _ALL = "none", "the first", "all at once"
+_BESIDE = 1.25
+"""Distance of two strategies side by side, in widths of the part."""
+_LINE = 0.6
+"""Width of a drawn strand over the fibre width, so that neighbours stay apart."""
+_TAKEN = ("report.html", "results.csv", "results.json", "paths.vtp")
+_SUFFIXES = (".gcode", "_waypoints.txt", "_waypoints.csv", "_cell.csv", "_trim.csv")
+
+
+class CompareTab:
+    """Runs in a process of their own, and what they found."""
+
+    def __init__(self, page: Tabbed) -> None:
+        self.page, gui = page, page.server.gui
+        self.run: ChildRun | None = None
+        self.results: RunResults | None = None
+        known = strategy_modules.named()
+        self.ticks: dict[str, Any] = {}
+        with gui.add_folder("Strategies"):
+            self._add_ticks({name: known[name] for name in STRATEGIES})
+        with gui.add_folder("More strategies", expand_by_default=False):
+            self._add_ticks({k: v for k, v in known.items() if k not in STRATEGIES})
+        self.case = gui.add_dropdown("Load case", (_FIRST,), visible=False)
+        self.case.on_update(page.on(self.show))
+        self.start = gui.add_button("Compare", icon="player-play")
+        self.start.on_click(page.on(self._compare))
+        self.ending = gui.add_button("Stop", icon="player-stop", visible=False, color="red")
+        self.ending.on_click(page.on(self.stop))
+        self.bar = gui.add_progress_bar(0.0, visible=False)
+        self._said = gui.add_html("")
+        self._command = gui.add_html("")
+        self._table = gui.add_html("", visible=False)
+        self._found = gui.add_folder("Layers", visible=False)
+        with self._found:
+            self.left = gui.add_dropdown("Strategy", (_NO_ONE,))
+            self.right = gui.add_dropdown("Beside it", (_NO_ONE,))
+            self.layer = gui.add_slider("Layer", 0, 1, 1, 0)
+            for field in (self.left, self.right, self.layer):
+                field.on_update(page.on(self._draw))
+            self._layer_said = gui.add_html("")
+            self.prints = gui.add_button("G-code of this strategy", icon="printer")
+            self.prints.on_click(page.on(self._plan))
+        self._links = gui.add_html("")
+        self._handles: list[Any] = []
+
+    def _add_ticks(self, known: dict[str, Any]) -> None:
+        for name, strategy in known.items():
+            about = (inspect.getdoc(strategy) or "").split("\n")[0]
+            tick = self.page.server.gui.add_checkbox(name, name in STRATEGIES, hint=about)
+            tick.on_update(self.page.on(self.show))
+            self.ticks[name] = tick
+
+    # Running.
+
+    def _arguments(self) -> list[str]:
+        names = [name for name, tick in self.ticks.items() if tick.value]
+        if not names:
+            raise InputError("no strategy is ticked: tick one or more")
+        chosen = [] if set(names) == set(STRATEGIES) else ["--strategies", ",".join(names)]
+        return ["compare", self.page.bench.part_argument(), *chosen, *self._load_case()]
+
+    def _load_case(self) -> list[str]:
+        if not self.case.visible or self.case.value == _FIRST:
+            return []
+        return ["--load-case", "all" if self.case.value == _ALL else self.case.value]
+
+    def _compare(self) -> None:
+        self._begin(self._arguments())
+
+    def _plan(self) -> None:
+        name = self.left.value
+        part = self.page.bench.part_argument()
+        self._begin(["plan", part, "--strategy", name, "--gcode", *self._load_case()])
+
+    def _begin(self, arguments: list[str]) -> None:
+        page = self.page
+        if self.run is not None and self.run.state.running:
+            raise InputError("a run is going on: stop it first")
+        page.say("")
+        page.bench.part_file()
+        suffix = f"-{self.left.value}" if arguments[0] == "plan" else ""
+        folder = page.bench.results / f"{page.bench.name}{suffix}"
+        self.run = ChildRun(
+            arguments, page.bench.folder, lambda state: page.act(self._heed, state, folder)
+        )
+        self._tell(self.run.state)
+
+    def _heed(self, state: RunState, folder: Any) -> None:
+        self._tell(state)
+        if state.written:
+            self.results = read_results(folder)
+            self._show_results()
+            self.page.show_fibre(True)
+        elif not state.running:
+            self.page.say("" if state.stopped else state.complaint)
+
+    def _tell(self, state: RunState) -> None:
+        self.start.visible, self.ending.visible = not state.running, state.running
+        self.bar.visible, self.bar.value = state.running, 100.0 * state.share
+        said = f"{100.0 * state.share:.0f} %: {state.step}" if state.running else state.complaint
+        self._said.content = f'<p class="ccfem" role="status">{escaped(said)}</p>' if said else ""
+
+    def stop(self) -> None:
+        """Stop the run, if there is one."""
+        if self.run is not None:
+            self.run.stop()
+
+    def forget(self) -> None:
+        """Show no results: they are of another part."""
+        self.results = None
+        self._table.visible = self._found.visible = False
+        self._links.content = ""
+        self.page.view.value = "Part"
+        self.shown(False)
+
+    # Showing.
+
+    def show(self) -> None:
+        """Show the load cases, and the command that does the same."""
+        bench = self.page.bench
+        if bench.opened is None:
+            return
+        loads, sums = (bench.content.get(key) for key in ("loads", "combinations"))
+        names = [name for these in (loads, sums) if isinstance(these, dict) for name in these]
+        options = (_FIRST, *names, _ALL)
+        if self.case.options != options:
+            self.case.options, self.case.visible = options, len(names) > 1
+        try:
+            command = shlex.join(["ccfem", *self._arguments()])
+        except InputError:
+            command = "tick a strategy"
+        self._command.content = (
+            f'<p class="ccfem">In a terminal: <code>{escaped(command)}</code></p>'
+        )
+
+    def _show_results(self) -> None:
+        assert self.results is not None
+        heads, rows = self.results.rows()
+        lines = [
+            [name, *(cells or [f"failed: {why}", *[""] * (len(heads) - 1)])]
+            for name, cells, why in rows
+        ]
+        names = self.results.names
+        self._table.content = table_html(["strategy", *heads], lines, names[0] if names else "")
+        self._table.visible = True
+        files = [name for name in self.results.record["files"] if self._is_taken(name)]
+        items = "".join(
+            f'<li><a href="/files/{escaped(name)}" target="_blank" rel="noopener">{escaped(name)}'
+            "</a></li>"
+            for name in sorted(files, key=lambda name: name != "report.html")
+        )
+        where = self.results.folder.relative_to(self.page.bench.folder)
+        self._links.content = (
+            f'<div class="ccfem"><h2>Take away</h2><ul>{items}</ul><p>All of it is in '
+            f"<code>{escaped(where)}</code>.</p></div>"
+        )
+        self._found.visible = bool(names and self.results.layers)
+        if self._found.visible:
+            self.left.options, self.right.options = tuple(names), (_NO_ONE, *names)
+            self.left.value, self.right.value = names[0], (names[1] if names[1:] else _NO_ONE)
+            self.layer.max = max(len(self.results.layers) - 1, 1)
+            self.layer.value = self.results.first
+            self.prints.visible = not any(name.endswith(".gcode") for name in files)
+
+    def _is_taken(self, name: str) -> bool:
+        return name in _TAKEN or name.endswith(_SUFFIXES)
+
+    def served(self, name: str) -> Served | None:
+        """Serve a file of the results; None where it is none of them."""
+        if self.results is None or not self._is_taken(name):
+            return None
+        if name not in self.results.record["files"]:
+            return None
+        path = self.results.folder / name
+        if path.is_symlink() or not path.is_file():
+            return None
+        if name == "report.html":
+            return Served(path.read_bytes(), "text/html; charset=utf-8")
+        kind = mimetypes.guess_type(name)[0] or "application/octet-stream"
+        return Served(path.read_bytes(), kind, name)
+
+    def shown(self, fibre: bool) -> tuple[FloatArray, FloatArray] | None:
+        """Draw the strands, or take them away; opposite corners of what is drawn, mm."""
+        for handle in self._handles:
+            handle.remove()
+        self._handles = []
+        if not fibre or self.results is None:
+            return None
+        self._draw()
+        points = self.results.rims(self._place).reshape(-1, 3)
+        if not len(points):
+            return None
+        aside = self._aside(points) * (len(self._names) - 1)
+        return points.min(axis=0), points.max(axis=0) + aside
+
+    @property
+    def _place(self) -> int:
+        assert self.results is not None
+        return min(int(self.layer.value), len(self.results.layers) - 1)
+
+    @property
+    def _names(self) -> list[str]:
+        """Strategies that are shown: one, or two side by side."""
+        shown = (self.left.value, self.right.value)
+        return list(dict.fromkeys(name for name in shown if name != _NO_ONE))
+
+    def _aside(self, points: FloatArray) -> FloatArray:
+        """Step (3,), mm, from one strategy to the next: along x or y, as the part is narrower."""
+        reach = np.ptp(points, axis=0)
+        axis = int(np.argmin(np.where(reach > 1e-6 * reach.max(), reach, np.inf)[:2]))
+        return np.asarray(_BESIDE * max(float(reach[axis]), 0.1 * reach.max()) * np.eye(3)[axis])
+
+    def _draw(self) -> None:
+        """Draw a layer of one or two strategies, coloured by force."""
+        if self.results is None or self.page.view.value != "Fibre":
+            return
+        results, scene = self.results, self.page.server.scene
+        place, names = self._place, self._names
+        rims = results.rims(place)
+        corners = rims.reshape(-1, 3) if len(rims) else np.zeros((1, 3))
+        step = self._aside(corners)
+        low, middle = corners.min(axis=0), 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+        drawn: list[Any] = []
+        for k, name in enumerate(names):
+            pieces = results.pieces(name, place)
+            colours = np.repeat(self._colours(pieces)[:, None], 2, axis=1)
+            lines: tuple[tuple[str, FloatArray, Any, float, Any], ...] = (
+                ("rim", rims, _rgb(OUTLINE), 1.5, "screen"),
+                ("fibre", pieces.ends, colours, _LINE * results.width, "world"),
+            )
+            for what, ends, shade, width, unit in lines:
+                if len(ends):
+                    drawn.append(
+                        scene.add_line_segments(
+                            f"/fibre_{k}_{what}",
+                            (ends + k * step).astype(np.float32),
+                            shade,
+                            thickness=width,
+                            thickness_units=unit,
+                        )
+                    )
+            at = np.where(step > 0.0, low, middle) + k * step
+            title = scene.add_label(
+                f"/fibre_{k}_name", name, position=tuple(at), anchor="top-center"
+            )
+            drawn.append(title)
+        kept = {handle.name for handle in drawn}
+        for handle in self._handles:
+            if handle.name not in kept:
+                handle.remove()
+        self._handles = drawn
+        self._tell_layer(place, names)
+
+    def _tell_layer(self, place: int, names: list[str]) -> None:
+        assert self.results is not None
+        results = self.results
+        layer = results.layers[place]
+        said = "".join(
+            f"<li><b>{escaped(name)}</b> {escaped(results.caption(name, place))}</li>"
+            for name in names
+        )
+        ends = ", ".join(f"rgb{_share(share)}" for share in np.linspace(0.0, 1.0, 5))
+        self._layer_said.content = (
+            f'<div class="ccfem"><p>Layer {layer["index"]}, {escaped(layer["where"])}</p>'
+            f"<ul>{said}</ul><div class='bar' style='background: linear-gradient(90deg, {ends})'>"
+            f"</div><p class='ends'><span>0 N</span><span>{results.most_force:.3g} N in the fibre"
+            "</span></p></div>"
+        )
+
+    def _colours(self, pieces: Pieces) -> Any:
+        """Colours (s, 3) of pieces of fibre, bytes."""
+        assert self.results is not None
+        share = np.nan_to_num(pieces.force / self.results.most_force)
+        colours = np.round(255.0 * scale("size")(np.clip(share, 0.0, 1.0))[:, :3]).astype(np.uint8)
+        colours[pieces.link] = _rgb(LINK)
+        return colours
+
+
+def _rgb(name: str) -> tuple[int, int, int]:
+    red, green, blue = (int(name[k : k + 2], 16) for k in (1, 3, 5))
+    return red, green, blue
+
+
+def _share(share: float) -> tuple[int, ...]:
+    return tuple(round(255.0 * float(c)) for c in scale("size")(share)[:3])

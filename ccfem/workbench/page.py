@@ -1,0 +1,431 @@
+"""The page: the part in space, a panel of tabs, and lines of what the check says.
+
+All that a visit does is done by one thread, `Page.act`, one thing after the other: what is shown
+is a function of the part file and of the run.
+"""
+
+import contextlib
+import io
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from ccfem.base.arrays import FloatArray
+from ccfem.base.errors import InputError, SolveError
+from ccfem.cases.inspection import Check
+from ccfem.workbench.bench import Bench, Said
+from ccfem.workbench.body_scene import (
+    PatchPlace,
+    arrow,
+    borders,
+    cones,
+    face_meshes,
+    patch_places,
+    snapped,
+)
+from ccfem.workbench.compare_tab import CompareTab
+from ccfem.workbench.file_tab import FileTab
+from ccfem.workbench.guard import Guard, Served, escaped, limit_uploads
+from ccfem.workbench.loads_tab import LoadsTab, vector_of
+from ccfem.workbench.newest import Newest
+from ccfem.workbench.part_edits import Change, valued
+from ccfem.workbench.print_tab import PrintTab
+
+_FACE, _CHOSEN = (203, 210, 216), (245, 190, 65)
+_HELD, _LOADED, _BOTH = (120, 168, 214), (226, 142, 120), (170, 140, 190)
+_EDGE, _LOAD, _SUPPORT = (70, 80, 92), (179, 38, 30), (0, 98, 155)
+_MARKS = 10
+"""Symbols on a patch."""
+_TITLES = {
+    "mistake": "mistake",
+    "cannot be planned": "cannot be planned",
+    "not printable": "not printable",
+    "warning": "warning",
+}
+
+
+def lines_of(said: Said, known: bool = True) -> str:
+    """HTML of what a check says, the worst first."""
+    shown = [(kind, line) for kind, line in said if known or kind != "known"]
+    items = "".join(
+        f'<li class="{kind.replace(" ", "-")}">'
+        + (f"<b>{_TITLES[kind]}</b> " if kind in _TITLES else "")
+        + f"{escaped(line)}</li>"
+        for kind, line in shown
+    )
+    return f"<ul>{items}</ul>" if items else ""
+
+
+class Page:
+    """The page of a bench, served on this machine.
+
+    Parameters
+    ----------
+    bench : Bench
+    port : int
+        0 for any that is free.
+    """
+
+    def __init__(self, bench: Bench, port: int = 0) -> None:
+        import viser
+
+        self.bench, self.guard = bench, Guard(self._served)
+        self.chosen: list[int] = []
+        self.checked: Check | None = None
+        self._checked_text, self._said = "", Said()
+        self._faces: dict[int, Any] = {}
+        self.body: Any = None
+        self._listing: Any = None
+        self._drawn: list[Any] = []
+        self._acts = ThreadPoolExecutor(1, "page")
+        self.drawn = threading.Event()
+        """Set whenever a check has been drawn."""
+        with self.guard.before_viser():
+            self.server = viser.ViserServer("127.0.0.1", port, verbose=False)
+        limit_uploads(self.server, lambda why: self.act(self.say, why))
+        self._newest = Newest(bench.check, lambda text, came: self.act(self._heed, text, came))
+        self.act(self._build).result()
+
+    @property
+    def link(self) -> str:
+        """Link that opens the page."""
+        return self.guard.link(self.server.get_port())
+
+    def close(self) -> None:
+        """Stop the run and the server."""
+        self.compare.stop()
+        self._newest.close()
+        self._acts.shutdown(wait=False, cancel_futures=True)
+        with contextlib.redirect_stdout(io.StringIO()):
+            self.server.stop()
+
+    # Acting.
+
+    def act(self, what: Callable[..., None], *arguments: Any) -> "Future[None]":
+        """Do something when all before it is done; what goes wrong is said on the page."""
+        return self._acts.submit(self._safely, what, *arguments)
+
+    def _safely(self, what: Callable[..., None], *arguments: Any) -> None:
+        try:
+            with self.server.atomic():
+                what(*arguments)
+        except (InputError, SolveError, OSError) as error:
+            self.say(str(error))
+        except Exception as error:  # one act's fault ends no other
+            self.say(f"{type(error).__name__}: {error}")
+
+    def on(self, what: Callable[..., None], *arguments: Any) -> Callable[[Any], Any]:
+        """Return a callback of viser that does something; it is not called for values set here."""
+
+        async def heed(event: Any) -> None:
+            if event.client_id is not None:
+                self.act(what, *arguments)
+
+        return heed
+
+    def on_value(self, what: Callable[..., None], *arguments: Any) -> Callable[[Any], Any]:
+        """Return a callback as `on` does, that passes on the value as it is when that comes.
+
+        Until it is acted on, what is shown meanwhile may have set the field to something else.
+        """
+
+        async def heed(event: Any) -> None:
+            if event.client_id is not None:
+                self.act(what, *arguments, event.target.value)
+
+        return heed
+
+    def say(self, text: str) -> None:
+        """Show a line at the top; an empty one takes it away."""
+        self.message.content = f'<p class="ccfem message" role="alert">{escaped(text)}</p>'
+        self.message.visible = bool(text)
+
+    def edit(self, change: Change | str, field: str = "") -> None:
+        """Change the part file, and show it."""
+        self.bench.edit(change, field)
+        self.say("")
+        self.show()
+
+    def step(self, steps: int) -> None:
+        """Undo or redo."""
+        self.bench.step(steps)
+        self.show()
+
+    def open(self, what: str) -> None:
+        """Open a part, and look at it."""
+        self.say(f"reading {what} ...")
+        self.server.flush()
+        self.bench.open(what)
+        self.say("")
+        self.chosen, self.checked, self._said = [], None, ()
+        self.compare.forget()
+        self.show()
+        self.look()
+
+    # Building and showing.
+
+    def _build(self) -> None:
+        server, gui = self.server, self.server.gui
+        gui.configure_theme(
+            control_width="large",
+            show_logo=False,
+            show_share_button=False,
+            brand_color=(0, 98, 155),
+        )
+        gui.main_panel.dock_right()
+        gui.set_panel_label("ccfem")
+        server.scene.configure_default_lights(False)
+        server.scene.configure_environment_map(None)
+        server.scene.add_light_hemisphere(
+            "/sky", sky_color=(255, 255, 255), ground_color=(150, 155, 160), intensity=1.9
+        )
+        server.scene.add_light_directional("/sun", intensity=1.6, position=(-0.5, -0.9, 0.6))
+        server.scene.world_axes.visible = False
+        self.heading = gui.add_html("")
+        self.message = gui.add_html("", visible=False)
+        undoing = gui.add_button_group("History", ["Undo", "Redo"])
+        undoing.on_click(self.on_value(lambda how: self.step(-1 if how == "Undo" else 1)))
+        for label, key, steps in (("Undo", "Z", -1), ("Redo", "Y", 1)):
+            command = gui.add_command(label, hotkey=key, modifier="cmd/ctrl")
+            command.on_trigger(self.on(self.step, steps))
+        self.view = gui.add_button_group("View", ["Part", "Fibre"])
+        self.view.on_click(self.on_value(lambda how: self.show_fibre(how == "Fibre")))
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("Loads"):
+            self.loads = LoadsTab(self)
+        with tabs.add_tab("Print"):
+            self.prints = PrintTab(self)
+        with tabs.add_tab("Compare"):
+            self.compare = CompareTab(self)
+        with tabs.add_tab("Part file"):
+            self.file = FileTab(self)
+        self.lines = gui.add_html("")
+        self.show()
+        self.look()
+
+    def show(self) -> None:
+        """Show what the part file says, and have it checked."""
+        opened = self.bench.opened is not None
+        if opened:
+            listing = self.bench.listing
+            if listing is not self._listing:
+                self._draw_body(listing)
+            self._draw_symbols()
+        title = escaped(self.bench.content.get("title") or self.bench.name) if opened else "ccfem"
+        self.heading.content = f'<h1 class="ccfem">{title}</h1>'
+        for tab in (self.loads, self.prints, self.compare, self.file):
+            tab.show()
+        if opened and self._checked_text != self.bench.text:
+            self._checked_text = self.bench.text
+            self.drawn.clear()
+            self._tell_lines("checking ...")
+            self._newest.ask(self.bench.text)
+        elif not opened:
+            self.lines.content = (
+                '<p class="ccfem">Choose a body or a part under “Part file”, or a case that comes '
+                "with ccfem.</p>"
+            )
+
+    def _heed(self, text: str, came: tuple[Check | None, Said]) -> None:
+        """Show what the check of a text said."""
+        if text == self.bench.text:
+            self.checked, self._said = came
+            self._tell_lines("")
+            self._draw_symbols()
+            self.drawn.set()
+
+    def _tell_lines(self, doing: str) -> None:
+        bad = sum(kind not in ("known", "warning") for kind, _ in self._said)
+        warned = sum(kind == "warning" for kind, _ in self._said)
+        counted = [f"{bad} to mend"] * bool(bad) + [f"{warned} to look at"] * bool(warned)
+        head = doing or ("Check: " + (", ".join(counted) or "nothing keeps it from being solved"))
+        body = lines_of(self._said)
+        self.lines.content = f'<div class="ccfem check"><h2>{escaped(head)}</h2>{body}</div>'
+
+    def _served(self, name: str) -> Served | None:
+        """File of a name below ``/files/``."""
+        return self.file.served() if name == "part.toml" else self.compare.served(name)
+
+    # The part in space.
+
+    def look(self) -> None:
+        """Look at the part from the front, above."""
+        if self._listing is None:
+            return
+        points = self._listing.points[self._listing.triangles].reshape(-1, 3)
+        low, high = points.min(axis=0), points.max(axis=0)
+        self.look_at(low, high)
+
+    def look_at(self, low: FloatArray, high: FloatArray) -> None:
+        """Look at a box from the front, above."""
+        centre, size = 0.5 * (low + high), float(np.linalg.norm(high - low))
+        place = centre + 1.05 * size * np.array([-0.6, -0.7, 0.5])
+        cameras = [client.camera for client in self.server.get_clients().values()]
+        for camera in (self.server.initial_camera, *cameras):
+            camera.position, camera.look_at = tuple(place), tuple(centre)
+
+    def show_fibre(self, fibre: bool) -> None:
+        """Show the strands of the last run in place of the part, or the part."""
+        fibre = fibre and self.compare.results is not None
+        self.view.value = "Fibre" if fibre else "Part"
+        if self.body is not None:
+            self.body.visible = not fibre
+        box = self.compare.shown(fibre)
+        if box is None:
+            self.look()
+        else:
+            self.look_at(*box)
+
+    def _draw_body(self, listing: Any) -> None:
+        """Draw the faces, each to be clicked, and their borders."""
+        scene = self.server.scene
+        scene.remove_by_name("/body")
+        self.body = scene.add_frame("/body", show_axes=False)
+        self._faces, self._drawn, self._listing = {}, [], listing
+        for mesh in face_meshes(listing):
+            handle = scene.add_mesh_simple(
+                f"/body/face_{mesh.number}",
+                mesh.points.astype(np.float32),
+                mesh.triangles.astype(np.uint32),
+                color=_FACE,
+                side="double",
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+            handle.on_click(self.on(self.choose, mesh.number, False))
+            handle.on_click(modifier="shift")(self.on(self.choose, mesh.number, True))
+            self._faces[mesh.number] = handle
+        ends = borders(listing).astype(np.float32)
+        scene.add_line_segments(
+            "/body/borders", ends, _EDGE, thickness=1.5, thickness_units="screen"
+        )
+        self.loads.list_faces()
+
+    def choose(self, number: int, more: bool) -> None:
+        """Choose a face, or with `more` one more; one that is chosen is left out again."""
+        if not more:
+            self.chosen = [] if self.chosen == [number] else [number]
+        elif number in self.chosen:
+            self.chosen = [k for k in self.chosen if k != number]
+        else:
+            self.chosen = [*self.chosen, number]
+        self.show_chosen()
+
+    def choose_all(self, numbers: Sequence[int]) -> None:
+        """Choose these faces."""
+        self.chosen = list(numbers)
+        self.show_chosen()
+
+    def show_chosen(self) -> None:
+        """Show which faces are chosen."""
+        self._paint()
+        self.loads.show_chosen()
+
+    def places(self) -> dict[str, PatchPlace]:
+        """Places of the patches, as far as they are known."""
+        return patch_places(self.bench.content, self.bench.listing, self.checked)
+
+    def _paint(self) -> None:
+        """Colour the faces by what acts on them, and those that are chosen."""
+        held, loaded = set[int](), set[int]()
+        places = self.places()
+        for entry in self.loads.entries():
+            place = places.get(str(entry.table.get("patch")))
+            if place is not None:
+                (held if entry.keys[0] == "supports" else loaded).update(place.numbers)
+        for number, handle in self._faces.items():
+            roles = (number in held, number in loaded)
+            colour = {(True, False): _HELD, (False, True): _LOADED, (True, True): _BOTH}.get(
+                roles, _FACE
+            )
+            colour = _CHOSEN if number in self.chosen else colour
+            if tuple(handle.color) != colour:
+                handle.color = colour
+
+    def _draw_symbols(self) -> None:
+        """Draw cones on what is held and pressed, and arrows, to be dragged, for forces."""
+        scene, listing = self.server.scene, self.bench.listing
+        for handle in self._drawn:
+            handle.remove()
+        self._drawn = []
+        places, size = self.places(), listing.size
+        for k, entry in enumerate(self.loads.entries()):
+            place = places.get(str(entry.table.get("patch")))
+            if place is None:
+                continue
+            name, support = f"/body/symbol_{k}", entry.keys[0] == "supports"
+            force = vector_of(entry.table)
+            if support or force is None:
+                tips, outward = place.spots(_MARKS)
+                points, triangles = cones(tips, outward, 0.035 * size)
+                self._drawn.append(
+                    scene.add_mesh_simple(
+                        name,
+                        points.astype(np.float32),
+                        triangles.astype(np.uint32),
+                        color=_SUPPORT if support else _LOAD,
+                        flat_shading=True,
+                        cast_shadow=False,
+                        receive_shadow=False,
+                    )
+                )
+            elif np.any(force):
+                self._drawn += self._arrow(name, entry.keys, place, force, 0.22 * size)
+        self._paint()
+
+    def _arrow(
+        self,
+        name: str,
+        keys: Sequence[str | int],
+        place: PatchPlace,
+        force: FloatArray,
+        long: float,
+    ) -> list[Any]:
+        """Arrow of a force with its size, and a ball at its free end to drag it by."""
+        scene = self.server.scene
+        listing = self.bench.listing
+        ends, presses = arrow(place, force, long, listing.points[listing.triangles])
+        drawn = scene.add_arrows(
+            name,
+            ends[None].astype(np.float32),
+            _LOAD,
+            shaft_radius=0.03 * long,
+            head_radius=0.09 * long,
+            head_length=0.22 * long,
+        )
+        free = ends[0 if presses else 1]
+        ball = scene.add_icosphere(
+            f"{name}_ball",
+            0.08 * long,
+            _LOAD,
+            position=tuple(free),
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        label = scene.add_label(
+            f"{name}_size",
+            f"{np.linalg.norm(force):.4g} N",
+            position=tuple(free + 0.12 * (ends[1] - ends[0]) * (-1.0 if presses else 1.0)),
+            anchor="bottom-center",
+        )
+        amount, sign = float(np.linalg.norm(force)), -1.0 if presses else 1.0
+
+        async def drag(event: Any) -> None:
+            self.act(dragged, np.array(event.end_position), event.phase)
+
+        def dragged(end: FloatArray, phase: str) -> None:
+            along = snapped(end - place.centre)
+            if phase == "end":
+                vector = [round(float(x), 3) + 0.0 for x in sign * amount * along]
+                self.edit(valued((*keys, "vector"), vector))
+                return
+            tip = place.centre + long * along
+            new = [tip, place.centre] if presses else [place.centre, tip]
+            ball.position = tuple(tip)
+            drawn.points = np.array(new, dtype=np.float32)[None]
+
+        ball.on_drag(drag)
+        return [drawn, ball, label]

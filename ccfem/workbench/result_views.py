@@ -1,0 +1,169 @@
+"""What the page shows of a run: the views of its report, read back from the folder of results."""
+
+import json
+import re
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ccfem.base.arrays import BoolArray, FloatArray
+from ccfem.base.errors import InputError
+from ccfem.comparison.headline import HEADLINE, value_text
+from ccfem.comparison.report.packing import unpack
+from ccfem.comparison.table import FIRST_COLUMNS
+
+_DATA = re.compile(r'<script type="application/octet-stream" id="data">([^<]*)</script>')
+_NOT_KNOWN = 255
+"""Byte of a value that is not known (`packing.as_bytes`)."""
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Straight pieces of fibre of one strategy on one layer.
+
+    Attributes
+    ----------
+    ends : (s, 2, 3) array, mm
+    force : (s,) array, N
+        Tension in each; NaN where it is not known.
+    link : (s,) bool array
+        Whether a piece only joins strands.
+    """
+
+    ends: FloatArray
+    force: FloatArray
+    link: BoolArray
+
+
+@dataclass(frozen=True)
+class RunResults:
+    """Results in a folder: what ``results.json`` records, and what ``report.html`` draws.
+
+    Attributes
+    ----------
+    folder : Path
+    record : dict
+    views : dict
+        Layers and paths: see `ccfem.comparison.report.layer_view.layer_views`.
+    """
+
+    folder: Path
+    record: dict[str, Any]
+    views: dict[str, Any]
+
+    @property
+    def names(self) -> list[str]:
+        """Strategies whose paths can be shown, the best first."""
+        return [str(run["name"]) for run in self._stack["runs"]]
+
+    @property
+    def layers(self) -> list[dict[str, Any]]:
+        """Layers that can be shown."""
+        return list(self._stack["layers"])
+
+    @property
+    def first(self) -> int:
+        """Layer that shows most."""
+        return int(self._stack["first"])
+
+    @property
+    def most_force(self) -> float:
+        """End of the scale of forces, N."""
+        return float(self.views["scales"]["force"])
+
+    @property
+    def width(self) -> float:
+        """Width of a strand, mm."""
+        return float(self.views["width"])
+
+    @cached_property
+    def _stack(self) -> dict[str, Any]:
+        stacks = self.views.get("stacks") or [{"runs": [], "layers": [], "first": 0}]
+        return dict(stacks[0])
+
+    def rows(self) -> tuple[list[str], list[tuple[str, list[str], str]]]:
+        """Table of the first columns of the headline: titles, and name, cells and failure of each.
+
+        The best stands first.
+        """
+        totals = {str(run["name"]): run for run in self.record["strategies"]}
+        known = {key for run in totals.values() for key in run["total"]}
+        skipped = {"interlayer_load"}
+        skipped |= {"print_time_nearest"} if "whole_print_time" in known else set()
+        heads = [
+            head
+            for head in HEADLINE
+            if head.column in FIRST_COLUMNS and head.column in known - skipped
+        ]
+        order = [*self.names, *(name for name in totals if name not in self.names)]
+        rows = []
+        for name in order:
+            run = totals[name]
+            cells = [value_text(run["total"], head) for head in heads] if run["total"] else []
+            rows.append((name, cells, "" if cells else str(run["failure"])))
+        return [head.title for head in heads], rows
+
+    def why_not(self, name: str) -> str:
+        """Why the paths of a strategy cannot be printed; empty where they can."""
+        return next((str(r["why_not"]) for r in self.record["strategies"] if r["name"] == name), "")
+
+    def pieces(self, name: str, layer: int) -> Pieces:
+        """Pieces of fibre of a strategy on the layer at a place of `layers`."""
+        view, laid = self.layers[layer], self._laid(name, layer)
+        points = _in_space(laid["space"] if "space" in laid else laid["points"], view["space"])
+        last = np.zeros(len(points), dtype=bool)
+        last[np.asarray(laid["offsets"], dtype=int)[1:] - 1] = True
+        start = np.flatnonzero(~last)
+        force = np.asarray(laid["force"], dtype=float)
+        force = np.where(force == _NOT_KNOWN, np.nan, force / 254.0 * self.most_force)
+        link = np.zeros(len(points)) if laid["link"] is None else np.asarray(laid["link"])
+        ends = np.stack([points[start], points[np.minimum(start + 1, len(points) - 1)]], axis=1)
+        return Pieces(ends.reshape(-1, 2, 3), force[start], link[start] > 0)
+
+    def caption(self, name: str, layer: int) -> str:
+        """Words of the report below a layer of a strategy."""
+        return str(self._laid(name, layer)["caption"])
+
+    def _laid(self, name: str, layer: int) -> dict[str, Any]:
+        return dict(self._stack["runs"][self.names.index(name)]["layers"][layer])
+
+    def rims(self, layer: int) -> FloatArray:
+        """Border of a layer in pieces, (s, 2, 3), mm."""
+        view = self.layers[layer]
+        flat = isinstance(view["space"], list)
+        points = _in_space(view["rims"] if flat else view["space"], view["space"])
+        offsets = np.asarray(view["rim_offsets"], dtype=int)
+        inner = np.setdiff1d(np.arange(len(points)), offsets[1:] - 1)
+        return np.stack([points[inner], points[inner + 1]], axis=1).reshape(-1, 2, 3)
+
+
+def _in_space(points: FloatArray, space: Any) -> FloatArray:
+    """Points (n, 3), mm, of a layer: of a flat one from its plane, whose frame and height follow.
+
+    Those of a curved layer are in space already.
+    """
+    if not isinstance(space, list):
+        return np.asarray(points)
+    frame, height = np.reshape(space[:9], (3, 3)), float(space[9])
+    return np.asarray(points).reshape(-1, 2) @ frame[:2] + height * frame[2]
+
+
+def read_results(folder: Path) -> RunResults:
+    """Read the results of a comparison or a plan.
+
+    Raises
+    ------
+    InputError
+        Where the folder holds none.
+    """
+    try:
+        record = json.loads((folder / "results.json").read_text(encoding="utf-8"))
+        page = (folder / "report.html").read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        raise InputError(f"{folder} holds no results that can be shown ({error})") from None
+    data = _DATA.search(page)
+    views = unpack(data[1])["layers"] if data else {"stacks": []}
+    return RunResults(folder, record, views)

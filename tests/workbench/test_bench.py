@@ -1,0 +1,161 @@
+"""The bench: what is opened, where it is kept, and that the same comes out as by hand."""
+
+import shutil
+import tomllib
+
+import pytest
+
+from ccfem.base.errors import InputError
+from ccfem.body.files import write_mesh
+from ccfem.body.mesh.box import box_mesh
+from ccfem.cases.part_file import read_part
+from ccfem.workbench.bench import Bench
+from ccfem.workbench.part_edits import appended, edited, patch_of, valued
+
+BY_HAND = """\
+# A bar, by hand.
+mesh = "bar.vtu"
+material = "pla"
+
+[[supports]]
+patch = "plane_minus_x"
+
+[[loads.load]]
+kind = "force"
+patch = "plane_x"
+vector = [100.0, 0.0, 0.0]
+
+[patches.plane_minus_x]
+rule = "face"
+at = [0.0, 5.0, 2.0]
+normal = "-x"
+
+[patches.plane_x]
+rule = "face"
+at = [40.0, 5.0, 2.0]
+normal = "x"
+"""
+
+
+@pytest.fixture
+def bench(tmp_path):
+    """A folder with a bar of 40 x 10 x 4 mm, and a part file of it by hand."""
+    write_mesh(box_mesh((40.0, 10.0, 4.0), (8, 3, 2)), tmp_path / "bar.vtu")
+    (tmp_path / "bar.toml").write_text(BY_HAND)
+    return Bench(tmp_path)
+
+
+def set_up(bench):
+    """Hold one end of the bar and pull the other, as clicks do."""
+    by_direction = {
+        face.along: number
+        for number, face in zip(bench.listing.numbers, bench.listing.faces, strict=True)
+    }
+    text, patch = patch_of(bench.text, bench.listing, [by_direction["-x"]])
+    bench.edit(edited(text, appended(("supports",), {"patch": patch})))
+    text, patch = patch_of(bench.text, bench.listing, [by_direction["x"]])
+    load = {"kind": "force", "patch": patch, "vector": [100.0, 0.0, 0.0]}
+    bench.edit(edited(text, appended(("loads", "load"), load)))
+
+
+def test_clicks_and_hands_come_to_the_same_part(bench):
+    bench.open("bar.vtu")
+    assert bench.check(bench.text)[1][0][0] == "mistake"  # nothing is held yet
+    set_up(bench)
+    assert tomllib.loads(bench.text) == tomllib.loads(BY_HAND)
+    checked, said = bench.check(bench.text)
+    assert "mistake" not in {kind for kind, _ in said}
+    assert checked.case.name == "bar"
+    # The file in results names the same body, and no file of the user's was touched.
+    kept = bench.part_file()
+    assert kept == bench.results / "bar.toml"
+    assert tomllib.loads(kept.read_text())["mesh"] == "../bar.vtu"
+    by_page, by_hand = read_part(kept), read_part(bench.folder / "bar.toml")
+    assert by_page.problem.loads == by_hand.problem.loads
+    assert by_page.problem.supports == by_hand.problem.supports
+    assert (by_page.problem.mesh.points == by_hand.problem.mesh.points).all()
+    for name, facets in by_hand.problem.mesh.patches.items():
+        assert (by_page.problem.mesh.patches[name] == facets).all()
+    assert (bench.folder / "bar.toml").read_text() == BY_HAND
+
+
+def test_a_part_file_opens_as_it_is(bench):
+    bench.open("bar.toml")
+    assert bench.text == BY_HAND
+    assert bench.part_argument() == "bar.toml"
+    assert not bench.results.exists()
+    bench.edit(valued(("layers",), 3))
+    assert bench.part_argument() == "results/bar.toml"
+    bench.step(-1)
+    assert bench.part_argument() == "bar.toml"
+    bench.step(1)
+    # Opened again it goes on in its place; another of its name does not replace it.
+    other = Bench(bench.folder)
+    other.open("results/bar.toml")
+    other.edit(valued(("layers",), 4))
+    assert other.part_argument() == "results/bar.toml"
+    bench.open("bar.vtu")
+    set_up(bench)
+    assert bench.part_argument() == "results/bar-2.toml"
+    assert "results/bar-2.toml" in bench.offered()
+
+
+def test_a_case_opens_with_its_mesh(tmp_path):
+    bench = Bench(tmp_path)
+    bench.open("bar")
+    assert {path.name for path in bench.results.iterdir()} == {"bar.toml", "bar.npz"}
+    assert not [line for kind, line in bench.check(bench.text)[1] if kind == "mistake"]
+    Bench(tmp_path).open("bar")
+    assert len([*bench.results.iterdir()]) == 2
+
+
+@pytest.mark.parametrize(
+    ("what", "said"),
+    [
+        ("nothing", "no case named 'nothing'"),
+        ("nothing.stl", "does not exist"),
+        ("../bar.toml", "lies outside"),
+        ("/etc/passwd", "lies outside"),
+        ("notes.txt", "is no body and no part file"),
+        ("empty.stl", "empty.stl"),
+        ("text.step", "text.step"),
+        ("far.toml", "lies outside"),
+        ("bad.toml", "not TOML"),
+    ],
+)
+def test_what_cannot_be_opened_is_one_line_and_changes_nothing(bench, what, said):
+    (bench.folder / "empty.stl").write_bytes(b"")
+    (bench.folder / "text.step").write_text("no body")
+    (bench.folder / "notes.txt").write_text("")
+    (bench.folder / "far.toml").write_text(BY_HAND.replace("bar.vtu", "../bar.vtu"))
+    (bench.folder / "bad.toml").write_text("mesh = ")
+    bench.open("bar.toml")
+    with pytest.raises(InputError, match=said) as error:
+        bench.open(what)
+    assert len(error.value.mistakes) == 1
+    assert "\n" not in str(error.value)
+    assert bench.text == BY_HAND
+
+
+def test_an_upload_is_kept_in_results(bench):
+    content = (bench.folder / "bar.vtu").read_bytes()
+    name = bench.upload("../../x/my bar.vtu", content)
+    assert name == "results/uploads/my_bar.vtu"
+    bench.open(name)
+    assert 'mesh = "results/uploads/my_bar.vtu"' in bench.text
+    for wrong in ("x.exe", "../", ".toml/..", "a.html"):
+        with pytest.raises(InputError, match="is no body and no part file"):
+            bench.upload(wrong, b"")
+    shutil.rmtree(bench.results / "uploads")
+    (bench.results / "uploads").symlink_to("/tmp")
+    with pytest.raises(InputError, match="lies outside"):
+        bench.upload("a.stl", b"")
+
+
+def test_an_edit_that_would_read_elsewhere_is_said(bench):
+    bench.open("bar.toml")
+    text = bench.text.replace("bar.vtu", "/etc/x.vtu")
+    assert bench.check(text)[1][0] == (
+        "mistake",
+        f"/etc/x.vtu lies outside {bench.folder}: start ccfem open in a folder that holds it",
+    )

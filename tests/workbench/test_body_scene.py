@@ -1,0 +1,84 @@
+"""What is drawn of a body covers it, and its symbols stand where the forces act."""
+
+import numpy as np
+import pytest
+import shapely
+
+from ccfem.body.mesh.face_rules import numbered_faces
+from ccfem.body.meshing import extrude
+from ccfem.workbench.body_scene import PatchPlace, arrow, borders, cones, face_meshes, snapped
+
+
+@pytest.fixture(scope="module")
+def plate():
+    """Faces of a plate 60 x 30 x 4 mm with a hole of radius 6 mm, its top of many triangles."""
+    outline = shapely.box(0, 0, 60, 30).difference(shapely.Point(40, 15).buffer(6, quad_segs=16))
+    return numbered_faces(extrude(outline, 4.0, 1.5))
+
+
+def areas_and_normals(points, triangles):
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    across = 0.5 * np.cross(b - a, c - a)
+    return np.linalg.norm(across, axis=1).sum(), across.sum(axis=0)
+
+
+def test_faces_are_drawn_whole_and_planes_by_few_triangles(plate):
+    meshes = face_meshes(plate)
+    assert [mesh.number for mesh in meshes] == list(plate.numbers)
+    for mesh, face in zip(meshes, plate.faces, strict=True):
+        area, outward = areas_and_normals(mesh.points, mesh.triangles)
+        assert area == pytest.approx(face.area, rel=1e-6)
+        if face.kind == "plane":
+            np.testing.assert_allclose(outward, face.area * face.direction, atol=1e-6 * face.area)
+    top = max(zip(plate.faces, meshes, strict=True), key=lambda pair: pair[0].area)[1]
+    assert 5 * len(top.triangles) < len(plate.faces[0].facets)
+
+
+def test_borders_are_the_edges_of_the_plate(plate):
+    ends = borders(plate)
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()
+    circle = 2 * np.pi * 6
+    assert length == pytest.approx(2 * (60 + 30) * 2 + 4 * 4 + 2 * circle, rel=1e-3)
+
+
+def square(height, normal):
+    corners = np.array(
+        [[[0, 0, 0], [2, 0, 0], [2, 2, 0]], [[0, 0, 0], [2, 2, 0], [0, 2, 0]]], float
+    )
+    return PatchPlace((corners if normal > 0 else corners[:, ::-1]) + [0, 0, height])
+
+
+def test_arrows_stand_outside_the_part():
+    top = square(5.0, 1.0)
+    np.testing.assert_allclose(top.centre, [1, 1, 5])
+    np.testing.assert_allclose(top.normal, [0, 0, 1])
+    slab = np.concatenate([top.corners, square(2.0, -1.0).corners])
+    ends, presses = arrow(top, np.array([0, 0, 7.0]), 3.0, slab)
+    np.testing.assert_allclose(ends, [[1, 1, 5], [1, 1, 8]])
+    assert not presses
+    ends, presses = arrow(top, np.array([0, 0, -7.0]), 3.0, slab)
+    np.testing.assert_allclose(ends, [[1, 1, 8], [1, 1, 5]])
+    assert presses
+    below = square(2.0, -1.0)  # and out of the other side, where the patch does not face it
+    wall = PatchPlace(np.concatenate([below.corners, below.corners[:, ::-1]]))
+    ends, presses = arrow(wall, np.array([0.01, 0, 7.0]), 3.0, slab)
+    np.testing.assert_allclose(ends[0], [1, 1, 5], atol=0.01)
+    assert not presses
+
+
+def test_cones_touch_the_surface_with_their_tips():
+    tips, outward = square(5.0, 1.0).spots(2)
+    points, triangles = cones(tips, outward, 1.0)
+    assert points[:, 2].min() == 5.0
+    assert points[:, 2].max() == 6.0
+    a, b, c = np.moveaxis(points[triangles] - points.mean(axis=0), 1, 0)
+    octagon = 8 * 0.5 * 0.4**2 * np.sin(np.pi / 4)
+    volume = np.einsum("ij,ij->", np.cross(a, b), c) / 6.0
+    assert volume == pytest.approx(2 * octagon / 3.0)  # positive: outward
+
+
+@pytest.mark.parametrize("angle", [0.0, 5.9, 6.1, 45.0])
+def test_a_direction_near_an_axis_takes_it(angle):
+    given = 3.0 * np.array([-np.cos(np.radians(angle)), np.sin(np.radians(angle)), 0.0])
+    wanted = [-1.0, 0.0, 0.0] if angle < 6.0 else given / 3.0
+    np.testing.assert_allclose(snapped(given), wanted, atol=1e-12)

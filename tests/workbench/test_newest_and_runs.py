@@ -1,0 +1,95 @@
+"""The newest of what is asked is worked on; a run says how far it is, and leaves nothing."""
+
+import os
+import signal
+import threading
+from pathlib import Path
+
+import pytest
+
+from ccfem.workbench.child_run import ChildRun, RunState
+from ccfem.workbench.newest import Newest
+
+
+def test_only_the_newest_is_worked_on():
+    worked, came = [], threading.Event()
+
+    def work(item):
+        worked.append(item)
+        return item + 1
+
+    def done(item, result):
+        assert (item, result) == (5, 6)
+        came.set()
+
+    newest = Newest(work, done)
+    for item in range(6):
+        newest.ask(item)
+    assert came.wait(10.0)
+    assert worked == [5]
+    newest.close()
+    newest._thread.join(5.0)
+    assert not newest._thread.is_alive()
+
+
+def alive(process):
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return "\nState:\tZ" not in Path(f"/proc/{process}/status").read_text()
+
+
+SLEEPER = """
+import os, signal, subprocess, sys, time
+signal.signal(signal.SIGTERM, signal.SIG_IGN) if sys.argv[1] == "deaf" else None
+child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+print(f"ccfem: 2 s, 40 %, about 3 s left: solving {child.pid}", file=sys.stderr, flush=True)
+time.sleep(60)
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="process groups are of Unix")
+@pytest.mark.parametrize("manner", ["heeds", "deaf"])
+def test_a_stopped_run_leaves_no_process(tmp_path, monkeypatch, manner):
+    (tmp_path / "ccfem").mkdir()
+    (tmp_path / "ccfem" / "__main__.py").write_text(SLEEPER)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr("ccfem.workbench.child_run._PATIENCE", 0.3)
+    states, begun = [], threading.Event()
+
+    def changed(state):
+        states.append(state)
+        begun.set()
+
+    run = ChildRun([manner], tmp_path, changed)
+    assert begun.wait(20.0)
+    assert states[0].share == 0.4
+    assert states[0].step.startswith("solving")
+    assert states[0].step.endswith("(about 3 s left)")
+    child = int(states[0].step.split()[1])
+    assert alive(child)
+    run.stop()
+    assert not alive(run._process.pid)
+    for _ in range(500):  # until the system has taken it away
+        if not alive(child):
+            break
+        threading.Event().wait(0.01)
+    assert not alive(child)
+    assert run.state.complaint == "stopped"
+    assert run.state.code in (-signal.SIGTERM, -signal.SIGKILL)
+
+
+@pytest.mark.parametrize(
+    ("state", "complaint"),
+    [
+        (RunState(""), ""),
+        (RunState("", code=0), ""),
+        (RunState("", code=3), ""),
+        (RunState("", code=2, lines=("a", "ccfem: error: no load")), "no load"),
+        (RunState("", code=-9, lines=("a",)), "the run ended with exit code -9: a"),
+    ],
+)
+def test_the_end_of_a_run_is_one_line(state, complaint):
+    assert state.complaint == complaint
+    assert state.written == (state.code in (0, 3))

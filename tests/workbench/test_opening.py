@@ -1,0 +1,49 @@
+"""Opening the workbench from Python: the link it shows, and one line where viser is missing."""
+
+import socket
+import sys
+import urllib.request
+
+import pytest
+
+import ccfem
+from ccfem.base.errors import InputError
+
+
+def test_without_viser_one_line_names_the_extra(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "viser", None)
+    with pytest.raises(InputError, match=r'not installed: pip install "ccfem\[ui\]"$'):
+        ccfem.open(folder=tmp_path)
+
+
+def test_a_notebook_shows_a_link_that_opens_the_page(tmp_path):
+    pytest.importorskip("viser", reason="viser is not installed: pip install ccfem[ui]")
+    workbench = ccfem.open("bar", tmp_path)
+    try:
+        assert workbench.link in repr(workbench)
+        assert f'href="{workbench.link}"' in workbench._repr_html_()
+        with urllib.request.urlopen(workbench.link, timeout=10) as answer:
+            assert answer.headers["Set-Cookie"].startswith("ccfem-")
+        assert workbench._page.bench.part_argument() == "results/bar.toml"
+    finally:
+        workbench.close()
+    port = int(workbench.link.partition("/?")[0].rpartition(":")[2])
+    with pytest.raises(OSError, match="refused"):
+        socket.create_connection(("127.0.0.1", port), timeout=5)
+
+
+def test_nothing_is_open_at_first(tmp_path):
+    pytest.importorskip("viser", reason="viser is not installed: pip install ccfem[ui]")
+    workbench = ccfem.open(folder=tmp_path)
+    page = workbench._page
+    try:
+        for act in (page.compare._compare, page.loads._load, lambda: page.show_fibre(True)):
+            page.act(act).result()
+            assert "Error" not in page.message.content.replace("InputError", "")
+        page.act(page.open, "nothing").result()
+        assert "no case named" in page.message.content
+        assert not (tmp_path / "results").exists()
+        page.act(page.open, "bar").result()
+        assert "Tensile bar" in page.heading.content
+    finally:
+        workbench.close()
