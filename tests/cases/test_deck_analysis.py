@@ -8,6 +8,8 @@ import pytest
 from benchmarks.calculix import compared
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import box_mesh
+from ccfem.cases.inspection import check
+from ccfem.cases.inspection.beginning import new_part
 from ccfem.cases.part_file import read_part
 from ccfem.cases.reading import read
 from ccfem.fem.elasticity import (
@@ -281,6 +283,11 @@ def test_a_deck_is_a_part_by_itself(tmp_path):
     case = read(str(tmp_path / "bar.inp"))
     assert case.name == "bar"
     assert dict(case.problem.loads) == {"step_1": (Pressure("end", 1.0),)}
+    checked = check(tmp_path / "bar.inp")
+    assert "pressure on end" in checked.known
+    assert not checked.mistakes
+    new = read(new_part(tmp_path / "bar.inp", tmp_path / "new.toml"))
+    assert dict(new.problem.loads) == dict(case.problem.loads)
 
 
 def test_parts_and_instances_are_followed(tmp_path):

@@ -59,7 +59,7 @@ def _bisected(
     """Cut cells, or facets, at the edges of these keys; the pieces, and whose pieces they are."""
     sides = np.array(list(combinations(range(cells.shape[1]), 2)))
     rest, owner = cells.astype(np.int64), np.arange(len(cells))
-    done, owners = [], []
+    done, owners = [rest[:0]], [owner[:0]]
     while len(rest):
         ends = np.sort(rest[:, sides], axis=2)
         wanted = np.where(ends[..., 1] < n, ends[..., 0] * n + ends[..., 1], -1)

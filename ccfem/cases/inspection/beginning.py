@@ -1,7 +1,7 @@
 """Part files to start from: one for a body, and examples."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from importlib.resources import files
 from pathlib import Path
 from string import Template
@@ -16,6 +16,7 @@ from ccfem.body.mesh.face_places import BodyFaces
 from ccfem.body.mesh.smooth_faces import Face, direction_text, place_text
 from ccfem.body.meshing.cad import is_cad
 from ccfem.cases.inspection.body_faces import faces as faces_of
+from ccfem.cases.reading import is_analysis, read
 
 _PARALLEL = np.cos(np.radians(5.0))
 """Cosine of the angle up to which planes face the same way."""
@@ -39,6 +40,7 @@ def new_part(
     most of it would be held, as a scan is, the lower end is held and the upper one pulled up. Cells
     are a twenty-fifth of the diagonal long, and no longer than walls are thick, up to about 100,000
     of them. Where the lengths look like metres (`BodyFaces.doubt`), the file scales them by 1000.
+    A deck with steps has supports and loads of its own: they are taken over.
 
     Parameters
     ----------
@@ -67,6 +69,10 @@ def new_part(
     existing_file(body, "the body")
     out = Path(f"{body.stem}.toml" if out is None else out)
     _refuse_present(out, force)
+    if is_analysis(body):
+        with whole_file(out) as temporary:
+            temporary.write_text(_of_deck(body, read(body).problem.loads), "utf-8")
+        return out
     listing = faces_of(body)
     doubt = listing.doubt
     if doubt:
@@ -77,6 +83,16 @@ def new_part(
         cells = edge if is_surface(body) or is_cad(body) else None
         temporary.write_text(_text(body, cells, listing, held, pulled, pull, doubt), "utf-8")
     return out
+
+
+def _of_deck(deck: Path, cases: Iterable[str]) -> str:
+    """Text of the part file of a deck with its analysis."""
+    return f'''# A part file for {deck}, whose supports, loads and materials are taken over.
+mesh = "{str(deck).replace(chr(92), "/")}"
+analysis = "deck"            # its load cases: {", ".join(cases)}
+build = "z"                  # CHANGE: direction of printing
+layers = 12                  # CHANGE: layers of fibre
+'''
 
 
 def usual_edge_length(listing: BodyFaces) -> float:

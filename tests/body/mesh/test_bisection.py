@@ -41,3 +41,10 @@ def test_one_cell_is_halved_at_its_longest_edge():
     same, parent = bisected(mesh, np.array([False]))
     np.testing.assert_array_equal(same.cells, mesh.cells)
     np.testing.assert_array_equal(parent, [0])
+
+
+def test_patches_without_facets_stay_empty():
+    mesh = box_mesh((2.0, 1.0, 1.0), (2, 1, 1))
+    mesh = mesh.with_patches({"inside": np.zeros((0, 3), dtype=np.int64)})
+    finer, _ = bisected(mesh, np.ones(len(mesh.cells), dtype=bool))
+    assert finer.patches["inside"].shape == (0, 3)

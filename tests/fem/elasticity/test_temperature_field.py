@@ -123,7 +123,7 @@ def test_nodes_are_held_and_loaded_by_their_places():
 
 def test_two_nodes_at_one_place_are_named():
     two = type(BOX)(
-        np.concatenate([BOX.points, BOX.points + [20.0, 0.0, 0.0]]),
+        np.concatenate([BOX.points, BOX.points + np.array([20.0, 0.0, 0.0])]),
         np.concatenate([BOX.cells, BOX.cells + len(BOX.points)]),
     )
     with pytest.raises(InputError, match="where two nodes lie"):
