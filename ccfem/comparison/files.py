@@ -232,7 +232,7 @@ def _write_matrix(comparison: Comparison, folder: Path) -> None:
 
 def _files_of_print(folder: Path, name: str, run: Run, comparison: Comparison) -> list[_Write]:
     """Files of what a printer and a cell of robots do to print a part: one chain of moves."""
-    from ccfem.printing.export.gcode import gcode_of_moves
+    from ccfem.printing.export.gcode import gcode_pieces
     from ccfem.printing.export.robot_cell import write_robot_cell
     from ccfem.printing.export.trim_table import write_trims
 
@@ -242,8 +242,9 @@ def _files_of_print(folder: Path, name: str, run: Run, comparison: Comparison) -
     doubts = [run.why_not] if run.why_not else []
 
     def write_gcode() -> None:
-        text = gcode_of_moves(moves, plan, case.machine, f"{case.name}, {name}", doubts)
-        (folder / f"{name}.gcode").write_text(text, encoding="utf-8", newline="\n")
+        pieces = gcode_pieces(moves, plan, case.machine, f"{case.name}, {name}", doubts)
+        with (folder / f"{name}.gcode").open("w", encoding="utf-8", newline="\n") as file:
+            file.writelines(pieces)
 
     files: list[_Write] = [
         write_gcode,

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, in_brief
 
@@ -68,7 +69,8 @@ class Moves:
     __repr__ = in_brief
 
     def __post_init__(self) -> None:
-        whole = dict.fromkeys(("event", "tool", "role", "layer", "strand"), int)
+        whole: dict[str, DTypeLike] = dict.fromkeys(("event", "tool", "role"), np.int8)
+        whole |= dict.fromkeys(("layer", "strand"), np.int32)
         rest = dict.fromkeys(
             ("place", "normal", "feed", "beside", "speed", "width", "height", "amount"), float
         )

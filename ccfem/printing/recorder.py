@@ -14,6 +14,8 @@ _FEED_DIGITS = 5
 _SAME = 1e-9
 _STRAIGHT = 1.5 * 10.0**-COORDINATE_DIGITS
 """Distance from a straight line, mm, within which rounded points lie on it."""
+_BLOCKS = 500
+"""Blocks of rows that are joined."""
 _LEVEL = 0.1
 """Cosine of the tilt below which a head's own axis leads too far aside to leave along it."""
 
@@ -25,6 +27,7 @@ class Recorder:
         self.machine = machine
         self.rows: list[tuple[float, ...]] = []
         self.blocks: list[FloatArray] = []
+        self.joined: list[FloatArray] = []
         self.place: FloatArray | None = None
         self.normal = np.array([0.0, 0.0, 1.0])
         self.tool = -1
@@ -184,14 +187,27 @@ class Recorder:
         if self.rows:
             self.blocks.append(np.array(self.rows))
             self.rows = []
+        if len(self.blocks) > _BLOCKS:  # small ones would leave holes in memory
+            self.joined.append(np.concatenate(self.blocks))
+            self.blocks = []
 
     def moves(self) -> Moves:
         """All that was noted."""
         self._flush()
-        table = np.concatenate([np.zeros((0, 17)), *self.blocks])
+        blocks = [np.zeros((0, 17)), *self.joined, *self.blocks]
+
+        def column(first: int, last: int | None = None) -> FloatArray:
+            """Join a column of all blocks: a table of all would double the memory."""
+            return np.concatenate(
+                [b[:, first if last is None else slice(first, last)] for b in blocks]
+            )
+
         names = ["tool", "feed", "beside", "speed", "width", "height", "amount", "role", "layer"]
-        columns = dict(zip([*names, "strand"], table[:, 7:].T, strict=True))
-        return Moves(event=table[:, 0], place=table[:, 1:4], normal=table[:, 4:7], **columns)
+        columns = {name: column(k) for k, name in enumerate([*names, "strand"], start=7)}
+        normal = column(4, 7)
+        if (normal == normal[:1]).all():  # a head that never turns needs no memory
+            normal = np.broadcast_to(normal[:1].copy(), normal.shape)
+        return Moves(event=column(0), place=column(1, 4), normal=normal, **columns)
 
 
 def _ends_of_moves(line: FloatArray, normals: FloatArray, alike: FloatArray) -> IntArray:

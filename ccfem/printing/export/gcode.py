@@ -10,13 +10,13 @@ the path; the rest is dragged out and laid by G1 without E.
 All that happens is decided before, in `ccfem.printing`; here it is only written.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.whole import whole_file
 from ccfem.machine.kinematics import axis_values
 from ccfem.machine.machine import Machine
@@ -41,6 +41,8 @@ from ccfem.printing.part_moves import part_moves
 from ccfem.printing.print_plan import PrintPlan
 from ccfem.printing.print_totals import print_totals
 
+_TOGETHER = 100_000
+"""Rows that are written at a time: a large print has millions."""
 _FEED_DIGITS = 5
 """Decimals of E, mm."""
 
@@ -99,38 +101,47 @@ def gcode_of_moves(
     moves: Moves, plan: PrintPlan, machine: Machine, title: str = "", doubts: Sequence[str] = ()
 ) -> str:
     """G-code of moves that were made of a plan; title and doubts as of `gcode_head`."""
+    return "".join(gcode_pieces(moves, plan, machine, title, doubts))
+
+
+def gcode_pieces(
+    moves: Moves, plan: PrintPlan, machine: Machine, title: str = "", doubts: Sequence[str] = ()
+) -> Iterator[str]:
+    """Yield the text of `gcode_of_moves` piece by piece: that of a large print fills memory."""
     lines = _Lines(machine, plan)
     axes, values = _axes(moves, machine), {**lines.values}
     start = np.concatenate([axes[:1], axes[:-1]])
-    speed = _speeds(moves, axes, start)
+    speeds = _speeds(moves, axes, start)
     warm = machine.process if machine.process.warm_height > 0.0 else None
     values["bed_temperature"] += warm.warm_bed if warm else 0.0
     values["matrix_temperature"] += warm.warm_matrix if warm else 0.0
+    yield "\n".join(gcode_head(moves, plan, machine, title, doubts)) + "\n"
     lines.fill("start", **values, layers=len(plan.top))
-    columns = (moves.event, moves.tool, moves.feed, moves.beside, speed, moves.amount)
-    rows = zip(*(c.tolist() for c in columns), lines.places(moves, axes, start), strict=True)
-    about = zip(
-        moves.role.tolist(),
-        moves.width.tolist(),
-        moves.height.tolist(),
-        moves.strand.tolist(),
-        strict=True,
-    )
-    first = True
-    for (event, tool, feed, beside, speed, value, place), (role, width, height, strand) in zip(
-        rows, about, strict=True
-    ):
-        if event in (TRAVEL, LAY):
-            if event == LAY:
-                lines.say(role, width, height)
-            lines.move(event, tool, place, feed, beside, speed, first)
-            first = False
-        elif event == FEED:
-            lines.feed(tool, feed, beside, speed)
-        else:
-            lines.happen(event, tool, value, strand)
+    moved, first = axes != start, True
+    begins = np.isin(moves.event, (TRAVEL, LAY)).argmax() if len(moves) else 0
+    moved[begins : begins + 1] = True  # the first move names all axes
+    of_moves = (moves.event, moves.tool, moves.feed, moves.beside, speeds, moves.amount)
+    of_lines = (moves.role, moves.width, moves.height, moves.strand)
+    for begin in range(0, len(moves), _TOGETHER):
+        some = slice(begin, begin + _TOGETHER)
+        places = lines.places(axes[some], moved[some], moves.tool[some])
+        columns = (column[some].tolist() for column in (*of_moves, *of_lines))
+        for event, tool, feed, beside, speed, value, role, width, height, strand, place in zip(
+            *columns, places, strict=True
+        ):
+            if event in (TRAVEL, LAY):
+                if event == LAY:
+                    lines.say(role, width, height)
+                lines.move(event, tool, place, feed, beside, speed, first)
+                first = False
+            elif event == FEED:
+                lines.feed(tool, feed, beside, speed)
+            else:
+                lines.happen(event, tool, value, strand)
+        yield "\n".join([*lines.lines, ""])
+        lines.lines.clear()
     lines.fill("end", layers=len(plan.top))
-    return "\n".join([*gcode_head(moves, plan, machine, title, doubts), *lines.lines]) + "\n"
+    yield "\n".join(lines.lines) + "\n"
 
 
 def _axes(moves: Moves, machine: Machine) -> FloatArray:
@@ -195,17 +206,11 @@ class _Lines:
         self.lines += [new for new, old in zip(said, self._said, strict=True) if new != old]
         self._said = said
 
-    def places(self, moves: Moves, axes: FloatArray, start: FloatArray) -> list[str]:
-        """Words of the axes that each row moves, from a start (n, k) to values (n, k).
-
-        The first move names all axes.
-        """
-        moved = axes != start
-        first = np.isin(moves.event, (TRAVEL, LAY)).argmax() if len(moves) else 0
-        moved[first : first + 1] = True
+    def places(self, axes: FloatArray, moved: BoolArray, tool: IntArray) -> list[str]:
+        """Words of the axes that each row moves (n, k), by their values (n, k)."""
         offset = np.zeros(axes.shape[1])
         offset[:3] = self._offset
-        axes = axes - (moves.tool == 1)[:, None] * offset
+        axes = axes - (tool == 1)[:, None] * offset
         # Rows that move the same axes share one format.
         words = np.full(len(axes), "", dtype=object)
         kind = moved @ (1 << np.arange(axes.shape[1]))

@@ -43,10 +43,8 @@ def write_robot_cell(path: str | Path, moves: Moves) -> None:
         np.divide(fed, length, out=np.zeros(len(moves)), where=laying)
         for fed in (moves.feed, moves.beside)
     ]
-    table = np.column_stack(
-        [moves.strand, moves.tool, moves.layer, moves.place, moves.normal, moves.speed, *share]
-    )
-    table = np.column_stack([table, moves.width, moves.height])
+    numbers = (moves.strand, moves.tool, moves.layer, *moves.place.T, *moves.normal.T)
+    columns = (*numbers, moves.speed, *share, moves.width, moves.height)
     value = np.where(moves.feed == 0.0, moves.beside, moves.feed)
     with whole_file(path) as temporary, temporary.open("w", encoding="ascii") as file:
         file.write(_HEADER + "\n")
@@ -54,7 +52,7 @@ def write_robot_cell(path: str | Path, moves: Moves) -> None:
             some = slice(first, first + _TOGETHER)
             about = (moves.event, value, moves.amount, moves.tool)
             names = map(_named, *(column[some].tolist() for column in about))
-            rows = zip(*(column[some].tolist() for column in table.T), names, strict=True)
+            rows = zip(*(column[some].tolist() for column in columns), names, strict=True)
             file.writelines(map(_ROW.__mod__, rows))
 
 

@@ -148,11 +148,10 @@ def write_waypoints(path: str | Path, toolpaths: Toolpaths, layers: Sequence[Lay
     missing = set(fibre.layer.tolist()) - {layer.index for layer in layers}
     if missing:
         raise InputError(f"paths lie on layer {min(missing)}, which is not among the layers given")
-    out: list[str] = []
-    for layer in layers:
-        out.append(f"{_MARK} {layer.index}")
-        for line in fibre.on_layer(layer.index):
-            rows = (line @ layer.plane.frame.T).round(4) + 0.0
-            out += ["S", *(f"X{x:.10g} Y{y:.10g} Z{z:.10g}" for x, y, z in rows.tolist()), "E"]
-    with whole_file(path) as temporary:
-        temporary.write_text("\n".join(out) + "\n", encoding="utf-8")
+    with whole_file(path) as temporary, temporary.open("w", encoding="utf-8") as file:
+        for layer in layers:
+            out = [f"{_MARK} {layer.index}"]
+            for line in fibre.on_layer(layer.index):
+                rows = (line @ layer.plane.frame.T).round(4) + 0.0
+                out += ["S", *(f"X{x:.10g} Y{y:.10g} Z{z:.10g}" for x, y, z in rows.tolist()), "E"]
+            file.write("\n".join(out) + "\n")

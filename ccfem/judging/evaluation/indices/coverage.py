@@ -77,6 +77,9 @@ _TIE = 1e-6
 _HALF = 2
 """Half a fibre width, in steps of the grid, rounded down."""
 
+_MOST = 500_000
+"""Grid points of the largest section that a part may have, up to which all are kept."""
+
 _SHIFT = (0.381966, 0.276393)
 """Offset of the grid in cells: irrational, so that strands at round numbers do not end on it."""
 
@@ -103,7 +106,9 @@ class CoverageSamples:
     gap: FloatArray
 
 
-def sample_coverage(paths: PlanePaths, stress: LayerStress, width: float) -> CoverageSamples:
+def sample_coverage(
+    paths: PlanePaths, stress: LayerStress, width: float, share: float = 1.0
+) -> CoverageSamples:
     """Sample the section of a layer.
 
     Parameters
@@ -113,6 +118,8 @@ def sample_coverage(paths: PlanePaths, stress: LayerStress, width: float) -> Cov
     width : float, mm
         Fibre width W: the band that a path covers. Grid points lie 0.2 W apart, so that a
         straight strand along an axis of the layer counts with its exact width.
+    share : float, default 1
+        Of the grid points inside, chosen at random, that are kept; the same for all layers.
     """
     layer, paths = paths.layer, paths.in_part
     step = 0.2 * width
@@ -129,9 +136,13 @@ def sample_coverage(paths: PlanePaths, stress: LayerStress, width: float) -> Cov
     first = np.flatnonzero(starts_segment(offsets))
     _paint_paths(covered, origin, step, pieces[first], pieces[first + 1], 0.5 * width)
     inside = tension >= 0.0
+    values, under = tension[inside], covered[inside]
+    if share < 1.0:
+        kept = np.random.default_rng(layer.index).random(len(values)) < share
+        values, under = values[kept], under[kept]
     return CoverageSamples(
-        tension[inside],
-        covered[inside],
+        values,
+        under,
         np.array([width * paths.lengths.sum()]),
         np.array([layer.areas.sum()]),
         np.array([step * step * _gaps(inside & ~covered)]),
@@ -235,7 +246,10 @@ def coverage_indices(samples: CoverageSamples, sampled: float = 1.0) -> dict[str
 
 def sample(paths: LayerPaths) -> CoverageSamples:
     """Take the samples of one layer."""
-    return sample_coverage(paths.plane, paths.layer_stress, paths.machine.fibre_width)
+    width, mesh = paths.machine.fibre_width, paths.stress.mesh
+    longest = np.sort(np.ptp(mesh.points[mesh.corners].reshape(-1, 3), axis=0))[1:]
+    share = min(1.0, _MOST * (0.2 * width) ** 2 / float(longest.prod()))
+    return sample_coverage(paths.plane, paths.layer_stress, width, share)
 
 
 def indices(samples: CoverageSamples, basis: Basis) -> dict[str, float]:
