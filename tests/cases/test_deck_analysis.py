@@ -203,11 +203,11 @@ def test_stiffness_constants_are_placed_as_in_abaqus(tmp_path):
 
 
 def test_two_materials_are_regions(tmp_path):
-    text = "*MATERIAL, NAME=Hard\n*ELASTIC\n4000., 0.\n" + MATERIAL
-    text += "*SOLID SECTION, ELSET=half, MATERIAL=Hard\n" + HELD + step("*DSLOAD\nend, P, -2.\n")
-    # Five layers of cells: two of them lie in the half by their centres, the middle one in part.
     mesh = box_mesh((LENGTH, 4.0, 4.0), (4, 2, 2))
-    case = case_of(tmp_path, text, mesh=mesh)
+    other = np.flatnonzero(mesh.centres[:, 0] > LENGTH / 2) + 1
+    text = "*ELSET, ELSET=other\n" + rows(other) + "*MATERIAL, NAME=Hard\n*ELASTIC\n4000., 0.\n"
+    text += MATERIAL.replace("Eall", "other") + "*SOLID SECTION, ELSET=half, MATERIAL=Hard\n"
+    case = case_of(tmp_path, text + HELD + step("*DSLOAD\nend, P, -2.\n"), mesh=mesh)
     assert sorted(m.name for m, _ in case.problem.materials) == ["Hard", "Soft"]
     assert tip(solve(case.problem)["step_1"])[0] == pytest.approx(2.0 * (10 / 4000 + 10 / 1000))
 
@@ -321,6 +321,7 @@ def test_parts_and_instances_are_followed(tmp_path):
         ("*CLOAD\ncorner, 1, 1.\n", "it stands in no \\*STEP"),
         ("*INITIAL CONDITIONS, TYPE=STRESS\nEall, 1.\n", "only TYPE=TEMPERATURE is followed"),
         ("*SOLID SECTION, ELSET=Eall, MATERIAL=Iron\n", "the deck has no material 'IRON'"),
+        ("*SOLID SECTION, ELSET=half, MATERIAL=Soft\n", "have a section already"),
         ("*SOLID SECTION, ELSET=Eall, MATERIAL=Soft, COMPOSITE\n", "COMPOSITE is not followed"),
         ("*MATERIAL, NAME=X\n*ELASTIC\n1., 0.\n2., 0., 100.\n", "depend on temperature"),
         ("*MATERIAL, NAME=X\n*ELASTIC, TYPE=LAMINA\n1., 0.\n", "TYPE=LAMINA is not followed"),
