@@ -1,11 +1,12 @@
 """Whole analyses from decks: bars whose answers are known, CalculiX, and what is refused."""
 
 import shutil
+import sys
 
 import numpy as np
 import pytest
 
-from benchmarks.calculix import compared
+from benchmarks import calculix
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import box_mesh
 from ccfem.cases.inspection import check
@@ -411,7 +412,16 @@ def test_displacement_stress_and_reactions_are_those_of_calculix(tmp_path, mesh)
     text += step(pressure + "*CLOAD\ntip, 3, .5\ntip, 3, .25\n")
     text += step("*CLOAD\ntip, 3, -.5\n") + step(warm)
     (tmp_path / "deck.inp").write_text(text)
-    rows_of = compared(tmp_path / "deck.inp")
+    rows_of = calculix.compared(tmp_path / "deck.inp")
     assert [row.split(" | ")[0] for row in rows_of] == ["step_1", "step_2", "step_3"]
     for row in rows_of:
         assert all(float(part.rstrip("%")) < 0.2 for part in row.split(" | ")[2:])
+
+
+def test_the_benchmark_says_that_calculix_is_missing(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["calculix", str(tmp_path), "--ccx", "no-such-program"])
+    with pytest.raises(SystemExit, match="holds no deck"):
+        calculix.main()
+    (tmp_path / "a.inp").write_text("*NODE\n")
+    with pytest.raises(SystemExit, match="CalculiX is not there as 'no-such-program'"):
+        calculix.main()
