@@ -2,6 +2,7 @@
 
 import ast
 import operator
+import warnings
 from collections.abc import Callable, Mapping
 
 import numpy as np
@@ -43,7 +44,7 @@ def check_formula(text: str) -> None:
         For anything but numbers, x, y, z, pi, ``+ - * / **``, brackets and the functions sqrt, exp,
         log, sin, cos, tan (of radians), abs, min and max (of two).
     """
-    _value(_parsed(text), dict.fromkeys("xyz", np.ones(1)), text)
+    _evaluated(text, dict.fromkeys("xyz", np.ones(1)))
 
 
 def formula_values(text: str, points: FloatArray) -> FloatArray:
@@ -61,7 +62,7 @@ def formula_values(text: str, points: FloatArray) -> FloatArray:
     """
     names = dict(zip("xyz", np.asarray(points, dtype=np.float64).T, strict=True))
     with np.errstate(all="ignore"):
-        values = np.broadcast_to(_value(_parsed(text), names, text), len(points)).copy()
+        values = np.broadcast_to(_evaluated(text, names), len(points)).copy()
     if not np.isfinite(values).all():
         at = points[np.flatnonzero(~np.isfinite(values))[0]].tolist()
         raise InputError(
@@ -70,10 +71,21 @@ def formula_values(text: str, points: FloatArray) -> FloatArray:
     return values
 
 
+def _evaluated(text: str, names: Mapping[str, FloatArray]) -> FloatArray:
+    """Value of a formula."""
+    try:
+        return _value(_parsed(text), names, text)
+    except RecursionError:
+        raise _no_formula(text, text) from None
+
+
 def _parsed(text: str) -> ast.expr:
     """Tree of a formula."""
     try:
-        if len(text) <= _LONGEST:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SyntaxWarning)  # what is no formula is refused anyway
+            if len(text) > _LONGEST:
+                raise ValueError
             return ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         pass

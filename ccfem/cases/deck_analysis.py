@@ -7,6 +7,7 @@ What cannot be taken over is a mistake, with its line.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -29,12 +30,15 @@ from ccfem.fem.elasticity.load_kinds import (
     Temperature,
     Traction,
     Vector,
+    points_of,
 )
 from ccfem.fem.elasticity.problem import Region
 from ccfem.fem.elasticity.support_kinds import AnySupport, NodeSupport, Support
 from ccfem.fem.materials import Material
 from ccfem.geometry.facets import are_among, facet_keys
 
+_MOVED = 1e-3
+"""Distance over the size of the part by which nodes of folded cells may have been moved."""
 _SAME = 1e-9
 """Difference of loads, over their size, that counts as rounding."""
 
@@ -64,6 +68,15 @@ class DeckAnalysis:
     def on_cells(self, mesh: TetMesh) -> tuple[Material, tuple[Region, ...], FloatArray | None]:
         """Material, regions and axes of the cells of its mesh, mended or made quadratic."""
         _, at = cKDTree(self.mesh.centres).query(mesh.centres)
+        kinds = [*self.supports, *chain(*self.case_supports.values()), *chain(*self.loads.values())]
+        places = [point for kind in kinds for point in points_of(kind)]
+        size = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+        away = cKDTree(mesh.points).query(places)[0] if places else np.zeros(0)
+        if (away > _MOVED * size).any():
+            raise InputError(
+                f"{np.count_nonzero(away > _MOVED * size)} nodes that the deck holds or loads "
+                "belong to no cell once flat ones are taken out: mesh the part again"
+            )
         first, *others = self.materials.materials
         number, axes = self.materials.number[at], self.materials.axes
         chosen = [np.flatnonzero(number == k) for k in range(1, len(others) + 1)]
@@ -320,6 +333,10 @@ class _Conversion:
         )
         if np.isnan(start[self.steps.in_cell]).any():
             raise InputError("*INITIAL CONDITIONS gives no temperature to some nodes: give one")
+        if self.steps.initial is None:
+            self.reading.remarks.append(
+                "*TEMPERATURE counts from 0: there is no *INITIAL CONDITIONS, TYPE=TEMPERATURE"
+            )
         change = np.where(np.isnan(state.warmth), start, state.warmth) - start
         if self.steps.initial is None and np.isnan(state.warmth[self.steps.in_cell]).any():
             raise InputError("*TEMPERATURE leaves nodes out, and no *INITIAL CONDITIONS: give both")

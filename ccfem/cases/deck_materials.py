@@ -383,6 +383,11 @@ class DeckMaterials:
                 for name in self._reading.scopes_of(scope):
                     elset = block.parameters.get("ELSET", "")
                     _, cells = self._reading.cells([elset], [name])
+                    if (number[cells] >= 0).any():
+                        raise InputError(
+                            f"{np.count_nonzero(number[cells] >= 0)} of its tetrahedra have a "
+                            "section already: give each one"
+                        )
                     number[cells] = made[key]
                     if "ORIENTATION" in block.parameters:
                         moves = self._reading.model.scopes[name].moves

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -91,6 +91,12 @@ def read_part(path: str | os.PathLike[str]) -> Case:
     return _of_file(path, part_case)
 
 
+def deck_part(path: str | os.PathLike[str]) -> Case:
+    """Read a deck (.inp) with its analysis as a part by itself: see `read_part`."""
+    path = Path(path)
+    return _with_name({"mesh": path.name, "analysis": "deck"}, path, part_case)
+
+
 def faces_of_part(path: str | os.PathLike[str], angle: float = FEATURE_ANGLE) -> BodyFaces:
     """Faces of a part file's body, numbered as its rules have them; only the body is read.
 
@@ -104,10 +110,14 @@ def faces_of_content(content: TomlTable, folder: Path, angle: float = FEATURE_AN
     return _readable(content, Mistakes())[0].faces(folder, angle)
 
 
-def _of_file(path: str | os.PathLike[str], take: Callable[[Mapping[str, Any], Path], T]) -> T:
+def _of_file(path: str | os.PathLike[str], take: Callable[[TomlTable, Path], T]) -> T:
     """Take something of a part file's content; the file's name is in every mistake."""
     path = Path(path)
-    content = read_toml(path, "part file")
+    return _with_name(read_toml(path, "part file"), path, take)
+
+
+def _with_name(content: TomlTable, path: Path, take: Callable[[TomlTable, Path], T]) -> T:
+    """Take something of the content of a part; the file's name is in every mistake."""
     try:
         return take(content, path)
     except InputError as error:

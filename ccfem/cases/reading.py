@@ -9,7 +9,7 @@ from ccfem.base import plugins
 from ccfem.base.errors import InputError
 from ccfem.body.files.deck import has_steps
 from ccfem.cases.case import Case
-from ccfem.cases.part_file import part_case, read_part
+from ccfem.cases.part_file import deck_part, read_part
 from ccfem.cases.shipped import shipped_cases
 
 
@@ -65,9 +65,7 @@ def read(part: str | os.PathLike[str] | Case, **parameters: Any) -> Case:
         )
     if isinstance(part, Case):
         return part
-    if deck:
-        return part_case({"mesh": Path(part).name, "analysis": "deck"}, Path(part))
-    return read_part(Path(part))
+    return deck_part(part) if deck else read_part(part)
 
 
 def is_analysis(path: str | os.PathLike[str]) -> bool:

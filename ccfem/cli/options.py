@@ -8,7 +8,11 @@ import typer
 from ccfem.cli.arguments import path_of
 
 CasePath = Annotated[
-    str, typer.Argument(metavar="CASE_OR_PART.toml", help="Name of a case, or a part file.")
+    str,
+    typer.Argument(
+        metavar="CASE_OR_PART.toml",
+        help="Name of a case, a part file, or a deck with its analysis (.inp).",
+    ),
 ]
 Out = Annotated[
     Path | None,

@@ -1,11 +1,12 @@
 """Whole analyses from decks: bars whose answers are known, CalculiX, and what is refused."""
 
 import shutil
+import sys
 
 import numpy as np
 import pytest
 
-from benchmarks.calculix import compared
+from benchmarks import calculix
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import box_mesh
 from ccfem.cases.inspection import check
@@ -203,11 +204,11 @@ def test_stiffness_constants_are_placed_as_in_abaqus(tmp_path):
 
 
 def test_two_materials_are_regions(tmp_path):
-    text = "*MATERIAL, NAME=Hard\n*ELASTIC\n4000., 0.\n" + MATERIAL
-    text += "*SOLID SECTION, ELSET=half, MATERIAL=Hard\n" + HELD + step("*DSLOAD\nend, P, -2.\n")
-    # Five layers of cells: two of them lie in the half by their centres, the middle one in part.
     mesh = box_mesh((LENGTH, 4.0, 4.0), (4, 2, 2))
-    case = case_of(tmp_path, text, mesh=mesh)
+    other = np.flatnonzero(mesh.centres[:, 0] > LENGTH / 2) + 1
+    text = "*ELSET, ELSET=other\n" + rows(other) + "*MATERIAL, NAME=Hard\n*ELASTIC\n4000., 0.\n"
+    text += MATERIAL.replace("Eall", "other") + "*SOLID SECTION, ELSET=half, MATERIAL=Hard\n"
+    case = case_of(tmp_path, text + HELD + step("*DSLOAD\nend, P, -2.\n"), mesh=mesh)
     assert sorted(m.name for m, _ in case.problem.materials) == ["Hard", "Soft"]
     assert tip(solve(case.problem)["step_1"])[0] == pytest.approx(2.0 * (10 / 4000 + 10 / 1000))
 
@@ -321,6 +322,7 @@ def test_parts_and_instances_are_followed(tmp_path):
         ("*CLOAD\ncorner, 1, 1.\n", "it stands in no \\*STEP"),
         ("*INITIAL CONDITIONS, TYPE=STRESS\nEall, 1.\n", "only TYPE=TEMPERATURE is followed"),
         ("*SOLID SECTION, ELSET=Eall, MATERIAL=Iron\n", "the deck has no material 'IRON'"),
+        ("*SOLID SECTION, ELSET=half, MATERIAL=Soft\n", "have a section already"),
         ("*SOLID SECTION, ELSET=Eall, MATERIAL=Soft, COMPOSITE\n", "COMPOSITE is not followed"),
         ("*MATERIAL, NAME=X\n*ELASTIC\n1., 0.\n2., 0., 100.\n", "depend on temperature"),
         ("*MATERIAL, NAME=X\n*ELASTIC, TYPE=LAMINA\n1., 0.\n", "TYPE=LAMINA is not followed"),
@@ -410,7 +412,16 @@ def test_displacement_stress_and_reactions_are_those_of_calculix(tmp_path, mesh)
     text += step(pressure + "*CLOAD\ntip, 3, .5\ntip, 3, .25\n")
     text += step("*CLOAD\ntip, 3, -.5\n") + step(warm)
     (tmp_path / "deck.inp").write_text(text)
-    rows_of = compared(tmp_path / "deck.inp")
+    rows_of = calculix.compared(tmp_path / "deck.inp")
     assert [row.split(" | ")[0] for row in rows_of] == ["step_1", "step_2", "step_3"]
     for row in rows_of:
         assert all(float(part.rstrip("%")) < 0.2 for part in row.split(" | ")[2:])
+
+
+def test_the_benchmark_says_that_calculix_is_missing(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["calculix", str(tmp_path), "--ccx", "no-such-program"])
+    with pytest.raises(SystemExit, match="holds no deck"):
+        calculix.main()
+    (tmp_path / "a.inp").write_text("*NODE\n")
+    with pytest.raises(SystemExit, match="CalculiX is not there as 'no-such-program'"):
+        calculix.main()

@@ -5,14 +5,17 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 import pyvista
 
 from benchmarks.fuzz.mutants import frd
+from ccfem.base.errors import InputError
 from ccfem.base.tensor import to_voigt
 from ccfem.body.mesh import TetMesh, box_mesh
 from ccfem.cases.part_file import read_part
 from ccfem.fem.elasticity import solve
 from ccfem.fem.stress_files import read_stress
+from ccfem.printing.export.vtu_result import result_path
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "how_to" / "foreign_stress.md").read_text()
@@ -96,3 +99,9 @@ def test_the_table_of_the_page_reads(tmp_path):
     stress = read_stress(tmp_path / "stress.csv", mesh).stress
     assert stress[:, 0, 0].tolist() == [12.5, 11.75]
     assert stress[1, 0, 2] == 0.1
+
+
+def test_names_of_load_cases_that_no_file_can_have_are_named():
+    assert result_path("part.vtu", "pull 2") == Path("part-pull 2.vtu")
+    with pytest.raises(InputError, match="'a/b' cannot stand in that of a file"):
+        result_path("part.vtu", "a/b")

@@ -382,6 +382,11 @@ def temperature_change(mesh: TetMesh, load: Temperature) -> FloatArray:
     away, at = cKDTree(points).query(mesh.points)
     result = change[at]
     between = away > _AT_POINT * max(float(np.ptp(points, axis=0).max()), 1e-300)
+    if mesh.order == 2:  # points at the corners of the cells: linear along their sides
+        ends, middles = mesh.cells[:, mesh.edges], mesh.cells[:, 4:]
+        along = between[middles] & ~between[ends].any(axis=2)
+        result[middles[along]] = result[ends[along]].mean(axis=1)
+        between[middles[along]] = False
     if between.any() and len(points) > _CORNERS:
         try:
             inside = LinearNDInterpolator(points, change)(mesh.points[between])

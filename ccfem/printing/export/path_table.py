@@ -243,6 +243,8 @@ def _rows(path: Path) -> list[FloatArray]:
                 "file"
             ) from None
     places = np.array(points, dtype=np.float64).reshape(-1, 3)
+    if len(places):
+        check_near(places, str(path))
     ends = np.flatnonzero(np.linalg.norm(np.diff(places, axis=0), axis=1) > _JUMP) + 1
     return [strand for strand in np.split(places, ends) if len(strand) > 1]
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from ccfem.base.errors import InputError
+from ccfem.base.errors import InputError, shown
 from ccfem.base.tensor import principal
 from ccfem.base.whole import whole_file
 from ccfem.body.files.formats import vtu
@@ -17,11 +17,16 @@ def result_path(path: str | Path, case: str = "") -> Path:
     Raises
     ------
     InputError
-        When the name does not end in ``.vtu``.
+        When the name does not end in ``.vtu``, or that of the case cannot stand in one of a file.
     """
     path = Path(path)
     if path.suffix.lower() != ".vtu":
         raise InputError(f"a result is a VTK unstructured grid; got {path}: end it in .vtu")
+    if {"/", "\\", "\0"} & set(case):
+        raise InputError(
+            f"the name of load case {shown(case)} cannot stand in that of a file: rename it, or "
+            "take it alone by --load-case"
+        )
     return path.with_name(f"{path.stem}-{case}{path.suffix}") if case else path
 
 

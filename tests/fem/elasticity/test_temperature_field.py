@@ -135,6 +135,7 @@ def test_two_nodes_at_one_place_are_named():
     [
         "__import__('os')", "x.real", "x if y else z", "[x]", "f(x)", "sqrt(x, y)", "", "x +",
         "1e400", "lambda: x", "x == y", "'a'", "True", "1 << 3", "(" * 400 + "x" + ")" * 400,
+        "-" * 990 + "x",
     ],
 )  # fmt: skip
 def test_what_is_no_formula_is_refused(text):

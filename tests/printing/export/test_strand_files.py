@@ -74,3 +74,5 @@ def test_what_does_not_read_is_one_line(tmp_path, name, text, message):
 def test_an_empty_folder_is_named(tmp_path):
     with pytest.raises(InputError, match="holds no files of strands"):
         read_paths(tmp_path, FRAME)
+    (tmp_path / "1.txt").write_text("\n")
+    assert len(read_paths(tmp_path, FRAME)) == 0
