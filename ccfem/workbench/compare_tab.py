@@ -290,9 +290,12 @@ class CompareTab:
         """Colours (s, 3) of pieces of fibre, bytes."""
         assert self.results is not None
         share = np.nan_to_num(pieces.force / self.results.most_force)
-        colours = np.round(255.0 * scale("size")(np.clip(share, 0.0, 1.0))[:, :3]).astype(np.uint8)
-        colours[pieces.link] = _rgb(LINK)
-        return colours
+        colours = np.asarray(scale("size")(np.clip(share, 0.0, 1.0))[:, :3])
+        colours[pieces.link] = np.array(_rgb(LINK)) / 255.0
+        # viser takes the colours of pieces for linear light, and encodes them as sRGB itself.
+        low = colours <= 0.04045
+        linear = np.where(low, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
+        return np.round(255.0 * linear).astype(np.uint8)
 
 
 def _rgb(name: str) -> tuple[int, int, int]:

@@ -1,5 +1,6 @@
 """Opening the workbench: from a notebook, or until Ctrl-C from the command line."""
 
+import atexit
 import contextlib
 import os
 import signal
@@ -29,9 +30,11 @@ class Workbench:
     def __init__(self, page: "Page") -> None:
         self._page = page
         self.link = page.link
+        atexit.register(self.close)
 
     def close(self) -> None:
-        """Stop the run and the server."""
+        """Stop the run and the server; the end of the program does that, too."""
+        atexit.unregister(self.close)
         self._page.close()
 
     def __repr__(self) -> str:

@@ -106,7 +106,12 @@ class Page:
 
     def act(self, what: Callable[..., None], *arguments: Any) -> "Future[None]":
         """Do something when all before it is done; what goes wrong is said on the page."""
-        return self._acts.submit(self._safely, what, *arguments)
+        try:
+            return self._acts.submit(self._safely, what, *arguments)
+        except RuntimeError:  # the page is closed, or the program ends
+            ended: Future[None] = Future()
+            ended.cancel()
+            return ended
 
     def _safely(self, what: Callable[..., None], *arguments: Any) -> None:
         try:
