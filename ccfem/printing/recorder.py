@@ -1,5 +1,7 @@
 """Notes down what a machine does, knowing where its nozzle stands."""
 
+from typing import Any
+
 import numpy as np
 
 from ccfem.base.arrays import FloatArray, IntArray
@@ -203,11 +205,12 @@ class Recorder:
             )
 
         names = ["tool", "feed", "beside", "speed", "width", "height", "amount", "role", "layer"]
-        columns = {name: column(k) for k, name in enumerate([*names, "strand"], start=7)}
+        columns: dict[str, Any] = {"event": column(0), "place": column(1, 4)}
+        columns |= {name: column(k) for k, name in enumerate([*names, "strand"], start=7)}
         normal = column(4, 7)
         if (normal == normal[:1]).all():  # a head that never turns needs no memory
             normal = np.broadcast_to(normal[:1].copy(), normal.shape)
-        return Moves(event=column(0), place=column(1, 4), normal=normal, **columns)
+        return Moves(normal=normal, **columns)
 
 
 def _ends_of_moves(line: FloatArray, normals: FloatArray, alike: FloatArray) -> IntArray:
