@@ -23,6 +23,7 @@ from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.facets import are_among
 from ccfem.geometry.locate import locate
 
+from ccfem.geometry.polylines import line_length
 from ccfem.machine.machine import Machine
 from ccfem.paths.linking.finishing import keep_off_border, long_enough, trim_to_clearance
 from ccfem.paths.linking.joining import Joined
@@ -35,6 +36,7 @@ from ccfem.strategies.stripe_pattern.packing import (
     even_points,
     evened,
     joined_ends,
+    rings_in_rest,
     stepped_over,
 )
 from ccfem.strategies.stripe_pattern.pattern import (
@@ -49,10 +51,12 @@ _EDGE = 0.9
 """Longest edge of the triangles of the pattern, in widths."""
 _INSET = 0.1
 """Distance from the border, in widths, at which curves are cut before they are moved off it."""
-_TRIM = 0.8
+_TRIM = .6
 """Distance, in widths, from a longer curve below which a curve is cut before they are moved."""
 _PIECE = 1.5
 """Shortest curve, in widths, that may be joined to others."""
+_NEARLY = 0.9
+"""Share of the shortest length that a strand must have before strands move."""
 _END = 0.4
 """Distance that strands keep from the border at last, in widths: half a width but for corners."""
 _HALVINGS = 40
@@ -184,11 +188,15 @@ def _packed(curves: list[FloatArray], layer: Layer, machine: Machine) -> list[Fl
     lines = keep_off_border(curves, section, _INSET * width)
     lines = trim_to_clearance(even_points(lines, width), _TRIM * width, _PIECE * width)
     lines = even_points(joined_ends(even_points(lines, width), width), width)
+    lines = stepped_over(lines, section, width, least)
+    lines = even_points(joined_ends(lines, width), width)
+    # What is too short makes room for the others.
+    lines = [line for line in lines if line_length(line) >= _NEARLY * least]
     lines = evened(lines, section, width)
-    lines = stepped_over(even_points(lines, width), section, width, least)
-    lines = evened(even_points(joined_ends(lines, width), width), section, width)
     lines = keep_off_border(lines, section, _END * width)
     lines = trim_to_clearance(even_points(lines, width), _TRIM * width, _PIECE * width)
+    lines = [line for line in lines if line_length(line) >= least]
+    lines += rings_in_rest(lines, section, width, least, machine.minimum_radius)
     joined = Joined(lines, [np.zeros(len(line), dtype=bool) for line in lines])
     return long_enough(unfolded(joined, section, machine, least), least).lines
 

@@ -82,11 +82,11 @@ def possible_links(
         )
     if radius > 0.0:
         links += smooth_links(lines, ends, limit, width, radius)
-        links = links_without_folds(lines, links, radius)
+        links = _without_folds(lines, links, radius)
     return links
 
 
-def links_without_folds(lines: Sequence[FloatArray], links: list[Link], radius: float) -> list[Link]:
+def _without_folds(lines: Sequence[FloatArray], links: list[Link], radius: float) -> list[Link]:
     """Links in which the joined strand does not fold, nor where it enters and leaves them."""
     heads: dict[tuple[int, bytes], FloatArray] = {}
 

@@ -1,6 +1,6 @@
 """Curves side by side made to strands: joined end to end, moved apart, long enough for the cutter."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -8,18 +8,17 @@ import shapely
 from scipy.linalg import solveh_banded
 from scipy.spatial import cKDTree
 
-from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.polylines import (
-    along_line,
     is_closed,
+    lengths,
     line_length,
     pack,
-    points_along,
     resample,
+    starts_segment,
 )
-from ccfem.geometry.shapes import Region, open_lines, strings
+from ccfem.geometry.shapes import Region, strings
 from ccfem.paths.linking.joining import Joint, join
-from ccfem.paths.linking.possible_links import Link, cut_back, links_without_folds, smooth_links
 
 STEP = 0.4
 """Distance of points along a strand, in widths."""
@@ -29,8 +28,13 @@ _TANGENT, _ASIDE = np.cos(np.radians(35.0)), np.cos(np.radians(40.0))
 """Cosines of the largest angle between the strands at such a gap, and between strand and gap."""
 _HEAD = 1.5
 """Length, in widths, over which the direction at an end is measured."""
-_PUSHES = 16
-_SPREAD = 3.0
+_PUSHES, _SEARCH = 48, 6
+"""Rounds of pushes, and of those for which neighbours are searched once."""
+_NEAR = 1.3
+"""Distance, in widths, up to which they are."""
+_APART = 1.015
+"""Distance to which lines are pushed apart, in widths: a chart changes lengths, by a few hundredths."""
+_SPREAD = 6.0
 """Length along a strand over which a push is spread, in widths."""
 _OWN = 4.0
 """Length along a strand, in widths, from which on it is its own neighbour."""
@@ -113,6 +117,21 @@ def joined_ends(lines: Sequence[FloatArray], width: float) -> list[FloatArray]:
     return join(lines, joints).lines
 
 
+def _frames(
+    points: FloatArray, offsets: IntArray, rings: BoolArray | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Unit vectors along lines and to the left of them at their points, (p, 2) each."""
+    tangent = np.zeros_like(points)
+    step = np.where(starts_segment(offsets)[:-1, None], np.diff(points, axis=0), 0.0)
+    tangent[1:] += step
+    tangent[:-1] += step
+    if rings is not None and rings.any():
+        first, last = offsets[:-1][rings], offsets[1:][rings] - 1
+        tangent[first] = tangent[last] = tangent[first] + tangent[last]
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=1), 1e-12)[:, None]
+    return tangent, np.column_stack([-tangent[:, 1], tangent[:, 0]])
+
+
 def evened(
     lines: Sequence[FloatArray], section: Region, width: float, rounds: int = _PUSHES
 ) -> list[FloatArray]:
@@ -131,8 +150,8 @@ def evened(
     points, offsets = pack(lines)
     count, sizes = len(points), np.diff(offsets)
     line = np.repeat(np.arange(len(lines)), sizes)
-    number = np.arange(count) - offsets[line]
     rings = np.array([is_closed(each) for each in lines])
+    p = q = np.zeros(0, dtype=np.int64)
     border = shapely.get_rings(shapely.get_parts(section))
     wall = shapely.get_coordinates(shapely.segmentize(border, STEP * width))
     inner = line[1:] == line[:-1]
@@ -143,24 +162,10 @@ def evened(
     band[1, 1:] += stiff * inner
     band[1, :-1] += stiff * inner
     band[0, 1:] = -stiff * inner
-    own = int(_OWN / STEP)
-    for _ in range(rounds):
-        tangent = np.zeros_like(points)
-        step = np.where(inner[:, None], np.diff(points, axis=0), 0.0)
-        tangent[1:] += step
-        tangent[:-1] += step
-        if rings.any():
-            both = tangent[ring_first] + tangent[ring_last]
-            tangent[ring_first] = tangent[ring_last] = both
-        tangent /= np.maximum(np.linalg.norm(tangent, axis=1), 1e-12)[:, None]
-        normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
-        tree = cKDTree(points)
-        pairs = tree.query_pairs(1.02 * width, output_type="ndarray")
-        apart = np.abs(number[pairs[:, 0]] - number[pairs[:, 1]])
-        around = sizes[line[pairs[:, 0]]] - 1 - apart
-        apart = np.where(rings[line[pairs[:, 0]]], np.minimum(apart, around), apart)
-        pairs = pairs[(line[pairs[:, 0]] != line[pairs[:, 1]]) | (apart > own)]
-        p, q = np.concatenate([pairs, pairs[:, ::-1]]).T
+    for turn in range(rounds):
+        tangent, normal = _frames(points, offsets, rings)
+        if not turn % _SEARCH:
+            p, q = _neighbours(points, offsets, rings, width)
         gap = points[p] - points[q]
         # Beside a line the distance is that from its tangent, beyond its end that from the end.
         across = np.einsum("ij,ij->i", gap, normal[q])
@@ -168,47 +173,79 @@ def evened(
         beside = along < 0.6 * STEP * width
         distance = np.where(beside, np.abs(across), np.linalg.norm(gap, axis=1))
         side = np.einsum("ij,ij->i", gap, normal[p])
-        missing = 0.5 * (width - distance)
+        missing = 0.5 * (_APART * width - distance)
         # The border pushes alone, so by all that is missing.
         near, at = cKDTree(wall).query(points, distance_upper_bound=width)
         close = np.flatnonzero(np.isfinite(near))
         off = points[close] - wall[at[close]]
-        p = np.concatenate([p, close])
+        pushed = np.concatenate([p, close])
         side = np.concatenate([side, np.einsum("ij,ij->i", off, normal[close])])
         missing = np.concatenate([missing, 0.5 * width - near[close]])
         up, down = np.zeros(count), np.zeros(count)
         kept = missing > 0.0
-        p, side, missing = p[kept], side[kept], missing[kept]
-        np.maximum.at(up, p[side > 0.0], missing[side > 0.0])
-        np.maximum.at(down, p[side < 0.0], missing[side < 0.0])
+        pushed, side, missing = pushed[kept], side[kept], missing[kept]
+        np.maximum.at(up, pushed[side > 0.0], missing[side > 0.0])
+        np.maximum.at(down, pushed[side < 0.0], missing[side < 0.0])
         push = solveh_banded(band, up - down)
         if rings.any():
             push[ring_first] = push[ring_last] = 0.5 * (push[ring_first] + push[ring_last])
         points = points + push[:, None] * normal
-    return np.split(points, offsets[1:-1])
+    return np.split(_moved_in(points, section, width), offsets[1:-1])
+
+
+def _neighbours(
+    points: FloatArray, offsets: IntArray, rings: BoolArray, width: float
+) -> tuple[IntArray, IntArray]:
+    """Points near each other, each pair in both orders, but for those of one stretch of a line."""
+    sizes = np.diff(offsets)
+    line = np.repeat(np.arange(len(sizes)), sizes)
+    number = np.arange(len(points)) - offsets[line]
+    pairs = cKDTree(points).query_pairs(_NEAR * width, output_type="ndarray")
+    one, other = line[pairs].T
+    apart = np.abs(number[pairs[:, 0]] - number[pairs[:, 1]])
+    apart = np.where(rings[one], np.minimum(apart, sizes[one] - 1 - apart), apart)
+    pairs = pairs[(one != other) | (apart > round(_OWN / STEP))]
+    p, q = np.concatenate([pairs, pairs[:, ::-1]]).T
+    return p, q
+
+
+def _moved_in(points: FloatArray, section: Region, width: float) -> FloatArray:
+    """Points less than half a width outside the room of strands, moved to its border."""
+    room = shapely.buffer(section, -0.5 * width)
+    if shapely.is_empty(room):
+        return points
+    shapely.prepare(room)
+    out = np.flatnonzero(~shapely.contains_xy(room, points))
+    nearest = shapely.get_coordinates(shapely.shortest_line(room, shapely.points(points[out])))
+    nearest = nearest[::2]
+    close = np.linalg.norm(nearest - points[out], axis=1) < 0.5 * width
+    points = points.copy()
+    points[out[close]] = nearest[close]
+    return points
 
 
 _SHIFT = 4.5
-"""Length, in widths, before and behind its end over which a line steps over to its neighbour's."""
+"""Length, in widths, before and behind a place over which a line steps over to its neighbour's."""
 _NEXT = 1.6
-"""Farthest neighbour of an end, in widths."""
+"""Farthest neighbour of a line, in widths."""
 _ROUNDS = 8
 _LEAST_GAIN = 2.0
 """Least gain of such a step, in widths of length."""
 
 
-def _worth(length: float, least: float) -> float:
+def _worth(length: FloatArray, least: float) -> FloatArray:
     """Length that counts: what is too short for the cutter may still grow."""
-    return length if length >= least else 0.5 * length * (length / least) ** 2
+    return np.where(length >= least, length, 0.5 * length * (length / least) ** 2)
 
 
 def stepped_over(
     lines: Sequence[FloatArray], section: Region, width: float, least: float
 ) -> list[FloatArray]:
-    """Lead lines that are too short on along their neighbours' tracks.
+    """Exchange the tracks of neighbours so that more of their length is long enough.
 
-    Where a short line ends beside a longer one, it takes over the track of that one, which then
-    ends there, if both are long enough afterwards or at least more of the length is.
+    Where lines run side by side, one steps over to the track of the other, and goes on along it;
+    the rests of both end and begin there. This is done where one of them is too short, as long as
+    more of the length is in lines that are long enough.
 
     Parameters
     ----------
@@ -221,87 +258,71 @@ def stepped_over(
     room = shapely.buffer(section, -0.3 * width)
     shapely.prepare(room)
     for _ in range(_ROUNDS):
-        steps = sorted(_steps_over(lines, width, least), key=lambda step: -step.gain)
         touched: set[int] = set()
         tree = shapely.STRtree(strings(lines))
         new: list[FloatArray] = []
-        for step in steps:
-            if step.short in touched or step.long in touched:
+        for k, other, parts in _steps_over(lines, width, least):
+            if k in touched or other in touched:
                 continue
-            curve = shapely.linestrings(step.curve)
-            if not shapely.covers(room, curve):
+            before, curve, after, *rests = parts
+            string = shapely.linestrings(curve)
+            near = tree.query(string, predicate="dwithin", distance=0.4 * width).tolist()
+            if not shapely.covers(room, string) or set(near) - {k, other}:
                 continue
-            met = set(tree.query(curve, predicate="dwithin", distance=0.4 * width).tolist())
-            if met - {step.short, step.long}:
-                continue
-            touched |= met | {step.short, step.long}
-            new += [part for part in step.lines if len(part) > 1]
+            touched |= {k, other}
+            new += [np.concatenate([before, curve[1:-1], after])]
+            new += [rest for rest in rests if len(rest) > 1]
         if not touched:
             break
         lines = [line for k, line in enumerate(lines) if k not in touched] + even_points(new, width)
     return lines
 
 
-class _Step(NamedTuple):
-    """A short line that steps over to the track of a long one; `lines` take the place of both."""
-
-    gain: float
-    short: int
-    long: int
-    curve: FloatArray
-    lines: tuple[FloatArray, ...]
-
-
-def _steps_over(lines: list[FloatArray], width: float, least: float) -> list[_Step]:
+def _steps_over(
+    lines: list[FloatArray], width: float, least: float
+) -> Iterator[tuple[int, int, list[FloatArray]]]:
+    """Pairs of lines, best first, and what they become: three parts of one line, and two rests."""
     points, offsets = pack(lines)
-    owner = np.repeat(np.arange(len(lines)), np.diff(offsets))
-    tree, shift = cKDTree(points), _SHIFT * width
-    size = [line_length(line) for line in lines]
-    steps: list[_Step] = []
-    for k, line in enumerate(lines):
-        if size[k] >= least or size[k] < shift + 2.0 * width or is_closed(line):
-            continue
-        for side in (0, 1):
-            ahead = line if side else line[::-1]
-            near = np.array(tree.query_ball_point(ahead[-1], _NEXT * width), dtype=np.int64)
-            for other in np.unique(owner[near]).tolist():
-                if other == k or is_closed(lines[other]):
-                    continue
-                mine = near[owner[near] == other]
-                nearest = mine[np.argmin(np.linalg.norm(points[mine] - ahead[-1], axis=1))]
-                step = _step_over(ahead, lines[other], int(nearest - offsets[other]), width)
-                if step is None:
-                    continue
-                curve, parts = step
-                after = sum(_worth(line_length(part), least) for part in parts if len(part) > 1)
-                gain = after - _worth(size[k], least) - _worth(size[other], least)
-                if gain > _LEAST_GAIN * width:
-                    steps.append(_Step(gain, k, other, curve, parts))
-    return steps
-
-
-def _step_over(
-    short: FloatArray, long: FloatArray, at: int, width: float
-) -> tuple[FloatArray, tuple[FloatArray, ...]] | None:
-    """Curve from the end of a line to the track of another beside its point `at`, and both lines."""
-    outward = short[-1] - short[-4]
-    along = long[min(at + 2, len(long) - 1)] - long[max(at - 2, 0)]
-    cosine = float(outward @ along) / max(
-        float(np.linalg.norm(outward) * np.linalg.norm(along)), 1e-12
-    )
-    if abs(cosine) < _TANGENT:
-        return None
-    if cosine < 0.0:
-        long, at = long[::-1], len(long) - 1 - at
-    reach = int(round(_SHIFT / STEP))
-    leave, meet = len(short) - 1 - reach, at + reach
-    if leave < 4 or meet > len(long) - 4:
-        return None
-    curve = _blend(short[leave], short[leave] - short[leave - 3], long[meet], long[meet + 3] - long[meet])
-    return curve, (
-        np.concatenate([short[:leave], curve, long[meet + 1 :]]),
-        long[: max(at - reach, 0)],
-    )
+    count = np.diff(offsets)
+    owner = np.repeat(np.arange(len(lines)), count)
+    size, (tangent, _) = lengths(points, offsets), _frames(points, offsets)
+    opened = np.array([not is_closed(line) for line in lines])
+    useful = (size < least) & opened
+    pairs = cKDTree(points).query_pairs(_NEXT * width, output_type="ndarray")
+    pairs = np.concatenate([pairs, pairs[:, ::-1]])
+    one, other = owner[pairs].T
+    kept = (one != other) & opened[one] & opened[other] & (useful[one] | useful[other])
+    pairs, one, other = pairs[kept], one[kept], other[kept]
+    # Of the points of the other line the one nearest to each.
+    away = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
+    order = np.lexsort((pairs[:, 1], np.round(away, 9), pairs[:, 0], other, one))
+    pairs, one, other = pairs[order], one[order], other[order]
+    first = np.ones(len(pairs), dtype=bool)
+    first[1:] = (pairs[1:, 0] != pairs[:-1, 0]) | (other[1:] != other[:-1])
+    pairs, one, other = pairs[first], one[first], other[first]
+    # Numbers of both points along their lines, the other one seen in the sense of the first.
+    cosine = np.einsum("ij,ij->i", tangent[pairs[:, 0]], tangent[pairs[:, 1]])
+    i, j = pairs[:, 0] - offsets[one], pairs[:, 1] - offsets[other]
+    j = np.where(cosine < 0.0, count[other] - 1 - j, j)
+    reach = round(_SHIFT / STEP)
+    possible = (np.abs(cosine) > _TANGENT) & (i >= reach + 3) & (j + reach <= count[other] - 4)
+    i, j, one, other, cosine = (x[possible] for x in (i, j, one, other, cosine))
+    step = size / np.maximum(count - 1, 1)
+    after = _worth(i * step[one] + (count[other] - 1 - j) * step[other], least)
+    after += _worth(np.maximum(j - reach, 0) * step[other], least)
+    after += _worth(np.maximum(count[one] - 1 - i - reach, 0) * step[one], least)
+    gain = np.round(after - _worth(size[one], least) - _worth(size[other], least), 6)
+    for k in np.lexsort((np.arange(len(gain)), -gain)).tolist():
+        if gain[k] <= _LEAST_GAIN * width:
+            return
+        line, track = lines[one[k]], lines[other[k]]
+        track = track if cosine[k] > 0.0 else track[::-1]
+        leave, meet = int(i[k]) - reach, int(j[k]) + reach
+        curve = _blend(
+            line[leave], line[leave] - line[leave - 3], track[meet], track[meet + 3] - track[meet]
+        )
+        rests = line[int(i[k]) + reach :], track[: max(int(j[k]) - reach, 0)]
+        yield int(one[k]), int(other[k]), [line[: leave + 1], curve, track[meet:], *rests]
 
 
 def _blend(
@@ -319,104 +340,32 @@ def _blend(
     )
 
 
-_TURN = 0.75
-"""Radius of a turn that leads a strand back, in least radii of the machine; one of 0.66 folds."""
-_TURN_LIMIT = 10.0
-"""Largest distance of the ends that it joins, in widths."""
-_CLEAR = 0.95
-"""Distance, in widths, that other strands are cut back to."""
+_BEND = 0.75
+"""Least radius of rings, in least radii of the machine; one of 0.66 folds."""
 
 
-def turned_back(
+def rings_in_rest(
     lines: Sequence[FloatArray], section: Region, width: float, least: float, radius: float
 ) -> list[FloatArray]:
-    """Join ends of lines that are too short by turns, and cut back what lies in their way.
+    """Rings in what lines leave free of a section, from the outside in.
 
     Parameters
     ----------
-    lines : sequence of (k, 2) arrays, mm
-        In steps as of `even_points`.
     least : float, mm
-        Of a strand.
+        Of a ring.
     radius : float, mm
         Least radius of the machine.
     """
-    lines = list(lines)
-    room = shapely.buffer(section, -0.4 * width)
-    shapely.prepare(room)
-    for _ in range(_ROUNDS):
-        turns = sorted(
-            _turns(lines, room, width, least, radius), key=lambda turn: -round(turn.gain, 6)
-        )
-        touched: set[int] = set()
-        new: list[FloatArray] = []
-        for turn in turns:
-            if touched & turn.old:
-                continue
-            touched |= turn.old
-            new += turn.lines
-        if not touched:
-            break
-        lines = [line for k, line in enumerate(lines) if k not in touched] + even_points(new, width)
-    return lines
-
-
-class _Turn(NamedTuple):
-    """A turn that joins two lines, and the `lines` that take the place of all `old` ones."""
-
-    gain: float
-    old: set[int]
-    lines: list[FloatArray]
-
-
-def _turns(
-    lines: list[FloatArray], room: Region, width: float, least: float, radius: float
-) -> list[_Turn]:
-    size = np.array([line_length(line) for line in lines])
-    opened = np.array([not is_closed(line) for line in lines])
-    number = np.flatnonzero(opened & (size > 6.0 * width))
-    ends = (2 * number[:, None] + np.arange(2)).ravel()
-    # From the ends, and from where a turn ends where the strand did.
-    back = int(round(_TURN * radius / (STEP * width)))
-    shorter = [line[back:-back] if len(line) > 4 * back else line for line in lines]
-    links = []
-    for tracks in (lines, shorter):
-        links += smooth_links(tracks, ends, _TURN_LIMIT * width, width, _TURN * radius)
-    links = [
-        link
-        for link in links
-        if min(size[link.first // 2], size[link.second // 2]) < least
-        and link.first // 2 != link.second // 2
-    ]
-    if not links:
-        return []
-    paths = strings([link.path for link in links])
-    inside = shapely.covers(room, paths)
-    links = links_without_folds(lines, [links[k] for k in np.flatnonzero(inside)], radius)
-    if not links:
-        return []
-    paths = strings([link.path for link in links])
-    tracks = strings(lines)
-    link, track = shapely.STRtree(tracks).query(paths, predicate="dwithin", distance=_CLEAR * width)
-    turns = []
-    for k, candidate in enumerate(links):
-        first, second = candidate.first // 2, candidate.second // 2
-        old = {first, second}
-        one, other = cut_back(lines[first], candidate, first), cut_back(lines[second], candidate, second)
-        if min(len(one), len(other)) < 2:
-            continue
-        before = one if candidate.first % 2 else one[::-1]
-        after = other[::-1] if candidate.second % 2 else other
-        joined = np.concatenate([before, candidate.path[1:-1], after])
-        zone = shapely.buffer(paths[k], _CLEAR * width)
-        parts = [joined]
-        for met in track[link == k].tolist():
-            if met in (first, second):
-                continue
-            old.add(met)
-            parts += open_lines(shapely.difference(tracks[met], zone))
-        gain = sum(_worth(line_length(part), least) for part in parts) - line_length(candidate.path)
-        gain -= sum(_worth(size[j], least) for j in old)
-        if gain > _LEAST_GAIN * width and shapely.is_simple(shapely.linestrings(joined)):
-            turns.append(_Turn(gain, old, parts))
-    return turns
+    rings: list[FloatArray] = []
+    rest = section
+    if len(lines):
+        rest = shapely.difference(rest, shapely.union_all(shapely.buffer(strings(lines), 0.5 * width)))
+    while True:
+        room = shapely.buffer(rest, -0.5 * width)
+        room = shapely.buffer(shapely.buffer(room, -_BEND * radius), _BEND * radius, quad_segs=16)
+        new = [shapely.get_parts(ring)[0] for ring in shapely.get_rings(shapely.get_parts(room))]
+        new = [shapely.get_coordinates(ring) for ring in new if ring.length >= least]
+        if not new:
+            return even_points(rings, width)
+        rings += new
+        rest = shapely.difference(rest, shapely.union_all(shapely.buffer(strings(new), 0.5 * width)))
