@@ -15,24 +15,24 @@ from typing import Any, ClassVar
 import numpy as np
 import shapely
 
-from ccfem.base.arrays import FloatArray
+from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.checks import check_choices, check_fields
 from ccfem.base.parallel import in_processes
 from ccfem.base.tensor import in_plane
 from ccfem.fem.elasticity import PartStress
-from ccfem.geometry.facets import are_among
+from ccfem.geometry.facets import are_among, connected
 from ccfem.geometry.locate import locate
-
 from ccfem.geometry.polylines import line_length
 from ccfem.machine.machine import Machine
 from ccfem.paths.linking.finishing import keep_off_border, long_enough, trim_to_clearance
-from ccfem.paths.linking.joining import Joined
+from ccfem.paths.linking.joining import Joined, join
 from ccfem.paths.planning.infill import Turns, with_turns
 from ccfem.paths.planning.strategy import Amount, LayerPlanner
 from ccfem.paths.planning.unfolding import unfolded
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer, LayerStress, stress_on
 from ccfem.strategies.stripe_pattern.packing import (
+    corners,
     even_points,
     evened,
     joined_ends,
@@ -51,7 +51,7 @@ _EDGE = 0.9
 """Longest edge of the triangles of the pattern, in widths."""
 _INSET = 0.1
 """Distance from the border, in widths, at which curves are cut before they are moved off it."""
-_TRIM = .6
+_TRIM = 0.6
 """Distance, in widths, from a longer curve below which a curve is cut before they are moved."""
 _PIECE = 1.5
 """Shortest curve, in widths, that may be joined to others."""
@@ -76,27 +76,32 @@ class Stripes:
         keeps the stretch that carries most.
     pitch : float, default 0.95
         Distance of the curves in fibre widths before they are moved apart to a width.
-    smooth : float, default 2
+    smooth : float, default 4
         Length over which the direction is smoothed, in fibre widths.
     border : float, default 5
         How far the border turns strands along itself, in fibre widths.
     tries : int, default 1
         Number of patterns that are tried for each layer; the one that carries most is taken.
+    folds : bool, default False
+        Whether strands that are too short are joined to their neighbours by links in which they
+        fold (`ccfem.paths.folds`). More of the layer is then covered.
     turns : {"tight", "printable", "cut"}, default "tight"
         As in `Zigzag`.
     """
 
     density: float = 1.0
     pitch: float = 0.95
-    smooth: float = 2.0
+    smooth: float = 4.0
     border: float = 5.0
     tries: int = 1
+    folds: bool = False
     turns: Turns = "tight"
 
     amount: ClassVar[Amount] = Amount("density", most=1.0, least=0.05)
     in_plane: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "half": {"density": 0.5},
+        "folds": {"folds": True},
         "best": {"tries": 2, "turns": "cut"},
     }
 
@@ -127,11 +132,11 @@ class Stripes:
             every = [strand for some in strands for strand in some]
             level = _level(every, self.density, machine.shortest_strand)
             strands = [_kept(some, level, machine.shortest_strand) for some in strands]
-        lines = {
-            layer.index: [strand.line for strand in some]
+        by_layer = {
+            layer.index: Joined([one.line for one in some], [one.link for one in some])
             for layer, some in zip(layers, strands, strict=True)
         }
-        return _Planner(self, lines)
+        return _Planner(self, by_layer)
 
     def strands(self, layer: Layer, stress: LayerStress, machine: Machine) -> "list[_Strand]":
         """Strands of one layer side by side, with the tension along them."""
@@ -150,8 +155,10 @@ class Stripes:
         best: list[_Strand] = []
         for seed in range(self.tries):
             pattern = stripe_pattern(cells, angle, self.pitch * width, seed)
-            lines = _packed(isocurves(pattern), layer, machine)
-            strands = [_carrying(line, layer, plane) for line in lines]
+            joined = _packed(isocurves(pattern), layer, machine, self.folds)
+            strands = [
+                _carrying(line, link, layer, plane) for line, link in zip(*joined, strict=True)
+            ]
             if not best or _carried(strands) > _carried(best):
                 best = strands
         return best
@@ -162,10 +169,11 @@ class _Planner:
     """Strands of all layers, by `Layer.index`."""
 
     strategy: Stripes
-    lines: Mapping[int, list[FloatArray]]
+    joined: Mapping[int, Joined]
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
-        joined = with_turns(self.strategy, self.lines[layer.index], machine)
+        lines, link = self.joined[layer.index]
+        joined = with_turns(self.strategy, lines, machine, link)
         return Toolpaths.from_plane(joined.lines, layer, link=joined.link)
 
 
@@ -182,23 +190,37 @@ def _crossed_border(layer: Layer, patches: Sequence[str]) -> FloatArray:
     return flags
 
 
-def _packed(curves: list[FloatArray], layer: Layer, machine: Machine) -> list[FloatArray]:
-    """Strands side by side, long enough for the cutter and without folds, made of curves."""
+def _packed(
+    curves: list[FloatArray], layer: Layer, machine: Machine, folds: bool = False
+) -> Joined:
+    """Strands side by side, long enough for the cutter, made of curves."""
     section, width, least = layer.plane.polygon, machine.fibre_width, machine.shortest_strand
     lines = keep_off_border(curves, section, _INSET * width)
     lines = trim_to_clearance(even_points(lines, width), _TRIM * width, _PIECE * width)
     lines = even_points(joined_ends(even_points(lines, width), width), width)
     lines = stepped_over(lines, section, width, least)
     lines = even_points(joined_ends(lines, width), width)
-    # What is too short makes room for the others.
-    lines = [line for line in lines if line_length(line) >= _NEARLY * least]
+    # What stays too short makes room for the others.
+    lines = _long_chains(lines, width, _NEARLY * least, folds)
     lines = evened(lines, section, width)
     lines = keep_off_border(lines, section, _END * width)
     lines = trim_to_clearance(even_points(lines, width), _TRIM * width, _PIECE * width)
-    lines = [line for line in lines if line_length(line) >= least]
+    lines = _long_chains(lines, width, least, folds)
     lines += rings_in_rest(lines, section, width, least, machine.minimum_radius)
-    joined = Joined(lines, [np.zeros(len(line), dtype=bool) for line in lines])
-    return long_enough(unfolded(joined, section, machine, least), least).lines
+    joined = join(lines, corners(lines, width, least) if folds else [])
+    return long_enough(joined if folds else unfolded(joined, section, machine, least), least)
+
+
+def _long_chains(
+    lines: list[FloatArray], width: float, least: float, folds: bool
+) -> list[FloatArray]:
+    """Lines that are long enough, alone or, where strands may fold, joined to others."""
+    size = np.array([line_length(line) for line in lines])
+    if folds:
+        ends = [(joint.first // 2, joint.second // 2) for joint in corners(lines, width, least)]
+        chain = connected(np.array(ends, dtype=np.int64).reshape(-1, 2), len(lines))
+        size = np.bincount(chain, size)[chain] if len(lines) else size
+    return [line for line, length in zip(lines, size, strict=True) if length >= least]
 
 
 # How much of each strand is laid.
@@ -211,6 +233,8 @@ class _Strand:
     Attributes
     ----------
     line : (k, 2) array, mm
+    link : (k,) bool array
+        Whether the step from each point is a link.
     along : (k,) array, mm
         Arc length at its points.
     carried : (k,) array, N/mm
@@ -218,19 +242,22 @@ class _Strand:
     """
 
     line: FloatArray
+    link: BoolArray
     along: FloatArray
     carried: FloatArray
 
 
-def _carrying(line: FloatArray, layer: Layer, plane: FloatArray) -> _Strand:
+def _carrying(line: FloatArray, link: BoolArray, layer: Layer, plane: FloatArray) -> _Strand:
     middle, step = 0.5 * (line[1:] + line[:-1]), np.diff(line, axis=0)
     triangle, weights = locate(layer.plane.points, layer.triangles, middle, np.inf)
     s11, s22, s12 = np.einsum("qk,qkc->cq", weights, plane[layer.triangles[triangle]])
     x, y = step.T
     length = np.hypot(x, y)
-    pulled = (x * x * s11 + y * y * s22 + 2.0 * x * y * s12) / np.maximum(length, 1e-300)
+    pulled = (
+        ~link[:-1] * (x * x * s11 + y * y * s22 + 2.0 * x * y * s12) / np.maximum(length, 1e-300)
+    )
     along = np.concatenate([[0.0], np.cumsum(length)])
-    return _Strand(line, along, np.concatenate([[0.0], np.cumsum(pulled)]))
+    return _Strand(line, link, along, np.concatenate([[0.0], np.cumsum(pulled)]))
 
 
 def _carried(strands: Sequence[_Strand]) -> float:
@@ -285,5 +312,7 @@ def _kept(strands: Sequence[_Strand], level: float, least: float) -> list[_Stran
         if stretch is not None:
             a, b = stretch
             rows = slice(a, b + 1)
-            kept.append(_Strand(strand.line[rows], strand.along[rows], strand.carried[rows]))
+            link = strand.link[rows].copy()
+            link[-1] = False
+            kept.append(_Strand(strand.line[rows], link, strand.along[rows], strand.carried[rows]))
     return kept

@@ -58,7 +58,9 @@ class _Ends(NamedTuple):
 
 
 def _ends(lines: Sequence[FloatArray], width: float) -> _Ends:
-    number = [2 * k + side for k, line in enumerate(lines) if not is_closed(line) for side in (0, 1)]
+    number = [
+        2 * k + side for k, line in enumerate(lines) if not is_closed(line) for side in (0, 1)
+    ]
     back = max(int(round(_HEAD / STEP)), 1)
     place = [lines[end // 2][-(end % 2)] for end in number]
     inner = [
@@ -325,9 +327,7 @@ def _steps_over(
         yield int(one[k]), int(other[k]), [line[: leave + 1], curve, track[meet:], *rests]
 
 
-def _blend(
-    start: FloatArray, way: FloatArray, end: FloatArray, onward: FloatArray
-) -> FloatArray:
+def _blend(start: FloatArray, way: FloatArray, end: FloatArray, onward: FloatArray) -> FloatArray:
     """Cubic curve (k, 2) from one place to another, leaving and meeting them along two vectors."""
     chord = float(np.linalg.norm(end - start))
     way, onward = (chord * v / max(float(np.linalg.norm(v)), 1e-12) for v in (way, onward))
@@ -338,6 +338,55 @@ def _blend(
         + t**2 * (3.0 - 2.0 * t) * end
         + t**2 * (t - 1.0) * onward
     )
+
+
+_CORNER = 2.5
+"""Largest gap between two ends that are joined by a corner, in widths."""
+_BESIDE = 0.7
+"""Least cosine of the angle between the ways in which two such ends leave their lines."""
+
+
+def corners(lines: Sequence[FloatArray], width: float, least: float) -> list[Joint]:
+    """Marked links, in which strands turn back, between ends side by side of lines too short.
+
+    Parameters
+    ----------
+    lines : sequence of (k, 2) arrays, mm
+        In steps as of `even_points`.
+    least : float, mm
+        Chains of lines that are as long are not joined to each other.
+    """
+    ends = _ends(lines, width)
+    if len(ends.number) < 2:
+        return []
+    pairs = cKDTree(ends.place).query_pairs(_CORNER * width, output_type="ndarray")
+    a, b = pairs.T
+    gap = np.linalg.norm(ends.place[b] - ends.place[a], axis=1)
+    beside = np.einsum("ij,ij->i", ends.outward[a], ends.outward[b])
+    possible = (beside > _BESIDE) & (ends.number[a] // 2 != ends.number[b] // 2)
+    a, b, gap = a[possible], b[possible], gap[possible]
+    bridges = np.stack([ends.place[a], ends.place[b]], axis=1)
+    # Without a thousandth at each end, where they touch their own lines.
+    inner = bridges + 1e-3 * (bridges[:, ::-1] - bridges)
+    met, _ = shapely.STRtree(strings(lines)).query(
+        shapely.linestrings(inner), predicate="intersects"
+    )
+    crossed = np.zeros(len(a), dtype=bool)
+    crossed[met] = True
+    chain, size = np.arange(len(lines)), np.array([line_length(line) for line in lines])
+    taken: set[int] = set()
+    joints = []
+    for k in np.lexsort((a, np.round(gap, 6))).tolist():
+        first, second = int(ends.number[a[k]]), int(ends.number[b[k]])
+        one, other = chain[first // 2], chain[second // 2]
+        long = size[one] >= least and size[other] >= least
+        if crossed[k] or long or one == other or first in taken or second in taken:
+            continue
+        taken |= {first, second}
+        size[one] += size[other] + gap[k]
+        chain[chain == other] = one
+        joints.append(Joint(first, second, np.zeros((0, 2)), marked=True))
+    return joints
 
 
 _BEND = 0.75
@@ -359,7 +408,9 @@ def rings_in_rest(
     rings: list[FloatArray] = []
     rest = section
     if len(lines):
-        rest = shapely.difference(rest, shapely.union_all(shapely.buffer(strings(lines), 0.5 * width)))
+        rest = shapely.difference(
+            rest, shapely.union_all(shapely.buffer(strings(lines), 0.5 * width))
+        )
     while True:
         room = shapely.buffer(rest, -0.5 * width)
         room = shapely.buffer(shapely.buffer(room, -_BEND * radius), _BEND * radius, quad_segs=16)
@@ -368,4 +419,6 @@ def rings_in_rest(
         if not new:
             return even_points(rings, width)
         rings += new
-        rest = shapely.difference(rest, shapely.union_all(shapely.buffer(strings(new), 0.5 * width)))
+        rest = shapely.difference(
+            rest, shapely.union_all(shapely.buffer(strings(new), 0.5 * width))
+        )

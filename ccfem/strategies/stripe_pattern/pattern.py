@@ -189,7 +189,10 @@ def line_field(
     w = smooth**2 * cells.weights
     full = held + np.bincount(a, w, count) + np.bincount(b, w, count)
     full = full + _SHIFT * float(full.mean())
-    rows, columns = np.concatenate([a, b, np.arange(count)]), np.concatenate([b, a, np.arange(count)])
+    rows, columns = (
+        np.concatenate([a, b, np.arange(count)]),
+        np.concatenate([b, a, np.arange(count)]),
+    )
     matrix = sp.coo_array((np.concatenate([-w, -w, full]), (rows, columns)), (count, count))
     z = positive_definite(matrix).solve(np.column_stack([wanted.real, wanted.imag]))
     return np.asarray(0.5 * np.arctan2(z[:, 1], z[:, 0]))
@@ -298,7 +301,9 @@ def isocurves(pattern: Pattern) -> list[FloatArray]:
     sides = np.column_stack([over_bc, over_ca, over_ab])[t]
     first = cells.edges[sides, 0]
     seen = np.where(
-        first == a[t, None], at_a[t, None], np.where(first == b[t, None], at_b[t, None], at_c[t, None])
+        first == a[t, None],
+        at_a[t, None],
+        np.where(first == b[t, None], at_b[t, None], at_c[t, None]),
     )
     sign = np.where(
         first == a[t, None],
