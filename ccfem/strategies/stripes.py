@@ -22,7 +22,7 @@ from ccfem.base.tensor import in_plane
 from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.facets import are_among, connected
 from ccfem.geometry.locate import locate
-from ccfem.geometry.polylines import line_length
+from ccfem.geometry.polylines import line_length, pack, starts_segment
 from ccfem.machine.machine import Machine
 from ccfem.paths.linking.finishing import keep_off_border, long_enough, trim_to_clearance
 from ccfem.paths.linking.joining import Joined, join
@@ -74,7 +74,7 @@ class Stripes:
     density : float in (0, 1], default 1
         Fibre to lay, as a share of all that the strategy lays side by side. With less, each strand
         keeps the stretch that carries most.
-    pitch : float, default 0.95
+    pitch : float, default 0.98
         Distance of the curves in fibre widths before they are moved apart to a width.
     smooth : float, default 4
         Length over which the direction is smoothed, in fibre widths.
@@ -90,7 +90,7 @@ class Stripes:
     """
 
     density: float = 1.0
-    pitch: float = 0.95
+    pitch: float = 0.98
     smooth: float = 4.0
     border: float = 5.0
     tries: int = 1
@@ -156,9 +156,7 @@ class Stripes:
         for seed in range(self.tries):
             pattern = stripe_pattern(cells, angle, self.pitch * width, seed)
             joined = _packed(isocurves(pattern), layer, machine, self.folds)
-            strands = [
-                _carrying(line, link, layer, plane) for line, link in zip(*joined, strict=True)
-            ]
+            strands = _carrying(joined, layer, plane)
             if not best or _carried(strands) > _carried(best):
                 best = strands
         return best
@@ -247,17 +245,24 @@ class _Strand:
     carried: FloatArray
 
 
-def _carrying(line: FloatArray, link: BoolArray, layer: Layer, plane: FloatArray) -> _Strand:
-    middle, step = 0.5 * (line[1:] + line[:-1]), np.diff(line, axis=0)
-    triangle, weights = locate(layer.plane.points, layer.triangles, middle, np.inf)
+def _carrying(joined: Joined, layer: Layer, plane: FloatArray) -> list[_Strand]:
+    """Strands of a layer with the stress (n, 3) at its points."""
+    if not joined.lines:
+        return []
+    points, offsets = pack(joined.lines)
+    step = np.zeros_like(points)
+    step[:-1] = np.where(starts_segment(offsets)[:-1, None], np.diff(points, axis=0), 0.0)
+    triangle, weights = locate(layer.plane.points, layer.triangles, points + 0.5 * step, np.inf)
     s11, s22, s12 = np.einsum("qk,qkc->cq", weights, plane[layer.triangles[triangle]])
     x, y = step.T
     length = np.hypot(x, y)
-    pulled = (
-        ~link[:-1] * (x * x * s11 + y * y * s22 + 2.0 * x * y * s12) / np.maximum(length, 1e-300)
-    )
-    along = np.concatenate([[0.0], np.cumsum(length)])
-    return _Strand(line, link, along, np.concatenate([[0.0], np.cumsum(pulled)]))
+    pulled = (x * x * s11 + y * y * s22 + 2.0 * x * y * s12) / np.maximum(length, 1e-300)
+    pulled[np.concatenate(joined.link)] = 0.0
+    strands = []
+    for line, link, a, b in zip(*joined, offsets[:-1], offsets[1:], strict=True):
+        along, carried = (np.append(0.0, np.cumsum(x[a : b - 1])) for x in (length, pulled))
+        strands.append(_Strand(line, link, along, carried))
+    return strands
 
 
 def _carried(strands: Sequence[_Strand]) -> float:

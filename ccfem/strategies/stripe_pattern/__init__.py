@@ -1,1 +1,1 @@
-"""What `stripes` stands on: a line field on a layer, its stripe pattern, strands packed side by side."""
+"""A line field on a layer, its stripe pattern, and strands packed side by side: for `stripes`."""

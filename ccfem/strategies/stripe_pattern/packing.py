@@ -1,6 +1,7 @@
-"""Curves side by side made to strands: joined end to end, moved apart, long enough for the cutter."""
+"""Curves side by side made to strands: joined, moved apart, long enough for the cutter."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.polylines import (
+    farthest_point,
     is_closed,
     lengths,
     line_length,
@@ -18,6 +20,7 @@ from ccfem.geometry.polylines import (
     starts_segment,
 )
 from ccfem.geometry.shapes import Region, strings
+from ccfem.paths.folds import MARGIN, folds
 from ccfem.paths.linking.joining import Joint, join
 
 STEP = 0.4
@@ -33,9 +36,13 @@ _PUSHES, _SEARCH = 48, 6
 _NEAR = 1.3
 """Distance, in widths, up to which they are."""
 _APART = 1.015
-"""Distance to which lines are pushed apart, in widths: a chart changes lengths, by a few hundredths."""
+"""Distance to which lines are pushed apart, in widths: charts change lengths by some hundredths."""
 _SPREAD = 6.0
 """Length along a strand over which a push is spread, in widths."""
+_WALL = 0.2001
+"""Largest distance of the points of the border, in widths: no part of a usual length."""
+_FACING = 0.7
+"""Twice the cosine of the angle between the normals of line and border from which on it pushes."""
 _OWN = 4.0
 """Length along a strand, in widths, from which on it is its own neighbour."""
 
@@ -58,21 +65,16 @@ class _Ends(NamedTuple):
 
 
 def _ends(lines: Sequence[FloatArray], width: float) -> _Ends:
-    number = [
-        2 * k + side for k, line in enumerate(lines) if not is_closed(line) for side in (0, 1)
-    ]
-    back = max(int(round(_HEAD / STEP)), 1)
-    place = [lines[end // 2][-(end % 2)] for end in number]
-    inner = [
-        lines[end // 2][max(len(lines[end // 2]) - 1 - back, 0) if end % 2 else back]
-        if len(lines[end // 2]) > back
-        else lines[end // 2][-1 + end % 2]
-        for end in number
-    ]
-    place_, inner_ = np.array(place).reshape(-1, 2), np.array(inner).reshape(-1, 2)
-    way = place_ - inner_
+    opened = [k for k, line in enumerate(lines) if not is_closed(line)]
+    number = [2 * k + side for k in opened for side in (0, 1)]
+    # Each end with the points behind it, the end first.
+    heads = [lines[end // 2][:: -1 if end % 2 else 1] for end in number]
+    back = round(_HEAD / STEP)
+    place = np.array([head[0] for head in heads]).reshape(-1, 2)
+    inner = np.array([head[min(back, len(head) - 1)] for head in heads]).reshape(-1, 2)
+    way = place - inner
     size = np.maximum(np.linalg.norm(way, axis=1), 1e-12)[:, None]
-    return _Ends(np.array(number, dtype=np.int64), place_, way / size)
+    return _Ends(np.array(number, dtype=np.int64), place, way / size)
 
 
 def joined_ends(lines: Sequence[FloatArray], width: float) -> list[FloatArray]:
@@ -122,7 +124,7 @@ def joined_ends(lines: Sequence[FloatArray], width: float) -> list[FloatArray]:
 def _frames(
     points: FloatArray, offsets: IntArray, rings: BoolArray | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """Unit vectors along lines and to the left of them at their points, (p, 2) each."""
+    """Return unit vectors along lines and to the left of them at their points, (p, 2) each."""
     tangent = np.zeros_like(points)
     step = np.where(starts_segment(offsets)[:-1, None], np.diff(points, axis=0), 0.0)
     tangent[1:] += step
@@ -155,7 +157,8 @@ def evened(
     rings = np.array([is_closed(each) for each in lines])
     p = q = np.zeros(0, dtype=np.int64)
     border = shapely.get_rings(shapely.get_parts(section))
-    wall = shapely.get_coordinates(shapely.segmentize(border, STEP * width))
+    wall = shapely.get_coordinates(shapely.segmentize(border, _WALL * width))
+    walls = cKDTree(wall)
     inner = line[1:] == line[:-1]
     ring_first, ring_last = offsets[:-1][rings], offsets[1:][rings] - 1
     stiff = (_SPREAD / STEP) ** 2
@@ -176,13 +179,14 @@ def evened(
         distance = np.where(beside, np.abs(across), np.linalg.norm(gap, axis=1))
         side = np.einsum("ij,ij->i", gap, normal[p])
         missing = 0.5 * (_APART * width - distance)
-        # The border pushes alone, so by all that is missing.
-        near, at = cKDTree(wall).query(points, distance_upper_bound=width)
+        # The border pushes alone, so by all that is missing; not where a line runs into it.
+        near, at = walls.query(points, distance_upper_bound=0.5 * width)
         close = np.flatnonzero(np.isfinite(near))
-        off = points[close] - wall[at[close]]
-        pushed = np.concatenate([p, close])
-        side = np.concatenate([side, np.einsum("ij,ij->i", off, normal[close])])
-        missing = np.concatenate([missing, 0.5 * width - near[close]])
+        aside = np.einsum("ij,ij->i", points[close] - wall[at[close]], normal[close])
+        facing = np.abs(aside) / np.maximum(near[close], 1e-12)
+        pressing = np.clip(2.0 * facing - _FACING, 0.0, 1.0) * (0.5 * width - near[close])
+        pushed, side = np.concatenate([p, close]), np.concatenate([side, aside])
+        missing = np.concatenate([missing, pressing])
         up, down = np.zeros(count), np.zeros(count)
         kept = missing > 0.0
         pushed, side, missing = pushed[kept], side[kept], missing[kept]
@@ -230,6 +234,8 @@ _SHIFT = 4.5
 """Length, in widths, before and behind a place over which a line steps over to its neighbour's."""
 _NEXT = 1.6
 """Farthest neighbour of a line, in widths."""
+_OFF = 0.3
+"""Least distance of such a step from the border, and a little less than that from other lines."""
 _ROUNDS = 8
 _LEAST_GAIN = 2.0
 """Least gain of such a step, in widths of length."""
@@ -257,7 +263,7 @@ def stepped_over(
         Of a strand.
     """
     lines = list(lines)
-    room = shapely.buffer(section, -0.3 * width)
+    room = shapely.buffer(section, -_OFF * width)
     shapely.prepare(room)
     for _ in range(_ROUNDS):
         touched: set[int] = set()
@@ -284,11 +290,13 @@ def _steps_over(
     lines: list[FloatArray], width: float, least: float
 ) -> Iterator[tuple[int, int, list[FloatArray]]]:
     """Pairs of lines, best first, and what they become: three parts of one line, and two rests."""
+    if not lines:
+        return
     points, offsets = pack(lines)
     count = np.diff(offsets)
     owner = np.repeat(np.arange(len(lines)), count)
     size, (tangent, _) = lengths(points, offsets), _frames(points, offsets)
-    opened = np.array([not is_closed(line) for line in lines])
+    opened = np.array([not is_closed(line) for line in lines], dtype=bool)
     useful = (size < least) & opened
     pairs = cKDTree(points).query_pairs(_NEXT * width, output_type="ndarray")
     pairs = np.concatenate([pairs, pairs[:, ::-1]])
@@ -347,7 +355,7 @@ _BESIDE = 0.7
 
 
 def corners(lines: Sequence[FloatArray], width: float, least: float) -> list[Joint]:
-    """Marked links, in which strands turn back, between ends side by side of lines too short.
+    """Link ends side by side of lines that are too short: strands turn back there.
 
     Parameters
     ----------
@@ -389,8 +397,10 @@ def corners(lines: Sequence[FloatArray], width: float, least: float) -> list[Joi
     return joints
 
 
-_BEND = 0.75
+_BEND = 0.85
 """Least radius of rings, in least radii of the machine; one of 0.66 folds."""
+_ARC = 32
+"""Segments of their arcs per quarter turn: the same ring to some thousandths, however it lies."""
 
 
 def rings_in_rest(
@@ -406,19 +416,20 @@ def rings_in_rest(
         Least radius of the machine.
     """
     rings: list[FloatArray] = []
-    rest = section
-    if len(lines):
-        rest = shapely.difference(
-            rest, shapely.union_all(shapely.buffer(strings(lines), 0.5 * width))
-        )
+    rest, new = section, list(lines)
+    grown = partial(shapely.buffer, quad_segs=_ARC)
     while True:
-        room = shapely.buffer(rest, -0.5 * width)
-        room = shapely.buffer(shapely.buffer(room, -_BEND * radius), _BEND * radius, quad_segs=16)
-        new = [shapely.get_parts(ring)[0] for ring in shapely.get_rings(shapely.get_parts(room))]
-        new = [shapely.get_coordinates(ring) for ring in new if ring.length >= least]
+        if new:
+            rest = shapely.difference(rest, shapely.union_all(grown(strings(new), 0.5 * width)))
+        room = grown(grown(rest, -0.5 * width - _BEND * radius), _BEND * radius)
+        edges = shapely.get_rings(shapely.get_parts(room))
+        new = [shapely.get_coordinates(edge) for edge in edges if edge.length >= least]
+        # They begin at the same place however the layer lies.
+        first = [farthest_point(ring) for ring in new]
+        new = [np.concatenate([x[k:-1], x[: k + 1]]) for x, k in zip(new, first, strict=True)]
+        new = even_points(new, width)
+        bends = folds(*pack(new), np.ones(len(new), dtype=bool), MARGIN * radius, strict=True)
+        new = [ring for ring, count in zip(new, bends.counts, strict=True) if not count]
         if not new:
-            return even_points(rings, width)
+            return rings
         rings += new
-        rest = shapely.difference(
-            rest, shapely.union_all(shapely.buffer(strings(new), 0.5 * width))
-        )

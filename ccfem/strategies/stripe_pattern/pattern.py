@@ -64,7 +64,7 @@ def refined(
 
 
 def _split(points: FloatArray, triangles: IntArray, middle: IntArray) -> IntArray:
-    """Split triangles (t, 3) at the middles (t, 3) of the sides opposite to corners, -1 for none."""
+    """Split triangles (t, 3) at middles (t, 3) of the sides opposite to corners, -1 for none."""
     count = (middle >= 0).sum(axis=1)
     # Turned so that the only halved side, or the only whole one, is opposite to the first corner.
     first = np.where(count == 1, np.argmax(middle >= 0, axis=1), np.argmax(middle < 0, axis=1))
@@ -283,7 +283,7 @@ def isocurves(pattern: Pattern) -> list[FloatArray]:
     number = np.maximum(high - low + 1, 0)
     start = np.concatenate([[0], np.cumsum(number)])
     # Phases at the corners of each triangle, seen from its first corner.
-    a, b, c = cells.triangles.T
+    a, b, _ = cells.triangles.T
     over_bc, over_ca, over_ab = cells.opposite.T
 
     def along(first: IntArray, edge: IntArray) -> FloatArray:
@@ -300,16 +300,10 @@ def isocurves(pattern: Pattern) -> list[FloatArray]:
     t = np.flatnonzero(plain)
     sides = np.column_stack([over_bc, over_ca, over_ab])[t]
     first = cells.edges[sides, 0]
-    seen = np.where(
-        first == a[t, None],
-        at_a[t, None],
-        np.where(first == b[t, None], at_b[t, None], at_c[t, None]),
-    )
-    sign = np.where(
-        first == a[t, None],
-        1.0,
-        np.where(first == b[t, None], same[over_ab][t, None], same[over_ca][t, None]),
-    ).astype(np.int64)
+    seen = np.where(first == b[t, None], at_b[t, None], at_c[t, None])
+    seen = np.where(first == a[t, None], at_a[t, None], seen)
+    sign = np.where(first == b[t, None], same[over_ab][t, None], same[over_ca][t, None])
+    sign = np.where(first == a[t, None], 1.0, sign).astype(np.int64)
     shift = np.round(seen / turn - sign * begin[sides]).astype(np.int64)
     owner, nth = repeated(number[sides].ravel())
     level = (sign * low[sides] + shift).ravel()[owner] + sign.ravel()[owner] * nth
