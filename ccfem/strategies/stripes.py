@@ -31,20 +31,20 @@ from ccfem.paths.planning.strategy import Amount, LayerPlanner
 from ccfem.paths.planning.unfolding import unfolded
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer, LayerStress, stress_on
-from ccfem.strategies.stripe_pattern.packing import (
-    corners,
-    even_points,
-    evened,
-    joined_ends,
-    rings_in_rest,
-    stepped_over,
-)
 from ccfem.strategies.stripe_pattern.pattern import (
     Cells,
     isocurves,
     line_field,
     refined,
     stripe_pattern,
+)
+from ccfem.strategies.stripe_pattern.strand_packing import (
+    corners,
+    even_points,
+    evened,
+    joined_ends,
+    rings_in_rest,
+    stepped_over,
 )
 
 _EDGE = 0.9

@@ -123,8 +123,9 @@ class Cells:
     @cached_property
     def areas(self) -> FloatArray:
         """A third of the area of the triangles round each point, (n,), mm^2."""
-        size = np.abs(signed_areas(self.points, self.triangles))
-        return np.bincount(self.triangles.ravel(), np.repeat(size / 3.0, 3), len(self.points))
+        third = np.repeat(np.abs(signed_areas(self.points, self.triangles)) / 3.0, 3)
+        total = np.bincount(self.triangles.ravel(), third, len(self.points))
+        return total.astype(np.float64)
 
     @cached_property
     def weights(self) -> FloatArray:
@@ -134,7 +135,8 @@ class Cells:
         across = np.abs(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0])
         cotangent = (u * v).sum(axis=2) / np.maximum(across, 1e-300)
         cotangent = 0.5 * np.clip(cotangent, *_COTANGENT)
-        return np.bincount(self.opposite.ravel(), cotangent.ravel(), len(self.edges))
+        total = np.bincount(self.opposite.ravel(), cotangent.ravel(), len(self.edges))
+        return total.astype(np.float64)
 
     @cached_property
     def border(self) -> BoolArray:
@@ -241,7 +243,7 @@ def stripe_pattern(cells: Cells, angle: FloatArray, pitch: float, seed: int = 0)
     omega = np.pi / pitch * turned
     count = len(cells.points)
     w = cells.weights
-    full = np.bincount(a, w, count) + np.bincount(b, w, count)
+    full = np.asarray(np.bincount(a, w, count) + np.bincount(b, w, count), dtype=np.float64)
     solve = _factor(cells, omega, same, full + _SHIFT * float(full.mean()))
     x = np.zeros((count, 2))
     x[:, 0] = np.random.default_rng(seed).standard_normal(count)

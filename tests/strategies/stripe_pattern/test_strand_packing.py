@@ -4,7 +4,7 @@ import shapely
 
 from ccfem.geometry.polylines import is_closed, line_length
 from ccfem.paths.folds import folds
-from ccfem.strategies.stripe_pattern.packing import (
+from ccfem.strategies.stripe_pattern.strand_packing import (
     corners,
     even_points,
     evened,
