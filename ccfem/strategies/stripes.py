@@ -59,6 +59,8 @@ _NEARLY = 0.9
 """Share of the shortest length that a strand must have before strands move."""
 _END = 0.4
 """Distance that strands keep from the border at last, in widths: half a width but for corners."""
+_CHARTED = 1.03
+"""Shortest strand in the chart of a curved layer, over the machine's: charts change lengths."""
 _HALVINGS = 40
 
 
@@ -130,8 +132,9 @@ class Stripes:
         _, strands = known[key]
         if self.density < 1.0:
             every = [strand for some in strands for strand in some]
-            level = _level(every, self.density, machine.shortest_strand)
-            strands = [_kept(some, level, machine.shortest_strand) for some in strands]
+            least = max(_least(layer, machine) for layer in layers)
+            level = _level(every, self.density, least)
+            strands = [_kept(some, level, least) for some in strands]
         by_layer = {
             layer.index: Joined([one.line for one in some], [one.link for one in some])
             for layer, some in zip(layers, strands, strict=True)
@@ -175,6 +178,11 @@ class _Planner:
         return Toolpaths.from_plane(joined.lines, layer, link=joined.link)
 
 
+def _least(layer: Layer, machine: Machine) -> float:
+    """Length of the shortest strand in the plane of a layer, mm: more in charts of curved ones."""
+    return machine.shortest_strand * (1.0 if layer.turns is None else _CHARTED)
+
+
 def _crossed_border(layer: Layer, patches: Sequence[str]) -> FloatArray:
     """1 at points on outer borders that are held or loaded, (n,): strands may end there."""
     flags = np.zeros(len(layer.points))
@@ -192,7 +200,7 @@ def _packed(
     curves: list[FloatArray], layer: Layer, machine: Machine, folds: bool = False
 ) -> Joined:
     """Strands side by side, long enough for the cutter, made of curves."""
-    section, width, least = layer.plane.polygon, machine.fibre_width, machine.shortest_strand
+    section, width, least = layer.plane.polygon, machine.fibre_width, _least(layer, machine)
     lines = keep_off_border(curves, section, _INSET * width)
     lines = trim_to_clearance(even_points(lines, width), _TRIM * width, _PIECE * width)
     lines = even_points(joined_ends(even_points(lines, width), width), width)
