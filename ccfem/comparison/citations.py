@@ -19,6 +19,7 @@ METHODS: dict[str, tuple[str, ...]] = {
     "pruned": (),
     "stream_function": (),
     "streamline": ("jobard_1997", "papapetrou_2020", "wang_2021"),
+    "stripes": ("zhang_2025", "knoeppel_2015"),
     "svt": ("wang_2021",),
     "winding": ("fang_2024",),
     "zigzag": (),

@@ -81,7 +81,7 @@ def isocontours(
     high = np.floor(np.maximum(scaled[ends[:, 0]], scaled[ends[:, 1]])).astype(np.int64)
     start = np.concatenate([[0], np.cumsum(np.maximum(high - low + 1, 0))])
     edge, level, weights = _crossings(scaled, ends, low, start)
-    line, offsets = _chain(of_triangle, low, high, start)
+    line, offsets = chained(_links(of_triangle, low, high, start))
     order = np.argsort(level[line[offsets[:-1]]], kind="stable")
     sizes = np.diff(offsets)[order]
     nth, number = repeated(sizes)
@@ -115,12 +115,9 @@ def _crossings(
 
 
 @njit(cache=True, nogil=True)
-def _chain(
-    of_triangle: IntArray, low: IntArray, high: IntArray, start: IntArray
-) -> tuple[IntArray, IntArray]:
-    """Curves as crossing numbers with offsets; open ones first end to end, then the closed."""
-    count = start[-1]
-    link = np.full((count, 2), -1)
+def _links(of_triangle: IntArray, low: IntArray, high: IntArray, start: IntArray) -> IntArray:
+    """Crossings before and after each crossing on its curve, as of `chained`."""
+    link = np.full((start[-1], 2), -1)
     # A level that crosses a triangle crosses two of its sides: link these two crossings.
     for t in range(len(of_triangle)):
         bottom = min(low[of_triangle[t, 0]], low[of_triangle[t, 1]], low[of_triangle[t, 2]])
@@ -136,12 +133,33 @@ def _chain(
                     else:
                         link[first, 1 if link[first, 0] >= 0 else 0] = k
                         link[k, 1 if link[k, 0] >= 0 else 0] = first
+    return link
+
+
+@njit(cache=True, nogil=True)
+def chained(link: IntArray) -> tuple[IntArray, IntArray]:
+    """Curves through things that are linked to at most two others.
+
+    Parameters
+    ----------
+    link : (n, 2) int array
+        Neighbours of each thing, -1 for none; one that has a single neighbour has it first.
+
+    Returns
+    -------
+    line : (p,) int array
+        Things along the curves, first the open ones, end to end, then the closed ones, whose first
+        thing is repeated at the end. Those without a neighbour are left out.
+    offsets : (k + 1,) int array
+        As in CSR.
+    """
+    count = len(link)
     line = np.empty(2 * count, np.int64)
     offsets = np.zeros(count + 1, np.int64)
     used = np.zeros(count, np.bool_)
     chains = 0
     size = 0
-    # Follow the links, first from the crossings with one link, which are ends; the rest are rings.
+    # Follow the links, first from the things with one link, which are ends; the rest are rings.
     for closed in range(2):
         for seed in range(count):
             if used[seed] or link[seed, 0] < 0 or (closed == 0 and link[seed, 1] >= 0):

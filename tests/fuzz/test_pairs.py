@@ -15,7 +15,7 @@ def made(tmp_path_factory):
 @pytest.mark.parametrize("slicing", ["planar, scrap", "surfaces"])
 def test_layers_on_which_strategies_lay_nothing(made, slicing, tmp_path):
     """Rings, streamlines and strands round the holes: none has room on the scrap."""
-    strategies = ["concentric", "streamline", "winding"]
+    strategies = ["concentric", "streamline", "stripes", "winding"]
     found = see(made[slicing], strategies, None, False, tmp_path, strand=None)
     empty = 1 if slicing == "surfaces" else 0
     assert [run.empty_layers for run in found.succeeded] == [1] * len(found.succeeded)

@@ -28,7 +28,8 @@ RADIUS = 40.0
 CURVED = [name for name in sorted(named()) if not getattr(named()[name], "flat_layers_only", False)]
 FREE = ["concentric", "offset", "streamline", "winding"]
 """Strategies that have no direction of their own: a chart may lie in its plane in any way. Ends of
-`isocurve` move by up to 0.8 mm where the same chart lies turned by so much, and are left out."""
+`isocurve` move by up to 0.8 mm where the same chart lies turned by so much, and one of `stripes` by
+0.24 mm; they are left out."""
 
 
 def turn():

@@ -1,0 +1,74 @@
+import numpy as np
+import pytest
+import shapely
+
+from ccfem.geometry.polylines import is_closed, line_length
+from ccfem.paths.folds import folds
+from ccfem.strategies.stripe_pattern.strand_packing import (
+    corners,
+    even_points,
+    evened,
+    joined_ends,
+    rings_in_rest,
+    stepped_over,
+)
+
+WIDE = shapely.box(-50.0, -50.0, 150.0, 50.0)
+
+
+def straight(start, stop, y):
+    return np.array([[start, y], [stop, y]], dtype=float)
+
+
+def test_ends_that_face_each_other_are_joined():
+    lines = even_points([straight(0.0, 20.0, 0.0), straight(22.0, 40.0, 0.3)], 1.0)
+    (line,) = joined_ends(lines, 1.0)
+    assert line_length(line) == pytest.approx(40.0, abs=0.1)
+    # Not side by side, nor across another strand, nor over more than three widths.
+    for others in (
+        [straight(0.0, 20.0, 0.0), straight(20.0, 40.0, 1.5)],
+        [straight(0.0, 20.0, 0.0), straight(23.5, 40.0, 0.0)],
+        [straight(0.0, 20.0, 0.0), straight(22.0, 40.0, 0.0), [[21.0, -5.0], [21.0, 5.0]]],
+    ):
+        lines = even_points([np.asarray(line, dtype=float) for line in others], 1.0)
+        assert len(joined_ends(lines, 1.0)) == len(others)
+
+
+def test_lines_move_apart_to_a_width_and_off_the_border():
+    lines = even_points([straight(0.0, 40.0, y) for y in (0.0, 0.85, 1.6)], 1.0)
+    moved = evened(lines, WIDE, 1.0)
+    level = np.array([line[20:-20, 1].mean() for line in moved])
+    np.testing.assert_allclose(np.diff(level), 1.0, atol=0.03)
+    assert level.mean() == pytest.approx(0.8167, abs=0.05)
+    (line,) = evened(even_points([straight(0.0, 40.0, 49.8)], 1.0), WIDE, 1.0)
+    np.testing.assert_allclose(line[10:-10, 1], 49.5, atol=0.01)
+
+
+def test_a_line_too_short_takes_over_the_track_of_its_neighbour():
+    lines = even_points([straight(0.0, 30.0, 0.0), straight(0.0, 100.0, 1.0)], 1.0)
+    size = sorted(line_length(line) for line in stepped_over(lines, WIDE, 1.0, 20.0))
+    assert size == pytest.approx([30.0, 100.0])
+    lines = even_points([straight(30.0, 60.0, 0.0), straight(0.0, 120.0, 1.0)], 1.0)
+    size = sorted(line_length(line) for line in stepped_over(lines, WIDE, 1.0, 42.0))
+    assert size[-2] >= 42.0
+    assert sum(length for length in size if length >= 42.0) > 130.0
+
+
+def test_corners_join_what_is_too_short_side_by_side():
+    lines = even_points([straight(0.0, 30.0, y) for y in (0.0, 1.0, 2.0, 3.0)], 1.0)
+    joints = corners(lines, 1.0, 42.0)
+    assert {end // 2 for joint in joints for end in (joint.first, joint.second)} == {0, 1, 2, 3}
+    assert all(joint.marked for joint in joints)
+    assert not corners(lines, 1.0, 25.0)
+
+
+def test_rings_fill_what_is_left_and_do_not_fold():
+    rings = rings_in_rest([], shapely.box(0.0, 0.0, 40.0, 30.0), 1.0, 42.0, 3.85)
+    assert len(rings) > 5
+    assert all(is_closed(ring) for ring in rings)
+    offsets = np.concatenate([[0], np.cumsum([len(ring) for ring in rings])])
+    bends = folds(np.concatenate(rings), offsets, np.ones(len(rings), bool), 3.85, strict=True)
+    assert bends.counts.sum() == 0
+    string = shapely.linestrings(rings[0])
+    apart = [shapely.distance(string, shapely.linestrings(ring)) for ring in rings[1:]]
+    assert min(apart) > 0.97
