@@ -132,7 +132,7 @@ class Stripes:
         _, strands = known[key]
         if self.density < 1.0:
             every = [strand for some in strands for strand in some]
-            least = max(_least(layer, machine) for layer in layers)
+            least = max((_least(layer, machine) for layer in layers), default=0.0)
             level = _level(every, self.density, least)
             strands = [_kept(some, level, least) for some in strands]
         by_layer = {

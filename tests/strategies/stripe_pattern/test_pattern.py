@@ -119,3 +119,20 @@ def test_a_fan_branches_and_a_half_turn_of_the_direction_ends_curves():
     lines = isocurves(stripe_pattern(Cells(points, triangles), half, 1.0))
     total = sum(np.linalg.norm(np.diff(line, axis=0), axis=1).sum() for line in lines)
     assert total == pytest.approx(16.0 * 16.0, rel=0.15)
+
+
+def test_curves_do_not_depend_on_signs_and_are_mirrored_with_the_layer():
+    points, triangles = annulus(6.0, 12.0, 60, 8)
+    angle = np.arctan2(points[:, 1], points[:, 0]) + 0.05 * points[:, 0]
+    lines = isocurves(stripe_pattern(Cells(points, triangles), angle, 1.1))
+    flipped = np.pi * np.random.default_rng(2).integers(2, size=len(points))
+    again = isocurves(stripe_pattern(Cells(points, triangles), angle + flipped, 1.1))
+    mirror = np.array([-1.0, 1.0])
+    mirrored = Cells(points * mirror, triangles[:, [0, 2, 1]])
+    image = isocurves(stripe_pattern(mirrored, np.pi - angle, 1.1))
+    assert len(lines) == len(again) == len(image)
+    for others, turn in ((again, np.ones(2)), (image, mirror)):
+        both = [
+            np.sort(np.concatenate(some) * t, axis=0) for some, t in ((lines, 1), (others, turn))
+        ]
+        np.testing.assert_allclose(*both, atol=1e-6)
