@@ -72,9 +72,11 @@ class Moves:
         whole: dict[str, DTypeLike] = dict.fromkeys(("event", "tool", "role"), np.int8)
         whole |= dict.fromkeys(("layer", "strand"), np.int32)
         rest = dict.fromkeys(
-            ("place", "normal", "feed", "beside", "speed", "width", "height", "amount"), float
+            ("place", "feed", "beside", "speed", "width", "height", "amount"), float
         )
         freeze(self, **whole, **rest)
+        if not self.normal.strides or self.normal.strides[0]:  # else it is one for all rows
+            freeze(self, normal=float)
 
     def __len__(self) -> int:
         return len(self.event)

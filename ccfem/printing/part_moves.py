@@ -236,7 +236,11 @@ def _with_rows(moves: Moves, places: list[int], values: list[float], tools: list
             new[:] = values
         elif field.name == "tool":
             new[:] = tools
+        if field.name == "normal" and old.strides[0] == 0:  # one for all rows
+            by_row["normal"] = np.broadcast_to(old[:1], (len(old) + len(at), 3))
+            continue
         by_row[field.name] = np.insert(old, at, new, axis=0)
+        by_row[field.name].flags.writeable = False
     return Moves(**by_row)
 
 

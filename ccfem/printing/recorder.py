@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.geometry.polylines import subdivide
@@ -17,7 +18,19 @@ _SAME = 1e-9
 _STRAIGHT = 1.5 * 10.0**-COORDINATE_DIGITS
 """Distance from a straight line, mm, within which rounded points lie on it."""
 _BLOCKS = 500
-"""Blocks of rows that are joined."""
+"""Blocks of rows that are kept as such: many small ones leave holes in memory."""
+_COLUMNS: dict[str, tuple[int | slice, DTypeLike]] = {
+    "event": (0, np.int8),
+    "place": (slice(1, 4), float),
+    "normal": (slice(4, 7), float),
+    "tool": (7, np.int8),
+    **{name: (8 + k, float) for k, name in enumerate(("feed", "beside", "speed", "width"))},
+    **{name: (12 + k, float) for k, name in enumerate(("height", "amount"))},
+    "role": (14, np.int8),
+    "layer": (15, np.int32),
+    "strand": (16, np.int32),
+}
+"""Columns of `Moves`: where they stand in a row, and their kind."""
 _LEVEL = 0.1
 """Cosine of the tilt below which a head's own axis leads too far aside to leave along it."""
 
@@ -29,7 +42,7 @@ class Recorder:
         self.machine = machine
         self.rows: list[tuple[float, ...]] = []
         self.blocks: list[FloatArray] = []
-        self.joined: list[FloatArray] = []
+        self.columns: dict[str, list[NDArray[Any]]] = {}
         self.place: FloatArray | None = None
         self.normal = np.array([0.0, 0.0, 1.0])
         self.tool = -1
@@ -189,28 +202,29 @@ class Recorder:
         if self.rows:
             self.blocks.append(np.array(self.rows))
             self.rows = []
-        if len(self.blocks) > _BLOCKS:  # small ones would leave holes in memory
-            self.joined.append(np.concatenate(self.blocks))
-            self.blocks = []
+        if len(self.blocks) > _BLOCKS:
+            self._split()
+
+    def _split(self) -> None:
+        """Keep the columns of the blocks so far, each as small as `Moves` has it."""
+        table = np.concatenate([np.zeros((0, 17)), *self.blocks])
+        self.blocks = []
+        for name, (place, kind) in _COLUMNS.items():
+            self.columns.setdefault(name, []).append(table[:, place].astype(kind))
 
     def moves(self) -> Moves:
-        """All that was noted."""
+        """All that was noted; afterwards the recorder is empty."""
         self._flush()
-        blocks = [np.zeros((0, 17)), *self.joined, *self.blocks]
-
-        def column(first: int, last: int | None = None) -> FloatArray:
-            """Join a column of all blocks: a table of all would double the memory."""
-            return np.concatenate(
-                [b[:, first if last is None else slice(first, last)] for b in blocks]
-            )
-
-        names = ["tool", "feed", "beside", "speed", "width", "height", "amount", "role", "layer"]
-        columns: dict[str, Any] = {"event": column(0), "place": column(1, 4)}
-        columns |= {name: column(k) for k, name in enumerate([*names, "strand"], start=7)}
-        normal = column(4, 7)
+        self._split()
+        joined: dict[str, Any] = {}
+        for name in _COLUMNS:  # column by column, so that few are there twice
+            column = np.concatenate(self.columns.pop(name))
+            column.flags.writeable = False
+            joined[name] = column
+        normal = joined["normal"]
         if (normal == normal[:1]).all():  # a head that never turns needs no memory
-            normal = np.broadcast_to(normal[:1].copy(), normal.shape)
-        return Moves(normal=normal, **columns)
+            joined["normal"] = np.broadcast_to(normal[:1].copy(), normal.shape)
+        return Moves(**joined)
 
 
 def _ends_of_moves(line: FloatArray, normals: FloatArray, alike: FloatArray) -> IntArray:
