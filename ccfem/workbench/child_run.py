@@ -18,6 +18,9 @@ _PATIENCE = 5.0
 """Seconds in which a process that was asked to stop may put things in order."""
 _LEAST_MEMORY = 8e9
 """Address space, bytes, that a run may take on any machine; else as much as there is memory."""
+_PROGRAM = (sys.executable, "-P", "-m", "ccfem")
+"""What runs: without the folder of the run on the path, so that no module in it is taken for ours.
+"""
 _KEPT = 40
 """Last lines of what it said that are kept."""
 
@@ -92,7 +95,7 @@ class ChildRun:
         self.state = RunState(shlex.join(["ccfem", *arguments]))
         self._changed = changed
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "ccfem", *arguments],
+            [*_PROGRAM, *arguments],
             cwd=folder,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,

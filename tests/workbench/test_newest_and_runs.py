@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 import threading
 from pathlib import Path
 
@@ -52,9 +53,9 @@ time.sleep(60)
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="process groups are of Unix")
 @pytest.mark.parametrize("manner", ["heeds", "deaf"])
 def test_a_stopped_run_leaves_no_process(tmp_path, monkeypatch, manner):
-    (tmp_path / "ccfem").mkdir()
-    (tmp_path / "ccfem" / "__main__.py").write_text(SLEEPER)
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    (tmp_path / "sleeper.py").write_text(SLEEPER)
+    program = (sys.executable, str(tmp_path / "sleeper.py"))
+    monkeypatch.setattr("ccfem.workbench.child_run._PROGRAM", program)
     monkeypatch.setattr("ccfem.workbench.child_run._PATIENCE", 0.3)
     states, begun = [], threading.Event()
 
@@ -78,6 +79,14 @@ def test_a_stopped_run_leaves_no_process(tmp_path, monkeypatch, manner):
     assert not alive(child)
     assert run.state.complaint == "stopped"
     assert run.state.code in (-signal.SIGTERM, -signal.SIGKILL)
+
+
+def test_no_module_in_the_folder_of_a_run_is_executed(tmp_path):
+    for name in ("ccfem", "numpy"):
+        (tmp_path / f"{name}.py").write_text('open("executed", "w").close()')
+    state = ChildRun(["machines"], tmp_path, lambda state: None).wait(60.0)
+    assert state.code == 0
+    assert not (tmp_path / "executed").exists()
 
 
 @pytest.mark.parametrize(
