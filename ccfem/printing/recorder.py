@@ -232,7 +232,7 @@ def _ends_of_moves(line: FloatArray, normals: FloatArray, alike: FloatArray) -> 
 
     Lines that are not level keep all points: the head turns along them.
     """
-    if (normals[:, 2] < 1.0 - _SAME).any() or np.ptp(line[:, 2]) > 0.0:
+    if len(line) < 2 or (normals[:, 2] < 1.0 - _SAME).any() or np.ptp(line[:, 2]) > 0.0:
         return np.arange(len(line))
     changes = np.flatnonzero((alike[1:] != alike[:-1]).any(axis=1)) + 1
     return bends(line[:, :2], changes, _STRAIGHT)

@@ -75,3 +75,14 @@ def test_steps_on_a_straight_line_are_one_move():
     walked = shapely.LineString(np.vstack([path[0], moves.place[laid]])[:, :2])
     assert shapely.hausdorff_distance(walked, shapely.LineString(path[:, :2])) < 2e-3
     assert moves.feed[laid].sum() == pytest.approx(0.05 * walked.length, abs=1e-4)
+
+
+def test_a_line_of_one_point_is_no_move():
+    """As the way back over a strand's end that is ironed over less than a micrometre."""
+    recorder = Recorder(Machine())
+    place, nothing = np.array([[3.0, 4.0, 0.4]]), np.zeros(0)
+    recorder.travel(place[0], UP[0])
+    before = len(recorder.rows)
+    recorder.lay(place, UP[:1], nothing, nothing, nothing, nothing, "travel")
+    assert len(recorder.rows) == before
+    assert not (recorder.moves().event == LAY).any()

@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
+from ccfem.base.checks import check_number
 from ccfem.base.display import Shown
 from ccfem.base.errors import InputError
 from ccfem.base.parallel import in_processes
@@ -156,7 +157,7 @@ def evaluate(
     build : sequence of 3 floats, optional
         Build direction. The head's tilt on curved layers is measured from it, and flat layers
         normal to it serve for comparison (`across_flat`). Default: mean normal of the layers.
-    most : int, optional
+    most : int, at least 1, optional
         Layers, evenly spread over the stack, on which indices are taken that some layers of many
         tell: means and quantiles of angles, distances and coverage. Sums, and all that the limits
         of a machine bound, are always of all layers. Default: all layers.
@@ -164,8 +165,10 @@ def evaluate(
     Raises
     ------
     InputError
-        When there is no layer, or a path lies on none of the layers.
+        When there is no layer, a path lies on none of the layers, or `most` is below 1.
     """
+    if most is not None:
+        check_number("most", most, at_least=1)
     layers = tuple(layers)
     if not layers:
         raise InputError("expected at least one layer to evaluate; got none: slice the part")

@@ -15,14 +15,18 @@ from ccfem.base.errors import InputError
 from ccfem.base.whole import existing_file, text_of
 from ccfem.geometry.polylines import pack
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
-from ccfem.printing.export.waypoints import LARGEST_NUMBER, check_near, read_waypoints
+from ccfem.printing.export.waypoints import (
+    CLOSED,
+    LARGEST_NUMBER,
+    check_near,
+    close_rings,
+    read_waypoints,
+)
 
 FRAMES = ("mesh", "tool")
 """What coordinates of a file may be in: those of the mesh, or the axes of the printer's tool."""
 
 _COLUMNS = ("x", "y", "z", "path", "layer")
-_CLOSED = 1e-3
-"""Largest distance, mm, between the ends of a closed path."""
 
 
 def read_paths(path: str | Path, frame: FloatArray, named: str | None = None) -> Toolpaths:
@@ -148,7 +152,7 @@ def _toolpaths(values: FloatArray, axes: FloatArray, normal: FloatArray, name: s
     points = values[:, :3]
     check_near(points, name)
     first, last = offsets[:-1], offsets[1:] - 1
-    closed = (np.linalg.norm(points[first] - points[last], axis=1) <= _CLOSED) & (
+    closed = (np.linalg.norm(points[first] - points[last], axis=1) <= CLOSED) & (
         np.diff(offsets) > 3
     )
     points[last[closed]] = points[first[closed]]
@@ -218,10 +222,7 @@ def read_strands(path: str | Path, axes: FloatArray, normal: FloatArray) -> Tool
     if not lines:
         return Toolpaths.empty()
     check_near(np.concatenate(lines), str(path))
-    closed = [len(a) > 3 and float(np.linalg.norm(a[0] - a[-1])) <= _CLOSED for a in lines]
-    for line, ring in zip(lines, closed, strict=True):
-        if ring:
-            line[-1] = line[0]
+    closed = close_rings(lines)
     points, offsets = pack(lines)
     normals = np.broadcast_to(normal, points.shape)
     kind = np.full(len(lines), FIBRE)

@@ -18,7 +18,7 @@ from ccfem.geometry.polylines import pack
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
-_CLOSED = 1e-3
+CLOSED = 1e-3
 """Largest distance, mm, between the ends of a closed path: the files round to 6 digits."""
 LARGEST_NUMBER = 1e15
 """Of paths and layers: larger ones are not told apart from their neighbours."""
@@ -51,10 +51,7 @@ def read_waypoints(path: str | Path, frame: FloatArray) -> Toolpaths:
     if not lines:
         return Toolpaths.empty()
     check_near(np.concatenate(lines), str(path))
-    closed = [len(a) > 3 and float(np.linalg.norm(a[0] - a[-1])) <= _CLOSED for a in lines]
-    for line, ring in zip(lines, closed, strict=True):
-        if ring:
-            line[-1] = line[0]
+    closed = close_rings(lines)
     points, offsets = pack(lines)
     return Toolpaths(
         points=points @ frame,
@@ -126,6 +123,15 @@ def _coordinates(word: str) -> list[float]:
     if not np.isfinite(values).all():
         raise ValueError(word)
     return values
+
+
+def close_rings(lines: Sequence[FloatArray]) -> list[bool]:
+    """Close lines (k, 3) whose ends meet, in place; which are closed."""
+    closed = [len(a) > 3 and float(np.linalg.norm(a[0] - a[-1])) <= CLOSED for a in lines]
+    for line, ring in zip(lines, closed, strict=True):
+        if ring:
+            line[-1] = line[0]
+    return closed
 
 
 def write_waypoints(path: str | Path, toolpaths: Toolpaths, layers: Sequence[Layer]) -> None:

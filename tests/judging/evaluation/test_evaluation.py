@@ -319,3 +319,5 @@ def test_of_many_layers_some_tell_angles_and_distances(make_part):
         assert some.total[name] == pytest.approx(alone.total[name])
     # Layers are equal here: gaps of five are five thirds of those of three.
     assert some.total["gap_area"] == pytest.approx(alone.total["gap_area"] * 5.0 / 3.0)
+    with pytest.raises(InputError, match="most"):
+        evaluate(paths, part.layers, part.stress, MACHINE, most=0)
