@@ -41,6 +41,7 @@ class CompareTab:
             self._add_ticks({k: v for k, v in known.items() if k not in STRATEGIES})
         self.case = gui.add_dropdown("Load case", (_FIRST,), visible=False)
         self.case.on_update(page.on(self.show))
+        self.minutes = gui.add_number("Longest run, min", 120.0, min=0.1, step=10.0)
         self.start = gui.add_button("Compare", icon="player-play")
         self.start.on_click(page.on(self._compare))
         self.ending = gui.add_button("Stop", icon="player-stop", visible=False, color="red")
@@ -100,7 +101,10 @@ class CompareTab:
         suffix = f"-{self.left.value}" if arguments[0] == "plan" else ""
         folder = page.bench.results / f"{page.bench.name}{suffix}"
         self.run = ChildRun(
-            arguments, page.bench.folder, lambda state: page.act(self._heed, state, folder)
+            arguments,
+            page.bench.folder,
+            lambda state: page.act(self._heed, state, folder),
+            float(self.minutes.value),
         )
         self._tell(self.run.state)
 
@@ -111,7 +115,7 @@ class CompareTab:
             self._show_results()
             self.page.show_fibre(True)
         elif not state.running:
-            self.page.say("" if state.stopped else state.complaint)
+            self.page.say("" if state.stopped == "stopped" else state.complaint)
 
     def _tell(self, state: RunState) -> None:
         self.start.visible, self.ending.visible = not state.running, state.running
