@@ -19,6 +19,7 @@ from ccfem.comparison.plot.part_picture import coloured, load_arrows, support_ma
 from ccfem.comparison.report.charts import curve_charts, fronts, spreads
 from ccfem.comparison.report.layer_view import layer_views
 from ccfem.comparison.report.packing import Rounded, as_bytes, compressed, pack
+from ccfem.comparison.report.print_view import print_views
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.table import (
     FIRST_REMARKS,
@@ -83,10 +84,13 @@ def report_html(
     left_out = record["left_out"]
     charts: dict[str, Any] = {"curve": [], "fronts": [], "spreads": []}
     data: dict[str, Any] = {"part": None, "layers": {"stacks": []}, "charts": charts}
+    data["print"] = {"runs": []}
     with spared("view of the part", left_out):
         data["part"] = part_view(checked, comparison.stress)
     with spared("view of layers and paths", left_out):
         data["layers"] = layer_views(comparison.slicings, strategies)
+    with spared("view of the print", left_out):
+        data["print"] = print_views(ranked)
     with spared("curve", left_out):
         charts["curve"] = curve_charts(curve, colours)
     with spared("fronts", left_out):
