@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import spared
+from ccfem.base.tensor import von_mises
 from ccfem.cases.inspection import Check, check
 from ccfem.comparison.citations import bibtex, cited, methods_of, sentence
 from ccfem.comparison.headline import TEST_COLUMNS
@@ -280,6 +281,8 @@ def _plotly() -> str:
 
 _FACETS = 16_000
 """Facets that are drawn; a part with more is drawn coarser."""
+_HIGH = 0.995
+"""Share of the surface's nodes whose stress lies within the scale of colours."""
 _SHOWN = 0.06
 """Largest displacement that is drawn, over the size of the part, at the scale that is proposed."""
 
@@ -290,7 +293,7 @@ def part_view(checked: Check, stress: StressField) -> dict[str, Any]:
     Parameters
     ----------
     stress : StressField
-        Of the load case that counts.
+        Of the load case that counts, without fibre.
 
     Returns
     -------
@@ -330,6 +333,9 @@ def part_view(checked: Check, stress: StressField) -> dict[str, Any]:
             "most": most,
             "scale": _round_scale(_SHOWN * size / most) if most > 0.0 else 1.0,
         }
+        mises = von_mises(stress.nodal[used])
+        high = float(np.quantile(mises, _HIGH))
+        view |= {"stress": as_bytes(mises[kept], high), "most_stress": high}
     return view
 
 

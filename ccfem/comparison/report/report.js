@@ -254,12 +254,21 @@ function partScene(part) {
         colorbar: { title: { text: "mm" }, thickness: 10, len: 0.6 } },
     ];
   }
+  function stressed() {
+    words = [];
+    byId("part-said").textContent = `Von Mises stress of the part without fibre; above ${short(part.most_stress)} MPa, ` +
+      "in half a percent of the surface's nodes, the colour stays the same.";
+    const size = Array.from(part.stress, (v) => (v / 254) * part.most_stress);
+    return [{ ...body, x, y, z, intensity: size, flatshading: false, cmin: 0, cmax: part.most_stress,
+      colorscale: SCALES.value.map((c, k) => [k / 4, c]), hoverinfo: "text", text: size.map((v) => short(v) + " MPa"),
+      colorbar: { title: { text: "MPa" }, thickness: 10, len: 0.6 } }];
+  }
   const modes = byId("part-mode");
-  if (!part.moved) modes.options[1].disabled = true;
+  if (!part.moved) modes.options[1].disabled = modes.options[2].disabled = true;
   const draw = () => {
     const moved = modes.value === "moved";
     byId("part-scale-label").hidden = !moved;
-    const traces = moved ? deformed() : setUp();
+    const traces = moved ? deformed() : modes.value === "stress" ? stressed() : setUp();
     return Plotly.react(view, traces, scene(view, words, traces), CONFIG);
   };
   modes.onchange = byId("part-scale").oninput = draw;
