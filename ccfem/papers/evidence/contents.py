@@ -26,6 +26,7 @@ from ccfem.papers.evidence.rows import (
     BREAKING,
     FITTED,
     LOAD,
+    NONE,
     ORDER,
     SLOPE,
     SOLIDS,
@@ -86,7 +87,10 @@ class Study:
             return f"not computed: {row.why}"
         if self.missing(row):
             return f"not run: set {', '.join(self.missing(row))}"
-        paths = "paths of ours" if row.ours else "published paths"
+        if row.specimen == NONE:
+            return "no fibre"
+        rebuilt = "rebuilt" if row.published == "a drawing" else "theirs"
+        paths = "ours" if row.ours else rebuilt
         return paths if row.counted else f"{paths}, not counted"
 
 
@@ -115,23 +119,23 @@ def write_evidence(study: Study, file: Path) -> None:
 
 
 def _number(value: float) -> str:
-    return "" if np.isnan(value) else f"{value:.3g}"
+    return "" if np.isnan(value) else f"{value:#.3g}"
 
 
 def _predicted_cell(made: Prediction) -> str:
     """Predicted value, with its interval where it has one."""
-    text = f"{made.value:.3g}"
+    text = _number(made.value)
     if made.high - made.low < 0.005 * made.value:
         return text
-    return f"{text} ({made.low:.3g} to {made.high:.3g})"
+    return f"{text} ({_number(made.low)} to {_number(made.high)})"
 
 
 def pairs_table(study: Study) -> str:
-    """Rows that have a number or an order, in short: for the screen and the page."""
-    head = ("part", "quantity", "measured", "predicted", "error %", "order", "")
+    """Rows that are predicted, or would be with their data: for the screen and the page."""
+    head = ("part", "quantity", "measured", "predicted", "error %", "order", "paths")
     lines = []
     for row in rows():
-        if not row.kind:
+        if row.why:
             continue
         made = study.predictions.get(row)
         measured = "more" if row.kind == ORDER else _number(row.measured)
@@ -155,19 +159,22 @@ def _aligned(head: tuple[str, ...], lines: list[tuple[str, ...]]) -> str:
 
 
 def absent_table() -> str:
-    """What was measured, or not, and cannot be predicted."""
+    """Write what was measured and cannot be predicted."""
     head = ("paper", "part", "measured", "source", "why not")
-    return table(
-        head, [(r.paper, r.part, r.quantity, r.source, r.why) for r in rows() if not r.kind]
-    )
+    lines = []
+    for row in rows():
+        if row.why:
+            number = "" if np.isnan(row.measured) else f": {row.measured:.3g}"
+            lines.append((row.paper, row.part, row.quantity + number, row.source, row.why))
+    return table(head, lines)
 
 
 def basis_table() -> str:
-    """What each row rests on: source, specimens, what is published, what was taken from where."""
+    """Write the source, specimens, what is published and what was taken from where, row by row."""
     head = ("part", "quantity", "paper", "source", "specimens", "published", "rests on", "remark")
     lines = []
     for row in rows():
-        if row.kind:
+        if not row.why:
             about = (row.part, row.quantity, row.paper, row.source, str(row.tests), row.published)
             lines.append((*about, row.rests_on, row.remark))
     return table(head, lines)
@@ -229,6 +236,14 @@ def quantities(study: Study) -> dict[str, float]:
     return values
 
 
+_PLURAL = {
+    STIFFNESS: "stiffness ratios",
+    BREAKING: "ratios of breaking loads",
+    SLOPE: "slopes",
+    LOAD: "breaking loads",
+}
+
+
 def summary_lines(study: Study) -> str:
     """Medians and orders in words, as a list."""
     whole = study.summary
@@ -242,16 +257,19 @@ def summary_lines(study: Study) -> str:
         said = f"{whole.median(kind):.1f} %{wanted.get(kind, '')} ({len(errors)} values"
         said += f", {min(errors):+.0f} to {max(errors):+.0f} %)"
         if len(every) > len(errors):
-            said += f"; with paths of ours {whole.median(kind + ALSO_OURS):.1f} % ({len(every)})"
+            said += f"; with our paths {whole.median(kind + ALSO_OURS):.1f} % ({len(every)})"
         if kind in whole.left_out:
             said += f"; rho fitted to the other solid {whole.median_left_out(kind):.1f} %"
             said += f" ({len(whole.left_out[kind])})"
-        lines.append(f"median error of {kind}: {said}")
+        lines.append(f"median error of {_PLURAL[kind]}: {said}")
     counts = {name: len(pairs) for name, pairs in whole.orders.items()}
     total = sum(counts.values())
-    lines.append(f"orders of two designs: {counts['right']} of {total} right")
+    if total:
+        theirs = [name for name, pairs in whole.orders.items() for row in pairs if not row.ours]
+        said = f"orders of two designs: {counts['right']} of {total} right"
+        lines.append(f"{said}; of published paths {theirs.count('right')} of {len(theirs)}")
     for name in ("wrong", "tie"):
-        lines += [f"order {name}: {pair}" for pair in whole.orders[name]]
+        lines += [f"order {name}: {row.part}, {row.quantity}" for row in whole.orders[name]]
     return "".join(f"- {line}\n" for line in lines)
 
 
@@ -333,7 +351,7 @@ def _legend(axes: Any, parts: set[str], kinds: tuple[str, ...]) -> None:
     axes.legend(handles=handles, fontsize=7.5, loc="upper left", framealpha=0.9)
 
 
-_HOLLOW = "hollow: paths of ours, or not counted"
+_HOLLOW = "hollow: our paths, or not counted"
 
 
 def _figures(study: Study) -> Mapping[str, "Callable[[], Figure | None]"]:
@@ -344,7 +362,7 @@ def _figures(study: Study) -> Mapping[str, "Callable[[], Figure | None]"]:
 
 
 def introduction(study: Study) -> str:
-    """What the table shows, in words that its figures bear out."""
+    """Say what the table shows, in words that its figures bear out."""
     return f"""\
 # Predicted beside measured
 
@@ -353,8 +371,8 @@ parts, beside what the virtual test predicts. One set of parameters predicts all
 carry tension only, EA/E = 4 mm^2. Intervals reach to a test with fibre mode '{FAR_END}'. Breaking
 loads are predicted to grow as the stiffness does. No value is fitted on a print that it then
 predicts: moduli and strengths of the matrix come from another part's print without fibre. EA/E = 4
-was chosen when the tests of the Loop and of the pulled Shell were known, so these are also predicted
-with EA/E fitted to the other solid alone.
+was chosen when the tests of the Loop and of the pulled Shell were known, so these are predicted with
+EA/E fitted to the other solid alone, too.
 
 {summary_lines(study)}
 """

@@ -28,7 +28,7 @@ from ccfem.body.mesh.patches import Cylinder, PatchRule, Plane, patches_from_rul
 from ccfem.fem.elasticity import StressField, solve
 from ccfem.fem.elasticity.problem import Force, Problem, Support
 from ccfem.fem.materials import isotropic
-from ccfem.judging.virtual_testing.equilibrium import BONDED
+from ccfem.judging.virtual_testing.equilibrium import IN_COMPRESSION, PARTIAL
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strands import cut_strands
 from ccfem.judging.virtual_testing.strength import matrix_peak
@@ -47,7 +47,7 @@ from ccfem.strategies import create
 FANG, ZHANG = "CCFEM_FANG2024", "CCFEM_ZHANG2025"
 """Environment variables that name data of authors, beside `CHEN`."""
 
-FAR_END = BONDED
+FAR_END = PARTIAL
 """Mode of the virtual test at the other end of the intervals; the prediction is tension only."""
 
 RHOS = (2.5, 6.0)
@@ -186,12 +186,13 @@ GAIN_OF_CUBOID = 0.634
 def _cuboid(progress: Progress) -> Tested:
     """Strands along the load add their stiffness to that of the cuboid, exactly.
 
-    Pushed, they add nothing, or at the other end of the interval as much as when pulled.
+    Pushed, they add the share that they carry in compression of what they add when pulled.
     """
+    gain = IN_COMPRESSION[FAR_END] * GAIN_OF_CUBOID
     return Tested(
         (
             {NONE: 1.0, "along the load": 1.0},
-            {NONE: 1.0, "along the load": 1.0 + GAIN_OF_CUBOID},
+            {NONE: 1.0, "along the load": 1.0 + gain},
         )
     )
 

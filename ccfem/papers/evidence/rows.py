@@ -22,7 +22,14 @@ NONE = "none"
 """Print without fibre."""
 
 _DESIGNS = (("zigzag", NONE), ("authors", NONE), ("authors", "zigzag"))
-_NAMES = {"authors": "the authors' paths", NONE: "no fibre"}
+_NAMES = {"authors": "authors'", NONE: "no fibre"}
+_MEASURED = {
+    STIFFNESS: "stiffness",
+    BREAKING: "breaking load",
+    SLOPE: SLOPE,
+    LOAD: LOAD,
+    ORDER: "stiffness and load",
+}
 
 
 @dataclass(frozen=True)
@@ -77,10 +84,10 @@ class Row:
             return self.text
         first = _NAMES.get(self.specimen, self.specimen)
         if not self.over:
-            return f"{self.kind}: {first}"
+            return f"{_MEASURED[self.kind]}, {first}"
         if self.over_part != self.part:
-            return f"{self.kind}: {first}, over {self.over_part}"
-        return f"{self.kind}: {first} / {_NAMES.get(self.over, self.over)}"
+            return f"{_MEASURED[self.kind]}, {first} / {self.over_part}"
+        return f"{_MEASURED[self.kind]}, {first} / {_NAMES.get(self.over, self.over)}"
 
     @property
     def rests_on(self) -> str:
@@ -94,7 +101,7 @@ class Row:
         if NONE == self.specimen == self.over:
             return "nothing: elasticity alone"
         matrix = {SLOPE: "E", LOAD: "E and strength of the matrix"}.get(self.kind)
-        given = f"; {matrix} from {self.scale} without fibre" if matrix else ""
+        given = f"; {matrix} of {self.scale} without fibre" if matrix else ""
         return f"rho {RHO:g} mm^2{given}"
 
     @property
@@ -298,14 +305,14 @@ class Summary:
     ----------
     errors : mapping of kind to tuple of floats
         By kind; those with paths of ours under the kind and ", ours too".
-    orders : mapping of verdict to tuple of str
-        Names of the pairs of designs that are right, wrong or a tie.
+    orders : mapping of verdict to tuple of Row
+        Pairs of designs whose order is "right", "wrong" or a "tie".
     left_out : mapping of kind to tuple of floats
         Errors with rho fitted to the other solids.
     """
 
     errors: Mapping[str, tuple[float, ...]]
-    orders: Mapping[str, tuple[str, ...]]
+    orders: Mapping[str, tuple[Row, ...]]
     left_out: Mapping[str, tuple[float, ...]]
 
     def median(self, kind: str) -> float:
@@ -327,13 +334,13 @@ def summary(judged: Mapping[Row, Prediction]) -> Summary:
     """Sum up the rows that are predicted."""
     errors: dict[str, list[float]] = {}
     left_out: dict[str, list[float]] = {}
-    orders: dict[str, list[str]] = {"right": [], "wrong": [], "tie": []}
+    orders: dict[str, list[Row]] = {"right": [], "wrong": [], "tie": []}
     for row, prediction in judged.items():
         if not row.counted:
             continue
         verdict = order(row, prediction)
         if verdict:
-            orders[verdict].append(f"{row.part}, {row.quantity}")
+            orders[verdict].append(row)
         if row.kind == ORDER:
             continue
         off = error(row, prediction.value)
@@ -345,6 +352,6 @@ def summary(judged: Mapping[Row, Prediction]) -> Summary:
                 left_out.setdefault(row.kind, []).append(without)
     return Summary(
         {kind: tuple(values) for kind, values in errors.items()},
-        {verdict: tuple(names) for verdict, names in orders.items()},
+        {verdict: tuple(pairs) for verdict, pairs in orders.items()},
         {kind: tuple(values) for kind, values in left_out.items()},
     )
