@@ -38,7 +38,7 @@ from ccfem.papers.chen_2021.authors import PATHS
 from ccfem.papers.chen_2021.loop import FOLDER as CHEN, LAYERS_TABLE_2, authors_folder, authors_loop
 from ccfem.papers.chen_2021.virtual_test import authors_paths, spread_paths
 from ccfem.papers.contents import WhenAsked
-from ccfem.papers.evidence.rows import NONE, Tested
+from ccfem.papers.evidence.rows import NONE, PartResult
 from ccfem.paths.planning import plan_to_length
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.slicers.planar import Planar
@@ -62,7 +62,7 @@ _BUILD = (0.0, 1.0, 0.0)
 
 def _tested(
     field: StressField, paths: Mapping[str, Toolpaths], rhos: Sequence[float] = ()
-) -> Tested:
+) -> PartResult:
     """Test prints of a part: tension only, and at the far end of the interval."""
     specimen = Specimen.of(field)
     first: dict[str, float] = {}
@@ -78,7 +78,7 @@ def _tested(
         by_rho[name] = {test.rho: test.ratio, **dict(test.span)}
         force[name] = _highest_force(test)
     index = matrix_peak(field)[0] / specimen.force(np.zeros_like(field.mesh.points))
-    return Tested((first, far), by_rho if rhos else None, index, force)
+    return PartResult((first, far), by_rho if rhos else None, index, force)
 
 
 def _highest_force(test: VirtualTest) -> float:
@@ -145,16 +145,16 @@ def shell_paths(name: str) -> Toolpaths:
     return spread_paths(authors_folder() / "Shell" / file, _SHELL_LAYERS[name])
 
 
-def _loop(progress: Progress) -> Tested:
+def _loop(progress: Progress) -> PartResult:
     paths = {"zigzag": authors_paths("zigzag"), "authors": authors_paths("ours")}
     return _tested(solve(authors_loop().problem)["pull"], paths, RHOS)
 
 
-def _shell_pulled(progress: Progress) -> Tested:
+def _shell_pulled(progress: Progress) -> PartResult:
     return _tested(shell_field(), {name: shell_paths(name) for name in _SHELL_LAYERS}, RHOS)
 
 
-def _shell_pushed(progress: Progress) -> Tested:
+def _shell_pushed(progress: Progress) -> PartResult:
     """Test the zigzag, and isocurves of ours for this load, as long as the authors' paths."""
     field = shell_field(pushed=True)
     layers = Planar(count=LAYERS_TABLE_2).cut(field.mesh, _BUILD)
@@ -164,7 +164,7 @@ def _shell_pushed(progress: Progress) -> Tested:
     return _tested(field, {"zigzag": shell_paths("zigzag"), "authors": planned.toolpaths}, RHOS)
 
 
-def _bar(progress: Progress) -> Tested:
+def _bar(progress: Progress) -> PartResult:
     rules = {"support": Plane("x", "min"), "load": Plane("x", "max")}
     field = chen_field("bar", "Bar.tet", rules, np.array([1000.0, 0.0, 0.0]))
     folder = authors_folder() / "bar"
@@ -183,13 +183,13 @@ GAIN_OF_CUBOID = 0.634
 """Gain of the breaking load of the cuboid that is pulled (figure 2 a), which sets its fibre."""
 
 
-def _cuboid(progress: Progress) -> Tested:
-    """Strands along the load add their stiffness to that of the cuboid, exactly.
+def _cuboid(progress: Progress) -> PartResult:
+    """Strands spread evenly along the load add their stiffness to that of the cuboid, exactly.
 
     Pushed, they add the share that they carry in compression of what they add when pulled.
     """
     gain = IN_COMPRESSION[FAR_END] * GAIN_OF_CUBOID
-    return Tested(
+    return PartResult(
         (
             {NONE: 1.0, "along the load": 1.0},
             {NONE: 1.0, "along the load": 1.0 + gain},
@@ -203,23 +203,21 @@ def _cuboid(progress: Progress) -> Tested:
 _SHARES = (0.6, 0.55, 0.65)
 """Share of the box that the optimised beam fills: the paper's, and variations of its drawing."""
 
-_PRINTED = ("grid 45", "concentric", "mat", "mps")
 
-
-def _beam(progress: Progress) -> Tested:
+def _beam(progress: Progress) -> PartResult:
     from ccfem.papers.plocher_2022.plates import optimised_beam
-    from ccfem.papers.plocher_2022.study import PATTERNS, run_case
+    from ccfem.papers.plocher_2022.study import PATTERNS, PRINTED, run_case
 
     readings = []
     for k, share in enumerate(_SHARES):
         progress(f"beam that fills {share:g} of its box", k / len(_SHARES))
         plate = optimised_beam(volume_fraction=share)
-        case = run_case(plate, {name: PATTERNS[name] for name in _PRINTED})
+        case = run_case(plate, {name: PATTERNS[name] for name in PRINTED})
         # Under one load stiffnesses are to each other as the energies are the other way round.
-        stiffness = {name: 1.0 / case.value(name, "energy_S") for name in _PRINTED}
+        stiffness = {name: 1.0 / case.value(name, "energy_S") for name in PRINTED}
         ends = {"stiffest": max(stiffness.values()), "softest": min(stiffness.values())}
         readings.append({**stiffness, **ends})
-    return Tested(tuple(readings))
+    return PartResult(tuple(readings))
 
 
 # Fang et al. 2024 and Zhang et al. 2025.
@@ -238,7 +236,7 @@ def _curved() -> Toolpaths:
     return authors_strands(authors_layers(_bracket()))
 
 
-def _fang_bracket(progress: Progress) -> Tested:
+def _fang_bracket(progress: Progress) -> PartResult:
     from ccfem.papers.fang_2024.strength import COUNTS, FIBRE as LENGTH
 
     field, curved = _bracket(), _curved()
@@ -254,7 +252,7 @@ def _fang_bracket(progress: Progress) -> Tested:
     return _tested(field, paths)
 
 
-def _zhang_bracket(progress: Progress) -> Tested:
+def _zhang_bracket(progress: Progress) -> PartResult:
     folder = Path(os.environ[ZHANG]) / "T-bracket" / "StripPath"
     return _tested(_bracket(), {"curved layers": _curved(), "dense": read_strips(folder)})
 
@@ -298,7 +296,7 @@ def read_strips(folder: Path) -> Toolpaths:
 class Part:
     """How a part is tested, and the environment variables that must name the data for it."""
 
-    test: Callable[[Progress], Tested]
+    test: Callable[[Progress], PartResult]
     needs: tuple[str, ...] = ()
 
     @property
@@ -319,6 +317,6 @@ PARTS = {
 }
 
 
-def parts_tested(progress: Progress) -> Mapping[str, Tested]:
+def parts_tested(progress: Progress) -> Mapping[str, PartResult]:
     """All parts, each tested when it is first asked for."""
     return WhenAsked(tuple(PARTS), lambda name: PARTS[name].test(progress), progress, "testing")

@@ -172,7 +172,7 @@ def measured_of(part: str, specimen: str, kind: str) -> float:
 
 
 @dataclass(frozen=True)
-class Tested:
+class PartResult:
     """A part under its load, as predicted.
 
     Attributes
@@ -204,7 +204,7 @@ class Prediction:
     left_out: float = np.nan
 
 
-def predicted(row: Row, tests: Mapping[str, Tested]) -> Prediction:
+def predicted(row: Row, tests: Mapping[str, PartResult]) -> Prediction:
     """Predict a row from the parts that it needs (`parts_of`)."""
     values = np.array([_value(row, tests, k) for k in range(len(tests[row.part].readings))])
     left_out = np.nan
@@ -215,7 +215,7 @@ def predicted(row: Row, tests: Mapping[str, Tested]) -> Prediction:
     return Prediction(float(values[0]), float(values.min()), float(values.max()), left_out)
 
 
-def _value(row: Row, tests: Mapping[str, Tested], reading: int) -> float:
+def _value(row: Row, tests: Mapping[str, PartResult], reading: int) -> float:
     """Predict with one of the readings of the part."""
     tested = tests[row.part]
     stiffness = tested.readings[reading][row.specimen]
@@ -247,7 +247,7 @@ SOLIDS = {"Loop": "Loop", "Shell, pulled": "Shell", "Shell, pushed": "Shell"}
 FITTED = tuple(SOLIDS)
 
 
-def ratio_at(rho: float, specimen: str, tested: Tested) -> float:
+def ratio_at(rho: float, specimen: str, tested: PartResult) -> float:
     """Stiffness ratio of a print at a rho, mm^2, through those that were tested."""
     if specimen == NONE:
         return 1.0
@@ -257,7 +257,7 @@ def ratio_at(rho: float, specimen: str, tested: Tested) -> float:
     return float(np.exp(np.polyval(curve, np.log(rho))))
 
 
-def fitted_rho(parts: Sequence[str], tests: Mapping[str, Tested]) -> float:
+def fitted_rho(parts: Sequence[str], tests: Mapping[str, PartResult]) -> float:
     """Fit rho, mm^2, to slopes over those without fibre, by least squares of their logarithms.
 
     Only prints whose paths are published count.
