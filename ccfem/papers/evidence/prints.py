@@ -184,7 +184,7 @@ GAIN_OF_CUBOID = 0.634
 
 
 def _cuboid(progress: Progress) -> PartResult:
-    """Strands spread evenly along the load add their stiffness to that of the cuboid, exactly.
+    """Strands along the load add their stiffness to that of the cuboid.
 
     Pushed, they add the share that they carry in compression of what they add when pulled.
     """
