@@ -39,6 +39,7 @@ from ccfem.papers.evidence.rows import (
     STIFFNESS,
     PartResult,
     Prediction,
+    calibrated,
     error,
     fitted_rho,
     measured_of,
@@ -135,6 +136,17 @@ def test_rho_is_fitted_to_the_other_solid_alone():
     changed = {**pushed.by_rho, "authors": dict.fromkeys((2.5, 4.0, 6.0), 9.0)}
     tests["Shell, pushed"] = PartResult(pushed.readings, changed, 0.01)
     assert fitted_rho(["Shell, pushed"], tests) == pytest.approx(3.0, rel=1e-4)
+
+
+def test_a_part_is_calibrated_by_its_zigzag_alone():
+    tests = exact_tests()
+    loop = tests["Loop"]
+    other = {**loop.by_rho, "authors": {2.5: 2.0, 4.0: 2.2, 6.0: 2.4}}
+    tests["Loop"] = PartResult(loop.readings, other, 0.01)
+    rho, ratio = calibrated("Loop", tests)
+    assert rho == pytest.approx(5.0, rel=1e-4)
+    # Between the values at 4 and 6, on a smooth curve.
+    assert 2.29 < ratio < 2.32
 
 
 def test_a_ratio_has_the_interval_of_the_readings():

@@ -17,6 +17,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -100,7 +101,7 @@ _SHELL_LAYERS = {"zigzag": 8, "authors": LAYERS_TABLE_2}
 _SHELL_PUSHED = 35635.0
 """Fibre of the authors' paths for the pushed Shell, mm, in table 2."""
 
-_BARS = {
+_BARS: dict[str, tuple[str, dict[str, Any], float]] = {
     "B, zigzag": ("zigzag", {"turns": "tight"}, 835.2),
     "C, contours": ("concentric", {"turns": "tight"}, 815.4),
     "D, uniform": ("isocurve", {"power": 0.0}, 789.3),

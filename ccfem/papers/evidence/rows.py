@@ -262,12 +262,26 @@ def fitted_rho(parts: Sequence[str], tests: Mapping[str, PartResult]) -> float:
 
     Only prints whose paths are published count.
     """
-    used = [
-        row
-        for row in rows()
-        if row.part in parts and row.kind == STIFFNESS and row.over == NONE != row.specimen
-        if not row.ours
-    ]
+    return _least_misfit(
+        [
+            row
+            for row in rows()
+            if row.part in parts and row.kind == STIFFNESS and row.over == NONE != row.specimen
+            if not row.ours
+        ],
+        tests,
+    )
+
+
+def calibrated(part: str, tests: Mapping[str, PartResult]) -> tuple[float, float]:
+    """Fit rho, mm^2, to the zigzag of a part alone; it, and the ratio of the authors' paths."""
+    used = [row for row in rows() if (row.part, row.kind) == (part, STIFFNESS)]
+    rho = _least_misfit([r for r in used if (r.specimen, r.over) == ("zigzag", NONE)], tests)
+    return rho, ratio_at(rho, "authors", tests[part])
+
+
+def _least_misfit(used: Sequence[Row], tests: Mapping[str, PartResult]) -> float:
+    """Rho, mm^2, with which the ratios of some rows are met best."""
 
     def misfit(rho: float) -> float:
         off = [np.log(ratio_at(rho, r.specimen, tests[r.part]) / r.measured) for r in used]
