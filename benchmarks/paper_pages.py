@@ -53,7 +53,7 @@ def page(paper: str, folder: Path) -> str:
             text = f"## {HEADINGS[name]}\n\n{text}"
         parts.append(text.strip())
     if paper in PICTURES:
-        parts.insert(-1, f"![{named_papers()[paper].title}]({paper}.png)")
+        parts.insert(3 if cited else 2, f"![{named_papers()[paper].title}]({paper}.png)")
         shutil.copy(folder / f"{PICTURES[paper]}.png", PAGES / f"{paper}.png")
     return "\n\n".join(parts) + "\n"
 
