@@ -36,6 +36,15 @@ def test_every_page_gives_the_figures_of_the_published_tests(page):
     assert "one printed part" not in text
 
 
+def test_pages_give_what_calibration_by_a_print_of_the_same_part_buys():
+    text = (ROOT / "docs/papers/evidence.md").read_text(encoding="utf-8")
+    table = text.partition("## With EA/E fitted to one print")[2].partition("\n## ")[0]
+    errors = [int(off) for off in re.findall(r"\(([-+]\d+) %\)", table)]
+    assert errors == [0, 7]
+    for page in ("docs/how_to/calibration.md", "docs/concepts/judging.md"):
+        assert "0 and 7 % off" in " ".join((ROOT / page).read_text(encoding="utf-8").split())
+
+
 def test_the_loop_is_the_one_of_the_paper():
     zigzag, ours, between = PHYSICAL
     assert between == pytest.approx(ours / zigzag, abs=0.005)
