@@ -400,8 +400,8 @@ What these figures are worth:
   pulled Shell were known; a table below predicts these with EA/E fitted to the other solid alone.
 - Absolute slopes are off by as much as the matrix of two prints differs: without a print of the
   part itself, or a coupon, only ratios mean something.
-- Where layers come apart, which the papers saw in the Loop's zigzag and in planar T-brackets, the
-  stiffness says nothing about the breaking load.
+- Where layers come apart, which the papers saw in the Loop's zigzag and in the T-bracket with
+  layers across z, the stiffness says nothing about the breaking load.
 - `authors'` are the stress-oriented paths of Chen et al. "Theirs" are published paths, "ours" plans
   of ccfem for the published load and length of fibre, "rebuilt" is what was made from a drawing.
   Rows that are not counted are left out of medians and orders; the last table says why.
