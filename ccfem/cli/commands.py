@@ -224,6 +224,9 @@ def reproduce(
         return
     with progress_bar(lines=True) as progress:
         made = make(paper, part or "", None if out is None else path_of(out), progress)
+    shown = named_papers()[paper].shown
+    if shown and not part:
+        print((made / shown).read_text(encoding="utf-8"))
     print(made)
     if part:
         print(f"kept; made again only where code or data have changed ({made.parent / KEPT})")
