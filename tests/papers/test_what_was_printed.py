@@ -48,8 +48,13 @@ def test_pages_give_what_calibration_by_a_print_of_the_same_part_buys():
 def test_the_loop_is_the_one_of_the_paper():
     zigzag, ours, between = PHYSICAL
     assert between == pytest.approx(ours / zigzag, abs=0.005)
-    assert "published prints of Chen et al. 2021" in HONEST_PROMISE
-    assert "one specimen each" in HONEST_PROMISE
+    assert "published prints of Chen et al. 2021, one specimen each" in HONEST_PROMISE
+    for kind in ("stiffness ratios", "ratios of breaking loads"):
+        median = float(figure(rf"- median error of {kind}: ([\d.]+) %"))
+        ends = figure(rf"- median error of {kind}: .*?values, ([-+]\d+) to ([-+]\d+) %\)")
+        worst = max(abs(int(end)) for end in ends)
+        for error in (f"{median:.0f} %", f"{worst} %"):
+            assert error in HONEST_PROMISE
     assert PARTS_AT_HAND in (ROOT / "docs/papers/chen_2021.md").read_text(encoding="utf-8")
 
 
