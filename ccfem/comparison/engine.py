@@ -156,7 +156,7 @@ class Solved:
         said = slicer_remarks(chosen, stress)
         stack = tuple(layers)
         about = (strand, case.build, below, propped, said, self.every_layer, self.longest_test)
-        return Part(stress, stack, case.machine, self.cases, *about)
+        return Part(stress, stack, case.machine, self.cases, *about, case.bed)
 
 
 def solved(request: Request, seconds: dict[str, float] | None = None) -> Solved:

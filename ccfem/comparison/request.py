@@ -258,7 +258,7 @@ class Request:
         case = self.case
         (slicing,) = self.slicings.values()
         layers = case.known_layers(slicing.slicer)
-        check_print(case.problem.mesh, case.build, case.machine, layers)
+        check_print(case.problem.mesh, case.build, case.machine, layers, case.bed)
         if self.support and layers:
             check_support(case.problem.mesh, layers, case.machine)
 

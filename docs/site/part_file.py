@@ -11,6 +11,7 @@ from ccfem.cases.part_tables import RULES
 from ccfem.fem.materials import isotropic, material_names, transversely_isotropic
 from ccfem.machine import GcodeProfile, Kinematics, Limits, Machine, Process, SpeedTable
 from ccfem.paths.placement import FibrePlaces, FibreRegion
+from ccfem.printing.bed_layout import BedTable
 
 __all__ = ["part_file_page"]
 
@@ -22,6 +23,7 @@ def part_file_page() -> str:
     parts = (
         f"# Part file\n\n{about}\n\n",
         f"## Keys at the top\n\n{keys(Part)}",
+        f"## Bed `[bed]`\n\n{keys(BedTable)}",
         f"## Material\n\n`material` is one of {names}, or a table.\n\n",
         f"### Isotropic\n\n{keys(isotropic)}",
         f"### Transversely isotropic\n\n{keys(transversely_isotropic)}",

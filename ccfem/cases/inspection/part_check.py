@@ -315,7 +315,7 @@ def check(part: str | os.PathLike[str] | Case, **parameters: Any) -> Check:
         case.check_layers()
         known = case.known_layers()
         mesh, machine = problem.mesh, case.machine
-        refused = refusal(mesh, case.build, machine, known)
+        refused = refusal(mesh, case.build, machine, known, case.bed)
         not_printable = tuple(filter(None, (refused, in_air(mesh, machine, known))))
     fibre = () if case.fibre is None else known
     return Check(

@@ -99,3 +99,37 @@ def test_what_cannot_be_printed_ends_in_one_line(ccfem, machine, message):
     assert err.count("\n") == 1
     assert message in err
     assert not folder.exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--gcode", "--copies", "400"], "400 copies of 60 x 24 mm do not fit on the bed"),
+        (["--gcode", "--centre", "2,2"], "the part needs"),
+        (["--gcode", "--turn", "w=1"], "a turn must be AXIS=DEGREES, as x=90; got 'w=1'"),
+        (["--copies", "2"], "--centre and --copies place a print on the bed: add --gcode"),
+    ],
+)
+def test_a_wrong_place_on_the_bed_ends_in_one_line(ccfem, words, said):
+    code, err, folder = ccfem(PART, *words)
+    assert (code, err.count("\n")) == (2, 1)
+    assert said in err
+    assert not folder.exists()
+
+
+def test_options_and_table_place_copies_and_say_that_all_is_of_all(ccfem, follow):
+    code, err, folder = ccfem(PART, "--gcode", "--copies", "1x2", "--turn", "z=90")
+    assert (code, err) == (0, "")
+    text = (folder / "zigzag.gcode").read_text()
+    seconds = float(re.search(r";TIME:(\d+)", text)[1])
+    run, about = follow(text), json.loads((folder / "results.json").read_text())
+    (total,) = [strategy["total"] for strategy in about["strategies"]]
+    assert len(run.lines(1)) == 2 * total["paths"] + 1  # and the first strand, on its bar
+    assert "; 2 copies, of all of which are fibre, matrix, time and file" in text
+    assert total["whole_print_time"] == pytest.approx(seconds, abs=1)
+    upright = PART.replace("[planform]", "[bed]\nturn = ['x=90']\ncopies = 2\n[planform]")
+    code, _, folder = ccfem(upright, "--gcode", "--force")
+    assert code == 0
+    again = (folder / "zigzag.gcode").read_text()
+    height = float(re.search(r";MAXZ:([\d.]+)", again)[1])
+    assert height == pytest.approx(24.0, abs=1e-3)
