@@ -32,6 +32,7 @@ from ccfem.cli.options import (
     Fibre,
     FibreInAll,
     Force,
+    FromLayer,
     Heights,
     Layers,
     LoadCase,
@@ -40,6 +41,7 @@ from ccfem.cli.options import (
     Out,
     Paths,
     PathsFrame,
+    Pause,
     Pictures,
     PrintedSupport,
     PrintFile,
@@ -501,6 +503,8 @@ def plan(
     support: PrintedSupport = False,
     centre: Centre = None,
     copies: Copies = None,
+    pause: Pause = None,
+    from_layer: FromLayer = 0,
     stress: StressFile = None,
     stress_unit: StressUnit = None,
     stress_array: StressArray = None,
@@ -520,6 +524,7 @@ def plan(
 
     def ask() -> Any:
         from ccfem.comparison.request import LONGEST_TEST, Request, named_strategies
+        from ccfem.printing.course import Course
 
         parameters = parameters_by_strategy(set_ or (), strategy)
         cut = layers_of(layers, heights, slicing)
@@ -533,6 +538,7 @@ def plan(
         )
         if not gcode and not (centre is None and copies is None):
             raise InputError("--centre and --copies place a print on the bed: add --gcode")
+        course = Course(tuple(pause or ()), from_layer)
         bed = bed_table_of(turn, centre, copies)
         part = load(case, set_case, refine, machine, set_machine, set_fibre, bed)
         part, strand = calibrated(part, virtual_test is not False, calibration)
@@ -550,6 +556,7 @@ def plan(
             backend=backend,
             print_plans=gcode,
             support=support,
+            course=course,
             every_layer=every_layer,
             longest_test=LONGEST_TEST if untold else float("inf"),
         )

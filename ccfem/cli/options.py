@@ -94,6 +94,22 @@ Copies = Annotated[
         "--copies", metavar="N|NXxNY", help="Print several in one file, as 4, or 2x3 by X and Y."
     ),
 ]
+Pause = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--pause",
+        metavar="LAYER|MMmm",
+        help="Halt before a layer, as 12, or when a height is printed, as 3.4mm; repeatable.",
+    ),
+]
+FromLayer = Annotated[
+    int,
+    typer.Option(
+        "--from-layer",
+        metavar="N",
+        help="Begin the file at this layer, on what is printed below it; the lowest is 0.",
+    ),
+]
 Force = Annotated[
     bool,
     typer.Option(

@@ -26,6 +26,7 @@ from ccfem.comparison.runs import Run
 from ccfem.comparison.shown import file_stem
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.paths.toolpaths import Toolpaths
+from ccfem.printing.print_totals import PrintTotals
 from ccfem.slicing.layers.layer import curved_layers
 
 if TYPE_CHECKING:
@@ -457,9 +458,20 @@ def _run_record(run: Run) -> dict[str, Any]:
         "seconds": run.seconds,
         "untested": run.untested,
         "total": headline_values(run),
+        "print": None if run.print_totals is None else _print_record(run.print_totals),
         "load_cases": run.cases.values() if run.cases else None,
         "first_failure": vars(run.tested.failure) if run.tested and run.tested.failure else None,
         "first_failure_alternative": _alternative_failure(run),
+    }
+
+
+def _print_record(totals: PrintTotals) -> dict[str, Any]:
+    """Say what a print takes layer by layer, of spools, and what it costs."""
+    return {
+        "layer_seconds": {k: round(taken, 1) for k, taken in totals.by_layer.items()},
+        "spools": [vars(spool) for spool in totals.spools],
+        "cost": dict(totals.cost),
+        "currency": totals.currency,
     }
 
 

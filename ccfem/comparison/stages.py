@@ -39,6 +39,7 @@ from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.bed_layout import AS_IT_STANDS, BedLayout
 from ccfem.printing.before_solving import in_air, refusal
 from ccfem.printing.copies import arranged
+from ccfem.printing.course import WITHOUT_HALT, Course, on_course
 from ccfem.printing.curved_plan import curved_plan
 from ccfem.printing.part_moves import part_moves
 from ccfem.printing.print_plan import plan_print
@@ -86,6 +87,8 @@ class Part:
     build : tuple of 3 floats, optional
     layout : BedLayout
         Turn, place and copies on the bed.
+    course : Course
+        Where a print begins and halts.
     support : SupportLayers, optional
         Printed below curved layers.
     propped : bool
@@ -110,6 +113,7 @@ class Part:
     every_layer: bool = False
     longest_test: float = float("inf")
     layout: BedLayout = AS_IT_STANDS
+    course: Course = WITHOUT_HALT
 
     @property
     def flat_layers(self) -> tuple[Layer, ...]:
@@ -397,13 +401,14 @@ def with_print(run: Run, part: Part) -> Run:
             if curved
             else plan_print(*what, part.propped, spin)
         )
-        plan = arranged(plan, part.layout, part.machine)
+        plan = on_course(arranged(plan, part.layout, part.machine), part.course, part.machine)
         moves = part_moves(plan, part.machine)
     except InputError as error:
         why = "; ".join(filter(None, (str(error), run.why_not)))
         return replace(run, unprinted=str(error), why_not=why)
     share = plan.volume(part.machine) / (plan.copies * float(part.stress.mesh.volumes.sum()))
     totals = print_totals(moves, part.machine)
+    plan = replace(plan, warnings=(*plan.warnings, *totals.words))
     return replace(run, print_plan=plan, moves=moves, print_totals=totals, printed_volume=share)
 
 

@@ -9,11 +9,11 @@ from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, in_brief
 
 EVENTS = (
     *("travel", "lay", "feed", "cut", "tool", "standby", "preheat", "heat", "work"),
-    *("heat bed", "fan", "wait", "layer", "start", "end"),
+    *("heat bed", "fan", "wait", "layer", "start", "end", "pause"),
 )
 """Kinds of rows: moves first, then events during which the nozzle stands still."""
 TRAVEL, LAY, FEED, CUT, TOOL, STANDBY, PREHEAT, HEAT, WORK = range(9)
-HEAT_BED, FAN, WAIT, LAYER, PATH_START, PATH_END = range(9, 15)
+HEAT_BED, FAN, WAIT, LAYER, PATH_START, PATH_END, PAUSE = range(9, 16)
 
 ROLES = ("travel", "contour", "infill", "fibre", "tail", "block", "skirt", "pad", "short")
 """Roles of laid lines: "tail" is fibre after its cut, "short" replaces strands too short to cut."""

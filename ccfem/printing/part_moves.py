@@ -23,6 +23,7 @@ from ccfem.printing.moves import (
     LAYER,
     PATH_END,
     PATH_START,
+    PAUSE,
     PREHEAT,
     STANDBY,
     TOOL,
@@ -41,7 +42,8 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
     """Turn the plan of a part into moves.
 
     Layer by layer: tool changes with their lifts and temperatures, first filament on a block beside
-    the part and on a bar, the skirt, lines of matrix, strands with their cuts.
+    the part and on a bar, the skirt, lines of matrix, strands with their cuts, pauses. Of a plan
+    whose file begins above the lowest layer, the rest of what is laid, at its place.
 
     Parameters
     ----------
@@ -59,7 +61,13 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
     below = 0.0
     for number in np.unique(paths.layer).tolist():
         top, thickness = float(plan.top[number]), float(plan.thickness[number])
+        if number < plan.first:
+            site.printed(top, paths.kind[paths.layer == number] == FIBRE)
+            below = top
+            continue
         begin_layer(recorder, number, top, below, machine)
+        if number in plan.pauses:
+            _pause(recorder, number, machine)
         for k in np.flatnonzero(paths.layer == number).tolist():
             start, end = int(paths.offsets[k]), int(paths.offsets[k + 1])
             line, normals = paths.points[start:end], paths.normals[start:end]
@@ -86,6 +94,17 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
     return moves
 
 
+def _pause(recorder: Recorder, number: int, machine: Machine) -> None:
+    """Halt before a layer, with the carriage parked above all that is printed."""
+    height = recorder.top + machine.process.tool_lift
+    recorder.rise(height)
+    _draw_back(recorder, machine)
+    park = np.array([*machine.gcode.park, height])
+    shift = np.array(machine.gcode.offset[:2]) if recorder.tool == 1 else np.zeros(2)
+    recorder.travel(park + np.append(shift, 0.0), _UP)
+    recorder.note(PAUSE, number)
+
+
 def _speed(below: float, machine: Machine) -> float:
     """Speed of matrix on a layer that lies on this height."""
     slower = machine.process.first_layer_speed if below == 0.0 else 1.0
@@ -103,6 +122,14 @@ class _Site:
     def __init__(self, around: Beside, highest: float | None) -> None:
         self.around, self.height, self.bar = around, 0.0, 0.0
         self.strand, self.highest = around.strand, highest
+
+    def printed(self, top: float, fibre: BoolArray) -> None:
+        """Pass a layer that is printed already, with block and bar; mask of its strands."""
+        if not fibre.all():
+            self.height = max(self.height, top)
+            self.bar = self.bar if self.strand is None else self.height
+        if fibre.any():
+            self.strand = None
 
     def prime(
         self, recorder: Recorder, top: float, first: bool, changed: bool, machine: Machine
@@ -297,15 +324,10 @@ def change_tool(recorder: Recorder, tool: int, top: float, machine: Machine) -> 
     old = recorder.tool
     if tool == old:
         return False
-    process, profile = machine.process, machine.gcode
+    process = machine.process
     if old >= 0:
         recorder.rise(recorder.top + process.tool_lift)
-        if old == 0 and process.tool_retract > recorder.drawn_back:
-            recorder.feed(recorder.drawn_back - process.tool_retract, profile.retract_speed)
-            recorder.drawn_back = process.tool_retract
-        if old == 1 and machine.coextrusion:
-            back = max(process.tool_fibre_retract, recorder.beside_back)
-            recorder.draw_back_beside(back, profile.retract_speed)
+        _draw_back(recorder, machine)
         cool = machine.fibre_standby if old else machine.matrix_standby
         recorder.note(STANDBY, cool, old)
     recorder.tool = tool
@@ -313,6 +335,16 @@ def change_tool(recorder: Recorder, tool: int, top: float, machine: Machine) -> 
     recorder.note(WORK, _working(tool, top, machine))
     recorder.note(FAN, _fan(tool, top, machine))
     return True
+
+
+def _draw_back(recorder: Recorder, machine: Machine) -> None:
+    """Draw matrix back as far as a tool that waits needs."""
+    process, speed = machine.process, machine.gcode.retract_speed
+    if recorder.tool == 0 and process.tool_retract > recorder.drawn_back:
+        recorder.feed(recorder.drawn_back - process.tool_retract, speed)
+        recorder.drawn_back = process.tool_retract
+    if recorder.tool == 1 and machine.coextrusion:
+        recorder.draw_back_beside(max(process.tool_fibre_retract, recorder.beside_back), speed)
 
 
 def line_sizes(heights: FloatArray, room: float, machine: Machine) -> tuple[FloatArray, FloatArray]:

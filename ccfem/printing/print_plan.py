@@ -65,6 +65,10 @@ class PrintPlan:
         layer, in the order chosen, and as it leans.
     copies : int
         How many times the part is printed: all but `warnings` is of all of them.
+    pauses : tuple of int
+        Layers before which the print halts.
+    first : int
+        Layer with which the file begins; those below are printed already.
     """
 
     paths: Toolpaths
@@ -80,6 +84,8 @@ class PrintPlan:
     ended: float = 0.0
     touched: tuple[float, float, float] = (0.0, 0.0, 0.0)
     copies: int = 1
+    pauses: tuple[int, ...] = ()
+    first: int = 0
 
     __repr__ = in_brief
 

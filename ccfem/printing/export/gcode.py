@@ -10,7 +10,7 @@ the path; the rest is dragged out and laid by G1 without E.
 All that happens is decided before, in `ccfem.printing`; here it is only written.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from ccfem.base.whole import whole_file
 from ccfem.machine.kinematics import axis_values
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import FIBRE
+from ccfem.printing.duration import durations
 from ccfem.printing.laid_layer import COORDINATE_DIGITS
 from ccfem.printing.moves import (
     CUT,
@@ -31,6 +32,7 @@ from ccfem.printing.moves import (
     LAYER,
     PATH_END,
     PATH_START,
+    PAUSE,
     ROLES,
     TOOL,
     TRAVEL,
@@ -39,7 +41,7 @@ from ccfem.printing.moves import (
 )
 from ccfem.printing.part_moves import part_moves
 from ccfem.printing.print_plan import PrintPlan
-from ccfem.printing.print_totals import print_totals
+from ccfem.printing.print_totals import layer_seconds, print_totals
 
 _TOGETHER = 100_000
 """Rows that are written at a time: a large print has millions."""
@@ -108,15 +110,17 @@ def gcode_pieces(
     moves: Moves, plan: PrintPlan, machine: Machine, title: str = "", doubts: Sequence[str] = ()
 ) -> Iterator[str]:
     """Yield the text of `gcode_of_moves` piece by piece: that of a large print fills memory."""
-    lines = _Lines(machine, plan)
+    lines = _Lines(machine, plan, _progress(moves, machine))
     axes, values = _axes(moves, machine), {**lines.values}
     start = np.concatenate([axes[:1], axes[:-1]])
     speeds = _speeds(moves, axes, start)
-    warm = machine.process if machine.process.warm_height > 0.0 else None
+    below = float(plan.top[plan.first - 1]) if plan.first else 0.0
+    warm = machine.process if machine.process.warm_height > below else None
     values["bed_temperature"] += warm.warm_bed if warm else 0.0
     values["matrix_temperature"] += warm.warm_matrix if warm else 0.0
     yield "\n".join(gcode_head(moves, plan, machine, title, doubts)) + "\n"
-    lines.fill("start", **values, layers=len(plan.top))
+    first = {"layers": len(plan.top), "layer": plan.first, "height": below}
+    lines.fill("resume" if plan.first else "start", **values, **first)
     moved, first = axes != start, True
     begins = np.isin(moves.event, (TRAVEL, LAY)).argmax() if len(moves) else 0
     moved[begins : begins + 1] = True  # the first move names all axes
@@ -167,11 +171,32 @@ def _speeds(moves: Moves, axes: FloatArray, start: FloatArray) -> FloatArray:
     return np.asarray((moves.speed * share).round(4))
 
 
+def _progress(moves: Moves, machine: Machine) -> dict[int, dict[str, float]]:
+    """Time and share of the print until each layer begins; nothing where no line shows them."""
+    shown = ("{elapsed}", "{percent}", "{minutes}")
+    if not any(field in line for line in machine.gcode.layer for field in shown):
+        return {}
+    seconds = layer_seconds(durations(moves, machine), moves)
+    total, elapsed, progress = sum(seconds.values()), 0.0, {}
+    for number, taken in seconds.items():
+        left = total - elapsed
+        progress[number] = {
+            "elapsed": round(elapsed, 1),
+            "percent": float(100.0 * elapsed // max(total, 1.0)),
+            "minutes": float(round(left / 60.0)),
+        }
+        elapsed += taken
+    return progress
+
+
 class _Lines:
     """Lines of the file so far, and what was said last."""
 
-    def __init__(self, machine: Machine, plan: PrintPlan) -> None:
+    def __init__(
+        self, machine: Machine, plan: PrintPlan, progress: Mapping[int, Mapping[str, float]]
+    ) -> None:
         self.machine, self.profile, self.plan = machine, machine.gcode, plan
+        self.progress = progress
         self.values: dict[str, float] = {
             "bed_temperature": machine.bed_temperature,
             "matrix_temperature": machine.matrix_temperature,
@@ -273,6 +298,8 @@ class _Lines:
             self.fill("cut")
         elif event == WAIT:
             self.lines.append(f"G4 P{1000.0 * value:.10g}")
+        elif event == PAUSE:
+            self.fill("pause", layer=value, number=value + 1.0)
         elif event == TOOL:
             self.fill("tool", tool=tool)
         elif event == FAN:
@@ -289,7 +316,7 @@ class _Lines:
             f";LAYER:{number}",
         ]
         self._said, self._line = ("", "", ""), None
-        self.fill("layer", layer=number, number=number + 1)
+        self.fill("layer", layer=number, number=number + 1, **self.progress.get(number, {}))
 
 
 # The head of a G-code file: how long it takes, how much it needs, where it lies.
@@ -308,7 +335,7 @@ def gcode_head(
         What keeps the plan from being printed as it is, one line each; they come first.
     """
     total = print_totals(moves, machine)
-    strands = plan.paths.of_kind(FIBRE)
+    strands = plan.paths.select((plan.paths.kind == FIBRE) & (plan.paths.layer >= plan.first))
     places = moves.place[moves.event == LAY]
     low, high = places.min(axis=0), places.max(axis=0)
     lines = [
