@@ -4,6 +4,7 @@ It knows the words of four firmwares from their documents and nothing of who wro
 that a firmware does not know is an error.
 """
 
+import cmath
 import math
 import re
 from dataclasses import dataclass, field
@@ -15,14 +16,17 @@ __all__ = ["Change", "Halt", "Run", "Step", "follow"]
 COMMON = {"G0", "G1", "G4", "G21", "G28", "G90", "G91", "G92"}
 COMMON |= {"M73", "M83", "M84", "M106", "M140", "M190", "M400"}
 HEATERS = {"M104", "M109", "M107"}
+ARCS = {"G2", "G3"}
+"""Not in the list of codes of Aura's printer."""
 KNOWN = {
-    "marlin_two_tools": COMMON | HEATERS | {"M280", "M0", "T0", "T1"},
-    "chen2021": COMMON | HEATERS | {"M280", "M0", "T0", "T1"},
+    "marlin_two_tools": COMMON | ARCS | HEATERS | {"M280", "M0", "T0", "T1"},
+    "chen2021": COMMON | ARCS | HEATERS | {"M280", "M0", "T0", "T1"},
     # No M280 and no M218: servos by name, offsets in the macros T0 and T1.
     "klipper": COMMON
+    | ARCS
     | HEATERS
     | {"SET_SERVO", "SET_PRESSURE_ADVANCE", "SET_KINEMATIC_POSITION", "PAUSE", "T0", "T1"},
-    "reprap_duet": COMMON | {"M280", "G10", "M116", "M568", "M572", "M226", "T0", "T1"},
+    "reprap_duet": COMMON | ARCS | {"M280", "G10", "M116", "M568", "M572", "M226", "T0", "T1"},
     "aura_like": COMMON | HEATERS | {"M280", "M1001", "M1002", "M530", "M532", "M0", "T0", "T1"},
 }
 PAUSES = {"M0", "M226", "PAUSE"}
@@ -94,6 +98,7 @@ class Run:
     cuts: list = field(default_factory=list)
     changes: list = field(default_factory=list)
     wrong: list = field(default_factory=list)
+    arcs: int = 0
     halts: list = field(default_factory=list)
     waited: float = 0.0
     head: dict = field(default_factory=dict)
@@ -154,12 +159,15 @@ class _Printer:
         if not words:
             return
         word, given = words[0], _values(words)
-        moves = word in ("G0", "G1")
-        if word not in KNOWN[self.machine] or (moves and not self.letters.issuperset(given)):
+        moves = word in ("G0", "G1", "G2", "G3")
+        letters = self.letters | (set("IJ") if word in ARCS else set())
+        if word not in KNOWN[self.machine] or (moves and not letters.issuperset(given)):
             self.run.wrong.append(f"no {self.machine} knows {line}")
         if word not in KNOWN[self.machine]:
             return
-        if moves:
+        if word in ARCS:
+            self._arc(word == "G3", given, line)
+        elif moves:
             self._move(word == "G0", given, line)
         elif word == "G4":
             self.run.waited += given["P"] / 1000.0
@@ -238,6 +246,24 @@ class _Printer:
         if rapid:
             self.strand, self.cut = "", False
             self.ends += 1
+
+    def _arc(self, counter_clockwise: bool, given: dict[str, float], line: str) -> None:
+        """Go along an arc as firmware does, in chords that leave it by a thousandth of a mm."""
+        x, y = self.place[:2]
+        centre = complex(x + given["I"], y + given["J"])
+        start, end = complex(x, y) - centre, complex(given["X"], given["Y"]) - centre
+        if abs(abs(start) - abs(end)) > 0.05:
+            self.run.wrong.append(f"an arc that does not end on its circle: {line}")
+        turn = (cmath.phase(end / start)) % (2.0 * math.pi)
+        turn -= 0.0 if counter_clockwise else 2.0 * math.pi
+        count = max(math.ceil(abs(turn) / math.sqrt(8e-3 / abs(start))), 2)
+        fed = {letter: given[letter] / count for letter in "EUV" if letter in given}
+        rate = {"F": given["F"]} if "F" in given else {}
+        for k in range(1, count + 1):
+            ray = start * cmath.exp(1j * turn * k / count) + centre
+            place = (ray.real, ray.imag) if k < count else (given["X"], given["Y"])
+            self._move(False, {"X": place[0], "Y": place[1], **fed, **rate}, line)
+        self.run.arcs += 1
 
     def _change(self, new: int) -> None:
         """Change tools; a Duet sets the old one to its standby temperature by itself."""

@@ -127,6 +127,12 @@ class GcodeProfile:
     matrix_angle, matrix_turn : float, degrees
         Direction of the zigzag of the lowest matrix layer, and its turn from one matrix layer to
         the next.
+    arcs : bool
+        Whether curves are written as arcs, G2 and G3, that the firmware of a machine with three
+        axes has to know.
+    arc_tolerance : float, mm
+        Largest distance between an arc and the lines that it replaces; it is at most 0.1 % longer
+        than they are.
     longest_feed : float, mm
         Longest feed in one move. Marlin refuses more than EXTRUDE_MAXLENGTH, by default 200.
     """
@@ -194,6 +200,8 @@ class GcodeProfile:
     feed_speed: float = 10.0
     matrix_angle: float = 45.0
     matrix_turn: float = 45.0
+    arcs: bool = False
+    arc_tolerance: float = 0.02
     longest_feed: float = 190.0
 
     def __post_init__(self) -> None:

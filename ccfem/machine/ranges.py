@@ -82,6 +82,7 @@ RANGES = {
         "matrix_angle": _TURN,
         "matrix_turn": _TURN,
         "park": _PLACE,
+        "arc_tolerance": Range(0.001, 1.0, "mm"),
         "longest_feed": Range(1.0, 100000.0, "mm"),
     },
     "process": {

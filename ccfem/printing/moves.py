@@ -25,6 +25,29 @@ def role(name: str) -> int:
 
 
 @dataclass(frozen=True)
+class Arcs:
+    """Arcs that stand for chains of moves, in their order.
+
+    Attributes
+    ----------
+    first, last : (k,) int arrays
+        Rows of `Moves` from where the arc begins to where it ends, both included.
+    centre : (k, 2) array, mm
+        Rounded to 0.001 mm.
+    sweep : (k,) array, radians
+        Angle that it passes, counter-clockwise from above.
+    """
+
+    first: IntArray
+    last: IntArray
+    centre: FloatArray
+    sweep: FloatArray
+
+    def __post_init__(self) -> None:
+        freeze(self, first=int, last=int, centre=float, sweep=float)
+
+
+@dataclass(frozen=True)
 class Moves:
     """Moves and events of a print, in their order.
 
@@ -50,6 +73,8 @@ class Moves:
     layer : (n,) int array
     strand : (n,) int array
         Number of the strand that is laid; -1 for other rows, and for strands beside the part.
+    arcs : Arcs, optional
+        Chains of rows that firmware goes along as arcs.
     """
 
     event: IntArray
@@ -65,6 +90,7 @@ class Moves:
     role: IntArray
     layer: IntArray
     strand: IntArray
+    arcs: Arcs | None = None
 
     __repr__ = in_brief
 

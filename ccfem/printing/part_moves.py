@@ -10,6 +10,7 @@ from ccfem.geometry.polylines import along_line, line_length, points_along, turn
 from ccfem.machine.machine import Machine
 from ccfem.machine.speeds import step_curvatures, table_speeds
 from ccfem.paths.toolpaths import FIBRE, SUPPORT
+from ccfem.printing.arcs import with_arcs
 from ccfem.printing.beside import Beside, beside
 from ccfem.printing.duration import durations
 from ccfem.printing.laid_layer import COORDINATE_DIGITS
@@ -90,6 +91,8 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
     # Away from the part, before the end of the file moves the carriage home.
     recorder.rise(recorder.top + machine.process.tool_lift)
     moves = preheated(_numbered(recorder.moves()), machine)
+    if machine.gcode.arcs and not machine.kinematics.letters:
+        moves = with_arcs(moves, machine)
     _check_bed(moves, machine)
     return moves
 
@@ -253,6 +256,8 @@ def _with_rows(moves: Moves, places: list[int], values: list[float], tools: list
     by_row = {}
     for field in fields(moves):
         old = getattr(moves, field.name)
+        if old is None:
+            continue
         new = np.zeros((len(places), *old.shape[1:]), dtype=old.dtype)
         at = np.array(places)
         if field.name in ("place", "normal", "layer", "strand"):

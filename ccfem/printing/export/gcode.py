@@ -37,6 +37,7 @@ from ccfem.printing.moves import (
     TOOL,
     TRAVEL,
     WAIT,
+    Arcs,
     Moves,
 )
 from ccfem.printing.part_moves import part_moves
@@ -124,18 +125,31 @@ def gcode_pieces(
     moved, first = axes != start, True
     begins = np.isin(moves.event, (TRAVEL, LAY)).argmax() if len(moves) else 0
     moved[begins : begins + 1] = True  # the first move names all axes
-    of_moves = (moves.event, moves.tool, moves.feed, moves.beside, speeds, moves.amount)
-    of_lines = (moves.role, moves.width, moves.height, moves.strand)
+    arc_of = _arcs_of(moves)
+    centres: list[str] = []
+    if moves.arcs is not None:
+        moved[moves.arcs.last, :2] = True
+        centres = _centres(moves.arcs, moves)
+        feeds = [_summed(column, moves.arcs) for column in (moves.feed, moves.beside)]
+    else:
+        feeds = [moves.feed, moves.beside]
+    of_moves = (moves.event, moves.tool, *feeds, speeds, moves.amount)
+    of_lines = (moves.role, moves.width, moves.height, moves.strand, arc_of)
     for begin in range(0, len(moves), _TOGETHER):
         some = slice(begin, begin + _TOGETHER)
         places = lines.places(axes[some], moved[some], moves.tool[some])
         columns = (column[some].tolist() for column in (*of_moves, *of_lines))
-        for event, tool, feed, beside, speed, value, role, width, height, strand, place in zip(
+        for event, tool, feed, beside, speed, value, role, width, height, strand, arc, place in zip(
             *columns, places, strict=True
         ):
+            if arc == _IN_ARC:
+                continue
             if event in (TRAVEL, LAY):
                 if event == LAY:
                     lines.say(role, width, height)
+                if arc >= 0:
+                    lines.arc(centres[arc], tool, place, feed, beside, speed)
+                    continue
                 lines.move(event, tool, place, feed, beside, speed, first)
                 first = False
             elif event == FEED:
@@ -146,6 +160,40 @@ def gcode_pieces(
         lines.lines.clear()
     lines.fill("end", layers=len(plan.top))
     yield "\n".join(lines.lines) + "\n"
+
+
+_IN_ARC, _NO_ARC = -2, -1
+"""A row that its arc stands for, and one of no arc; others have the number of the arc they end."""
+
+
+def _arcs_of(moves: Moves) -> IntArray:
+    """Find the number of the arc that ends with each row (n,), `_IN_ARC` or `_NO_ARC`."""
+    arc_of = np.full(len(moves), _NO_ARC)
+    if moves.arcs is not None:
+        first, last = moves.arcs.first, moves.arcs.last
+        # Arcs do not overlap: rows within one are those that began and did not end.
+        change = np.zeros(len(moves) + 1, dtype=np.int64)
+        change[first] += 1
+        change[last] -= 1
+        arc_of[np.cumsum(change[:-1]) > 0] = _IN_ARC
+        arc_of[last] = np.arange(len(last))
+    return arc_of
+
+
+def _summed(column: FloatArray, arcs: Arcs) -> FloatArray:
+    """Values of rows, at the end of each arc that of all its rows."""
+    until = np.append(0.0, np.cumsum(column))
+    summed = np.array(column)
+    summed[arcs.last] = until[arcs.last + 1] - until[arcs.first]
+    return summed.round(_FEED_DIGITS)
+
+
+def _centres(arcs: Arcs, moves: Moves) -> list[str]:
+    """Command of each arc with its centre from its start, {} for the place where it ends."""
+    off = (arcs.centre - moves.start[arcs.first, :2]).round(COORDINATE_DIGITS) + 0.0
+    words = f"{{}} I%.{COORDINATE_DIGITS}f J%.{COORDINATE_DIGITS}f"
+    commands = np.where(arcs.sweep > 0.0, "G3 ", "G2 ").tolist()
+    return [kind + words % (x, y) for kind, (x, y) in zip(commands, off.tolist(), strict=True)]
 
 
 def _axes(moves: Moves, machine: Machine) -> FloatArray:
@@ -264,6 +312,13 @@ class _Lines:
         axes = self._fed(tool, feed, beside) if event == LAY else ""
         rapid = "G0" if event == TRAVEL else "G1"
         self.lines.append(f"{rapid} {place}{axes}{self._at(speed)}")
+
+    def arc(
+        self, words: str, tool: int, place: str, feed: float, beside: float, speed: float
+    ) -> None:
+        """Add an arc to a place."""
+        fed = self._fed(tool, feed, beside)
+        self.lines.append(f"{words.format(place)}{fed}{self._at(speed)}")
 
     def feed(self, tool: int, feed: float, beside: float, speed: float) -> None:
         """Add a feed without a move."""
