@@ -1,6 +1,7 @@
 """From a plan to all actions of the machine: one sequence for every file that is written."""
 
 from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -253,7 +254,7 @@ def _with_rows(moves: Moves, places: list[int], values: list[float], tools: list
     """Insert rows PREHEAT before the rows at the given places."""
     if not places:
         return moves
-    by_row = {}
+    by_row: dict[str, Any] = {}
     for field in fields(moves):
         old = getattr(moves, field.name)
         if old is None:

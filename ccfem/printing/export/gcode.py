@@ -120,8 +120,8 @@ def gcode_pieces(
     values["bed_temperature"] += warm.warm_bed if warm else 0.0
     values["matrix_temperature"] += warm.warm_matrix if warm else 0.0
     yield "\n".join(gcode_head(moves, plan, machine, title, doubts)) + "\n"
-    first = {"layers": len(plan.top), "layer": plan.first, "height": below}
-    lines.fill("resume" if plan.first else "start", **values, **first)
+    values |= {"layers": len(plan.top), "layer": plan.first, "height": below}
+    lines.fill("resume" if plan.first else "start", **values)
     moved, first = axes != start, True
     begins = np.isin(moves.event, (TRAVEL, LAY)).argmax() if len(moves) else 0
     moved[begins : begins + 1] = True  # the first move names all axes
