@@ -68,7 +68,9 @@ def _direction(case: Case) -> str:
     if not quick or not isinstance(slicing, Planar) or slicing.axis != "build":
         return ""
     name = next(iter(problem.loads))
-    rough = replace(problem, order=problem.mesh.order, loads={name: problem.loads[name]})
+    rough = replace(
+        problem, order=1 if problem.mesh.order == 1 else 2, loads={name: problem.loads[name]}
+    )
     held = {k: v for k, v in problem.case_supports.items() if k == name}
     rough = replace(rough, combinations={}, case_supports=held)
     try:

@@ -26,7 +26,6 @@ from ccfem.comparison.runs import Run
 from ccfem.comparison.shown import file_stem
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.printing.print_totals import PrintTotals
 from ccfem.slicing.layers.layer import curved_layers
 
 if TYPE_CHECKING:
@@ -458,16 +457,22 @@ def _run_record(run: Run) -> dict[str, Any]:
         "seconds": run.seconds,
         "untested": run.untested,
         "total": headline_values(run),
-        "print": None if run.print_totals is None else _print_record(run.print_totals),
+        "print": _print_record(run),
         "load_cases": run.cases.values() if run.cases else None,
         "first_failure": vars(run.tested.failure) if run.tested and run.tested.failure else None,
         "first_failure_alternative": _alternative_failure(run),
     }
 
 
-def _print_record(totals: PrintTotals) -> dict[str, Any]:
-    """Say what a print takes layer by layer, of spools, and what it costs."""
+def _print_record(run: Run) -> dict[str, Any] | None:
+    """Say of how many copies a print is, what it takes by layer and of spools, and its cost."""
+    totals, plan = run.print_totals, run.print_plan
+    if totals is None or plan is None:
+        return None
     return {
+        "copies": plan.copies,
+        "pauses": list(plan.pauses),
+        "first_layer": plan.first,
         "layer_seconds": {k: round(taken, 1) for k, taken in totals.by_layer.items()},
         "spools": [vars(spool) for spool in totals.spools],
         "cost": dict(totals.cost),

@@ -41,19 +41,19 @@ def with_arcs(moves: Moves, machine: Machine) -> Moves:
     chain = np.flatnonzero(np.append(laying[:1], laying[1:] & ~same))
     ends = np.append(same, False)
     last = np.flatnonzero(laying & ~ends)
-    found: list[tuple[int, int, float, float, float]] = []
+    arcs_of_chains: list[tuple[int, int, float, float, float]] = []
     for begin, end in zip(chain.tolist(), last.tolist(), strict=True):
         if end - begin + 1 < _LEAST:
             continue
         rows = slice(begin, end + 1)
         points = np.concatenate([starts[begin : begin + 1], moves.place[rows, :2]])
-        found += [
+        arcs_of_chains += [
             (begin + arc.first, begin + arc.last, *arc.circle)
             for arc in _chain_arcs(points, moves.speed[rows], moves.feed[rows], machine.gcode)
         ]
-    if not found:
+    if not arcs_of_chains:
         return moves
-    table = np.array(found)
+    table = np.array(arcs_of_chains)
     arcs = Arcs(table[:, 0], table[:, 1], table[:, 2:4], table[:, 4])
     return _fed_along(moves, arcs)
 

@@ -60,10 +60,13 @@ def test_arcs_lay_the_same_on_the_same_way(both):
     assert round_.arcs > 30
     assert round_.wrong == []
     assert len(text) < 0.75 * len(bare)
-    one, other = Lines.of(straight), Lines.of(round_)
+    bare_lines, arc_lines = Lines.of(straight), Lines.of(round_)
     for tool in (0, 1):
         for values in ("length", "fed"):
-            sums = [getattr(of, values)[of.lays & (of.tool == tool)].sum() for of in (one, other)]
+            sums = [
+                getattr(of, values)[of.lays & (of.tool == tool)].sum()
+                for of in (bare_lines, arc_lines)
+            ]
             assert sums[1] == pytest.approx(sums[0], rel=1e-3)
     # Lines between the same ways through the air, one by one, either way.
     drawn = [list(of_steps(run)) for run in (straight, round_)]

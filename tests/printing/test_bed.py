@@ -52,8 +52,14 @@ def test_the_table_of_a_turned_part_reads_as_the_same():
     assert layout.count == 6
 
 
-@pytest.mark.parametrize("turns", [["z=37"], ["x=90"], ["y=90", "z=-20"]])
-@pytest.mark.parametrize("name", ["marlin_two_tools", "aura_like"])
+@pytest.mark.parametrize(
+    ("turns", "name"),
+    [
+        (["z=37"], "marlin_two_tools"),
+        (["x=90"], "aura_like"),
+        (["y=90", "z=-20"], "marlin_two_tools"),
+    ],
+)
 def test_a_turned_part_prints_as_one_turned_by_hand(turns, name):
     machine = updated(Machine(), machine_table(name), {"matrix_height": 0.4})
     mesh = box_mesh((50.0, 4.0, 46.0), (4, 1, 4))

@@ -146,6 +146,7 @@ def test_pauses_spools_and_costs_are_in_file_and_record(ccfem):
     text = (folder / "zigzag.gcode").read_text()
     (record,) = json.loads((folder / "results.json").read_text())["strategies"]
     printed = record["print"]
+    assert (printed["copies"], printed["pauses"], printed["first_layer"]) == (1, [2], 1)
     seconds = float(re.search(r";TIME:(\d+)", text)[1])
     assert sum(printed["layer_seconds"].values()) == pytest.approx(seconds, abs=1.0)
     assert min(map(int, printed["layer_seconds"])) == 1
