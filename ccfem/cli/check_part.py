@@ -69,10 +69,12 @@ def _direction(case: Case) -> str:
         return ""
     name = next(iter(problem.loads))
     rough = replace(
-        problem, order=1 if problem.mesh.order == 1 else 2, loads={name: problem.loads[name]}
+        problem,
+        order=1 if problem.mesh.order == 1 else 2,
+        loads={name: problem.loads[name]},
+        combinations={},
+        case_supports={k: v for k, v in problem.case_supports.items() if k == name},
     )
-    held = {k: v for k, v in problem.case_supports.items() if k == name}
-    rough = replace(rough, combinations={}, case_supports=held)
     try:
         stress = solve(rough)[name]
     except SolveError as error:
