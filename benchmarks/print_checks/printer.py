@@ -25,7 +25,15 @@ KNOWN = {
     "klipper": COMMON
     | ARCS
     | HEATERS
-    | {"SET_SERVO", "SET_PRESSURE_ADVANCE", "SET_KINEMATIC_POSITION", "PAUSE", "T0", "T1"},
+    | {
+        "SET_SERVO",
+        "SET_PRESSURE_ADVANCE",
+        "SET_KINEMATIC_POSITION",
+        "SET_IDLE_TIMEOUT",
+        "PAUSE",
+        "T0",
+        "T1",
+    },
     "reprap_duet": COMMON | ARCS | {"M280", "G10", "M116", "M568", "M572", "M226", "T0", "T1"},
     "aura_like": COMMON | HEATERS | {"M280", "M1001", "M1002", "M530", "M532", "M0", "T0", "T1"},
 }

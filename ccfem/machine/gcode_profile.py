@@ -171,7 +171,7 @@ class GcodeProfile:
     path_start: tuple[str, ...] = ()
     path_end: tuple[str, ...] = ()
     layer: tuple[str, ...] = ()
-    pause: tuple[str, ...] = ("M0",)
+    pause: tuple[str, ...] = ("M84 S0 ; motors stay on", "M0")
     resume: tuple[str, ...] = (
         "G21 ; mm",
         "G92 Z{height} ; the nozzle touches what is printed",
