@@ -4,6 +4,7 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
+import shapely
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
@@ -109,14 +110,29 @@ def outline(low: FloatArray, high: FloatArray, layer: float, fibre: bool) -> Pri
 
 
 def _borders(plan: PrintPlan, machine: Machine) -> PrintPlan:
-    """Plan that needs as much room as another, with little in it: its first layer and its box."""
+    """Plan that needs as much room as another, with little in it.
+
+    Rings of its first layer, for the brim; a line through all that is farthest out in it, for the
+    skirt; and the box round all, for what stands beside.
+    """
     paths = plan.paths
     fibre = paths.of_kind(FIBRE)
     first = paths.on_layer(int(paths.layer.min()))
+    hull = shapely.get_coordinates(shapely.convex_hull(shapely.MultiPoint(first.points)))[:-1]
+    border = np.column_stack([hull, np.full(len(hull), first.points[0, 2])])
+    skirt = Toolpaths(
+        points=border,
+        normals=np.tile(_UP, (len(border), 1)),
+        offsets=np.array([0, len(border)]),
+        layer=np.zeros(1, dtype=np.int64),
+        kind=np.full(1, MATRIX),
+        closed=np.zeros(1, dtype=bool),
+    )
+    rings = first.select(first.closed)
     matrix = np.setdiff1d(paths.layer, fibre.layer)
     least = float(plan.thickness[matrix].min(initial=machine.highest_line))
     box = outline(paths.points.min(axis=0), paths.points.max(axis=0), least, False).paths
-    parts = [replace(first, layer=0 * first.layer), replace(box, layer=box.layer + 1)]
+    parts = [skirt, replace(rings, layer=0 * rings.layer), replace(box, layer=box.layer + 1)]
     if len(fibre):
         ends = (fibre.points.min(axis=0), fibre.points.max(axis=0), least, True)
         inner = outline(*ends).paths.of_kind(FIBRE)
@@ -152,8 +168,10 @@ def _shift(
 
     Without a centre that is wanted it is the least one.
     """
-    low, high = _reach(_repeated(alone, places), machine)
     bed = np.array(machine.gcode.bed[:2])
+    if (np.ptp(places, axis=0) + np.ptp(alone.paths.points[:, :2], axis=0) > bed).any():
+        return None
+    low, high = _reach(_repeated(alone, places), machine)
     if layout.centre is not None:
         least = most = np.array(layout.centre) - 0.5 * bed
     else:
