@@ -69,7 +69,7 @@ from ccfem.printing.course import WITHOUT_HALT, Course
 from ccfem.printing.line_counts import check_strands
 from ccfem.printing.support import SupportLayers, slice_with_support
 from ccfem.slicing.layers.layer import curved_layers
-from ccfem.slicing.layers.slicer import Slicer, slicer_remarks
+from ccfem.slicing.layers.slicer import Slicer, has_field, slicer_remarks
 from ccfem.strategies.fibre_aware.upper_bound import UpperBound, upper_bound
 
 _REPLACED = {
@@ -138,7 +138,7 @@ class Solved:
         case, stress = self.case, self.planned_on
         chosen = case.slicing if slicer is None else slicer
         below: SupportLayers | None = None
-        if support and hasattr(chosen, "slice"):
+        if support and has_field(chosen):
             layers, below = slice_with_support(chosen, stress, case.build, case.machine)
             if case.fibre is not None:
                 layers = case.fibre.on(layers, stress.mesh, case.machine)
@@ -568,6 +568,7 @@ def compare(
     slicings: Mapping[str, Slicer] | Sequence[str | Slicer] | None = None,
     fibre: float | None = None,
     stiffness: str | None = None,
+    course: Course = WITHOUT_HALT,
     **unknown: Any,
 ) -> Comparison:
     """Solve a case once, and plan and evaluate each strategy on it.
@@ -598,7 +599,7 @@ def compare(
     stiffness : str, optional
         Lay the least fibre that reaches it, by one strategy: a ratio to the stiffness of the part
         without fibre as ``"2.5"``, or ``"1200N/mm"``.
-    strand, load_case, stress, backend, curve, print_plans, support
+    strand, load_case, stress, backend, curve, print_plans, support, course
         As in `Request`.
     progress : callable, optional
         Receives what is being done, and the share of the work that is done.
@@ -630,5 +631,6 @@ def compare(
         curve=curve,
         print_plans=print_plans,
         support=support,
+        course=course,
     )
     return answer(request, progress)

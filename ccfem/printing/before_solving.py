@@ -23,6 +23,7 @@ def check_print(
     machine: Machine,
     layers: Sequence[Layer] = (),
     layout: BedLayout = AS_IT_STANDS,
+    curved: bool = False,
 ) -> None:
     """Refuse a print that its machine cannot make, whatever the paths are.
 
@@ -37,6 +38,8 @@ def check_print(
         stands upright, as its layers lie.
     layout : BedLayout
         Turn, place and copies on the bed.
+    curved : bool
+        Whether layers are curved, or will be.
 
     Raises
     ------
@@ -49,7 +52,7 @@ def check_print(
     up = _upwards(build, layers)
     check_machine(machine)
     check_matrix_lines(mesh, up, machine)
-    check_copies(layout, bool(layers))
+    check_copies(layout, not curved)
     if not layers:
         return
     _check_room(mesh, up, machine, layout)
@@ -81,10 +84,11 @@ def refusal(
     machine: Machine,
     layers: Sequence[Layer] = (),
     layout: BedLayout = AS_IT_STANDS,
+    curved: bool = False,
 ) -> str:
     """Say why `check_print` refuses a print; empty where it does not."""
     try:
-        check_print(mesh, build, machine, layers, layout)
+        check_print(mesh, build, machine, layers, layout, curved)
     except InputError as error:
         return str(error)
     return ""

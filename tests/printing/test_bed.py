@@ -12,6 +12,8 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases import read
+from ccfem.cases.inspection import check
+from ccfem.comparison.request import Request
 from ccfem.machine import Machine, machine_names, machine_table, updated
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.bed_layout import BedLayout, bed_of, bed_table, turned
@@ -189,7 +191,12 @@ def test_a_part_stands_where_it_is_wanted():
 
 def test_copies_of_curved_layers_are_refused_in_one_line():
     case = read("arm_bracket").on_bed({"copies": "2"})
-    said = refusal(case.problem.mesh, case.build, case.machine, (), case.bed)
+    said = refusal(case.problem.mesh, case.build, case.machine, (), case.bed, curved=True)
+    assert check(case).not_printable == (said,)
+    with pytest.raises(InputError, match="flat layers"):
+        Request.of(case, ["fiso"], print_plans=True)
+    # Of a slicer of one's making nothing is known before the solve.
+    Request.of(case, ["fiso"], lambda *_: (), print_plans=True)
     assert "flat layers" in said
     assert "\n" not in said
 
