@@ -124,7 +124,7 @@ class Part:
     def refusal(self) -> str:
         """Why no print of it is planned, whatever its paths are; else empty."""
         build = self.build or (0.0, 0.0, 1.0)
-        about = (self.machine, self.flat_layers, self.layout, curved_layers(self.layers))
+        about = (self.machine, self.flat_layers, self.layout, bool(curved_layers(self.layers)))
         return refusal(self.stress.mesh, build, *about)
 
     @cached_property

@@ -1,5 +1,6 @@
 """Copies of a part on the bed, printed together layer by layer, and where they stand."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from itertools import product
 
@@ -43,9 +44,8 @@ def arranged(plan: PrintPlan, layout: BedLayout, machine: Machine) -> PrintPlan:
     if layout.count == 1:
         if layout.centre is None:
             return plan
-        moved = _repeated(plan, (np.array(layout.centre) - centre)[None])
-        check_bed(moved, machine)
-        return moved
+        _check_centre(plan, layout.centre, machine)
+        return _repeated(plan, (np.array(layout.centre) - centre)[None])
     check_copies(layout, bool((plan.paths.normals[:, 2] > 1.0 - 1e-9).all()))
     alone = _borders(plan, machine)
     for grid in _grids(layout):
@@ -60,13 +60,34 @@ def arranged(plan: PrintPlan, layout: BedLayout, machine: Machine) -> PrintPlan:
             check_bed(copied, machine)
             return copied
     most = _most(alone, layout, machine)
+    where = "" if layout.centre is None else f"their middle at {_place(layout.centre)}, "
     size, bed = np.ptp(alone.paths.points, axis=0) + machine.matrix_width, machine.gcode.bed
     raise InputError(
         f"{' x '.join(str(number) for number in layout.copies)} copies of {size[0]:.4g} x "
         f"{size[1]:.4g} mm do not fit on the bed of {bed[0]:g} x {bed[1]:g} mm, "
-        f"{_gap(machine):.3g} mm apart and with what is printed beside them; "
+        f"{where}{_gap(machine):.3g} mm apart and with what is printed beside them; "
         f"{most or 'none'} fit{'s' * (most < 2)}: ask for fewer, or turn the part (--turn)"
     )
+
+
+def _check_centre(plan: PrintPlan, place: tuple[float, float], machine: Machine) -> None:
+    """Refuse a place of a part that is in the middle of the bed so far."""
+    bed = np.array(machine.gcode.bed[:2])
+    low, high = _reach(plan, machine)
+    least, most = 0.5 * bed - low, 1.5 * bed - high
+    if (least > most + _ROUNDING).any():
+        return  # it has no place at all, which is said when it is printed
+    if (place < least - _ROUNDING).any() or (place > most + _ROUNDING).any():
+        raise InputError(
+            f"with its middle at {_place(place)} mm the part, or what is printed beside it, lies "
+            f"beside the bed of {_place(bed)} mm: choose X from {least[0]:.4g} to {most[0]:.4g} "
+            f"and Y from {least[1]:.4g} to {most[1]:.4g}"
+        )
+
+
+def _place(place: Iterable[float]) -> str:
+    """Two numbers as they are said."""
+    return ", ".join(f"{value:.6g}" for value in place)
 
 
 def check_copies(layout: BedLayout, flat: bool) -> None:

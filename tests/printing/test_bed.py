@@ -1,5 +1,6 @@
 """Parts that are turned on the bed, and copies of them, read back from the file."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -183,6 +184,12 @@ def test_a_part_stands_where_it_is_wanted():
         assert "mm" in refusal(mesh, (0.0, 0.0, 1.0), machine, layers, layout)
         with pytest.raises(InputError):
             arranged(plan, layout, machine)
+    # The range that is named is the range that is taken, to 0.1 mm.
+    said = refusal(mesh, (0.0, 0.0, 1.0), machine, layers, BedLayout(centre=(1.0, 1.0)))
+    least, most, *_ = (float(x) for x in re.findall(r"[\d.]+(?= to| and Y)", said))
+    for x, good in ((least + 0.1, True), (least - 0.1, False), (most - 0.1, True)):
+        layout = BedLayout(centre=(x, 150.0))
+        assert (refusal(mesh, (0.0, 0.0, 1.0), machine, layers, layout) == "") == good
     # Copies that fit beside the block only out of the middle stand aside.
     wide, *_, long = box_plan(machine, (85.0, 40.0, 2.0))
     part_moves(arranged(long, BedLayout(copies=(3, 1)), machine), machine)

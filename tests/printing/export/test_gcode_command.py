@@ -105,7 +105,7 @@ def test_what_cannot_be_printed_ends_in_one_line(ccfem, machine, message):
     ("words", "said"),
     [
         (["--gcode", "--copies", "400"], "400 copies of 60 x 24 mm do not fit on the bed"),
-        (["--gcode", "--centre", "2,2"], "the part needs"),
+        (["--gcode", "--centre", "2,2"], "with its middle at 2, 2 mm the part, or what is printed"),
         (["--gcode", "--turn", "w=1"], "a turn must be AXIS=DEGREES, as x=90; got 'w=1'"),
         (["--gcode", "--pause", "900"], "a pause must lie within the print, layer 1 to"),
         (["--gcode", "--pause", "3 cm"], "a pause must be a layer, as 12, or a height, as 3.4mm"),
