@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -16,6 +16,7 @@ from ccfem.fem.elasticity.stress_field import PartStress
 from ccfem.fem.elasticity.support_kinds import AnySupport
 from ccfem.machine.machine import Machine
 from ccfem.paths.placement.fibre_places import FibrePlaces
+from ccfem.printing.bed_layout import AS_IT_STANDS, BedLayout, bed_of
 from ccfem.printing.line_counts import MOST_STRANDS, about_strands, check_strands
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.slicer import Slicer
@@ -35,6 +36,8 @@ class Case(Shown):
         One line for tables and reports.
     build : tuple of 3 floats, default z
         Build direction in the frame of the mesh.
+    bed : BedLayout
+        How the part, or copies of it, are turned and placed on the bed.
     slicing : Slicer, default 12 flat layers
         Cuts the part into layers of fibre.
     parameters : mapping of strategy name to parameters
@@ -69,6 +72,7 @@ class Case(Shown):
     fibre: FibrePlaces | None = None
     weights: Mapping[str, float] = field(default_factory=dict)
     body: BodyFaces | None = None
+    bed: BedLayout = AS_IT_STANDS
 
     def __repr__(self) -> str:
         return f"Case {self.name}: {self.title}"
@@ -79,6 +83,15 @@ class Case(Shown):
             check_known("load case", name, self.problem.cases)
             check_number(f"weight of load case '{name}'", weight, above=0.0)
         check_name(self.name, self.title)
+
+    def on_bed(self, table: Mapping[str, object]) -> "Case":
+        """Case placed on the bed otherwise, by keys of a table ``[bed]``.
+
+        Turns come after those that there are; about X and Y they change the build direction. Loads,
+        supports and paths stay in the frame of the part.
+        """
+        build, bed = bed_of(self.build, table, self.bed)
+        return replace(self, build=build, bed=bed)
 
     @cached_property
     def _flat_layers(self) -> dict[Planar, tuple[Layer, ...]]:

@@ -15,6 +15,7 @@ from ccfem.cases.part_loads import LOADS, SUPPORTS
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.materials import Material
 from ccfem.machine.machine import Machine
+from ccfem.printing.bed_layout import bed_table
 from ccfem.slicing.slicers.planar import Planar
 
 
@@ -47,6 +48,7 @@ def part_text(case: Case, mesh: str, comment: str = "") -> str:
         "mesh": mesh,
         "order": problem.order,
         "build": case.build,
+        "bed": bed_table(case.bed),
         "material": _material(problem.material),
         "slicing": {"method": member_name(case.slicing), **_changed(case.slicing, Planar())},
         "fibre": fibre_table(case.fibre),

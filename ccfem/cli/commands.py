@@ -14,7 +14,7 @@ import typer
 
 from ccfem.base.errors import InputError
 from ccfem.base.progress import progress_bar
-from ccfem.cli.arguments import drawings_of, names_of, parameters_by_strategy, path_of
+from ccfem.cli.arguments import bed_table_of, drawings_of, names_of, parameters_by_strategy, path_of
 from ccfem.cli.fibre_amounts import front
 from ccfem.cli.fibre_choice import SetFibre
 from ccfem.cli.machines import MachineName, SetMachine, machines
@@ -23,6 +23,8 @@ from ccfem.cli.options import (
     Backend,
     Calibration,
     CasePath,
+    Centre,
+    Copies,
     Curve,
     Details,
     Drawings,
@@ -30,6 +32,7 @@ from ccfem.cli.options import (
     Fibre,
     FibreInAll,
     Force,
+    FromLayer,
     Heights,
     Layers,
     LoadCase,
@@ -38,6 +41,7 @@ from ccfem.cli.options import (
     Out,
     Paths,
     PathsFrame,
+    Pause,
     Pictures,
     PrintedSupport,
     PrintFile,
@@ -56,6 +60,7 @@ from ccfem.cli.options import (
     StressStep,
     StressUnit,
     TestOrNot,
+    Turn,
     VirtualTest,
 )
 from ccfem.cli.part_commands import add_part_commands
@@ -370,6 +375,9 @@ def check(
     machine: MachineName = None,
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
+    turn: Turn = None,
+    centre: Centre = None,
+    copies: Copies = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -387,7 +395,8 @@ def check(
     """
     from ccfem.cli.check_part import check_part
 
-    read = partial(load, case, set_case, False, machine, set_machine, set_fibre)
+    bed = bed_table_of(turn, centre, copies)
+    read = partial(load, case, set_case, False, machine, set_machine, set_fibre, bed)
     if code := check_part(read, out):
         raise typer.Exit(code)
 
@@ -416,6 +425,7 @@ def compare(
     machine: MachineName = None,
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
+    turn: Turn = None,
     backend: Backend = "auto",
     stress: StressFile = None,
     stress_unit: StressUnit = None,
@@ -448,7 +458,8 @@ def compare(
         )
         if drawings is not None and slicings is not None:
             raise InputError("--drawings works with one slicing only; got --slicings: drop one")
-        part = load(case, set_case, refine, machine, set_machine, set_fibre)
+        bed = bed_table_of(turn)
+        part = load(case, set_case, refine, machine, set_machine, set_fibre, bed)
         part, strand = calibrated(part, virtual_test, calibration)
         chosen = named_strategies(part, names, parameters) if names or not files else {}
         return Request.of(
@@ -489,9 +500,14 @@ def plan(
     machine: MachineName = None,
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
+    turn: Turn = None,
     backend: Backend = "auto",
     gcode: PrintFile = False,
     support: PrintedSupport = False,
+    centre: Centre = None,
+    copies: Copies = None,
+    pause: Pause = None,
+    from_layer: FromLayer = 0,
     stress: StressFile = None,
     stress_unit: StressUnit = None,
     stress_array: StressArray = None,
@@ -511,6 +527,7 @@ def plan(
 
     def ask() -> Any:
         from ccfem.comparison.request import LONGEST_TEST, Request, named_strategies
+        from ccfem.printing.course import Course
 
         parameters = parameters_by_strategy(set_ or (), strategy)
         cut = layers_of(layers, heights, slicing)
@@ -522,7 +539,11 @@ def plan(
             step=stress_step,
             components=stress_components,
         )
-        part = load(case, set_case, refine, machine, set_machine, set_fibre)
+        if not gcode and not (centre is None and copies is None):
+            raise InputError("--centre and --copies place a print on the bed: add --gcode")
+        course = Course(tuple(pause or ()), from_layer)
+        bed = bed_table_of(turn, centre, copies)
+        part = load(case, set_case, refine, machine, set_machine, set_fibre, bed)
         part, strand = calibrated(part, virtual_test is not False, calibration)
         untold = virtual_test is None and stiffness is None and load_case != "all"
         return Request.of(
@@ -538,6 +559,7 @@ def plan(
             backend=backend,
             print_plans=gcode,
             support=support,
+            course=course,
             every_layer=every_layer,
             longest_test=LONGEST_TEST if untold else float("inf"),
         )

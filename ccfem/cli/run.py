@@ -6,9 +6,10 @@ Everything heavy is imported where it is needed, so that ``ccfem --help`` answer
 import shlex
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from ccfem.base.errors import InputError
@@ -45,6 +46,7 @@ def load(
     machine: str | None = None,
     set_machine: Sequence[str] | None = None,
     set_fibre: Sequence[str] | None = None,
+    bed: Mapping[str, Any] = MappingProxyType({}),
 ) -> "Case":
     """Read a part file, or make a case from its name and parameters.
 
@@ -58,6 +60,8 @@ def load(
         As in `machine_choice`.
     set_fibre
         As in `fibre_choice`.
+    bed : mapping
+        As in `ccfem.cli.arguments.bed_table_of`.
     """
     from ccfem.cases.reading import read
 
@@ -73,6 +77,8 @@ def load(
         case = replace(case, machine=printer(case.machine))
     if places is not None:
         case = replace(case, fibre=places(case.fibre))
+    if bed:
+        case = case.on_bed(bed)
     return _refined(case) if refine else case
 
 
