@@ -46,6 +46,7 @@ from ccfem.cli.options import (
     PrintedSupport,
     PrintFile,
     Refine,
+    RobotCell,
     SetCase,
     SetOfOne,
     SetOfStrategies,
@@ -508,6 +509,7 @@ def plan(
     copies: Copies = None,
     pause: Pause = None,
     from_layer: FromLayer = 0,
+    cell: RobotCell = False,
     stress: StressFile = None,
     stress_unit: StressUnit = None,
     stress_array: StressArray = None,
@@ -541,6 +543,8 @@ def plan(
         )
         if not gcode and not (centre is None and copies is None):
             raise InputError("--centre and --copies place a print on the bed: add --gcode")
+        if cell and not gcode:
+            raise InputError("--cell writes the moves of a print: add --gcode")
         course = Course(tuple(pause or ()), from_layer)
         bed = bed_table_of(turn, centre, copies)
         part = load(case, set_case, refine, machine, set_machine, set_fibre, bed)
@@ -564,7 +568,7 @@ def plan(
             longest_test=LONGEST_TEST if untold else float("inf"),
         )
 
-    output = Output(out, force, pictures, drawings_of(drawings), f"-{strategy}", details)
+    output = Output(out, force, pictures, drawings_of(drawings), f"-{strategy}", details, cell)
     if code := plan_code(run(case, ask, output), force):
         raise typer.Exit(code)
 

@@ -130,6 +130,13 @@ Drawings = Annotated[
         help="Also draw every flat layer of every strategy to scale, in mm: border, fibre, links.",
     ),
 ]
+RobotCell = Annotated[
+    bool,
+    typer.Option(
+        "--cell",
+        help="With --gcode: write all moves as a table for a cell of robots, too.",
+    ),
+]
 Details = Annotated[
     bool,
     typer.Option("--details", help="Print every index and remark, as the report shows them."),

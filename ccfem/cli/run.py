@@ -169,6 +169,8 @@ class Output:
         Also draw every flat layer of every strategy to scale.
     details : bool
         Print every index and remark.
+    cell : bool
+        Also write the moves of a print for a cell of robots.
     """
 
     out: Path | None = None
@@ -177,6 +179,7 @@ class Output:
     drawings: tuple[str, ...] = ()
     suffix: str = ""
     details: bool = False
+    cell: bool = False
 
     def folder(self, case: "Case") -> Path:
         """Folder for the results of a case."""
@@ -218,7 +221,7 @@ def run(name: str, ask: "Callable[[], Request]", output: Output) -> "Comparison"
         _check(comparison)
         command, rest = shlex.join(["ccfem", *sys.argv[1:]]), _part(progress, _SOLVED, 1.0)
         about = (command, seconds, rest, output.pictures, _text_of(name), output.drawings)
-        write_results(comparison, folder, *about)
+        write_results(comparison, folder, *about, cell=output.cell)
     print_comparison(comparison, where, time.perf_counter() - _STARTED, output.details)
     return comparison
 

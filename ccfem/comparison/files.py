@@ -47,6 +47,7 @@ def save(
     folder: str | os.PathLike[str],
     force: bool = False,
     progress: Progress = silent,
+    cell: bool = False,
 ) -> Path:
     """Write the report, tables and paths of a comparison: all files or none.
 
@@ -57,6 +58,8 @@ def save(
     force : bool, default False
         Also replace files of the same names that others wrote or changed.
     progress : callable, optional
+    cell : bool, default False
+        As in `write_results`.
 
     Returns
     -------
@@ -70,7 +73,7 @@ def save(
     """
     folder, command = Path(folder), "ccfem.save(comparison) in Python"
     with whole_folder(folder, RESULT_FILES, force) as temporary:
-        write_results(comparison, temporary, command, {}, progress)
+        write_results(comparison, temporary, command, {}, progress, cell=cell)
     return folder / "report.html"
 
 
@@ -83,12 +86,13 @@ def write_results(
     pictures: bool = False,
     part_file: str = "",
     drawings: Sequence[str] = (),
+    cell: bool = False,
 ) -> None:
     """Write ``results.csv``, ``results.json``, ``report.html`` and paths; pictures where wanted.
 
     With a curve, also ``curve.csv``; where layers are curved, ``matrix_waypoints.csv``, rings that
     fill the layers. Runs with a print plan get ``STRATEGY.gcode`` too, ``STRATEGY_cell.csv`` with
-    the same moves for a cell of robots, and ``STRATEGY_trim.csv`` where strands leave the part. In
+    the same moves where they are wanted, and ``STRATEGY_trim.csv`` where strands leave the part. In
     ``paths.vtp`` the cell array "strategy" numbers the strategies that did not fail, in the order
     of ``results.json``. Over slicings the name of the slicing stands before that of the strategy:
     ``SLICING_STRATEGY_waypoints.csv``. Characters that do not suit a file are dashes. Numbers and
@@ -113,6 +117,8 @@ def write_results(
         Text of the part file, for the report.
     drawings : sequence of {"svg", "dxf"}
         Also draw every flat layer of every run to scale: ``STRATEGY_layer_NN.svg``, ``.dxf``.
+    cell : bool, default False
+        Also write the moves of prints for a cell of robots: a table twice as large as the G-code.
     """
     start = time.perf_counter()
     spent, left_out = dict(seconds or {}), list[str]()
@@ -121,7 +127,7 @@ def write_results(
     if comparison.curve is not None:
         frame = comparison.curve.frame
         write_csv(folder / "curve.csv", [*frame], frame.itertuples(index=False))
-    _write_paths(comparison, folder)
+    _write_paths(comparison, folder, cell)
     spent["files"] = time.perf_counter() - start
     start = time.perf_counter()
     for suffix in drawings:
@@ -230,7 +236,9 @@ def _write_matrix(comparison: Comparison, folder: Path) -> None:
     write_robot_waypoints(folder / "matrix_waypoints.csv", matrix, layers, machine, MATRIX)
 
 
-def _files_of_print(folder: Path, name: str, run: Run, comparison: Comparison) -> list[_Write]:
+def _files_of_print(
+    folder: Path, name: str, run: Run, comparison: Comparison, cell: bool
+) -> list[_Write]:
     """Files of what a printer and a cell of robots do to print a part: one chain of moves."""
     from ccfem.printing.export.gcode import gcode_pieces
     from ccfem.printing.export.robot_cell import write_robot_cell
@@ -246,16 +254,15 @@ def _files_of_print(folder: Path, name: str, run: Run, comparison: Comparison) -
         with (folder / f"{name}.gcode").open("w", encoding="utf-8", newline="\n") as file:
             file.writelines(pieces)
 
-    files: list[_Write] = [
-        write_gcode,
-        partial(write_robot_cell, folder / f"{name}_cell.csv", moves),
-    ]
+    files: list[_Write] = [write_gcode]
+    if cell:
+        files.append(partial(write_robot_cell, folder / f"{name}_cell.csv", moves))
     if len(plan.trims):
         files.append(partial(write_trims, folder / f"{name}_trim.csv", plan))
     return files
 
 
-def _write_paths(comparison: Comparison, folder: Path) -> None:
+def _write_paths(comparison: Comparison, folder: Path, cell: bool) -> None:
     """Write the paths of every strategy in the formats of other programs, several at a time."""
     from ccfem.printing.export.robot_waypoints import write_robot_waypoints
     from ccfem.printing.export.vtk import write_paths
@@ -267,7 +274,7 @@ def _write_paths(comparison: Comparison, folder: Path) -> None:
     files: list[_Write] = []
     for run in runs:
         if run.print_plan is not None and run.moves is not None:
-            files += _files_of_print(folder, _stem(run.slicing, run), run, comparison)
+            files += _files_of_print(folder, _stem(run.slicing, run), run, comparison, cell)
     if not comparison.over_slicings and runs and curved_layers(comparison.layers):
         files.append(partial(_write_matrix, comparison, folder))
     files.append(partial(write_paths, every, folder / "paths.vtp", path_data={"strategy": number}))

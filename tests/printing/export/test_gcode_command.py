@@ -155,3 +155,15 @@ def test_pauses_spools_and_costs_are_in_file_and_record(ccfem):
     assert f"; fibre: {spool['length']:.2f} m, needs {spool['count']} spools, change before" in text
     assert text.count("\nM0\n") == 1
     assert "; begins at layer 1, on" in text
+
+
+def test_a_table_for_robots_is_written_where_it_is_wanted(ccfem):
+    code, _, folder = ccfem(PART, "--gcode")
+    assert code == 0
+    assert (folder / "zigzag.gcode").exists()
+    assert not (folder / "zigzag_cell.csv").exists()
+    code, _, folder = ccfem(PART, "--gcode", "--cell")
+    assert code == 0
+    assert (folder / "zigzag_cell.csv").read_text().startswith("path,tool,layer")
+    code, err, _ = ccfem(PART, "--cell")
+    assert (code, err) == (2, "ccfem: error: --cell writes the moves of a print: add --gcode\n")
