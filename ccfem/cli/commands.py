@@ -59,6 +59,7 @@ from ccfem.cli.options import (
     VirtualTest,
 )
 from ccfem.cli.part_commands import add_part_commands
+from ccfem.cli.plastic_choice import SetPlastic
 from ccfem.cli.run import (
     Output,
     calibrated,
@@ -125,7 +126,7 @@ def support(
     chosen = layers_of(layers, None, slicing)
     slicer = as_slicer(part.slicing if chosen is None else chosen)
     part.check_layers(slicer)
-    stress = solve(part.problem, backend=backend)[load_case or names[0]]
+    stress = solve(part.printed_problem(slicer), backend=backend)[load_case or names[0]]
     stack, support_stack = slice_with_support(slicer, stress, part.build, part.machine, angle, lift)
     columns = support_stack.columns
     x, y, z = columns.up.tolist()
@@ -367,6 +368,7 @@ def check(
     machine: MachineName = None,
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
+    set_plastic: SetPlastic = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -384,7 +386,7 @@ def check(
     """
     from ccfem.cli.check_part import check_part
 
-    read = partial(load, case, set_case, False, machine, set_machine, set_fibre)
+    read = partial(load, case, set_case, False, machine, set_machine, set_fibre, set_plastic)
     if code := check_part(read, out):
         raise typer.Exit(code)
 
@@ -413,6 +415,7 @@ def compare(
     machine: MachineName = None,
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
+    set_plastic: SetPlastic = None,
     backend: Backend = "auto",
     stress: StressFile = None,
     stress_unit: StressUnit = None,
@@ -445,7 +448,7 @@ def compare(
         )
         if drawings is not None and slicings is not None:
             raise InputError("--drawings works with one slicing only; got --slicings: drop one")
-        part = load(case, set_case, refine, machine, set_machine, set_fibre)
+        part = load(case, set_case, refine, machine, set_machine, set_fibre, set_plastic)
         part, strand = calibrated(part, virtual_test, calibration)
         chosen = named_strategies(part, names, parameters) if names or not files else {}
         return Request.of(
@@ -486,6 +489,7 @@ def plan(
     machine: MachineName = None,
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
+    set_plastic: SetPlastic = None,
     backend: Backend = "auto",
     gcode: PrintFile = False,
     support: PrintedSupport = False,
@@ -519,7 +523,7 @@ def plan(
             step=stress_step,
             components=stress_components,
         )
-        part = load(case, set_case, refine, machine, set_machine, set_fibre)
+        part = load(case, set_case, refine, machine, set_machine, set_fibre, set_plastic)
         part, strand = calibrated(part, virtual_test is not False, calibration)
         untold = virtual_test is None and stiffness is None and load_case != "all"
         return Request.of(
@@ -568,6 +572,7 @@ def calibrate(
     machine: MachineName = None,
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
+    set_plastic: SetPlastic = None,
     out: Annotated[
         Path,
         typer.Option(
@@ -590,7 +595,7 @@ def calibrate(
         "strand": None,
         "load_case": load_case,
     }
-    read = partial(load, case, set_case, False, machine, set_machine, set_fibre)
+    read = partial(load, case, set_case, False, machine, set_machine, set_fibre, set_plastic)
     fit_material(read, unreinforced, reinforced, strategy, parameters, options, out)
 
 

@@ -17,6 +17,7 @@ from ccfem.base.toml import assignment
 from ccfem.cli.arguments import numbers_of
 from ccfem.cli.fibre_choice import fibre_choice
 from ccfem.cli.machines import machine_choice
+from ccfem.cli.plastic_choice import plastic_choice
 
 if TYPE_CHECKING:
     from ccfem.cases.case import Case
@@ -45,6 +46,7 @@ def load(
     machine: str | None = None,
     set_machine: Sequence[str] | None = None,
     set_fibre: Sequence[str] | None = None,
+    set_plastic: Sequence[str] | None = None,
 ) -> "Case":
     """Read a part file, or make a case from its name and parameters.
 
@@ -56,12 +58,13 @@ def load(
         Refine cells until they are fine enough by the estimated error.
     machine, set_machine
         As in `machine_choice`.
-    set_fibre
-        As in `fibre_choice`.
+    set_fibre, set_plastic
+        As in `fibre_choice` and `plastic_choice`.
     """
     from ccfem.cases.reading import read
 
     printer, places = machine_choice(machine, set_machine), fibre_choice(set_fibre)
+    plastic = plastic_choice(set_plastic)
     _refuse_body(name)
     parameters = dict(assignment(text) for text in set_case or ())
     if parameters and name.endswith(".toml"):
@@ -73,6 +76,8 @@ def load(
         case = replace(case, machine=printer(case.machine))
     if places is not None:
         case = replace(case, fibre=places(case.fibre))
+    if plastic is not None:
+        case = replace(case, plastic=plastic(case.plastic))
     return _refined(case) if refine else case
 
 

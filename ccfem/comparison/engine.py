@@ -156,7 +156,7 @@ class Solved:
         said = slicer_remarks(chosen, stress)
         stack = tuple(layers)
         about = (strand, case.build, below, propped, said, self.every_layer, self.longest_test)
-        return Part(stress, stack, case.machine, self.cases, *about)
+        return Part(stress, stack, case.machine, self.cases, *about, case.plastic)
 
 
 def solved(request: Request, seconds: dict[str, float] | None = None) -> Solved:
@@ -178,7 +178,7 @@ def solved(request: Request, seconds: dict[str, float] | None = None) -> Solved:
     case, strand, backend = request.case, request.strand, request.backend
     check_slicings(request)
     with timed(seconds, "solve"):
-        fields = solve(case.problem, backend=backend)
+        fields = solve(case.printed_problem(request.only_slicer), backend=backend)
         if request.all_cases:
             cases = weighted_cases(case, fields)
         else:

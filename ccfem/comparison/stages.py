@@ -34,6 +34,7 @@ from ccfem.paths.planning.given_paths import GivenPaths
 from ccfem.paths.planning.plan import plan
 from ccfem.paths.planning.strategy import LengthStrategy, Planned
 from ccfem.paths.planning.unfolding import may_fold
+from ccfem.paths.plastic.plastic import SOLID, Plastic
 from ccfem.paths.splitting.printed_strands import printed_strands
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.before_solving import in_air, refusal
@@ -92,6 +93,8 @@ class Part:
         Length of fibre above which a run is not tested virtually.
     remarks : tuple of str
         Of the slicer, one line each.
+    plastic : Plastic
+        Walls, skins, infill and seam of its print.
     """
 
     stress: PartStress
@@ -105,6 +108,7 @@ class Part:
     remarks: tuple[str, ...] = ()
     every_layer: bool = False
     longest_test: float = float("inf")
+    plastic: Plastic = SOLID
 
     @property
     def flat_layers(self) -> tuple[Layer, ...]:
@@ -357,7 +361,7 @@ def evaluated(run: Run, part: Part) -> Run:
     def work() -> Run:
         most = None if part.every_layer else _MOST_LAYERS
         about = (part.layers, part.stress, part.machine, part.strand, part.build, most)
-        evaluation = evaluate(run.toolpaths, *about)
+        evaluation = evaluate(run.toolpaths, *about, part.cases.heaviest.problem.filled)
         # Who planned given paths is not known: their folds are no published pattern.
         given = isinstance(run.strategy, GivenPaths)
         by_design = not given and may_fold(run.strategy)
@@ -386,7 +390,9 @@ def with_print(run: Run, part: Part) -> Run:
         build = part.build or (0.0, 0.0, 1.0)
         curved = curved_layers(part.layers)
         plan = (
-            curved_plan(*what, build, part.support) if curved else plan_print(*what, part.propped)
+            curved_plan(*what, build, part.support)
+            if curved
+            else plan_print(*what, part.propped, part.plastic)
         )
         moves = part_moves(plan, part.machine)
     except InputError as error:

@@ -84,7 +84,8 @@ def matrix_layer(
     room = np.array(fill.widths)[which] / machine.matrix_width
     strands = (below.strands, below.height, machine, below.sections)
     if len(matrix):
-        matrix, heights, warning = with_flow(matrix, fill.section, thickness, *strands, room)
+        sparse = which >= len(fill.lines) - fill.sparse
+        matrix, heights, warning = with_flow(matrix, fill.solid, thickness, *strands, room, sparse)
     pad, _ = _printed(pads, height, number, SUPPORT)
     if len(pad):
         pad, high = pad_flow(pad, thickness, *strands)

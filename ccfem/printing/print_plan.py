@@ -14,6 +14,7 @@ from ccfem.geometry.offsets import offset_rings
 from ccfem.geometry.polylines import line_length, starts_segment
 from ccfem.geometry.shapes import Region, open_lines, strings
 from ccfem.machine.machine import Machine
+from ccfem.paths.plastic.plastic import SOLID, Plastic
 from ccfem.paths.splitting.printed_strands import (
     SHORT,
     PrintedStrands,
@@ -121,15 +122,16 @@ def plan_print(
     mesh: TetMesh,
     machine: Machine,
     support: bool = False,
+    plastic: Plastic = SOLID,
 ) -> PrintPlan:
     """Plan the print of a whole part.
 
     Fibre layers lie at the heights that they were planned at, as high as the filament's section
     needs (`Machine.strand_height`). The space below, between and above them is filled with matrix
     layers of equal height, as few as `Machine.matrix_height` allows, so that the part gets its full
-    height. A matrix layer is a contour and a zigzag of the section at its middle, which turns from
-    one matrix layer to the next; over fibre it lays what the strands leave
-    (`ccfem.printing.matrix_flow`). A fibre layer holds fibre, and lines of matrix in place of
+    height. A matrix layer is walls and a zigzag of the section at its middle, which turns from
+    one matrix layer to the next, or sparse infill (`Plastic`); over fibre it lays what the strands
+    leave (`ccfem.printing.matrix_flow`). A fibre layer holds fibre, and lines of matrix in place of
     strands that are too short for the cutter; a layer without fibre is left out. No strand is cut
     here. The lowest layer is that of `Process.first_layer_height`. Within a layer the next path is
     always the one with the nearest end. The part stands in the middle of the bed.
@@ -145,6 +147,8 @@ def plan_print(
     support : bool, default False
         Whether columns of matrix, as pads are, stand below what would be laid in air
         (`ccfem.printing.support.overhang`).
+    plastic : Plastic
+        Walls, skins, infill and seam. Default: solid.
 
     Raises
     ------
@@ -171,7 +175,7 @@ def plan_print(
         for index in borders
     }
     slabs = slabs_of(used, float(lowest[2]), float(highest[2]), machine, over)
-    fills = matrix_fills(slabs, mesh, frame, origin, machine)
+    fills = matrix_fills(slabs, layers, mesh, frame, origin, machine, plastic)
     placed = _Strands(fibre, short, borders)
     hanging = overhang(mesh, frame[2], machine) if support else None
     in_air = _NONE
