@@ -38,7 +38,7 @@ def infill_stiffness(infill: str, density: float, modulus: float, poisson: float
     else:
         young = (0.45 * rho**1.5, 0.45 * rho**1.5, 0.6 * rho**1.25)
         sliding = (0.225 * rho**1.3, 0.225 * rho**1.3, 0.2 * rho**1.45)
-        nu12, nu13 = 0.4, 0.2
+        nu12, nu13 = 0.5 - 0.3 * rho, 0.2
     compliance = np.diag([1.0 / x for x in (*young, *sliding)])
     compliance[0, 1] = compliance[1, 0] = -nu12 / young[0]
     compliance[:2, 2] = compliance[2, :2] = -nu13 / young[0]

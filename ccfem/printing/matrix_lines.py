@@ -13,7 +13,7 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.infill_lines import gyroid_lines, parallel_lines
 from ccfem.geometry.offsets import inset, offset_rings
-from ccfem.geometry.polylines import is_closed
+from ccfem.geometry.polylines import along_line, is_closed, points_along
 from ccfem.geometry.shapes import Region, open_lines, strings
 from ccfem.machine.machine import Machine
 from ccfem.paths.plastic.plastic import SOLID, Plastic
@@ -95,7 +95,7 @@ def matrix_fills(
         solid = section if sparse.is_empty else shapely.difference(section, sparse)
         lines, widths = _solid_lines(section, solid, float(np.radians(angle)), plastic, machine)
         infill = _infill_lines(sparse, phase, plastic, machine)
-        drawn = [_begun(on_bed(line), plastic.seam) for line in lines]
+        drawn = [_begun(on_bed(line), plastic.seam, width) for line in lines]
         return MatrixFill(
             shapely.transform(section, on_bed),
             shapely.transform(solid, on_bed),
@@ -171,18 +171,21 @@ def _across(lines: Sequence[FloatArray], angle: float) -> float:
     return float(np.degrees(0.5 * np.angle(twice.sum())) + 90.0) % 180.0
 
 
-def _begun(line: FloatArray, seam: str) -> FloatArray:
+def _begun(line: FloatArray, seam: str, width: float) -> FloatArray:
     """Line on the bed that begins at its seam, if it is closed."""
     if seam == "any" or not is_closed(line):
         return line
-    ring = line[:-1]
-    if seam == "behind":
-        first = int(np.lexsort((ring[:, 0], -ring[:, 1]))[0])
-    else:
-        before, after = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
-        turn = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-        angle = np.arctan2(turn, np.einsum("ij,ij->i", before, after)).round(3)
-        first = int(np.lexsort((ring[:, 0], -ring[:, 1], -angle))[0])
+    ring, turn = line[:-1], np.zeros(len(line) - 1)
+    if seam == "corner":
+        # Corners are rounded: they turn between places a line width before and behind.
+        along = along_line(line)
+        before, after = (
+            points_along(line, along, (along[:-1] + off) % along[-1]) for off in (-width, width)
+        )
+        into, out = ring - before, after - ring
+        cross = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
+        turn = np.arctan2(cross, np.einsum("ij,ij->i", into, out)).round(2)
+    first = int(np.lexsort((ring[:, 0], -ring[:, 1].round(3), -turn))[0])
     turned = np.roll(ring, -first, axis=0)
     return np.concatenate([turned, turned[:1]])
 

@@ -18,8 +18,8 @@ from ccfem.paths.plastic.sparse_regions import matrix_sections, sparse_share
 from ccfem.paths.splitting.slabs import slabs_of
 from ccfem.slicing.layers.layer import Layer
 
-_PLACES = 4
-"""Places along an edge of a cell at which it is asked what is printed there: 20 in a cell."""
+_PLACES = 5
+"""Places along an edge of a cell at which it is asked what is printed there: 35 in a cell."""
 
 
 def as_printed(
@@ -27,7 +27,7 @@ def as_printed(
 ) -> Problem:
     """Give each cell the mean stiffness, strength and mass of what is printed in it.
 
-    The share of a cell that lies in sparse infill (`matrix_sections`) is found at 20 places. Solid
+    The share of a cell that lies in sparse infill (`matrix_sections`) is found at 35 places. Solid
     plastic and infill in one cell share its strain.
 
     Parameters
