@@ -11,6 +11,7 @@ from ccfem.cases.part_tables import RULES
 from ccfem.fem.materials import isotropic, material_names, transversely_isotropic
 from ccfem.machine import GcodeProfile, Kinematics, Limits, Machine, Process, SpeedTable
 from ccfem.paths.placement import FibrePlaces, FibreRegion
+from ccfem.paths.plastic import Plastic
 
 __all__ = ["part_file_page"]
 
@@ -30,6 +31,7 @@ def part_file_page() -> str:
         f"## Loads `[[loads.CASE]]`\n\n{kinds('kind', LOADS)}",
         f"## Regions `[regions.NAME]`\n\n{kinds('rule', REGIONS)}",
         f"## Fibre `[fibre]`\n\n{_fibre()}",
+        f"## Plastic `[plastic]`\n\n{keys(Plastic)}",
         f"## Machine `[machine]`\n\n{keys(Machine)}",
         f"### Limits `[machine.limits]`\n\n{keys(Limits)}",
         f"### Speeds `[machine.speeds]`\n\n{keys(SpeedTable)}",

@@ -414,16 +414,14 @@ def _about_plastic(case: Case) -> tuple[str, ...]:
     if case.plastic == SOLID:
         return ()
     plastic, printed = case.plastic, case.printed_problem()
-    walls = f"{plastic.walls} wall{'s' * (plastic.walls > 1)}"
     if plastic.solid:
-        return (f"plastic: {walls}, solid",)
+        return (f"plastic: {plastic.about()}",)
     filled, mesh = printed.filled, printed.mesh
     sparse = (1.0 - filled) / (1.0 - plastic.density)
     grams = 1e-3 * case.machine.matrix_density * filled * float(mesh.volumes.sum())
     return (
-        f"plastic: {walls}, {plastic.skins} skins, {plastic.density:.0%} {plastic.infill} in "
-        f"{sparse:.0%} of the volume; {filled:.0%} of the volume is filled, {grams:.4g} g with "
-        "the fibre's place",
+        f"plastic: {plastic.about()} in {sparse:.0%} of the volume; {filled:.0%} of the volume is "
+        f"filled, {grams:.4g} g before fibre takes its place",
     )
 
 

@@ -57,6 +57,14 @@ class Plastic:
         """Whether the whole part is filled."""
         return self.infill == "solid"
 
+    def about(self) -> str:
+        """Return what it is, in words."""
+        walls = f"{self.walls} wall{'s' * (self.walls > 1)}"
+        if self.solid:
+            return f"{walls}, solid"
+        skins = f"{self.skins} skin{'s' * (self.skins != 1)}"
+        return f"{walls}, {skins}, {self.density:.0%} {self.infill}"
+
     def spacing(self, width: float) -> float:
         """Distance, mm, of parallel lines a width thick, or period of a gyroid.
 
