@@ -67,8 +67,12 @@ def main(folder: Path = FOLDER) -> None:
         assert page.compare.run is not None
         page.compare.run.wait()
         still("fibre")
+        page.act(page.show_view, "Deformed")
+        still("deformed")
+        page.act(page.show_view, "Stress")
+        still("stress")
         tab.get_by_role("tab", name="Part file").click()
-        page.act(page.show_fibre, False)
+        page.act(page.show_view, "Part")
         still("part_file")
         browser.close()
         page.close()

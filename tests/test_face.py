@@ -102,9 +102,9 @@ def test_a_comparison_prints_as_a_short_table(compared):
         assert title in lines[0]
     assert [line.split()[0] for line in lines[1:3]] == [run.name for run in compared.ranking]
     for line, run in zip(lines[1:3], compared.ranking, strict=True):
-        test = run.tested.bracket.tension
-        low, high = (f(ratio for _, ratio in test.span) for f in (min, max))
-        assert f" {test.ratio:.2f} ({low:.2f}–{high:.2f}) " in line
+        bracket = run.tested.bracket
+        low, high = (f"{test.ratio:.2f}" for test in (bracket.tension, bracket.partial))
+        assert f" {low} " in line if low == high else f" {low} (to {high}) " in line
         assert f" {run.tested.failure.load:.0f} ({run.tested.failure.what}) " in line
         assert f" {run.length_per_layer:.0f} " in line
         assert len(line) <= len(lines[0])
@@ -135,7 +135,7 @@ def test_a_failed_strategy_keeps_its_row(compared):
 def test_a_comparison_is_a_table_in_a_notebook(compared):
     page = compared._repr_html_()
     assert page.count("<tr>") == 3
-    assert f"<td>{compared.ranking[0].tested.bracket.tension.ratio:.2f} (" in page
+    assert f"<td>{compared.ranking[0].tested.bracket.tension.ratio:.2f}<" in page
     assert compared.verdict in page
 
 

@@ -134,7 +134,7 @@ def meshed(part: Part, size: float, angle: float, seed: int | None) -> TetMesh:
 
 
 def ratios(name: str) -> dict[Setting, FloatArray]:
-    """Stiffness of every design, tension only and bonded, (2, k), N/mm, on each of the meshes."""
+    """Stiffness of designs, without and with compression, (2, k), N/mm, on each of the meshes."""
     part = PARTS[name]
     settings = list(product(part.sizes, ANGLES, SEEDS))
     first = part.problem(meshed(part, *settings[0]))
@@ -150,7 +150,7 @@ def ratios(name: str) -> dict[Setting, FloatArray]:
             if not run.failure
         ]
         found[setting] = np.array(
-            [[t.tension.stiffness for t in tests], [t.bonded.stiffness for t in tests]]
+            [[t.tension.stiffness for t in tests], [t.partial.stiffness for t in tests]]
         )
         print(name, setting, len(field.mesh.cells), np.round(found[setting][0], 1), flush=True)
     return found

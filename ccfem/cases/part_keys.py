@@ -39,7 +39,7 @@ class Body:
     Attributes
     ----------
     mesh : str
-        File of tetrahedra: .tet .msh .vtu .vtk .inp .unv .med .bdf .nas .mesh .npz.
+        File of tetrahedra: .tet .msh .vtu .vtk .xdmf .inp .unv .med .bdf .nas .mesh .npz.
     surface : str
         Closed surface (.stl .obj .ply .3mf) or CAD file (.step .iges .brep), to be filled with
         tetrahedra.

@@ -19,6 +19,7 @@ _COLUMNS = (
     "fibre_per_layer",
     "stiffness",
     "stiffness_ratio_tension",
+    "stiffness_ratio_partial",
     "stiffness_ratio_bonded",
     "first_failure_load",
     "efficiency",

@@ -60,7 +60,7 @@ from ccfem.fem.elasticity.stress_field import GivenStress, PartStress, StressFie
 from ccfem.fem.elasticity.support_kinds import PressingSupport
 from ccfem.fem.stress_files.stress_file import read_stress
 from ccfem.judging.virtual_testing.several_cases import specimens
-from ccfem.judging.virtual_testing.strand import RHO_SPAN, Strand
+from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.paths.planning.given_paths import GivenPaths
 from ccfem.paths.planning.strategy import Strategy, full_length
 from ccfem.paths.toolpaths import Toolpaths
@@ -256,8 +256,7 @@ def answer(
     if request.print_plans:
         runs = side_by_side("planning the print of {}", with_print, runs, parts, tell)
     if basis.tests is not None:
-        span = () if isinstance(request.amount, Spread) else RHO_SPAN
-        test = partial(with_test, tests=basis.tests, span=span)
+        test = partial(with_test, tests=basis.tests)
         runs = side_by_side("testing {}", test, runs, parts, tell)
     curve = _curve(request, basis, parts, runs, wanted, tell, seconds)
     bounds = _bounds(request, basis, parts, runs, wanted, tell, seconds)
@@ -465,7 +464,7 @@ def _curve(
             replace(run, strategy=before.strategy)
             for run, before in zip(runs, _unplanned(request, "", part), strict=True)
         ]
-        return along_curve(unchanged, part, held, partial(with_test, tests=tests, span=()), tell)
+        return along_curve(unchanged, part, held, partial(with_test, tests=tests), tell)
 
 
 def _misses(runs: Sequence[Run], wanted: Wanted) -> bool:

@@ -7,14 +7,17 @@ import numpy as np
 from ccfem.comparison.headline import HEADLINE, cell_text, headline_values
 from ccfem.comparison.request import InAll, Wanted
 from ccfem.comparison.runs import Run
+from ccfem.judging.virtual_testing.equilibrium import IN_COMPRESSION, PARTIAL, TENSION
 from ccfem.judging.virtual_testing.virtual_test import FIRST, RESOLUTION, SAME, SECOND, UNDECIDED
 from ccfem.paths.planning.equal_fibre import TOLERANCE
 
 _SAME = TOLERANCE * (1.0 + 1e-9)
 """Share of the wanted length by which a run may differ and still count as equal."""
 
-_MODES = ("tension", "bonded")
-ALTERNATIVES = ("tension_alternative", "bonded_alternative")
+_MODES = (TENSION, PARTIAL)
+"""Modes of the test that order runs: between them lies what was measured on published prints."""
+
+ALTERNATIVES = tuple(f"{mode}_alternative" for mode in _MODES)
 """Modes under alternative supports; missing where the part has none, or their test failed."""
 
 _DIGITS = 2
@@ -23,7 +26,6 @@ _DIGITS = 2
 _STIFFNESSES = (
     "stiffness",
     "stiffness_ratio_tension",
-    "stiffness_ratio_bonded",
     "displacement",
 )
 """Columns whose best value is that of the stiffest run, if there is one."""
@@ -124,32 +126,30 @@ def off_length(run: Run, wanted: Wanted) -> bool:
     return not (1.0 - _SAME) * length <= planned <= (1.0 + _SAME) * length
 
 
-def stiffness_ratio(run: Run, mode: str = "tension") -> float:
-    """Stiffness over that without fibre, "tension" only or "bonded"; NaN where untested."""
+def stiffness_ratio(run: Run, mode: str = TENSION) -> float:
+    """Stiffness over that without fibre, in a mode of the test; NaN where untested."""
     return headline_values(run).get(f"stiffness_ratio_{mode}", np.nan)
 
 
-def merit(run: Run, mode: str = "tension") -> float:
+def merit(run: Run, mode: str = TENSION) -> float:
     """Return the value that ranks runs: the ratio, or `TestedCases.merit` of several load cases.
 
-    Modes are "tension", "bonded" and, under alternative supports, "tension_alternative" and
-    "bonded_alternative", which several load cases do not have.
+    Modes are those of the test and, under alternative supports, `ALTERNATIVES`, which several load
+    cases do not have.
     """
-    if mode in _MODES and run.cases:
+    if mode in IN_COMPRESSION and run.cases:
         return run.cases.merit(mode)
     return stiffness_ratio(run, mode)
 
 
 def stiffness_ratios(first: Run, other: Run) -> tuple[float, float]:
-    """Stiffness of one run over that of another, tension only and bonded; NaN where untested."""
-    return (
-        stiffness_ratio(first) / stiffness_ratio(other),
-        stiffness_ratio(first, "bonded") / stiffness_ratio(other, "bonded"),
-    )
+    """Stiffness of one run over another's, without and with some compression in fibre."""
+    tension, partial = (stiffness_ratio(first, m) / stiffness_ratio(other, m) for m in _MODES)
+    return tension, partial
 
 
 def is_tested(run: Run) -> bool:
-    """Whether a run has a stiffness, with fibres in tension only and with bonded fibres."""
+    """Whether a run has the stiffnesses that order runs."""
     return run.tested is not None and all(np.isfinite(merit(run, m)) for m in _MODES)
 
 
@@ -165,10 +165,10 @@ def order_of(one: Run, other: Run) -> str:
     -------
     str
         FIRST or SECOND if one is stiffer than the other by more than `RESOLUTION`, fibres carrying
-        tension only, and the table shows none of its stiffnesses, bonded or under alternative
-        supports, below that of the other. SAME if no stiffness differs by more than `RESOLUTION`.
-        Else UNDECIDED, and wherever a stiffness under the part's own supports is missing. What one
-        of both lacks under alternative supports does not count.
+        tension only, and the table shows none of its stiffnesses, with some compression or under
+        alternative supports, below that of the other. SAME if no stiffness differs by more than
+        `RESOLUTION`. Else UNDECIDED, and wherever a stiffness under the part's own supports is
+        missing. What one of both lacks under alternative supports does not count.
     """
     modes = (*_MODES, *(mode for mode in ALTERNATIVES if all_have((one, other), mode)))
     first, second = (np.array([merit(run, mode) for mode in modes]) for run in (one, other))

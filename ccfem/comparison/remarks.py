@@ -18,6 +18,7 @@ from ccfem.comparison.runs import Run
 from ccfem.judging.evaluation.evaluation import Evaluation
 from ccfem.judging.evaluation.layer_paths import plane_paths
 from ccfem.judging.evaluation.open_places import open_places
+from ccfem.judging.virtual_testing.equilibrium import BONDED
 from ccfem.judging.virtual_testing.virtual_test import RESOLUTION, SAME, UNDECIDED
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.upper_bound import LOOSE, UpperBound
@@ -57,7 +58,7 @@ def remarks(runs: Sequence[Run], wanted: Wanted, bound: UpperBound | None = None
             lines.setdefault(line, []).append(run.name)
     lines_said = [f"{', '.join(names)}: {line}" for line, names in lines.items()]
     tested = [run for run in order if is_tested(run) and not off_length(run, wanted)]
-    lines_said += _about_orders(tested)
+    lines_said += [*_about_orders(tested), *_if_bonded(tested)]
     return (
         [*lines_said, bound_remark(tested, bound)] if bound is not None and tested else lines_said
     )
@@ -118,7 +119,8 @@ def _about(run: Run, wanted: Wanted, bounded: bool) -> list[str]:
 def _about_orders(tested: Sequence[Run]) -> list[str]:
     """Say which runs, best first, cannot be ranked against each other; each reason once."""
     both = any(all_have((run,), ALTERNATIVES[0]) for run in tested)
-    of = "tension-only and bonded fibres" + (", or both models of the supports," if both else "")
+    of = "fibres without and with some compression"
+    of += ", or both models of the supports," if both else ""
     reasons = {
         UNDECIDED: ("undecided against", f", for {of} do not agree on an order"),
         SAME: ("no difference to", f": less than {RESOLUTION:.0%}, the resolution of the test"),
@@ -133,6 +135,19 @@ def _about_orders(tested: Sequence[Run]) -> list[str]:
         if pairs:
             lines.append("; ".join(pairs) + reason)
     return lines
+
+
+def _if_bonded(tested: Sequence[Run]) -> list[str]:
+    """Say which run, best first, would be the stiffest if strands carried compression fully."""
+    ratios = [stiffness_ratio(run, BONDED) for run in tested]
+    most = int(np.argmax(ratios)) if tested else 0
+    if not most or ratios[most] <= (1.0 + RESOLUTION) * ratios[0]:
+        return []
+    return [
+        f"if strands carried compression fully, which published prints do not show, "
+        f"{tested[most].name} would be stiffer than {tested[0].name}: {ratios[most]:.2f} and "
+        f"{ratios[0]:.2f} times the unreinforced stiffness"
+    ]
 
 
 def _about_links(total: Mapping[str, float]) -> list[str]:
@@ -224,7 +239,7 @@ def bound_remark(tested: Sequence[Run], bound: UpperBound) -> str:
     """Say how far the best run is from what any paths could reach, and which runs lie above that.
 
     The bound holds for strands that lie beside each other and carry tension only. Strands that
-    cross may exceed it, and so may bonded ones.
+    cross may exceed it, and so may strands that carry compression.
 
     Parameters
     ----------
@@ -234,8 +249,8 @@ def bound_remark(tested: Sequence[Run], bound: UpperBound) -> str:
     best = tested[0]
     length, name = max(run.length_per_layer for run in tested), best.name
     layers = 0 if best.evaluation is None else len(best.evaluation.layers)
-    bonded = max(stiffness_ratio(run, "bonded") for run in tested)
-    free = "; bonded fibres are not bounded" if bonded > bound.ratio else ""
+    pressed = max(stiffness_ratio(run, BONDED) for run in tested)
+    free = "; fibres in compression are not bounded" if pressed > bound.ratio else ""
     loose = f"; it may be loose by {bound.duality_gap:.1%}" if bound.duality_gap > LOOSE else ""
     most = (
         f"no paths of {length:.0f} mm a layer in {layers} layers can make the part "

@@ -27,7 +27,7 @@ class Tested:
     Attributes
     ----------
     bracket : Bracket
-        Fibres that carry tension only, and bonded fibres.
+        By what fibre in compression carries.
     failure : FirstFailure or None
         Of the tension-only test; None where a strength is unknown.
     note : str

@@ -35,7 +35,7 @@ def cases_verdict(runs: Sequence[Run], wanted: Wanted, bound: UpperBound | None)
         said = (
             f"{first.name} serves all load cases best: the worst of them reaches {reached}, "
             f"{merit(first) / merit(order[1]):.2f} times {order[1].name} (predicted, fibres "
-            "carrying tension only; no other is better with bonded fibres)."
+            "carrying tension only; no other is better with some compression)."
         )
     elif all_same(group):
         said = (
@@ -44,8 +44,8 @@ def cases_verdict(runs: Sequence[Run], wanted: Wanted, bound: UpperBound | None)
         )
     else:
         said = (
-            f"Undecided between {names} over all load cases: tension-only and bonded fibres do "
-            "not agree on an order."
+            f"Undecided between {names} over all load cases: fibres without and with some "
+            "compression do not agree on an order."
         )
     return said + left_out(runs, wanted, first)
 

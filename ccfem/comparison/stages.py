@@ -16,12 +16,11 @@ from ccfem.comparison.tested_cases import in_all_cases
 from ccfem.fem.elasticity.stress_field import PartStress, StressField, WeightedCases
 from ccfem.judging.evaluation import evaluate
 from ccfem.judging.evaluation.strand_rules import StrandVerdict, strand_verdict, why_not
-from ccfem.judging.virtual_testing.equilibrium import BONDED, TENSION
 from ccfem.judging.virtual_testing.specimen import Specimen
-from ccfem.judging.virtual_testing.strand import RHO_SPAN, Strand
+from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.judging.virtual_testing.strands import Strands, carrying_strands
 from ccfem.judging.virtual_testing.strength import first_failure, matrix_peak
-from ccfem.judging.virtual_testing.virtual_test import Bracket, virtual_test
+from ccfem.judging.virtual_testing.virtual_test import virtual_bracket
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.equal_fibre import (
     TOLERANCE,
@@ -440,7 +439,7 @@ def _peak(stress: StressField) -> float:
         return float("nan")
 
 
-def with_test(run: Run, part: Part, tests: Tests, span: Sequence[float] = RHO_SPAN) -> Run:
+def with_test(run: Run, part: Part, tests: Tests) -> Run:
     """Test a run virtually under one or two models of the supports, or say why it cannot be."""
     if tests.refused:
         return replace(run, untested=tests.refused)
@@ -456,7 +455,7 @@ def with_test(run: Run, part: Part, tests: Tests, span: Sequence[float] = RHO_SP
         mesh = tests.models[0][0].unreinforced.mesh
         about = (run.strategy, part.layers, mesh, part.machine, run.strand_verdict.parts)
         strands = carrying_strands(run.toolpaths, *about)
-        tests_done = [_test(strands, *model, tests.strand, part, span) for model in tests.models]
+        tests_done = [_test(strands, *model, tests.strand, part) for model in tests.models]
         both = replace(tests_done[0], alternative=[*tests_done[1:], None][0])
         if part.several_cases:
             every = in_all_cases(strands, part.cases, tests.strand, part.layers)
@@ -467,20 +466,12 @@ def with_test(run: Run, part: Part, tests: Tests, span: Sequence[float] = RHO_SP
 
 
 def _test(
-    strands: Strands,
-    specimen: Specimen,
-    before: float,
-    strand: Strand,
-    part: Part,
-    span: Sequence[float],
+    strands: Strands, specimen: Specimen, before: float, strand: Strand, part: Part
 ) -> Tested:
-    """Both tests of strands, and what fails first."""
-    tension = virtual_test(strands, specimen, strand, TENSION, span, tolerance=_TOLERANCE)
-    near = (specimen.unreinforced.displacement, tension.solution.displacement)
-    bonded = virtual_test(strands, specimen, strand, BONDED, (), known=near, tolerance=_TOLERANCE)
-    bracket = Bracket(tension, bonded)
+    """Test strands in every mode, and find what fails first."""
+    bracket = virtual_bracket(strands, specimen, strand, (), tolerance=_TOLERANCE)
     try:
-        failure = first_failure(tension, strand, layers=part.layers)
+        failure = first_failure(bracket.tension, strand, layers=part.layers)
     except InputError as error:
         return Tested(bracket, None, str(error))
     return Tested(bracket, failure, matrix_before=before)

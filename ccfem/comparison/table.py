@@ -196,8 +196,8 @@ def against_each_other(ranking: Sequence[Run]) -> Table | None:
     for run in runs:
         cells = []
         for other in runs:
-            tension, bonded = stiffness_ratios(run, other)
-            text = "–" if run is other else f"{tension:.2f} ({bonded:.2f})"
+            tension, partial = stiffness_ratios(run, other)
+            text = "–" if run is other else f"{tension:.2f} ({partial:.2f})"
             cells.append(Cell(text, value=float(tension)))
         rows.append((run.name, tuple(cells), ""))
     return Table(tuple(Head(f"over {run.name}") for run in runs), tuple(rows))
@@ -251,7 +251,7 @@ def curve_table(curve: Curve | None) -> Table | None:
     for name, points in curve.points.items():
         for wanted, run in points:
             values = headline_values(run)
-            ratios = ("stiffness_ratio_tension", "stiffness_ratio_bonded")
+            ratios = ("stiffness_ratio_tension", "stiffness_ratio_partial")
             cells = (
                 Cell(f"{wanted:.0f}", value=wanted),
                 Cell(f"{run.length_per_layer:.0f}", value=run.length_per_layer),
@@ -259,7 +259,7 @@ def curve_table(curve: Curve | None) -> Table | None:
                 Cell(run.failure or run.why_not or "yes", bad=not run.printable),
             )
             rows.append((name, cells, ""))
-    titles = ("wanted, mm a layer", "laid", "stiffness ratio", "bonded", "printable")
+    titles = ("wanted, mm a layer", "laid", "stiffness ratio", "at most", "printable")
     return Table(tuple(map(Head, titles)), tuple(rows))
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from ccfem.base.arrays import FloatArray, in_brief
 from ccfem.base.errors import InputError
 from ccfem.fem.elasticity.stress_field import WeightedCases
-from ccfem.judging.virtual_testing.equilibrium import BONDED
+from ccfem.judging.virtual_testing.equilibrium import IN_COMPRESSION, TENSION
 from ccfem.judging.virtual_testing.several_cases import (
     CasesFailure,
     CasesTest,
@@ -29,8 +29,8 @@ class TestedCases:
 
     Attributes
     ----------
-    tension, bonded : CasesTest
-        Fibres that carry tension only, and bonded fibres.
+    tension, partial, bonded : CasesTest
+        Fibres that carry no compression, a fifth of it, and all of it.
     failure : CasesFailure or None
         Of the tests in tension; None where a strength is unknown.
     bound : UpperBound, optional
@@ -38,6 +38,7 @@ class TestedCases:
     """
 
     tension: CasesTest
+    partial: CasesTest
     bonded: CasesTest
     failure: CasesFailure | None
     bound: UpperBound | None = None
@@ -49,12 +50,16 @@ class TestedCases:
         """Names of the cases."""
         return self.tension.names
 
-    def shares(self, mode: str = "tension") -> FloatArray:
+    def shares(self, mode: str = TENSION) -> FloatArray:
         """Stiffness ratio of each case over its own bound, (n,); over 1 without a bound."""
-        ratios = (self.tension if mode == "tension" else self.bonded).ratios
+        ratios = self._of(mode).ratios
         return ratios if self.bound is None else self.bound.shares(ratios)
 
-    def merit(self, mode: str = "tension") -> float:
+    def _of(self, mode: str) -> CasesTest:
+        test: CasesTest = getattr(self, mode)
+        return test
+
+    def merit(self, mode: str = TENSION) -> float:
         """Least share of all cases, by which runs are ranked."""
         return float(self.shares(mode).min())
 
@@ -62,8 +67,8 @@ class TestedCases:
         """Every value by its column; those of a case have its name in brackets."""
         values: dict[str, float] = {}
         for k, name in enumerate(self.names):
-            values[f"stiffness_ratio_tension[{name}]"] = float(self.tension.ratios[k])
-            values[f"stiffness_ratio_bonded[{name}]"] = float(self.bonded.ratios[k])
+            for mode in IN_COMPRESSION:
+                values[f"stiffness_ratio_{mode}[{name}]"] = float(self._of(mode).ratios[k])
             if self.bound is not None:
                 values[f"share_of_bound[{name}]"] = float(self.shares()[k])
             if self.failure is not None:
@@ -83,13 +88,15 @@ def in_all_cases(
     strand: Strand,
     layers: Sequence[Layer],
 ) -> TestedCases:
-    """Test strands under all cases, in tension only and bonded."""
+    """Test strands under all cases, in every mode."""
     parts = specimens(cases)
-    tension = virtual_tests(strands, parts, strand, tolerance=_TOLERANCE)
-    near = [test.solution.displacement for test in tension.tests]
-    bonded = virtual_tests(strands, parts, strand, BONDED, known=near, tolerance=_TOLERANCE)
+    modes: list[CasesTest] = []
+    near = None
+    for mode in IN_COMPRESSION:  # each starts from the one before
+        modes.append(virtual_tests(strands, parts, strand, mode, known=near, tolerance=_TOLERANCE))
+        near = [test.solution.displacement for test in modes[-1].tests]
     try:
-        failure = cases_failure(tension, strand, layers=layers)
+        failure = cases_failure(modes[0], strand, layers=layers)
     except InputError:  # the strength of matrix or strand is unknown: `Tested.note` says so
         failure = None
-    return TestedCases(tension, bonded, failure)
+    return TestedCases(modes[0], modes[1], modes[2], failure)

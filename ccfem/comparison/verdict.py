@@ -18,6 +18,7 @@ from ccfem.comparison.ranking import (
 )
 from ccfem.comparison.request import InAll, Wanted
 from ccfem.comparison.runs import Run
+from ccfem.judging.virtual_testing.equilibrium import PARTIAL, TENSION
 from ccfem.judging.virtual_testing.virtual_test import FIRST, RESOLUTION, SAME
 
 
@@ -26,10 +27,10 @@ def verdict(runs: Sequence[Run], wanted: Wanted) -> str:
 
     Only runs count that can be printed and have the wanted length. One is the stiffest if it is
     stiffer than every other of them by more than the resolution of the test, fibres carrying
-    tension only, and none is stiffer with bonded fibres or under the alternative supports, as the
-    table shows them (`order_of`). "No difference" is stated if all stiffnesses of the best agree
-    within the resolution; else the best are "undecided". Runs that do not count are named, with
-    those that are stiffer than the best.
+    tension only, and none is stiffer with some compression in them or under the alternative
+    supports, as the table shows them (`order_of`). "No difference" is stated if all stiffnesses of
+    the best agree within the resolution; else the best are "undecided". Runs that do not count are
+    named, with those that are stiffer than the best.
 
     Parameters
     ----------
@@ -100,7 +101,7 @@ def _by_stiffness(order: Sequence[Run], wanted: Wanted) -> str:
             f"{first.name} makes the stiffest part, {_amount(wanted)}: "
             f"{stiffness_ratio(first):.2f} times the unreinforced one, and {gain:.2f} times "
             f"{second.name} (predicted, fibres carrying tension only; no other is stiffer with "
-            f"bonded fibres{', or under the alternative supports' if both else ''})."
+            f"some compression{', or under the alternative supports' if both else ''})."
         )
     if all_same(group):
         return (
@@ -111,7 +112,7 @@ def _by_stiffness(order: Sequence[Run], wanted: Wanted) -> str:
     return (
         f"Undecided between {_names(group)}, {_amount(wanted)}: "
         f"{_ratios(group)} times the unreinforced stiffness where fibres carry tension only, "
-        f"{_ratios(group, 'bonded')} where they are bonded{_under_other(group)}."
+        f"{_ratios(group, PARTIAL)} with some compression{_under_other(group)}."
     )
 
 
@@ -142,14 +143,14 @@ def _names(runs: Sequence[Run]) -> str:
     return f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def _ratios(runs: Sequence[Run], mode: str = "tension") -> str:
+def _ratios(runs: Sequence[Run], mode: str = TENSION) -> str:
     ratios = [f"{stiffness_ratio(run, mode):.2f}" for run in runs]
     return f"{', '.join(ratios[:-1])} and {ratios[-1]}"
 
 
 def _under_other(runs: Sequence[Run]) -> str:
     """Say the same of the alternative supports, where the table shows it."""
-    names = dict(zip(ALTERNATIVES, ("tension only", "bonded"), strict=True))
+    names = dict(zip(ALTERNATIVES, ("tension only", "some compression"), strict=True))
     said = [
         f"{_ratios(runs, mode)} ({name})" for mode, name in names.items() if all_have(runs, mode)
     ]

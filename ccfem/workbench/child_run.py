@@ -41,8 +41,8 @@ class RunState:
         The last that it said.
     code : int, optional
         Exit code, when it has ended.
-    stopped : bool
-        Whether it was stopped.
+    stopped : str
+        Why it was stopped; empty where it was not.
     """
 
     command: str
@@ -50,7 +50,7 @@ class RunState:
     step: str = "starting"
     lines: tuple[str, ...] = ()
     code: int | None = None
-    stopped: bool = False
+    stopped: str = ""
 
     @property
     def running(self) -> bool:
@@ -68,7 +68,7 @@ class RunState:
         if self.running or self.written:
             return ""
         if self.stopped:
-            return "stopped"
+            return self.stopped
         said = [line for line in self.lines if line.startswith("ccfem: error: ")]
         if said:
             return said[-1].removeprefix("ccfem: error: ")
@@ -87,10 +87,16 @@ class ChildRun:
         Where it runs.
     changed : callable
         Called in a thread of its own with each `RunState`, the last one when the process has ended.
+    minutes : float, optional
+        After which it is stopped; default: never.
     """
 
     def __init__(
-        self, arguments: Sequence[str], folder: Path, changed: Callable[[RunState], object]
+        self,
+        arguments: Sequence[str],
+        folder: Path,
+        changed: Callable[[RunState], object],
+        minutes: float | None = None,
     ) -> None:
         self.state = RunState(shlex.join(["ccfem", *arguments]))
         self._changed = changed
@@ -109,6 +115,9 @@ class ChildRun:
         _limit_memory(self._process.pid)
         self._thread = threading.Thread(target=self._follow, name="run", daemon=True)
         self._thread.start()
+        if minutes is not None:
+            why = f"stopped after {minutes:g} min: allow a longer run, or ask for less"
+            threading.Thread(target=self._limit, args=(60.0 * minutes, why), daemon=True).start()
 
     def _follow(self) -> None:
         assert self._process.stdout is not None
@@ -125,10 +134,15 @@ class ChildRun:
         self.state = replace(self.state, code=code, share=1.0, step="")
         self._changed(self.state)
 
-    def stop(self) -> None:
+    def _limit(self, seconds: float, why: str) -> None:
+        self._thread.join(seconds)
+        if self._thread.is_alive():
+            self.stop(why)
+
+    def stop(self, why: str = "stopped") -> None:
         """End the process and all that it started, and wait for that."""
         if self._process.poll() is None:
-            self.state = replace(self.state, stopped=True)
+            self.state = replace(self.state, stopped=why)
             self._signal(signal.SIGTERM)
             with contextlib.suppress(subprocess.TimeoutExpired):
                 self._process.wait(_PATIENCE)

@@ -15,7 +15,7 @@ from ccfem.comparison.request import STRATEGIES
 from ccfem.workbench.child_run import ChildRun, RunState
 from ccfem.workbench.guard import Served, escaped
 from ccfem.workbench.result_views import Pieces, RunResults, read_results
-from ccfem.workbench.tab import Tabbed, table_html
+from ccfem.workbench.tab import FIBRE, MOVED, PART, STRESS, Tabbed, table_html
 
 _NO_ONE, _FIRST, _ALL = "none", "the first", "all at once"
 _BESIDE = 1.25
@@ -41,6 +41,7 @@ class CompareTab:
             self._add_ticks({k: v for k, v in known.items() if k not in STRATEGIES})
         self.case = gui.add_dropdown("Load case", (_FIRST,), visible=False)
         self.case.on_update(page.on(self.show))
+        self.minutes = gui.add_number("Longest run, min", 120.0, min=0.1, step=10.0)
         self.start = gui.add_button("Compare", icon="player-play")
         self.start.on_click(page.on(self._compare))
         self.ending = gui.add_button("Stop", icon="player-stop", visible=False, color="red")
@@ -100,7 +101,10 @@ class CompareTab:
         suffix = f"-{self.left.value}" if arguments[0] == "plan" else ""
         folder = page.bench.results / f"{page.bench.name}{suffix}"
         self.run = ChildRun(
-            arguments, page.bench.folder, lambda state: page.act(self._heed, state, folder)
+            arguments,
+            page.bench.folder,
+            lambda state: page.act(self._heed, state, folder),
+            float(self.minutes.value),
         )
         self._tell(self.run.state)
 
@@ -109,9 +113,9 @@ class CompareTab:
         if state.written:
             self.results = read_results(folder)
             self._show_results()
-            self.page.show_fibre(True)
+            self.page.show_view(FIBRE)
         elif not state.running:
-            self.page.say("" if state.stopped else state.complaint)
+            self.page.say("" if state.stopped == "stopped" else state.complaint)
 
     def _tell(self, state: RunState) -> None:
         self.start.visible, self.ending.visible = not state.running, state.running
@@ -129,8 +133,8 @@ class CompareTab:
         self.results = None
         self._table.visible = self._found.visible = False
         self._links.content = ""
-        self.page.view.value = "Part"
-        self.shown(False)
+        self.page.view.value = PART
+        self.shown(PART)
 
     # Showing.
 
@@ -198,13 +202,15 @@ class CompareTab:
         kind = mimetypes.guess_type(name)[0] or "application/octet-stream"
         return Served(path.read_bytes(), kind, name)
 
-    def shown(self, fibre: bool) -> tuple[FloatArray, FloatArray] | None:
-        """Draw the strands, or take them away; opposite corners of what is drawn, mm."""
+    def shown(self, view: str) -> tuple[FloatArray, FloatArray] | None:
+        """Draw what a view shows of the results; opposite corners of that, mm; None of the part."""
         for handle in self._handles:
             handle.remove()
         self._handles = []
-        if not fibre or self.results is None:
+        if view == PART or self.results is None:
             return None
+        if view in (STRESS, MOVED):
+            return self._draw_surface(view)
         self._draw()
         points = self.results.rims(self._place).reshape(-1, 3)
         if not len(points):
@@ -229,9 +235,30 @@ class CompareTab:
         axis = int(np.argmin(np.where(reach > 1e-6 * reach.max(), reach, np.inf)[:2]))
         return np.asarray(_BESIDE * max(float(reach[axis]), 0.1 * reach.max()) * np.eye(3)[axis])
 
+    def _draw_surface(self, view: str) -> tuple[FloatArray, FloatArray]:
+        """Draw the part without fibre with its stress, or deformed."""
+        import trimesh
+
+        assert self.results is not None
+        surface = self.results.surface("stress" if view == STRESS else "moved")
+        if surface is None:
+            raise InputError("the last run has no stress and no displacement to show")
+        matt = trimesh.visual.material.PBRMaterial(metallicFactor=0.0, roughnessFactor=1.0)
+        mesh = trimesh.Trimesh(surface.points, surface.triangles, process=False)
+        mesh.visual = trimesh.visual.TextureVisuals(material=matt)
+        colours = _linear(scale("size")(np.clip(surface.share, 0.0, 1.0))[:, :3])
+        mesh.visual.vertex_attributes["color"] = np.insert(colours, 3, 255, axis=1)
+        scene, low, high = self.page.server.scene, surface.points.min(0), surface.points.max(0)
+        above = (*(0.5 * (low + high))[:2], high[2] + 0.1 * np.ptp(surface.points))
+        self._handles = [
+            scene.add_mesh_trimesh("/surface", mesh, cast_shadow=False, receive_shadow=False),
+            scene.add_label("/surface_said", surface.said, position=above, anchor="bottom-center"),
+        ]
+        return low, high
+
     def _draw(self) -> None:
         """Draw a layer of one or two strategies, coloured by force."""
-        if self.results is None or self.page.view.value != "Fibre":
+        if self.results is None or self.page.view.value != FIBRE:
             return
         results, scene = self.results, self.page.server.scene
         place, names = self._place, self._names
@@ -292,10 +319,14 @@ class CompareTab:
         share = np.nan_to_num(pieces.force / self.results.most_force)
         colours = np.asarray(scale("size")(np.clip(share, 0.0, 1.0))[:, :3])
         colours[pieces.link] = np.array(_rgb(LINK)) / 255.0
-        # viser takes the colours of pieces for linear light, and encodes them as sRGB itself.
-        low = colours <= 0.04045
-        linear = np.where(low, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
-        return np.round(255.0 * linear).astype(np.uint8)
+        return _linear(colours)
+
+
+def _linear(colours: FloatArray) -> Any:
+    """Colours (n, 3) as bytes of linear light, which viser takes them for, encoding them itself."""
+    low = colours <= 0.04045
+    linear = np.where(low, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
+    return np.round(255.0 * linear).astype(np.uint8)
 
 
 def _rgb(name: str) -> tuple[int, int, int]:

@@ -33,6 +33,7 @@ from ccfem.workbench.loads_tab import LoadsTab, vector_of
 from ccfem.workbench.newest import Newest
 from ccfem.workbench.part_edits import Change, valued
 from ccfem.workbench.print_tab import PrintTab
+from ccfem.workbench.tab import PART, VIEWS
 
 _FACE, _CHOSEN = (203, 210, 216), (245, 190, 65)
 _HELD, _LOADED, _BOTH = (120, 168, 214), (226, 142, 120), (170, 140, 190)
@@ -196,8 +197,8 @@ class Page:
         for label, key, steps in (("Undo", "Z", -1), ("Redo", "Y", 1)):
             command = gui.add_command(label, hotkey=key, modifier="cmd/ctrl")
             command.on_trigger(self.on(self.step, steps))
-        self.view = gui.add_button_group("View", ["Part", "Fibre"])
-        self.view.on_click(self.on_value(lambda how: self.show_fibre(how == "Fibre")))
+        self.view = gui.add_button_group("View", VIEWS)
+        self.view.on_click(self.on_value(self.show_view))
         tabs = gui.add_tab_group()
         with tabs.add_tab("Loads"):
             self.loads = LoadsTab(self)
@@ -272,13 +273,13 @@ class Page:
         for camera in (self.server.initial_camera, *cameras):
             camera.position, camera.look_at = tuple(place), tuple(centre)
 
-    def show_fibre(self, fibre: bool) -> None:
-        """Show the strands of the last run in place of the part, or the part."""
-        fibre = fibre and self.compare.results is not None
-        self.view.value = "Fibre" if fibre else "Part"
+    def show_view(self, view: str) -> None:
+        """Show the part to be set up, or what the last run says of it: one of `VIEWS`."""
+        view = view if self.compare.results is not None else PART
+        self.view.value = view
         if self.body is not None:
-            self.body.visible = not fibre
-        box = self.compare.shown(fibre)
+            self.body.visible = view == PART
+        box = self.compare.shown(view)
         if box is None:
             self.look()
         else:

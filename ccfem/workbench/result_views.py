@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ccfem.base.arrays import BoolArray, FloatArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.errors import InputError
 from ccfem.comparison.headline import HEADLINE, value_text
 from ccfem.comparison.report.packing import unpack
@@ -39,6 +39,26 @@ class Pieces:
 
 
 @dataclass(frozen=True)
+class Surface:
+    """Surface of the part, coloured by a value at its points.
+
+    Attributes
+    ----------
+    points : (n, 3) array, mm
+    triangles : (t, 3) int array
+    share : (n,) array in [0, 1]
+        Of the largest value.
+    said : str
+        What is drawn, and the largest value.
+    """
+
+    points: FloatArray
+    triangles: IntArray
+    share: FloatArray
+    said: str
+
+
+@dataclass(frozen=True)
 class RunResults:
     """Results in a folder: what ``results.json`` records, and what ``report.html`` draws.
 
@@ -48,11 +68,15 @@ class RunResults:
     record : dict
     views : dict
         Layers and paths: see `ccfem.comparison.report.layer_view.layer_views`.
+    part : dict
+        The part with displacement and stress: see
+        `ccfem.comparison.report.html_report.part_view`; empty where the report has no such view.
     """
 
     folder: Path
     record: dict[str, Any]
     views: dict[str, Any]
+    part: dict[str, Any]
 
     @property
     def names(self) -> list[str]:
@@ -83,6 +107,21 @@ class RunResults:
     def _stack(self) -> dict[str, Any]:
         stacks = self.views.get("stacks") or [{"runs": [], "layers": [], "first": 0}]
         return dict(stacks[0])
+
+    def surface(self, view: str) -> Surface | None:
+        """Surface of the part without fibre, as "stress" or "moved"; None where it is not known."""
+        part = self.part
+        if "moved" not in part:
+            return None
+        triangles = np.asarray(part["triangles"], dtype=np.int64).reshape(-1, 3)
+        if view == "stress":
+            most = float(part["most_stress"])
+            said = f"von Mises stress, up to {most:.3g} MPa"
+            return Surface(part["points"], triangles, np.asarray(part["stress"]) / 254.0, said)
+        times, most = float(part["scale"]), float(part["most"])
+        said = f"displacement, up to {most:.3g} mm, drawn {times:g} times as large"
+        points = part["points"] + times * part["moved"]
+        return Surface(points, triangles, np.asarray(part["moved_size"]) / 254.0, said)
 
     def rows(self) -> tuple[list[str], list[tuple[str, list[str], str]]]:
         """Table of the first columns of the headline: titles, and name, cells and failure of each.
@@ -165,5 +204,6 @@ def read_results(folder: Path) -> RunResults:
     except (OSError, ValueError) as error:
         raise InputError(f"{folder} holds no results that can be shown ({error})") from None
     data = _DATA.search(page)
-    views = unpack(data[1])["layers"] if data else {"stacks": []}
-    return RunResults(folder, record, views)
+    views = unpack(data[1]) if data else {}
+    layers = views.get("layers") or {"stacks": []}
+    return RunResults(folder, record, layers, views.get("part") or {})

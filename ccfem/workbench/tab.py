@@ -7,6 +7,9 @@ from ccfem.workbench.bench import Bench
 from ccfem.workbench.guard import escaped
 from ccfem.workbench.part_edits import Change
 
+PART, STRESS, MOVED, FIBRE = VIEWS = ("Part", "Stress", "Deformed", "Fibre")
+"""What the page shows in space: the part to be set up, or what the last run says of it."""
+
 
 class Tabbed(Protocol):
     """The page, as its tabs see it."""
@@ -40,8 +43,8 @@ class Tabbed(Protocol):
     def choose_all(self, numbers: Sequence[int]) -> None:
         """Choose these faces."""
 
-    def show_fibre(self, fibre: bool) -> None:
-        """Show the strands of the last run, or the part."""
+    def show_view(self, view: str) -> None:
+        """Show one of `VIEWS`."""
 
 
 def table_html(heads: Sequence[str], rows: Sequence[Sequence[str]], marked: str = "") -> str:

@@ -132,8 +132,8 @@ def test_best_values_are_the_largest_or_the_smallest_as_each_column_says(compare
 def test_opposite_orders_are_undecided(compared):
     first, second = compared.ranking[:2]
     bracket = second.tested.bracket
-    stiffer = replace(bracket.bonded, stiffness=10.0 * bracket.bonded.stiffness)
-    tested = replace(second.tested, bracket=replace(bracket, bonded=stiffer))
+    stiffer = replace(bracket.partial, stiffness=10.0 * bracket.partial.stiffness)
+    tested = replace(second.tested, bracket=replace(bracket, partial=stiffer))
     turned = replace(compared, runs=(first, replace(second, tested=tested)))
     assert turned.verdict.startswith(f"Undecided between {first.name} and {second.name}")
     assert any(f"{first.name}: undecided against" in line for line in turned.remarks)
@@ -145,6 +145,20 @@ def test_opposite_orders_are_undecided(compared):
     same = replace(compared, runs=(first, second))
     assert not any("undecided" in line for line in same.remarks)
     assert same.verdict.startswith(f"{first.name} makes the stiffest part")
+
+
+def test_bonded_fibres_turn_no_verdict_round(compared):
+    """Published prints show no pair in the order of bonded fibres: a remark says theirs."""
+    first, second = compared.ranking[:2]
+    bracket = second.tested.bracket
+    stiffer = replace(bracket.bonded, stiffness=10.0 * bracket.bonded.stiffness)
+    tested = replace(second.tested, bracket=replace(bracket, bonded=stiffer))
+    turned = replace(compared, runs=(first, replace(second, tested=tested)))
+    assert turned.verdict == replace(compared, runs=(first, second)).verdict
+    said = [line for line in turned.remarks if "carried compression fully" in line]
+    assert len(said) == 1
+    assert f"{second.name} would be stiffer than {first.name}" in said[0]
+    assert not any("carried compression fully" in line for line in compared.remarks)
 
 
 def test_the_bond_between_layers_is_judged_where_its_strength_is_known(compared, tmp_path):
@@ -183,7 +197,7 @@ def test_alternative_supports_are_tested_too():
         replace(case, alternative_supports=wall), ["concentric", "zigzag"], load_case="push"
     )
     table = found.frame
-    for name in ("stiffness", "stiffness_ratio_tension", "stiffness_ratio_bonded"):
+    for name in ("stiffness", "stiffness_ratio_tension", "stiffness_ratio_partial"):
         np.testing.assert_allclose(table[f"{name}_alternative"], table[name], rtol=1e-6)
     # By the wall nothing is judged, by a plane of symmetry it is.
     for name in ("first_failure_load", "interlayer_load"):
@@ -399,7 +413,7 @@ def test_the_bound_says_that_it_is_not_one_of_bonded_fibres(compared):
     stiff = replace(bracket.bonded, stiffness=10.0 * bracket.bonded.stiffness)
     tested = replace(best.tested, bracket=replace(bracket, bonded=stiff))
     more = replace(compared, runs=(replace(best, tested=tested),))
-    assert "tension only; bonded fibres are not bounded): " in more.remarks[-1]
+    assert "tension only; fibres in compression are not bounded): " in more.remarks[-1]
 
 
 def test_the_print_is_planned_where_it_is_asked_for(compared):

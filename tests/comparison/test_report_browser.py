@@ -27,10 +27,10 @@ def report(tmp_path_factory):
     supports = (Support("x_min"),)
     loads = {"pull": (Force("x_max", (1000.0, 0.0, 0.0)),)}
     problem = Problem(mesh, isotropic(3500.0, 0.35), supports, loads)
-    machine = Machine(minimum_length=20.0)
+    machine = Machine(minimum_length=20.0, cutter_distance=20.0)
     case = Case("strip", f"Strip {EVIL}", problem, slicing=Planar(count=3), machine=machine)
     strategies = {EVIL: Zigzag(spacing=3.0), "rings": Concentric(spacing=3.0)}
-    result = compare(case, strategies, natural=True)
+    result = compare(case, strategies, natural=True, print_plans=True)
     failed = replace(result.runs[0], name="late", evaluation=None, tested=None, failure=EVIL)
     folder = tmp_path_factory.mktemp("report")
     write_results(replace(result, runs=(*result.runs, failed)), folder, f"ccfem {EVIL}", {},
@@ -181,7 +181,7 @@ CONTRASTS = """(() => {
 
 def test_paper_shows_the_views(page):
     page.wait_for_selector("body[data-printable]", state="attached", timeout=60_000)
-    assert page.locator("img.printed").count() == 2 + page.locator(".chart").count() > 4
+    assert page.locator("img.printed").count() == 3 + page.locator(".chart").count() > 4
     page.emulate_media(media="print")
     try:
         assert page.locator(".scene:visible, .chart:visible, .controls:visible").count() == 0
@@ -214,3 +214,18 @@ def test_the_part_lies_in_its_view_whatever_its_shape(page, size):
     assert columns[-1] < dark.shape[1] - 1
     share = max(np.ptp(rows) / dark.shape[0], np.ptp(columns) / dark.shape[1])
     assert share > 0.4  # and it is not lost in it
+
+
+def test_the_print_is_drawn_layer_by_layer(page):
+    drawn = "document.getElementById('print-view').data.map((trace) => trace.name)"
+    page.locator("#print-view").scroll_into_view_if_needed()
+    page.wait_for_function("document.getElementById('print-view').data", timeout=60_000)
+    assert {"contour", "matrix", "fibre"} <= set(page.evaluate(drawn))
+    assert "travel" not in page.evaluate(drawn)
+    page.locator("#print-travel").check()
+    assert "travel" in page.evaluate(drawn)
+    page.locator("#print-top").fill("0")
+    page.locator("#print-alone").check()
+    assert "fibre" not in page.evaluate(drawn)  # the lowest layer is matrix
+    assert page.locator("#print-top-said").inner_text().startswith("1 of ")
+    assert page.said == []

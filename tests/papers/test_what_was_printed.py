@@ -14,7 +14,8 @@ def test_every_page_says_that_one_printed_part_was_compared():
     """Two fibre plans of the Loop, each over the Loop without fibre: one part, three prints."""
     zigzag, ours, between = PHYSICAL
     assert between == pytest.approx(ours / zigzag, abs=0.005)
-    assert "Based on one published part, printed without fibre and with two plans" in HONEST_PROMISE
+    assert "published prints of Chen et al. 2021" in HONEST_PROMISE
+    assert "one specimen each" in HONEST_PROMISE
     for page in ("README.md", "docs/concepts/judging.md"):
         text = " ".join((ROOT / page).read_text(encoding="utf-8").split())
         assert "compared with one printed part, the Loop of Chen et al. 2021: without fibre" in text

@@ -81,6 +81,17 @@ def test_a_stopped_run_leaves_no_process(tmp_path, monkeypatch, manner):
     assert run.state.code in (-signal.SIGTERM, -signal.SIGKILL)
 
 
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="process groups are of Unix")
+def test_a_run_that_takes_too_long_is_stopped(tmp_path, monkeypatch):
+    (tmp_path / "sleeper.py").write_text(SLEEPER)
+    program = (sys.executable, str(tmp_path / "sleeper.py"))
+    monkeypatch.setattr("ccfem.workbench.child_run._PROGRAM", program)
+    state = ChildRun(["heeds"], tmp_path, lambda state: None, minutes=0.01).wait(20.0)
+    assert state.complaint == "stopped after 0.01 min: allow a longer run, or ask for less"
+    assert state.code == -signal.SIGTERM
+    assert not state.written
+
+
 def test_no_module_in_the_folder_of_a_run_is_executed(tmp_path):
     for name in ("ccfem", "numpy"):
         (tmp_path / f"{name}.py").write_text('open("executed", "w").close()')

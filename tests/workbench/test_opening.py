@@ -37,7 +37,7 @@ def test_nothing_is_open_at_first(tmp_path):
     workbench = ccfem.open(folder=tmp_path)
     page = workbench._page
     try:
-        for act in (page.compare._compare, page.loads._load, lambda: page.show_fibre(True)):
+        for act in (page.compare._compare, page.loads._load, lambda: page.show_view("Fibre")):
             page.act(act).result()
             assert "Error" not in page.message.content.replace("InputError", "")
         page.act(page.open, "nothing").result()

@@ -203,6 +203,19 @@ def test_a_run_is_stopped_found_again_and_shown(work):
     again.tab.get_by_text("Layer 0, at 1.00 mm").wait_for(timeout=5000)
     drawn = np.asarray(again.page.server.scene.get_handle_by_name("/fibre_0_fibre").points)
     assert 1.0 == pytest.approx(drawn[..., 2].min()) == pytest.approx(drawn[..., 2].max())
+    # The part without fibre: its stress, and deformed.
+    for name, said in (
+        ("Stress", "von Mises stress, up to "),
+        ("Deformed", "displacement, up to "),
+    ):
+        again.button(name)
+        again.settle()
+        scene = again.page.server.scene
+        assert scene.get_handle_by_name("/surface_said").text.startswith(said)
+        assert scene.get_handle_by_name("/fibre_0_fibre") is None
+    again.button("Fibre")
+    again.settle()
+    assert again.page.server.scene.get_handle_by_name("/surface") is None
     link = again.tab.get_by_role("link", name="report.html").get_attribute("href")
     report = again.tab.request.get(work.page.link.partition("/?")[0] + link)
     assert "stiffness ratio" in report.text()

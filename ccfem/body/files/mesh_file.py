@@ -21,11 +21,12 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0, check: bool = Tr
     ----------
     path : path
         One of the formats in `ccfem.body.files.formats`: ``.tet``, Gmsh ``.msh`` 2.2 or 4.1
-        (physical groups of triangles become patches), ``.vtu`` or legacy ``.vtk``, Abaqus ``.inp``
-        (instances where they are placed; surfaces, node sets and sets of triangles become patches),
-        ``.unv`` (groups of triangles or nodes become patches), ``.npz``, and what Gmsh reads:
-        ``.med`` (groups of triangles become patches), ``.bdf``, ``.nas`` and ``.mesh`` (numbered
-        properties and regions do). Linear or quadratic.
+        (physical groups of triangles become patches), ``.vtu`` or legacy ``.vtk``, ``.xdmf`` (tags
+        of triangles do, the first step of a series counts), Abaqus ``.inp`` (instances where they
+        are placed; surfaces, node sets and sets of triangles become patches), ``.unv`` (groups of
+        triangles or nodes become patches), ``.npz``, and what Gmsh reads: ``.med`` (groups of
+        triangles become patches), ``.bdf``, ``.nas`` and ``.mesh`` (numbered properties and regions
+        do). Linear or quadratic.
     scale : float, default 1
         Factor on the coordinates, to make them mm: 1000 for a file in metres.
     check : bool, default True

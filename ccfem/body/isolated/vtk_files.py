@@ -1,6 +1,9 @@
 """Files that VTK reads: grids and surfaces, to plain arrays."""
 
+import copy
+from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +62,81 @@ def read_grid(path: str) -> dict[str, Any]:
             if any(names):
                 arrays[f"components:{name}"] = np.array(names)
     return arrays
+
+
+def read_xdmf(path: str) -> dict[str, Any]:
+    """Points, types and nodes of the cells of an XDMF file, as `read_grid`.
+
+    Of a series, the first step counts. Grids of triangles on the same points, as DOLFINx writes the
+    tags of facets, join that of the tetrahedra; their numbers become the cell array ``patch``.
+    """
+    import pyvista
+    from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
+
+    reader = vtkXdmfReader()
+    _output(reader, _plain_xdmf(path))
+    found = reader.GetOutputDataObject(0)
+    whole = not found.IsA("vtkMultiBlockDataSet")
+    blocks = [found] if whole else [found.GetBlock(k) for k in range(found.GetNumberOfBlocks())]
+    blocks = [block for block in blocks if block is not None and block.IsA("vtkUnstructuredGrid")]
+    grids = [_grid_arrays(block) for block in blocks]
+    volumes = [k for k, grid in enumerate(grids) if {10, 24} & set(grid["types"].tolist())]
+    if not volumes:
+        raise ValueError("no grid of tetrahedra")
+    main = grids[volumes[0]]
+    for k, grid in enumerate(grids):
+        cells = {name: nodes for name, nodes in grid.items() if name.startswith("cells:")}
+        if k in volumes or not set(cells) <= {"cells:5", "cells:22"}:
+            continue
+        if len(grid["points"]) != len(main["points"]):
+            raise ValueError("its grids do not share their points")
+        arrays = pyvista.wrap(blocks[k]).cell_data.values()
+        numbers = next((a for a in arrays if a.dtype.kind in "iu" and a.ndim == 1), None)
+        before = main.get("cell:patch", np.zeros(len(main["types"]), dtype=np.int64))
+        added = np.zeros(len(grid["types"]), dtype=np.int64) if numbers is None else numbers
+        main["cell:patch"] = np.concatenate([before, added])
+        main["types"] = np.concatenate([main["types"], grid["types"]])
+        for name, nodes in cells.items():
+            main[name] = np.concatenate([main[name], nodes]) if name in main else nodes
+    return main
+
+
+def _grid_arrays(grid: Any) -> dict[str, Any]:
+    """Points, types and nodes of the cells of a grid, whose arrays may be implicit ones."""
+    import pyvista
+
+    seen = pyvista.wrap(grid)
+    cells = {f"cells:{kind}": nodes for kind, nodes in seen.cells_dict.items()}
+    return {"points": np.asarray(seen.points), "types": np.asarray(seen.celltypes), **cells}
+
+
+def _plain_xdmf(path: str) -> str:
+    """Copy of an XDMF file in the folder of this process, with what VTK cannot follow put in place.
+
+    That are inclusions of the geometry and topology of another grid, all steps but the first, and
+    relative names of the files that hold the numbers.
+    """
+    root = ElementTree.parse(path).getroot()
+    parents = {child: parent for parent in root.iter() for child in parent}
+    for series in root.iter("Grid"):
+        if series.get("CollectionType") == "Temporal":
+            for later in series.findall("Grid")[1:]:
+                series.remove(later)
+    for element in list(root.iter()):
+        if not element.tag.endswith("}include"):
+            continue
+        grid, at = parents[element], list(parents[element]).index(element)
+        grid.remove(element)
+        for name in ("Topology", "Geometry"):
+            source = root.find(f".//Grid/{name}") if name in element.get("xpointer", "") else None
+            if source is not None:
+                grid.insert(at, copy.deepcopy(source))
+    for item in root.iter("DataItem"):
+        if item.get("Format") == "HDF" and item.text:
+            file, _, place = item.text.strip().rpartition(":")
+            item.text = f"{Path(path).resolve().parent / file}:{place}"
+    ElementTree.ElementTree(root).write("copy.xdmf")
+    return "copy.xdmf"
 
 
 def _node_table(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import spared
+from ccfem.base.tensor import von_mises
 from ccfem.cases.inspection import Check, check
 from ccfem.comparison.citations import bibtex, cited, methods_of, sentence
 from ccfem.comparison.headline import TEST_COLUMNS
@@ -19,6 +20,7 @@ from ccfem.comparison.plot.part_picture import coloured, load_arrows, support_ma
 from ccfem.comparison.report.charts import curve_charts, fronts, spreads
 from ccfem.comparison.report.layer_view import layer_views
 from ccfem.comparison.report.packing import Rounded, as_bytes, compressed, pack
+from ccfem.comparison.report.print_view import print_views
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.table import (
     FIRST_REMARKS,
@@ -83,10 +85,13 @@ def report_html(
     left_out = record["left_out"]
     charts: dict[str, Any] = {"curve": [], "fronts": [], "spreads": []}
     data: dict[str, Any] = {"part": None, "layers": {"stacks": []}, "charts": charts}
+    data["print"] = {"runs": []}
     with spared("view of the part", left_out):
         data["part"] = part_view(checked, comparison.stress)
     with spared("view of layers and paths", left_out):
         data["layers"] = layer_views(comparison.slicings, strategies)
+    with spared("view of the print", left_out):
+        data["print"] = print_views(ranked)
     with spared("curve", left_out):
         charts["curve"] = curve_charts(curve, colours)
     with spared("fronts", left_out):
@@ -276,6 +281,8 @@ def _plotly() -> str:
 
 _FACETS = 16_000
 """Facets that are drawn; a part with more is drawn coarser."""
+_HIGH = 0.995
+"""Share of the surface's nodes whose stress lies within the scale of colours."""
 _SHOWN = 0.06
 """Largest displacement that is drawn, over the size of the part, at the scale that is proposed."""
 
@@ -286,7 +293,7 @@ def part_view(checked: Check, stress: StressField) -> dict[str, Any]:
     Parameters
     ----------
     stress : StressField
-        Of the load case that counts.
+        Of the load case that counts, without fibre.
 
     Returns
     -------
@@ -326,6 +333,9 @@ def part_view(checked: Check, stress: StressField) -> dict[str, Any]:
             "most": most,
             "scale": _round_scale(_SHOWN * size / most) if most > 0.0 else 1.0,
         }
+        mises = von_mises(stress.nodal[used])
+        high = float(np.quantile(mises, _HIGH))
+        view |= {"stress": as_bytes(mises[kept], high), "most_stress": high}
     return view
 
 

@@ -254,12 +254,21 @@ function partScene(part) {
         colorbar: { title: { text: "mm" }, thickness: 10, len: 0.6 } },
     ];
   }
+  function stressed() {
+    words = [];
+    byId("part-said").textContent = `Von Mises stress of the part without fibre; above ${short(part.most_stress)} MPa, ` +
+      "in half a percent of the surface's nodes, the colour stays the same.";
+    const size = Array.from(part.stress, (v) => (v / 254) * part.most_stress);
+    return [{ ...body, x, y, z, intensity: size, flatshading: false, cmin: 0, cmax: part.most_stress,
+      colorscale: SCALES.value.map((c, k) => [k / 4, c]), hoverinfo: "text", text: size.map((v) => short(v) + " MPa"),
+      colorbar: { title: { text: "MPa" }, thickness: 10, len: 0.6 } }];
+  }
   const modes = byId("part-mode");
-  if (!part.moved) modes.options[1].disabled = true;
+  if (!part.moved) modes.options[1].disabled = modes.options[2].disabled = true;
   const draw = () => {
     const moved = modes.value === "moved";
     byId("part-scale-label").hidden = !moved;
-    const traces = moved ? deformed() : setUp();
+    const traces = moved ? deformed() : modes.value === "stress" ? stressed() : setUp();
     return Plotly.react(view, traces, scene(view, words, traces), CONFIG);
   };
   modes.onchange = byId("part-scale").oninput = draw;
@@ -626,6 +635,46 @@ function spaceScene(part, layers) {
   whenSeen(view, draw);
 }
 
+// ---- the print --------------------------------------------------------------------------------
+
+// The layer on top is drawn whole; of those below it what is seen: contours, fibre, supports.
+const LINES = ["#6b7686", "#a9b4c2", "#0d2f5c", "#b08968", "#cfd8c8", "#b3261e"], FILLS = 1, TRAVEL = 5;
+function printScene(given) {
+  const view = byId("print-view"), choice = byId("print-run"), top = byId("print-top");
+  const alone = byId("print-alone"), travel = byId("print-travel");
+  given.runs.forEach((run, k) => choice.add(new Option(run.name, k)));
+  const layers = () => given.runs[+choice.value].layers;
+  const begin = () => { top.max = top.value = layers().length - 1; };
+  function draw() {
+    const at = +top.value, lists = given.kinds.map(() => [[], [], []]);
+    layers().slice(alone.checked ? at : 0, at + 1).forEach((layer) => {
+      const whole = layer === layers()[at];
+      layer.kind.forEach((kind, k) => {
+        if (kind === TRAVEL ? !(whole && travel.checked) : kind === FILLS && !whole) return;
+        lists[kind].forEach((list, c) => {
+          for (let p = layer.offsets[k]; p < layer.offsets[k + 1]; p++) list.push(layer.points[c][p]);
+          list.push(null);
+        });
+      });
+    });
+    const traces = lists.map(([x, y, z], kind) => ({ type: "scatter3d", mode: "lines", x, y, z, name: given.kinds[kind],
+      hoverinfo: "skip", line: { color: LINES[kind], width: kind === 2 ? 3 : 1.5 } })).filter((trace) => trace.x.length);
+    const run = given.runs[+choice.value], layer = layers()[at];
+    byId("print-top-said").textContent = `${layer.index + 1} of ${run.count}, ${short(layer.top)} mm`;
+    byId("print-said").textContent = (layers().length < run.count ? `${layers().length} of ${run.count} layers are drawn. ` : "") +
+      "Drag to turn, wheel or pinch to zoom. Below the uppermost layer only contours, fibre and supports are drawn.";
+    return Plotly.react(view, traces, scene(view, [], traces), CONFIG);
+  }
+  byId("print-legend").innerHTML = given.kinds.map((kind, k) =>
+    `<span class="legend"><i class="short" style="background:${LINES[k]}"></i>${kind}</span>`).join(" ");
+  begin();
+  choice.onchange = () => { begin(); draw(); };
+  top.oninput = alone.onchange = travel.onchange = draw;
+  for (const each of [choice, top, alone, travel]) each.addEventListener("change", () => printed(view));
+  byId("print").hidden = false;
+  whenSeen(view, draw);
+}
+
 // ---- charts -----------------------------------------------------------------------------------
 
 function chart(element, given) {
@@ -681,6 +730,7 @@ async function start() {
     partScene(data.part);
     if (!byId("layers").hidden) spaceScene(data.part, data.layers);
   } else byId("part-view").hidden = true;
+  if (data.print.runs.length) printScene(data.print);
   charts(data.charts);
   document.body.dataset.ready = "yes";
   await printable();

@@ -10,7 +10,12 @@ from ccfem.base.arrays import FloatArray, freeze, in_brief
 from ccfem.base.display import Shown
 from ccfem.base.errors import InputError
 from ccfem.fem.elasticity import SolveRecord, StressField
-from ccfem.judging.virtual_testing.equilibrium import BONDED, TENSION, Equilibrium, equilibrium
+from ccfem.judging.virtual_testing.equilibrium import (
+    IN_COMPRESSION,
+    TENSION,
+    Equilibrium,
+    equilibrium,
+)
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import RHO_SPAN, Strand
 from ccfem.judging.virtual_testing.strands import Strands, cut_strands
@@ -28,7 +33,7 @@ class VirtualTest(Shown):
     Attributes
     ----------
     mode : str
-        "bonded" or "tension".
+        "tension", "partial" or "bonded".
     rho : float, mm^2
         EA of a strand over Young's modulus of the matrix.
     unreinforced : StressField
@@ -83,15 +88,20 @@ class VirtualTest(Shown):
 
 @dataclass(frozen=True)
 class Bracket:
-    """The two tests between which a printed part is expected to lie.
+    """The tests of one set of paths by what fibre in compression carries.
+
+    A printed part is expected between the first two: between a share of 0 and of a fifth of the
+    stiffness of fibre in tension. Bonded fibre is what the part would gain if strands carried
+    compression fully, which no published print shows.
 
     Attributes
     ----------
-    tension, bonded : VirtualTest
-        Fibres that carry tension only, and fibres bonded in tension and compression.
+    tension, partial, bonded : VirtualTest
+        Fibres that carry no compression, a fifth of it, and all of it.
     """
 
     tension: VirtualTest
+    partial: VirtualTest
     bonded: VirtualTest
 
     __repr__ = in_brief
@@ -122,7 +132,8 @@ def virtual_test(
     strand : Strand, optional
         Stiffness of a strand; default rho = EA/E = 4 mm^2.
     mode : str, default "tension"
-        "tension": fibres in compression carry nothing. "bonded": all fibres carry.
+        "tension": fibres in compression carry nothing. "partial": a fifth of their stiffness.
+        "bonded": all of it.
     span : sequence of float, mm^2, default (2, 6)
         Further values of rho to report the ratio at; () for none.
     machine : Machine, optional
@@ -157,7 +168,7 @@ def virtual_test(
     unreinforced = specimen.stiffness(before.displacement, before.strain_energy)
     stiffnesses = _stiffnesses(specimen, strands, mode, span, balanced)
     ratios = [(float(rho), k / unreinforced) for rho, k in zip(span, stiffnesses, strict=True)]
-    force = np.where(balanced.carries, axial * balanced.strain, 0.0)
+    force = axial * balanced.carried * balanced.strain
     return VirtualTest(
         mode=mode,
         rho=axial / specimen.modulus,
@@ -206,12 +217,17 @@ def virtual_bracket(
     strand: Strand | None = None,
     span: Sequence[float] = RHO_SPAN,
     machine: Machine | None = None,
+    tolerance: float = 1e-8,
 ) -> Bracket:
-    """Both tests of `virtual_test`, with one factorisation; parameters as there."""
+    """Test in every mode of `virtual_test`, with one factorisation; parameters as there."""
     specimen, strands = _prepared(fibres, part, machine)
-    tension = virtual_test(strands, specimen, strand, TENSION, span)
-    known = (specimen.unreinforced.displacement, tension.solution.displacement)
-    return Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span, known=known))
+    tests: list[VirtualTest] = []
+    known = [specimen.unreinforced.displacement]
+    for mode in IN_COMPRESSION:  # each starts from those before
+        test = virtual_test(strands, specimen, strand, mode, span, None, known, tolerance)
+        tests.append(test)
+        known.append(test.solution.displacement)
+    return Bracket(*tests)
 
 
 # Which of two designs is stiffer, and how far the virtual test may be believed.
@@ -220,19 +236,19 @@ def virtual_bracket(
 FIRST, SECOND, SAME, UNDECIDED = "first", "second", "no difference", "undecided"
 
 HONEST_PROMISE = (
-    "Virtual test: it ranks two designs correctly and gives the ratio of their stiffnesses to "
-    "about 10 %, or says 'undecided'; the ratio to the unreinforced stiffness is accurate to 25 "
-    "%, or 10 % after calibration with one reinforced print; first-failure load to 30 % after "
-    "calibration, but the size of its gain is not reliable. Based on one published part, printed "
-    "without fibre and with two plans, one specimen each: an indication, not a validation. Linear "
-    "elastic, fibres as bars. "
-    "Delamination: use it only to rank slicings of one part, where fixed and pressing supports "
-    "give the same order; a published load of 0.87 kN was not reproduced."
+    "Virtual test: held against the published prints of Chen et al. 2021 (two designs under each "
+    "of four loads, on three parts, one specimen each) it orders every pair, and gives the ratio "
+    "of two stiffnesses to 10 %, that to the unreinforced stiffness to 15 % (at worst 23 %). The "
+    "order of breaking loads followed that of the stiffnesses; first failure says where, not at "
+    "which load. Linear elastic, fibres as bars that carry tension, and up to a fifth of their "
+    "stiffness in compression. Delamination: use it only to rank slicings of one part, where "
+    "fixed and pressing supports give the same order; a published load of 0.87 kN was not "
+    "reproduced."
 )
 """What may be expected of the numbers; to be shown wherever they are."""
 
 IN_SHORT = (
-    "Predicted by a virtual test that was held against one published part: an indication, not a "
+    "Predicted by a virtual test held against the prints of one paper: an indication, not a "
     "validation."
 )
 """The same in one sentence, where the report says the rest."""
@@ -251,8 +267,8 @@ up to 1.8 % from one mesh to the next."""
 def stiffer(first: Bracket, second: Bracket) -> str:
     """Say which design is stiffer: "first", "second", "no difference" or "undecided".
 
-    Stiffnesses that differ by less than `RESOLUTION` are no different. Undecided where bonded and
-    tension-only tests disagree on the order by more than that.
+    Stiffnesses that differ by less than `RESOLUTION` are no different. Undecided where the tests
+    in tension only and with some compression disagree on the order by more than that.
 
     Parameters
     ----------
@@ -272,7 +288,7 @@ def stiffer(first: Bracket, second: Bracket) -> str:
         )
     gains = (
         first.tension.stiffness / second.tension.stiffness - 1.0,
-        first.bonded.stiffness / second.bonded.stiffness - 1.0,
+        first.partial.stiffness / second.partial.stiffness - 1.0,
     )
     ahead, behind = max(gains) > RESOLUTION, min(gains) < -RESOLUTION
     if ahead == behind:

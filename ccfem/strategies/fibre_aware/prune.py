@@ -111,7 +111,7 @@ def prune(
         else:
             value = np.zeros(len(strands.length))
             for share, equilibrium in zip(counts / tested.work, tested.found, strict=True):
-                value += share * np.where(equilibrium.carries, equilibrium.strain, 0.0) ** 2
+                value += share * equilibrium.carried * equilibrium.strain**2
         share = max(1.0 / (rounds - k), _FASTEST if len(goal.parts) == 1 else 0.0)
         wanted = length + (1.0 - share) * max(length_now - length, 0.0)
         toolpaths = taken_off(toolpaths, strands, value, wanted, machine, tight)

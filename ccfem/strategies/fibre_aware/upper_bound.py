@@ -40,7 +40,7 @@ from ccfem.base.tensor import largest_in_plane
 from ccfem.fem.elasticity import StressField
 from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.judging.virtual_testing import Strand
-from ccfem.judging.virtual_testing.equilibrium import MODES, TENSION
+from ccfem.judging.virtual_testing.equilibrium import BONDED, TENSION
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.heights import fibre_capacity
@@ -222,7 +222,7 @@ def upper_bound(
         gap = LARGEST_GAP if len(cases) == 1 else LOOSE
     check_number("iterations", iterations, at_least=1)
     check_number("gap", gap, at_least=0.0)
-    check_known("mode", mode, MODES)
+    check_known("mode", mode, (TENSION, BONDED))
     check_known("objective", objective, OBJECTIVES)
     parts = smeared_cases(cases.fields, layers[0].plane.frame)
     alone = (layers, length, machine, strand, _SINGLE_ITERATIONS, mode)

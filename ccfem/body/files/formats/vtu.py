@@ -1,4 +1,4 @@
-"""VTK unstructured grids (``.vtu``, legacy ``.vtk``): read by VTK in a process of its own."""
+"""VTK unstructured grids (``.vtu``, legacy ``.vtk``, XDMF): read by VTK in its own process."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -89,13 +89,16 @@ def read_grid(path: Path) -> Grid:
     if path.suffix.lower() == ".vtk":
         marks, must = (b"# vtk DataFile", b"UNSTRUCTURED_GRID"), "begin with '# vtk DataFile' and "
         must += "have DATASET UNSTRUCTURED_GRID"
+    elif path.suffix.lower() == ".xdmf":
+        marks, must = (b"<Xdmf", b">"), "hold <Xdmf>"
     else:
         marks = (b"<VTKFile", b"UnstructuredGrid")
         must = "hold <VTKFile type='UnstructuredGrid'>"
     if not all(mark in start for mark in marks):
         raise InputError(f"{path} is not a VTK unstructured grid: it must {must}")
     try:
-        arrays = read_isolated("vtk_files:read_grid", path)
+        how = "read_xdmf" if path.suffix.lower() == ".xdmf" else "read_grid"
+        arrays = read_isolated(f"vtk_files:{how}", path)
     except ChildError as error:
         raise InputError(
             f"{path} is not a VTK unstructured grid that can be read: {error}: write it again"

@@ -1,0 +1,5 @@
+"""XDMF meshes (``.xdmf``) of DOLFINx and others, with numbers in XML or HDF5: read by VTK."""
+
+from ccfem.body.files.formats.vtu import read
+
+__all__ = ["read"]
