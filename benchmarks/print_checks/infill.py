@@ -142,7 +142,7 @@ def regions_of(job: Job, plastic: Plastic) -> list[Regions]:
     width, pixel = machine.matrix_width, _PIXEL * machine.matrix_width
     mine = lines.lays & lines.in_part & ~lines.beside_part
     height = lines.end[:, 2].round(3)
-    fibre = np.unique(height[mine & ((lines.tool == 1) | (lines.kind == PART[2]))])
+    fibre = np.unique(height[mine & lines.of_fibre])
     tops = np.setdiff1d(np.unique(height[mine]), fibre)
     lower = np.concatenate([[0.0], tops[:-1]])
     levels = np.union1d(np.append(0.0, tops), fibre)

@@ -51,6 +51,8 @@ class PrintPlan:
         in gaps. Its section stays that of `laid` (`ccfem.printing.part_moves.line_sizes`).
     short : (K,) bool array, optional
         Which lines of matrix take the place of strands that are too short for the cutter.
+    sparse : (K,) bool array, optional
+        Which lines are sparse infill; by default none.
     dropped, ended : float, mm
         As in `PrintedStrands`.
     warnings : tuple of str
@@ -77,6 +79,7 @@ class PrintPlan:
     warnings: tuple[str, ...] = ()
     ended: float = 0.0
     touched: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    sparse: BoolArray = None  # type: ignore[assignment]
 
     __repr__ = in_brief
 
@@ -86,11 +89,13 @@ class PrintPlan:
             object.__setattr__(self, "laid", whole)
         if self.room is None:
             object.__setattr__(self, "room", np.ones(len(self.paths)))
-        if self.short is None:
-            object.__setattr__(self, "short", np.zeros(len(self.paths), dtype=bool))
+        for name in ("short", "sparse"):
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, np.zeros(len(self.paths), dtype=bool))
         if self.trims is None:
             object.__setattr__(self, "trims", np.zeros((0, 3)))
-        freeze(self, trims=float, top=float, thickness=float, laid=float, room=float, short=bool)
+        freeze(self, trims=float, top=float, thickness=float, laid=float, room=float)
+        freeze(self, short=bool, sparse=bool)
 
     def volume(self, machine: Machine) -> float:
         """Volume of matrix and of fibre inside the part, mm^3."""
@@ -204,6 +209,7 @@ def plan_print(
             *check_cover(slabs, machine),
         ),
         strands.ended,
+        sparse=np.concatenate([layer.sparse for layer in done]),
     )
     check_bed(plan, machine)
     return plan

@@ -76,6 +76,23 @@ def test_nothing_is_laid_in_air_but_bridges(box, infill, spacing):
     assert beyond(job, regions) < 2e-3
 
 
+def test_comments_call_infill_what_it_is(box):
+    """As viewers know it; on layers of matrix all of it lies where the infill is sparse."""
+    job, _, regions = box("lines")
+    lines = Lines.of(job.done)
+    height, sparse = (
+        lines.end[:, 2].round(3),
+        lines.lays & (lines.kind == PART[2]) & ~lines.of_fibre,
+    )
+    assert {one.top for one in regions if one.sparse.any()} == set(height[sparse].tolist())
+    for region in regions:
+        mine = sparse & (height == region.top)
+        if mine.any():
+            middle = 0.5 * (lines.start[mine] + lines.end[mine])
+            inside = region.sparse[region.pixels(middle[:, :2])]
+            assert lines.length[mine][inside].sum() > 0.98 * lines.length[mine].sum()
+
+
 def test_fibre_cuts_no_wall(box):
     """Walls go round whole on each layer of matrix; on that of fibre there is none."""
     job, _, regions = box("gyroid")
