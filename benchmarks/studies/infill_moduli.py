@@ -13,6 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy import ndimage
+from threadpoolctl import threadpool_limits
 
 from ccfem.fem.infill_moduli import infill_stiffness
 from ccfem.paths.plastic.plastic import GYROID
@@ -44,6 +45,7 @@ def _cube(poisson: float) -> np.ndarray:
     return stiffness
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")  # more threads wait for each other
 def homogenised(
     voxels: np.ndarray, poisson: float = POISSON, tolerance: float = 1e-4
 ) -> np.ndarray:

@@ -61,6 +61,32 @@ def test_the_plain_cell_of_voxels_is_the_material():
     assert homogenised(plates)[1, 1] == pytest.approx(expected, rel=1e-6)
 
 
+def test_voxels_of_an_even_gyroid_are_as_published():
+    """Poisson's ratio 0.34, to 0.06, in all directions, and a modulus towards the upper bound.
+
+    DeValk and Lakes, Physica Status Solidi B 258 (2021); the bound is that of Hashin and Shtrikman.
+    """
+    poisson, count = 0.3, 32
+    x, y, z = np.meshgrid(*[2.0 * np.pi * (np.arange(count) + 0.5) / count] * 3, indexing="ij")
+    field = np.sin(x) * np.cos(y) + np.sin(y) * np.cos(z) + np.sin(z) * np.cos(x)
+    slope = np.sqrt(
+        (np.cos(x) * np.cos(y) - np.sin(z) * np.sin(x)) ** 2
+        + (np.cos(y) * np.cos(z) - np.sin(x) * np.sin(y)) ** 2
+        + (np.cos(z) * np.cos(x) - np.sin(y) * np.sin(z)) ** 2
+    )
+    voxels = np.abs(field) < 0.3 * slope
+    young, _, ratios = moduli(homogenised(voxels, poisson))
+    np.testing.assert_allclose(young, young[0], rtol=1e-3)
+    np.testing.assert_allclose(ratios, 0.34, atol=0.06)
+    rho, bulk, shear = voxels.mean(), 1.0 / (3.0 * (1.0 - 2.0 * poisson)), 0.5 / (1.0 + poisson)
+    k = bulk + (1.0 - rho) / (-1.0 / bulk + 3.0 * rho / (3.0 * bulk + 4.0 * shear))
+    g = shear + (1.0 - rho) / (
+        -1.0 / shear + 6.0 * rho * (bulk + 2.0 * shear) / (5.0 * shear * (3.0 * bulk + 4.0 * shear))
+    )
+    most = 9.0 * k * g / (3.0 * k + g)
+    assert 0.55 * most < young[0] < most
+
+
 SIZE = (120.0, 16.0, 16.0)
 FIBRE = 0.1075
 LOWER, UPPER = (7.8 - 0.5 * FIBRE) / 10.0, (8.0 - 0.5 * FIBRE) / 12.0
