@@ -7,9 +7,10 @@ reproduce PAPER --out FOLDER`` wrote there.
 
 import argparse
 import re
+import shutil
 from pathlib import Path
 
-from ccfem.comparison.citations import sentence
+from ccfem.comparison.citations import METHODS, sentence
 from ccfem.papers.reproduce import named_papers, reproduce
 
 PAGES = Path(__file__).resolve().parents[1] / "docs" / "papers"
@@ -25,11 +26,16 @@ HEADINGS = {
 }
 
 
+PICTURES = {"evidence": "figure_01_predicted_over_measured"}
+"""Figure of a run that stands on the page, where one does."""
+
+
 def page(paper: str, folder: Path) -> str:
     """Page of a paper from the tables in the folder of its run."""
+    cited = any(paper in keys for keys in METHODS.values())
     parts = [
         f"# {named_papers()[paper].title}",
-        sentence(paper),
+        *([sentence(paper)] if cited else []),
         f"    ccfem reproduce {paper}",
         "Written by `python -m benchmarks.paper_pages` from one run of that command; times are "
         "those of its machine.",
@@ -46,6 +52,9 @@ def page(paper: str, folder: Path) -> str:
         else:
             text = f"## {HEADINGS[name]}\n\n{text}"
         parts.append(text.strip())
+    if paper in PICTURES:
+        parts.insert(3 if cited else 2, f"![{named_papers()[paper].title}]({paper}.png)")
+        shutil.copy(folder / f"{PICTURES[paper]}.png", PAGES / f"{paper}.png")
     return "\n\n".join(parts) + "\n"
 
 

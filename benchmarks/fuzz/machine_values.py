@@ -38,9 +38,12 @@ KEYS = {
     "process": ("process",),
     "kinematics": ("kinematics",),
     "limits": ("limits",),
+    "spools": ("spools",),
+    "costs": ("costs",),
 }
 """Where a part file has each table."""
 LENGTHS = {"speed": 3, "curvature": 2, "length": 2, "angle": 2, "offset": 3, "bed": 3, "centre": 3}
+LENGTHS |= {"park": 2}
 """Of values that are several numbers."""
 
 

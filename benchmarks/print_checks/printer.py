@@ -4,24 +4,40 @@ It knows the words of four firmwares from their documents and nothing of who wro
 that a firmware does not know is an error.
 """
 
+import cmath
 import math
 import re
 from dataclasses import dataclass, field
 
 import numpy as np
 
-__all__ = ["Change", "Run", "Step", "follow"]
+__all__ = ["Change", "Halt", "Run", "Step", "follow"]
 
-COMMON = {"G0", "G1", "G4", "G21", "G28", "G90", "M83", "M84", "M140", "M190", "M400", "M106"}
+COMMON = {"G0", "G1", "G4", "G21", "G28", "G90", "G91", "G92"}
+COMMON |= {"M73", "M83", "M84", "M106", "M140", "M190", "M400"}
 HEATERS = {"M104", "M109", "M107"}
+ARCS = {"G2", "G3"}
+"""Not in the list of codes of Aura's printer."""
 KNOWN = {
-    "marlin_two_tools": COMMON | HEATERS | {"M280", "T0", "T1"},
-    "chen2021": COMMON | HEATERS | {"M280", "T0", "T1"},
+    "marlin_two_tools": COMMON | ARCS | HEATERS | {"M280", "M0", "T0", "T1"},
+    "chen2021": COMMON | ARCS | HEATERS | {"M280", "M0", "T0", "T1"},
     # No M280 and no M218: servos by name, offsets in the macros T0 and T1.
-    "klipper": COMMON | HEATERS | {"SET_SERVO", "SET_PRESSURE_ADVANCE", "T0", "T1"},
-    "reprap_duet": COMMON | {"M280", "G10", "M116", "M568", "M572", "T0", "T1"},
-    "aura_like": COMMON | HEATERS | {"M280", "M1001", "M1002", "M530", "M532", "T0", "T1"},
+    "klipper": COMMON
+    | ARCS
+    | HEATERS
+    | {
+        "SET_SERVO",
+        "SET_PRESSURE_ADVANCE",
+        "SET_KINEMATIC_POSITION",
+        "SET_IDLE_TIMEOUT",
+        "PAUSE",
+        "T0",
+        "T1",
+    },
+    "reprap_duet": COMMON | ARCS | {"M280", "G10", "M116", "M568", "M572", "M226", "T0", "T1"},
+    "aura_like": COMMON | HEATERS | {"M280", "M1001", "M1002", "M530", "M532", "M0", "T0", "T1"},
 }
+PAUSES = {"M0", "M226", "PAUSE"}
 LONGEST = {"klipper": 50.0}
 """max_extrude_only_distance of Klipper; EXTRUDE_MAXLENGTH of Marlin is 200."""
 _VALUE = re.compile(r"[A-Z][-+.\d]+")
@@ -73,6 +89,16 @@ class Change:
 
 
 @dataclass
+class Halt:
+    """A pause: after how many steps, where the nozzle stands, and the highest that is laid."""
+
+    at: int
+    place: Place
+    highest: float
+    tool: int
+
+
+@dataclass
 class Run:
     """All that the printer did."""
 
@@ -80,6 +106,8 @@ class Run:
     cuts: list = field(default_factory=list)
     changes: list = field(default_factory=list)
     wrong: list = field(default_factory=list)
+    arcs: int = 0
+    halts: list = field(default_factory=list)
     waited: float = 0.0
     head: dict = field(default_factory=dict)
     lines: object = None
@@ -127,7 +155,7 @@ class _Printer:
         self.place, self.tool, self.speed, self.highest = (0.0, 0.0, 0.0), -1, 0.0, 0.0
         self.kind, self.strand, self.ends = "", "", 0
         self.line = {"WIDTH": np.nan, "HEIGHT": np.nan}
-        self.changed, self.cut = -1, False
+        self.changed, self.cut, self.relative = -1, False, False
         self.active, self.standby = {}, {}
         self.heat, self.waited = {0: 20.0, 1: 20.0}, {0: False, 1: False}
 
@@ -139,16 +167,30 @@ class _Printer:
         if not words:
             return
         word, given = words[0], _values(words)
-        moves = word in ("G0", "G1")
-        if word not in KNOWN[self.machine] or (moves and not self.letters.issuperset(given)):
+        moves = word in ("G0", "G1", "G2", "G3")
+        letters = self.letters | (set("IJ") if word in ARCS else set())
+        if word not in KNOWN[self.machine] or (moves and not letters.issuperset(given)):
             self.run.wrong.append(f"no {self.machine} knows {line}")
         if word not in KNOWN[self.machine]:
             return
-        if moves:
+        if word in ARCS:
+            self._arc(word == "G3", given, line)
+        elif moves:
             self._move(word == "G0", given, line)
         elif word == "G4":
             self.run.waited += given["P"] / 1000.0
-        elif word == "G28" and "X" not in words:
+        elif word in ("G90", "G91"):
+            self.relative = word == "G91"
+        elif word in ("G92", "SET_KINEMATIC_POSITION"):
+            x, y, z = self.place
+            given |= {name: float(value) for name, value in re.findall(r"([XYZ])=([-+.\d]+)", line)}
+            self.place = (given.get("X", x), given.get("Y", y), given.get("Z", z))
+        elif word in PAUSES:
+            halt = Halt(len(self.run.steps), self.place, self.highest, self.tool)
+            self.run.halts.append(halt)
+        elif word == "G28" and "X" in words:
+            self.place = (0.0, 0.0, self.place[2])
+        elif word == "G28":
             self.place = (0.0, 0.0, 0.0)
         elif word in ("T0", "T1"):
             self._change(int(word[1]))
@@ -178,6 +220,10 @@ class _Printer:
         """Move the nozzle, or filament alone; a rapid move ends the strand."""
         self.speed = given.get("F", 60.0 * self.speed) / 60.0
         x, y, z = start = self.place
+        if self.relative:
+            way = (given.get(letter, 0.0) for letter in "XYZ")
+            there = (a + b for a, b in zip(start, way, strict=True))
+            given = given | dict(zip("XYZ", there, strict=True))
         self.place = end = (given.get("X", x), given.get("Y", y), given.get("Z", z))
         if self.tool == 1 and any(self.shift):
             start, end = _moved(start, self.shift), _moved(end, self.shift)
@@ -208,6 +254,24 @@ class _Printer:
         if rapid:
             self.strand, self.cut = "", False
             self.ends += 1
+
+    def _arc(self, counter_clockwise: bool, given: dict[str, float], line: str) -> None:
+        """Go along an arc as firmware does, in chords that leave it by a thousandth of a mm."""
+        x, y = self.place[:2]
+        centre = complex(x + given["I"], y + given["J"])
+        start, end = complex(x, y) - centre, complex(given["X"], given["Y"]) - centre
+        if abs(abs(start) - abs(end)) > 0.05:
+            self.run.wrong.append(f"an arc that does not end on its circle: {line}")
+        turn = (cmath.phase(end / start)) % (2.0 * math.pi)
+        turn -= 0.0 if counter_clockwise else 2.0 * math.pi
+        count = max(math.ceil(abs(turn) / math.sqrt(8e-3 / abs(start))), 2)
+        fed = {letter: given[letter] / count for letter in "EUV" if letter in given}
+        rate = {"F": given["F"]} if "F" in given else {}
+        for k in range(1, count + 1):
+            ray = start * cmath.exp(1j * turn * k / count) + centre
+            place = (ray.real, ray.imag) if k < count else (given["X"], given["Y"])
+            self._move(False, {"X": place[0], "Y": place[1], **fed, **rate}, line)
+        self.run.arcs += 1
 
     def _change(self, new: int) -> None:
         """Change tools; a Duet sets the old one to its standby temperature by itself."""

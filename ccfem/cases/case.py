@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -18,7 +18,9 @@ from ccfem.machine.machine import Machine
 from ccfem.paths.placement.fibre_places import FibrePlaces
 from ccfem.paths.plastic.as_printed import as_printed
 from ccfem.paths.plastic.plastic import SOLID, Plastic
+from ccfem.printing.bed_layout import AS_IT_STANDS, BedLayout, bed_of
 from ccfem.printing.line_counts import MOST_STRANDS, about_strands, check_strands
+from ccfem.printing.print_plan import spun
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.slicer import Slicer
 from ccfem.slicing.slicers.planar import Planar
@@ -37,6 +39,8 @@ class Case(Shown):
         One line for tables and reports.
     build : tuple of 3 floats, default z
         Build direction in the frame of the mesh.
+    bed : BedLayout
+        How the part, or copies of it, are turned and placed on the bed.
     slicing : Slicer, default 12 flat layers
         Cuts the part into layers of fibre.
     parameters : mapping of strategy name to parameters
@@ -75,6 +79,7 @@ class Case(Shown):
     plastic: Plastic = SOLID
     weights: Mapping[str, float] = field(default_factory=dict)
     body: BodyFaces | None = None
+    bed: BedLayout = AS_IT_STANDS
 
     def __repr__(self) -> str:
         return f"Case {self.name}: {self.title}"
@@ -85,6 +90,15 @@ class Case(Shown):
             check_known("load case", name, self.problem.cases)
             check_number(f"weight of load case '{name}'", weight, above=0.0)
         check_name(self.name, self.title)
+
+    def on_bed(self, table: Mapping[str, object]) -> "Case":
+        """Case placed on the bed otherwise, by keys of a table ``[bed]``.
+
+        Turns come after those that there are; about X and Y they change the build direction. Loads,
+        supports and paths stay in the frame of the part.
+        """
+        build, bed = bed_of(self.build, table, self.bed)
+        return replace(self, build=build, bed=bed)
 
     @cached_property
     def _flat_layers(self) -> dict[Planar, tuple[Layer, ...]]:
@@ -156,7 +170,8 @@ class Case(Shown):
                 "--slicing planar, or infill = 'solid'"
             )
         chosen.check(self.problem.mesh, self.build, self.machine)
-        return as_printed(self.problem, self.known_layers(chosen), self.plastic, self.machine)
+        machine = spun(self.machine, self.bed.spin)  # infill keeps its direction on the bed
+        return as_printed(self.problem, self.known_layers(chosen), self.plastic, machine)
 
 
 def check_name(name: str, title: str) -> None:

@@ -16,7 +16,6 @@ from typing import TypeVar
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError, Mistakes, shown
 from ccfem.base.toml import TomlTable, from_table, read_toml
 from ccfem.body.files.surface import Surface
@@ -67,8 +66,9 @@ from ccfem.machine.machine import Machine
 from ccfem.machine.named_machines import machine_from
 from ccfem.paths.placement.fibre_places import FibrePlaces
 from ccfem.paths.plastic.plastic import Plastic
+from ccfem.printing.bed_layout import BedLayout, bed_of
 from ccfem.slicing import slicers as slicers
-from ccfem.slicing.layers.slicer import Slicer
+from ccfem.slicing.layers.slicer import Slicer, Vector
 from ccfem.slicing.slicers.planar import Planar
 
 T = TypeVar("T")
@@ -144,7 +144,7 @@ def part_case(content: TomlTable, path: Path, mesh: TetMesh | None = None) -> Ca
     with mistakes.noted():
         check_name(name, part.title or name)
     with mistakes.noted():
-        given.build = unit_vector(part.build, "build")
+        given.build, given.bed = bed_of(unit_vector(part.build, "build").tolist(), part.bed)
     with mistakes.noted():
         given.slicing = slicing_of(part)
     with mistakes.noted():
@@ -204,7 +204,6 @@ def part_case(content: TomlTable, path: Path, mesh: TetMesh | None = None) -> Ca
         mesh.patch(patch)
     held = (*supports, *others, *chain.from_iterable(case_supports.values()))
     bare = without_faces(mesh, (*rules, *near, *patches_in_use(held, loads)))
-    x, y, z = given.build.tolist()
     material, cells, axes = (
         (given.material, regions_of(bare, regions), None) if deck is None else deck.on_cells(bare)
     )
@@ -222,7 +221,8 @@ def part_case(content: TomlTable, path: Path, mesh: TetMesh | None = None) -> Ca
             order=part.order,
             case_supports=case_supports,
         ),
-        build=(x, y, z),
+        build=given.build,
+        bed=given.bed,
         slicing=given.slicing,
         machine=given.machine,
         parameters=part.strategies,
@@ -273,7 +273,8 @@ def _on_body(
 class _Values:
     """What the sections of a part file give; none is missing where there was no mistake."""
 
-    build: FloatArray
+    build: Vector
+    bed: BedLayout
     slicing: Slicer
     machine: Machine
     material: Material

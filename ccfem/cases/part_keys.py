@@ -237,6 +237,8 @@ class Part(Body):
         Where the part comes from.
     build : str or tuple of 3 floats
         Build direction.
+    bed : table
+        Turn, place and copies on the bed.
     layers : int
         Number of flat layers of fibre, spread evenly over the height.
     heights : tuple of floats, mm
@@ -269,6 +271,7 @@ class Part(Body):
     title: str = ""
     source: str = ""
     build: str | Vector = "z"
+    bed: dict[str, Any] = field(default_factory=dict)
     layers: int | None = None
     heights: tuple[float, ...] | None = None
     slicing: dict[str, Any] | None = None

@@ -16,6 +16,7 @@ from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.materials import Material
 from ccfem.machine.machine import Machine
 from ccfem.paths.plastic.plastic import SOLID
+from ccfem.printing.bed_layout import bed_table
 from ccfem.slicing.slicers.planar import Planar
 
 
@@ -48,6 +49,7 @@ def part_text(case: Case, mesh: str, comment: str = "") -> str:
         "mesh": mesh,
         "order": problem.order,
         "build": case.build,
+        "bed": bed_table(case.bed),
         "material": _material(problem.material),
         "slicing": {"method": member_name(case.slicing), **_changed(case.slicing, Planar())},
         "fibre": fibre_table(case.fibre),

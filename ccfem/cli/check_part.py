@@ -2,14 +2,20 @@
 
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
+from ccfem.base.errors import SolveError
 from ccfem.base.whole import check_writable, whole_file
 from ccfem.cases.case import Case
 from ccfem.cases.inspection import check
+from ccfem.cases.inspection.part_check import solve_costs
 from ccfem.cli.run import NOT_PRINTABLE, complain
 from ccfem.comparison.plot.canvas import check_picture, save
 from ccfem.comparison.plot.part_picture import part_page, part_picture
+from ccfem.fem.elasticity.solve import solve
+from ccfem.printing.build_directions import better_direction
+from ccfem.slicing.slicers.planar import Planar
 
 
 def check_part(read: Callable[[], Case], picture: Path | None) -> int:
@@ -35,6 +41,8 @@ def check_part(read: Callable[[], Case], picture: Path | None) -> int:
         picture = check_picture(Path(f"{checked.case.name}-check.png"))
     page = check_writable(picture.with_suffix(".html"))
     print(checked.known)
+    if not checked.mistakes and (said := _direction(checked.case)):
+        print(said)
     save(part_picture(checked), picture)
     with whole_file(page) as temporary:
         temporary.write_text(part_page(checked), encoding="utf-8")
@@ -44,3 +52,32 @@ def check_part(read: Callable[[], Case], picture: Path | None) -> int:
     if checked.mistakes or checked.not_planned:
         return complain(*checked.mistakes, *checked.not_planned)
     return NOT_PRINTABLE if checked.not_printable else 0
+
+
+_QUICK = 15.0
+"""Estimated seconds of a solve that a check may take."""
+
+
+def _direction(case: Case) -> str:
+    """Say which build direction would let fibre take much more; empty for none, or if it is long.
+
+    The first load case is solved on the cells that there are.
+    """
+    slicing, problem = case.slicing, case.problem
+    quick = solve_costs(problem)[0].seconds <= _QUICK
+    if not quick or not isinstance(slicing, Planar) or slicing.axis != "build":
+        return ""
+    name = next(iter(problem.loads))
+    rough = replace(
+        problem,
+        order=1 if problem.mesh.order == 1 else 2,
+        loads={name: problem.loads[name]},
+        combinations={},
+        case_supports={k: v for k, v in problem.case_supports.items() if k == name},
+    )
+    try:
+        stress = solve(rough)[name]
+    except SolveError as error:
+        return f"remark: no build direction is compared, for the part is not solved: {error}"
+    said = better_direction(stress, case.build, case.machine)
+    return said and f"remark: {said}"

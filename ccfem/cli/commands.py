@@ -14,7 +14,7 @@ import typer
 
 from ccfem.base.errors import InputError
 from ccfem.base.progress import progress_bar
-from ccfem.cli.arguments import drawings_of, names_of, parameters_by_strategy, path_of
+from ccfem.cli.arguments import bed_table_of, drawings_of, names_of, parameters_by_strategy, path_of
 from ccfem.cli.fibre_amounts import front
 from ccfem.cli.fibre_choice import SetFibre
 from ccfem.cli.machines import MachineName, SetMachine, machines
@@ -23,6 +23,8 @@ from ccfem.cli.options import (
     Backend,
     Calibration,
     CasePath,
+    Centre,
+    Copies,
     Curve,
     Details,
     Drawings,
@@ -30,6 +32,7 @@ from ccfem.cli.options import (
     Fibre,
     FibreInAll,
     Force,
+    FromLayer,
     Heights,
     Layers,
     LoadCase,
@@ -38,6 +41,7 @@ from ccfem.cli.options import (
     Out,
     Paths,
     PathsFrame,
+    Pause,
     Pictures,
     PrintedSupport,
     PrintFile,
@@ -56,6 +60,7 @@ from ccfem.cli.options import (
     StressStep,
     StressUnit,
     TestOrNot,
+    Turn,
     VirtualTest,
 )
 from ccfem.cli.part_commands import add_part_commands
@@ -225,6 +230,9 @@ def reproduce(
         return
     with progress_bar(lines=True) as progress:
         made = make(paper, part or "", None if out is None else path_of(out), progress)
+    shown = named_papers()[paper].shown
+    if shown and not part:
+        print((made / shown).read_text(encoding="utf-8"))
     print(made)
     if part:
         print(f"kept; made again only where code or data have changed ({made.parent / KEPT})")
@@ -369,6 +377,9 @@ def check(
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
     set_plastic: SetPlastic = None,
+    turn: Turn = None,
+    centre: Centre = None,
+    copies: Copies = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -386,7 +397,8 @@ def check(
     """
     from ccfem.cli.check_part import check_part
 
-    read = partial(load, case, set_case, False, machine, set_machine, set_fibre, set_plastic)
+    bed = bed_table_of(turn, centre, copies)
+    read = partial(load, case, set_case, False, machine, set_machine, set_fibre, bed, set_plastic)
     if code := check_part(read, out):
         raise typer.Exit(code)
 
@@ -416,6 +428,7 @@ def compare(
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
     set_plastic: SetPlastic = None,
+    turn: Turn = None,
     backend: Backend = "auto",
     stress: StressFile = None,
     stress_unit: StressUnit = None,
@@ -448,7 +461,8 @@ def compare(
         )
         if drawings is not None and slicings is not None:
             raise InputError("--drawings works with one slicing only; got --slicings: drop one")
-        part = load(case, set_case, refine, machine, set_machine, set_fibre, set_plastic)
+        bed = bed_table_of(turn)
+        part = load(case, set_case, refine, machine, set_machine, set_fibre, bed, set_plastic)
         part, strand = calibrated(part, virtual_test, calibration)
         chosen = named_strategies(part, names, parameters) if names or not files else {}
         return Request.of(
@@ -490,9 +504,14 @@ def plan(
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
     set_plastic: SetPlastic = None,
+    turn: Turn = None,
     backend: Backend = "auto",
     gcode: PrintFile = False,
     support: PrintedSupport = False,
+    centre: Centre = None,
+    copies: Copies = None,
+    pause: Pause = None,
+    from_layer: FromLayer = 0,
     stress: StressFile = None,
     stress_unit: StressUnit = None,
     stress_array: StressArray = None,
@@ -512,6 +531,7 @@ def plan(
 
     def ask() -> Any:
         from ccfem.comparison.request import LONGEST_TEST, Request, named_strategies
+        from ccfem.printing.course import Course
 
         parameters = parameters_by_strategy(set_ or (), strategy)
         cut = layers_of(layers, heights, slicing)
@@ -523,7 +543,11 @@ def plan(
             step=stress_step,
             components=stress_components,
         )
-        part = load(case, set_case, refine, machine, set_machine, set_fibre, set_plastic)
+        if not gcode and not (centre is None and copies is None):
+            raise InputError("--centre and --copies place a print on the bed: add --gcode")
+        course = Course(tuple(pause or ()), from_layer)
+        bed = bed_table_of(turn, centre, copies)
+        part = load(case, set_case, refine, machine, set_machine, set_fibre, bed, set_plastic)
         part, strand = calibrated(part, virtual_test is not False, calibration)
         untold = virtual_test is None and stiffness is None and load_case != "all"
         return Request.of(
@@ -539,6 +563,7 @@ def plan(
             backend=backend,
             print_plans=gcode,
             support=support,
+            course=course,
             every_layer=every_layer,
             longest_test=LONGEST_TEST if untold else float("inf"),
         )
@@ -595,7 +620,9 @@ def calibrate(
         "strand": None,
         "load_case": load_case,
     }
-    read = partial(load, case, set_case, False, machine, set_machine, set_fibre, set_plastic)
+    read = partial(
+        load, case, set_case, False, machine, set_machine, set_fibre, set_plastic=set_plastic
+    )
     fit_material(read, unreinforced, reinforced, strategy, parameters, options, out)
 
 

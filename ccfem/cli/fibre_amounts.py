@@ -69,7 +69,7 @@ def front(
     strengths = () if strength is None else numbers_of(strength)
     if strength is not None and not strengths:
         raise InputError(f"--strength expects numbers from 0 to 1 as 0,0.25,0.5; got '{strength}'")
-    part = load(case, set_case, False, machine, set_machine, set_fibre, set_plastic)
+    part = load(case, set_case, False, machine, set_machine, set_fibre, set_plastic=set_plastic)
     chosen = named_strategies(part, (strategy,), parameters)
     request = Request(part, chosen, load_case=load_case, backend=backend)
     where = out if out is not None else Path("results") / f"{part.name}-front"

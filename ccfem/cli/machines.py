@@ -3,6 +3,7 @@
 import dataclasses
 import textwrap
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -74,12 +75,81 @@ def machines(
         str | None,
         typer.Argument(metavar="NAME_OR_FILE", help="Print all values of this one, to edit."),
     ] = None,
+    square: Annotated[
+        Path | None,
+        typer.Option(
+            "--square",
+            metavar="FILE.gcode",
+            help="Write a square to print that calibrates it, and say what to measure on it.",
+        ),
+    ] = None,
+    measured: Annotated[
+        str | None,
+        typer.Option(
+            "--measured",
+            metavar="NAME=VALUE,..",
+            help="Print it with the values that the measured square tells, as "
+            "front=5.2,back=4.9,left=5,right=5,start=15,end=14.6,mass=15.7.",
+        ),
+    ] = None,
 ) -> None:
-    """List the printers that come with ccfem, or print one as a file to edit."""
+    """List the printers that come with ccfem, print one as a file to edit, or calibrate it."""
     if name is None:
+        if square is not None or measured is not None:
+            raise InputError("--square and --measured need a machine: name it, or its file")
         _list()
+    elif square is not None:
+        if measured is not None:
+            raise InputError("--square comes before --measured: give one of them")
+        _write_square(name, square)
+    elif measured is not None:
+        print(calibrated_file(name, measured), end="")
     else:
         print(machine_file(name), end="")
+
+
+def _write_square(name: str, path: Path) -> None:
+    """Write the file of the square, and say what to measure on it."""
+    from ccfem.machine.machine import Machine
+    from ccfem.machine.named_machines import machine_table, updated
+    from ccfem.printing.calibration_square import calibration_square
+    from ccfem.printing.export.gcode import write_gcode
+
+    if path.suffix.lower() != ".gcode":
+        raise InputError(f"the square is written as G-code; got {path}: end it in .gcode")
+    planned = calibration_square(updated(Machine(), machine_table(name)))
+    write_gcode(path, planned.plan, planned.machine, "calibration square")
+    print(planned.form)
+    print(f"then: ccfem machines {name} --measured front=..,back=.. > mine.toml")
+
+
+def calibrated_file(name: str, text: str) -> str:
+    """File of a machine with the values that its measured square tells.
+
+    Parameters
+    ----------
+    name : str
+        Of a machine, or of its file.
+    text : str
+        Measures, as ``front=5.2,back=4.9``.
+    """
+    from ccfem.machine.machine import Machine
+    from ccfem.machine.named_machines import machine_table, updated
+    from ccfem.printing.calibration_square import Measured, corrected, corrections
+
+    pairs = [assignment(part) for part in text.split(",") if part.strip()]
+    if len(dict(pairs)) < len(pairs):
+        raise InputError(f"--measured names a measure twice: {text}")
+    machine, found = updated(Machine(), machine_table(name)), Measured.of(dict(pairs))
+    off = corrections(machine, found)
+    said = (
+        f"Calibrated: fibre lay {off['x']:+.2f} mm to the right and {off['y']:+.2f} mm to the "
+        f"back, began {off['start']:+.2f} mm and ended {off['end']:+.2f} mm too late; matrix fed: "
+        f"{off['flow']:.3f} of what was asked for."
+    )
+    if machine.gcode.offset_by == "firmware":
+        said += " The firmware knows the offset of the fibre's nozzle: change it there by as much."
+    return _file(corrected(machine, found), said)
 
 
 def _list() -> None:
@@ -110,10 +180,14 @@ def machine_file(name: str) -> str:
     from ccfem.machine.machine import Machine
     from ccfem.machine.named_machines import machine_about, machine_table, updated
 
-    machine = updated(Machine(), machine_table(name))
-    head = textwrap.fill(machine_about(name), _WIDTH, initial_indent="# ", subsequent_indent="# ")
+    return _file(updated(Machine(), machine_table(name)), machine_about(name))
+
+
+def _file(machine: "Machine", about: str) -> str:
+    """All values of a machine as a TOML file, with a comment about it at its head."""
+    head = textwrap.fill(about, _WIDTH, initial_indent="# ", subsequent_indent="# ")
     ends = ["# A file without this table at its end is cut off.", 'last_table = "end"', ""]
-    lines = [head] * bool(machine_about(name)) + ends + _lines(machine, "machine")
+    lines = [head] * bool(about) + ends + _lines(machine, "machine")
     return "\n".join([*lines, "", "[end]"]) + "\n"
 
 

@@ -73,6 +73,43 @@ Slicings = Annotated[
         "flat layers are as thick as the part's own unless they say otherwise.",
     ),
 ]
+Turn = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--turn",
+        metavar="AXIS=DEGREES",
+        help="Turn the part on the bed, as z=37; x and y change the build direction; repeatable, "
+        "one after the other.",
+    ),
+]
+Centre = Annotated[
+    str | None,
+    typer.Option(
+        "--centre", metavar="X,Y", help="Middle of the part, or of all copies, on the bed, mm."
+    ),
+]
+Copies = Annotated[
+    str | None,
+    typer.Option(
+        "--copies", metavar="N|NXxNY", help="Print several in one file, as 4, or 2x3 by X and Y."
+    ),
+]
+Pause = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--pause",
+        metavar="LAYER|MMmm",
+        help="Halt before a layer, as 12, or when a height is printed, as 3.4mm; repeatable.",
+    ),
+]
+FromLayer = Annotated[
+    int,
+    typer.Option(
+        "--from-layer",
+        metavar="N",
+        help="Begin the file at this layer, on what is printed below it; the lowest is 0.",
+    ),
+]
 Force = Annotated[
     bool,
     typer.Option(

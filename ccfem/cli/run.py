@@ -6,9 +6,10 @@ Everything heavy is imported where it is needed, so that ``ccfem --help`` answer
 import shlex
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from ccfem.base.errors import InputError
@@ -46,6 +47,7 @@ def load(
     machine: str | None = None,
     set_machine: Sequence[str] | None = None,
     set_fibre: Sequence[str] | None = None,
+    bed: Mapping[str, Any] = MappingProxyType({}),
     set_plastic: Sequence[str] | None = None,
 ) -> "Case":
     """Read a part file, or make a case from its name and parameters.
@@ -60,6 +62,8 @@ def load(
         As in `machine_choice`.
     set_fibre, set_plastic
         As in `fibre_choice` and `plastic_choice`.
+    bed : mapping
+        As in `ccfem.cli.arguments.bed_table_of`.
     """
     from ccfem.cases.reading import read
 
@@ -78,6 +82,8 @@ def load(
         case = replace(case, fibre=places(case.fibre))
     if plastic is not None:
         case = replace(case, plastic=plastic(case.plastic))
+    if bed:
+        case = case.on_bed(bed)
     return _refined(case) if refine else case
 
 

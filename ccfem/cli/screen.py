@@ -19,12 +19,12 @@ from ccfem.base.checks import check_known
 from ccfem.base.tensor import von_mises
 from ccfem.cli.docstring import about, attributes
 from ccfem.comparison.result import Comparison
+from ccfem.comparison.runs import Run
 from ccfem.comparison.shown import file_stem
 from ccfem.comparison.table import FIRST_REMARKS, Cell, Row, Table as Values, load_cases_table
 from ccfem.fem.elasticity.stress_field import StressField, about_cells
 from ccfem.judging.virtual_testing.virtual_test import HONEST_PROMISE, IN_SHORT
 from ccfem.printing.export.gcode import clock
-from ccfem.printing.print_totals import PrintTotals
 
 Item = typing.TypeVar("Item")
 
@@ -196,14 +196,18 @@ def print_comparison(
         console.print(f"--details or the report: {more}every index", style="dim", markup=False)
     for run in runs:
         if run.print_totals is not None:
-            _print_file(console, where / f"{file_stem(run.strategy_name)}.gcode", run.print_totals)
+            _print_file(console, where / f"{file_stem(run.strategy_name)}.gcode", run)
     _print_where(console, where, seconds)
 
 
-def _print_file(console: Console, file: Path, totals: PrintTotals) -> None:
-    """Print where the file of a print is, its time and its mass."""
+def _print_file(console: Console, file: Path, run: Run) -> None:
+    """Print where the file of a print is, its time and its mass, of all copies in it."""
+    totals, plan = run.print_totals, run.print_plan
+    assert totals is not None
+    assert plan is not None
+    many = f"{plan.copies} copies in " if plan.copies > 1 else ""
     said = (
-        f"{file}  {clock(totals.seconds)} of printing, {totals.matrix_mass:.2f} g of matrix, "
+        f"{file}  {many}{clock(totals.seconds)} of printing, {totals.matrix_mass:.2f} g of matrix, "
         f"{totals.fibre_mass:.2f} g of fibre"
     )
     console.print(said, markup=False, soft_wrap=True)

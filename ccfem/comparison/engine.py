@@ -65,10 +65,11 @@ from ccfem.paths.planning.given_paths import GivenPaths
 from ccfem.paths.planning.strategy import Strategy, full_length
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.before_solving import check_support
+from ccfem.printing.course import WITHOUT_HALT, Course
 from ccfem.printing.line_counts import check_strands
 from ccfem.printing.support import SupportLayers, slice_with_support
 from ccfem.slicing.layers.layer import curved_layers
-from ccfem.slicing.layers.slicer import Slicer, slicer_remarks
+from ccfem.slicing.layers.slicer import Slicer, has_field, slicer_remarks
 from ccfem.strategies.fibre_aware.upper_bound import UpperBound, upper_bound
 
 _REPLACED = {
@@ -102,7 +103,7 @@ class Solved:
         Stress of another program to plan and evaluate on.
     tests : Tests, optional
         None if nothing is tested.
-    every_layer, longest_test
+    every_layer, longest_test, course
         As of `Request`.
     """
 
@@ -112,6 +113,7 @@ class Solved:
     tests: Tests | None = None
     every_layer: bool = False
     longest_test: float = float("inf")
+    course: Course = WITHOUT_HALT
 
     @property
     def field(self) -> StressField:
@@ -136,7 +138,7 @@ class Solved:
         case, stress = self.case, self.planned_on
         chosen = case.slicing if slicer is None else slicer
         below: SupportLayers | None = None
-        if support and hasattr(chosen, "slice"):
+        if support and has_field(chosen):
             layers, below = slice_with_support(chosen, stress, case.build, case.machine)
             if case.fibre is not None:
                 layers = case.fibre.on(layers, stress.mesh, case.machine)
@@ -156,7 +158,8 @@ class Solved:
         said = slicer_remarks(chosen, stress)
         stack = tuple(layers)
         about = (strand, case.build, below, propped, said, self.every_layer, self.longest_test)
-        return Part(stress, stack, case.machine, self.cases, *about, case.plastic)
+        more = (case.bed, self.course, case.plastic)
+        return Part(stress, stack, case.machine, self.cases, *about, *more)
 
 
 def solved(request: Request, seconds: dict[str, float] | None = None) -> Solved:
@@ -189,8 +192,9 @@ def solved(request: Request, seconds: dict[str, float] | None = None) -> Solved:
         read = read_stress(foreign.path, field.mesh, foreign.unit, foreign.array,
                            field.held_or_loaded, foreign.step, foreign.components)  # fmt: skip
         given = replace(read, material=field.material)
+    about = (request.every_layer, request.longest_test, request.course)
     if strand is None:
-        return Solved(case, cases, given, None, request.every_layer)
+        return Solved(case, cases, given, None, *about)
     alternative = None
     if case.alternative_supports and len(cases) == 1:
         with timed(seconds, "solve, alternative supports"):
@@ -199,7 +203,7 @@ def solved(request: Request, seconds: dict[str, float] | None = None) -> Solved:
         if len(cases) > 1:
             specimens(cases, backend)  # one factorisation for all
         tests = Tests.of(field, alternative, strand, backend)
-    return Solved(case, cases, given, tests, request.every_layer, request.longest_test)
+    return Solved(case, cases, given, tests, *about)
 
 
 def otherwise_held(case: Case, field: StressField, backend: str) -> StressField:
@@ -564,6 +568,7 @@ def compare(
     slicings: Mapping[str, Slicer] | Sequence[str | Slicer] | None = None,
     fibre: float | None = None,
     stiffness: str | None = None,
+    course: Course = WITHOUT_HALT,
     **unknown: Any,
 ) -> Comparison:
     """Solve a case once, and plan and evaluate each strategy on it.
@@ -594,7 +599,7 @@ def compare(
     stiffness : str, optional
         Lay the least fibre that reaches it, by one strategy: a ratio to the stiffness of the part
         without fibre as ``"2.5"``, or ``"1200N/mm"``.
-    strand, load_case, stress, backend, curve, print_plans, support
+    strand, load_case, stress, backend, curve, print_plans, support, course
         As in `Request`.
     progress : callable, optional
         Receives what is being done, and the share of the work that is done.
@@ -626,5 +631,6 @@ def compare(
         curve=curve,
         print_plans=print_plans,
         support=support,
+        course=course,
     )
     return answer(request, progress)

@@ -458,9 +458,26 @@ def _run_record(run: Run) -> dict[str, Any]:
         "seconds": run.seconds,
         "untested": run.untested,
         "total": headline_values(run),
+        "print": _print_record(run),
         "load_cases": run.cases.values() if run.cases else None,
         "first_failure": vars(run.tested.failure) if run.tested and run.tested.failure else None,
         "first_failure_alternative": _alternative_failure(run),
+    }
+
+
+def _print_record(run: Run) -> dict[str, Any] | None:
+    """Say of how many copies a print is, what it takes by layer and of spools, and its cost."""
+    totals, plan = run.print_totals, run.print_plan
+    if totals is None or plan is None:
+        return None
+    return {
+        "copies": plan.copies,
+        "pauses": list(plan.pauses),
+        "first_layer": plan.first,
+        "layer_seconds": {k: round(taken, 1) for k, taken in totals.by_layer.items()},
+        "spools": [vars(spool) for spool in totals.spools],
+        "cost": dict(totals.cost),
+        "currency": totals.currency,
     }
 
 

@@ -30,6 +30,7 @@ _IMPORTANT = (
     ("linear theory", " are usual", "held nodes"),
     ("no paths of", "trust neither number", "bring the worst case above"),
     ("planned for ", "takes ", "the stress of another program"),
+    (" copies, of all of which ", "begins at layer ", " spools, change before "),
     ("strands cross", "no fibre on", "so it is placed below", "links lie"),
     ("estimated error", "lock", "tensile strength"),
 )

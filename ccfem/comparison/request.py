@@ -21,8 +21,9 @@ from ccfem.paths.planning.equal_fibre import check_wanted
 from ccfem.paths.planning.given_paths import GivenPaths
 from ccfem.paths.planning.strategy import Strategy
 from ccfem.printing.before_solving import check_print, check_support
+from ccfem.printing.course import WITHOUT_HALT, Course
 from ccfem.slicing.layers.layer import plane_frame
-from ccfem.slicing.layers.slicer import Slicer
+from ccfem.slicing.layers.slicer import Slicer, has_field
 from ccfem.slicing.slicers import as_slicer, from_text
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
@@ -206,6 +207,8 @@ class Request:
         Also plan the print of the whole part, matrix and fibre, for every run.
     support : bool, default False
         Also print support below the part.
+    course : Course
+        Where the file of a print begins and halts.
     every_layer : bool, default False
         Take all indices on every layer. By default those that some layers tell are taken on 60
         layers, evenly spread, where there are more.
@@ -230,6 +233,7 @@ class Request:
     bound: bool = True
     print_plans: bool = False
     support: bool = False
+    course: Course = WITHOUT_HALT
     every_layer: bool = False
     longest_test: float = float("inf")
 
@@ -253,6 +257,8 @@ class Request:
             self._check_print()
         elif self.support:
             raise InputError("support is laid in a print: plan that too (print_plans, --gcode)")
+        elif self.course:
+            raise InputError("pauses and a first layer are of a print: add --gcode (print_plans)")
         self._check_load_case()
 
     def _check_print(self) -> None:
@@ -260,7 +266,8 @@ class Request:
         case = self.case
         (slicing,) = self.slicings.values()
         layers = case.known_layers(slicing.slicer)
-        check_print(case.problem.mesh, case.build, case.machine, layers)
+        curved = has_field(slicing.slicer or case.slicing)
+        check_print(case.problem.mesh, case.build, case.machine, layers, case.bed, curved)
         if self.support and layers:
             check_support(case.problem.mesh, layers, case.machine)
 

@@ -36,7 +36,10 @@ from ccfem.paths.planning.unfolding import may_fold
 from ccfem.paths.plastic.plastic import SOLID, Plastic
 from ccfem.paths.splitting.printed_strands import printed_strands
 from ccfem.paths.toolpaths import Toolpaths
+from ccfem.printing.bed_layout import AS_IT_STANDS, BedLayout
 from ccfem.printing.before_solving import in_air, refusal
+from ccfem.printing.copies import arranged
+from ccfem.printing.course import WITHOUT_HALT, Course, on_course
 from ccfem.printing.curved_plan import curved_plan
 from ccfem.printing.part_moves import part_moves
 from ccfem.printing.print_plan import plan_print
@@ -82,6 +85,10 @@ class Part:
     cases : WeightedCases
         The load cases that paths are planned for and tested under: one, or several.
     build : tuple of 3 floats, optional
+    layout : BedLayout
+        Turn, place and copies on the bed.
+    course : Course
+        Where a print begins and halts.
     support : SupportLayers, optional
         Printed below curved layers.
     propped : bool
@@ -107,6 +114,8 @@ class Part:
     remarks: tuple[str, ...] = ()
     every_layer: bool = False
     longest_test: float = float("inf")
+    layout: BedLayout = AS_IT_STANDS
+    course: Course = WITHOUT_HALT
     plastic: Plastic = SOLID
 
     @property
@@ -118,7 +127,8 @@ class Part:
     def refusal(self) -> str:
         """Why no print of it is planned, whatever its paths are; else empty."""
         build = self.build or (0.0, 0.0, 1.0)
-        return refusal(self.stress.mesh, build, self.machine, self.flat_layers)
+        about = (self.machine, self.flat_layers, self.layout, bool(curved_layers(self.layers)))
+        return refusal(self.stress.mesh, build, *about)
 
     @cached_property
     def why_not_printable(self) -> tuple[str, ...]:
@@ -388,17 +398,20 @@ def with_print(run: Run, part: Part) -> Run:
         what = (run.strands, part.layers, part.stress.mesh, part.machine)
         build = part.build or (0.0, 0.0, 1.0)
         curved = curved_layers(part.layers)
+        spin = part.layout.spin
         plan = (
-            curved_plan(*what, build, part.support)
+            curved_plan(*what, build, part.support, spin)
             if curved
-            else plan_print(*what, part.propped, part.plastic)
+            else plan_print(*what, part.propped, spin, part.plastic)
         )
+        plan = on_course(arranged(plan, part.layout, part.machine), part.course, part.machine)
         moves = part_moves(plan, part.machine)
     except InputError as error:
         why = "; ".join(filter(None, (str(error), run.why_not)))
         return replace(run, unprinted=str(error), why_not=why)
-    share = plan.volume(part.machine) / float(part.stress.mesh.volumes.sum())
+    share = plan.volume(part.machine) / (plan.copies * float(part.stress.mesh.volumes.sum()))
     totals = print_totals(moves, part.machine)
+    plan = replace(plan, warnings=(*plan.warnings, *totals.words))
     return replace(run, print_plan=plan, moves=moves, print_totals=totals, printed_volume=share)
 
 

@@ -8,8 +8,10 @@ from ccfem.machine.machine import Machine
 from ccfem.machine.named_machines import machine_from, machine_names, machine_table, updated
 from ccfem.machine.print_process import Process
 from ccfem.machine.speeds import SpeedTable
+from ccfem.machine.supplies import Costs, Spools
 
 __all__ = [
+    "Costs",
     "FeedAxes",
     "GcodeProfile",
     "Kinematics",
@@ -17,6 +19,7 @@ __all__ = [
     "Machine",
     "Process",
     "SpeedTable",
+    "Spools",
     "machine_from",
     "machine_names",
     "machine_table",

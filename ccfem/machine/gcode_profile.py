@@ -26,7 +26,9 @@ _FIELDS = {
     "fan": ("fan",),
     "path_start": ("length",),
     "path_end": ("length",),
-    "layer": ("layer", "number"),
+    "layer": ("layer", "number", "elapsed", "percent", "minutes"),
+    "pause": ("layer", "number"),
+    "resume": ("layers", "layer", "height"),
 }
 """Kinds of lines, and the fields that each knows beside those that all know."""
 _FIELD = re.compile(r"\{(\w*)\}")
@@ -92,7 +94,17 @@ class GcodeProfile:
     path_start, path_end : tuple of str
         Lines before and after a strand of {length} mm.
     layer : tuple of str
-        Lines at the start of {layer}, counted from 0; {number} is counted from 1.
+        Lines at the start of {layer}, counted from 0; {number} is counted from 1. {elapsed} is
+        the estimated time until then in s, {percent} its share of the whole print, {minutes} what
+        is left: ``M73 P{percent} R{minutes}`` shows it on most printers,
+        ``;TIME_ELAPSED:{elapsed}`` in viewers.
+    pause : tuple of str
+        Lines that halt the print before {layer} until somebody lets it go on; the nozzle is parked.
+    resume : tuple of str
+        Lines in place of `start` for a file that begins at {layer}, on so much {height} in mm that
+        is printed. Before, somebody lets the nozzle of T0 touch that.
+    park : tuple of 2 floats, mm
+        X and Y of the carriage during a pause, above all that is printed.
     offset : tuple of 3 floats, mm
         Of the fibre nozzle from the matrix nozzle.
     offset_by : {"firmware", "gcode"}
@@ -115,6 +127,12 @@ class GcodeProfile:
     matrix_angle, matrix_turn : float, degrees
         Direction of the zigzag of the lowest matrix layer, and its turn from one matrix layer to
         the next.
+    arcs : bool
+        Whether curves are written as arcs, G2 and G3, that the firmware of a machine with three
+        axes has to know.
+    arc_tolerance : float, mm
+        Largest distance between an arc and the lines that it replaces; it is at most 0.1 % longer
+        than they are.
     longest_feed : float, mm
         Longest feed in one move. Marlin refuses more than EXTRUDE_MAXLENGTH, by default 200.
     """
@@ -153,6 +171,22 @@ class GcodeProfile:
     path_start: tuple[str, ...] = ()
     path_end: tuple[str, ...] = ()
     layer: tuple[str, ...] = ()
+    pause: tuple[str, ...] = ("M84 S0 ; motors stay on", "M0")
+    resume: tuple[str, ...] = (
+        "G21 ; mm",
+        "G92 Z{height} ; the nozzle touches what is printed",
+        "G91",
+        "G0 Z10 F300 ; off it",
+        "G90 ; absolute coordinates",
+        "M83 ; relative extrusion",
+        "G28 X Y ; home, but for Z",
+        "M140 S{bed_temperature}",
+        "M104 T0 S{matrix_temperature}",
+        "M104 T1 S{fibre_standby}",
+        "M190 S{bed_temperature}",
+        "M109 T0 S{matrix_temperature}",
+    )
+    park: tuple[float, float] = (0.0, 0.0)
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
     offset_by: Literal["firmware", "gcode"] = "firmware"
     axes: FeedAxes = field(default_factory=FeedAxes)
@@ -166,6 +200,8 @@ class GcodeProfile:
     feed_speed: float = 10.0
     matrix_angle: float = 45.0
     matrix_turn: float = 45.0
+    arcs: bool = False
+    arc_tolerance: float = 0.02
     longest_feed: float = 190.0
 
     def __post_init__(self) -> None:

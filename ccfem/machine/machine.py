@@ -10,6 +10,7 @@ from ccfem.machine.limits import Limits
 from ccfem.machine.print_process import Process
 from ccfem.machine.ranges import check_ranges
 from ccfem.machine.speeds import SpeedTable
+from ccfem.machine.supplies import Costs, Spools
 
 _CUTTER_DISTANCE = 42.0
 """Chen et al. 2021, section 5.2, mm."""
@@ -93,6 +94,10 @@ class Machine:
         How it rotates head and part relative to each other on curved layers.
     limits : Limits
         What it tolerates: paths beyond these limits are not printable as they are.
+    spools : Spools
+        Lengths on its spools.
+    costs : Costs
+        Prices of material and hours.
     """
 
     fibre_width: float = 1.0
@@ -131,6 +136,8 @@ class Machine:
     process: Process = field(default_factory=Process)
     kinematics: Kinematics = field(default_factory=Kinematics)
     limits: Limits = field(default_factory=Limits)
+    spools: Spools = field(default_factory=Spools)
+    costs: Costs = field(default_factory=Costs)
 
     __repr__ = in_brief
 

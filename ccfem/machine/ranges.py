@@ -81,6 +81,8 @@ RANGES = {
         "feed_speed": _SPEED,
         "matrix_angle": _TURN,
         "matrix_turn": _TURN,
+        "park": _PLACE,
+        "arc_tolerance": Range(0.001, 1.0, "mm"),
         "longest_feed": Range(1.0, 100000.0, "mm"),
     },
     "process": {
@@ -121,6 +123,11 @@ RANGES = {
         "pivot": _LENGTH,
         "tilt_limit": Range(0.0, 179.0, "degrees"),
     },
+    "spools": dict.fromkeys(
+        [f"{name}{rest}" for name in ("fibre", "matrix", "coextruded") for rest in ("", "_left")],
+        Range(0.01, 1e6, "m", zero=True),
+    ),
+    "costs": dict.fromkeys(("matrix", "fibre", "hour"), Range(0.0, 1e9)),
     "limits": {
         "short": _SHARE,
         "tight": _SHARE,
@@ -157,7 +164,7 @@ def check_ranges(value: object) -> None:
 
     Parameters
     ----------
-    value : Machine, SpeedTable, GcodeProfile, Process, Kinematics or Limits
+    value : Machine, SpeedTable, GcodeProfile, Process, Kinematics, Spools, Costs or Limits
         A field that is None passes; of a tuple every number is checked.
 
     Raises

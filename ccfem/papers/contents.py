@@ -139,6 +139,8 @@ class Contents:
         Numbers of the figures that can be drawn alone.
     needs : str, default ""
         Environment variable that must name the authors' data.
+    shown : str, default ""
+        File of the folder whose text the command prints.
     """
 
     title: str
@@ -149,6 +151,7 @@ class Contents:
     figures: Callable[[Any, int], Mapping[str, "Figure"]] = lambda study, number: {}
     numbers: tuple[int, ...] = ()
     needs: str = ""
+    shown: str = ""
 
     @property
     def parts(self) -> tuple[str, ...]:

@@ -21,7 +21,7 @@ from ccfem.papers.contents import Contents
 
 KEPT = "kept.json"
 """File beside the tables and figures of a paper that says what they were made of."""
-_DATA = ("CCFEM_CHEN2021", "CCFEM_FANG2024")
+_DATA = ("CCFEM_CHEN2021", "CCFEM_FANG2024", "CCFEM_ZHANG2025")
 """Environment variables that name data of authors."""
 
 

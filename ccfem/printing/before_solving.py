@@ -8,18 +8,22 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.machine.machine import Machine
 from ccfem.paths.splitting.slabs import check_cover, slabs_of
-from ccfem.paths.toolpaths import MATRIX, Toolpaths
+from ccfem.printing.bed_layout import AS_IT_STANDS, BedLayout
+from ccfem.printing.copies import arranged, check_copies, outline
 from ccfem.printing.line_counts import check_matrix_lines
 from ccfem.printing.part_moves import part_moves
-from ccfem.printing.print_plan import PrintPlan, check_bed, check_machine
+from ccfem.printing.print_plan import check_bed, check_machine
 from ccfem.printing.support.overhang import overhang
 from ccfem.slicing.layers.layer import Layer, plane_frame
 
-_UP = np.array([0.0, 0.0, 1.0])
-
 
 def check_print(
-    mesh: TetMesh, build: Sequence[float], machine: Machine, layers: Sequence[Layer] = ()
+    mesh: TetMesh,
+    build: Sequence[float],
+    machine: Machine,
+    layers: Sequence[Layer] = (),
+    layout: BedLayout = AS_IT_STANDS,
+    curved: bool = False,
 ) -> None:
     """Refuse a print that its machine cannot make, whatever the paths are.
 
@@ -32,20 +36,26 @@ def check_print(
     layers : sequence of Layer
         Flat layers that get fibre, if they are known before the part is solved; the part then
         stands upright, as its layers lie.
+    layout : BedLayout
+        Turn, place and copies on the bed.
+    curved : bool
+        Whether layers are curved, or will be.
 
     Raises
     ------
     InputError
         For speeds of 0, a cutter farther from the nozzle than the shortest strand is long, more
-        lines than are planned, a part that does not fit on the bed with all that is laid beside it,
-        and layers without room, or without matrix to hold them.
+        lines than are planned, a part or copies that do not fit on the bed with all that is laid
+        beside them, several copies of curved layers, and layers without room, or without matrix to
+        hold them.
     """
     up = _upwards(build, layers)
     check_machine(machine)
     check_matrix_lines(mesh, up, machine)
+    check_copies(layout, not curved)
     if not layers:
         return
-    _check_room(mesh, up, machine)
+    _check_room(mesh, up, machine, layout)
     level = mesh.points[np.unique(mesh.corners)] @ up
     check_cover(slabs_of(layers, float(level.min()), float(level.max()), machine), machine)
 
@@ -55,34 +65,30 @@ def _upwards(build: Sequence[float], layers: Sequence[Layer]) -> tuple[float, ..
     return tuple(layers[0].plane.frame[2].tolist() if layers else build)
 
 
-def _check_room(mesh: TetMesh, build: Sequence[float], machine: Machine) -> None:
+def _check_room(mesh: TetMesh, build: Sequence[float], machine: Machine, layout: BedLayout) -> None:
     """Print the outline of the part's box, once at its top: with all that is laid beside it."""
-    corners = mesh.points[np.unique(mesh.corners)] @ plane_frame(build).T
+    corners = mesh.points[np.unique(mesh.corners)] @ layout.frame(plane_frame(build)).T
     low, high = corners.min(axis=0), corners.max(axis=0)
     half = 0.5 * np.maximum(high - low - machine.matrix_width, 0.0)[:2]
-    turns = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]])
-    ring = 0.5 * np.array(machine.gcode.bed[:2]) + half * turns
-    height = float(high[2] - low[2])
-    points = np.column_stack([ring, np.full(len(ring), height)])
-    outline = Toolpaths(
-        points=points,
-        normals=np.tile(_UP, (len(ring), 1)),
-        offsets=np.array([0, len(ring)]),
-        layer=np.zeros(1, dtype=np.int64),
-        kind=np.full(1, MATRIX),
-        closed=np.ones(1, dtype=bool),
-    )
-    plan = PrintPlan(outline, np.array([height]), np.array([machine.matrix_height]))
+    middle, height = 0.5 * np.array(machine.gcode.bed[:2]), float(high[2] - low[2])
+    ends = (np.append(middle - half, height), np.append(middle + half, height))
+    # Of one part the fibre stays on the bed where the matrix does; whether copies do, is computed.
+    plan = outline(*ends, machine.matrix_height, layout.count > 1)
     check_bed(plan, machine)
-    part_moves(plan, machine)
+    part_moves(arranged(plan, layout, machine), machine)
 
 
 def refusal(
-    mesh: TetMesh, build: Sequence[float], machine: Machine, layers: Sequence[Layer] = ()
+    mesh: TetMesh,
+    build: Sequence[float],
+    machine: Machine,
+    layers: Sequence[Layer] = (),
+    layout: BedLayout = AS_IT_STANDS,
+    curved: bool = False,
 ) -> str:
     """Say why `check_print` refuses a print; empty where it does not."""
     try:
-        check_print(mesh, build, machine, layers)
+        check_print(mesh, build, machine, layers, layout, curved)
     except InputError as error:
         return str(error)
     return ""

@@ -13,7 +13,7 @@ from ccfem.printing.laid_layer import COORDINATE_DIGITS
 from ccfem.printing.poses import poses
 from ccfem.printing.print_plan import PrintPlan
 
-_GAP = 4.0
+GAP = 4.0
 """Distance from the part to the block and the bar, mm, with an upright head. Our choice."""
 _UP = np.array([0.0, 0.0, 1.0])
 _BAR_LINES = 3
@@ -63,14 +63,14 @@ def beside(plan: PrintPlan, machine: Machine) -> Beside:
     bar: list[FloatArray] = []
     strand = None
     if process.prime != "none":
-        right, middle = low[0] - _GAP, 0.5 * (low[1] + high[1])
+        right, middle = low[0] - GAP, 0.5 * (low[1] + high[1])
         matrix = np.setdiff1d(plan.paths.layer, plan.paths.layer[plan.paths.kind == FIBRE])
         least = float(plan.thickness[matrix].min(initial=machine.highest_line))
         block = _block(right, middle, least, machine)
     if process.prime != "none" and bool((plan.paths.kind == FIBRE).any()):
         long = machine.tail + _BAR_MORE
         left = 0.5 * (low[0] + high[0] - long)
-        front = low[1] - _GAP - (_BAR_LINES - 0.5) * width
+        front = low[1] - GAP - (_BAR_LINES - 0.5) * width
         for k in range(_BAR_LINES):
             ends = np.array([[left, front + k * width], [left + long, front + k * width]])
             bar.append(ends[:: -1 if k % 2 else 1].round(COORDINATE_DIGITS))

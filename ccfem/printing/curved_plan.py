@@ -15,6 +15,7 @@ from ccfem.machine.machine import Machine
 from ccfem.paths.linking.print_order import nearest_end_order
 from ccfem.paths.splitting.printed_strands import PrintedStrands, printed_strands
 from ccfem.paths.toolpaths import FIBRE, SUPPORT, Toolpaths
+from ccfem.printing.bed_layout import BedLayout
 from ccfem.printing.islands import Islands, clashes, island_order, islands_of, rests_on, steps_of
 from ccfem.printing.laid_layer import COORDINATE_DIGITS
 from ccfem.printing.layer_matrix import layer_matrix
@@ -149,6 +150,7 @@ def curved_plan(
     machine: Machine,
     build: Vector = (0.0, 0.0, 1.0),
     support: SupportLayers | None = None,
+    spin: float = 0.0,
 ) -> PrintPlan:
     """Plan the print of a part of curved layers.
 
@@ -175,6 +177,8 @@ def curved_plan(
         normal (`standing`).
     support : SupportLayers, optional
         Support of these layers; the part stands as it does there.
+    spin : float, degrees
+        Turn about the vertical (`ccfem.printing.bed_layout.BedLayout`).
 
     Raises
     ------
@@ -190,6 +194,7 @@ def curved_plan(
         frame = plane_frame(standing(layers, build))
     else:
         frame = plane_frame(support.columns.up.tolist())
+    frame = BedLayout(spin).frame(frame)
     filled = filled_layers(fibre, layers, support, machine)
     islands = islands_of([layer.layer for layer in filled])
     clash = clashes(islands, frame[2], machine)

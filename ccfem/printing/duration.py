@@ -6,7 +6,7 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.machine.machine import Machine
-from ccfem.printing.moves import CUT, FEED, LAY, PREHEAT, STANDBY, TRAVEL, WAIT, WORK, Moves
+from ccfem.printing.moves import CUT, FEED, LAY, PAUSE, PREHEAT, STANDBY, TRAVEL, WAIT, WORK, Moves
 
 
 def durations(moves: Moves, machine: Machine, heating: bool = True) -> FloatArray:
@@ -15,7 +15,7 @@ def durations(moves: Moves, machine: Machine, heating: bool = True) -> FloatArra
     Moves speed up and slow down at `Process.acceleration`. At a corner the speed is that on the arc
     that deviates from it by `Process.junction` (junction deviation). The nozzle stands still while
     only filament is fed, at cuts and at tool changes. Waiting tools cool and heat at their heating
-    rates. The first heating of bed and nozzles is not counted.
+    rates. The first heating of bed and nozzles is not counted, nor is how long a pause takes.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def durations(moves: Moves, machine: Machine, heating: bool = True) -> FloatArra
     moving = np.flatnonzero(np.isin(moves.event, [TRAVEL, LAY]) & (moves.length > 0.0))
     # The way to the first place starts at an unknown one.
     moving = moving[1:]
-    halt = np.cumsum(np.isin(moves.event, [FEED, CUT, WAIT, WORK]).astype(np.int64))
+    halt = np.cumsum(np.isin(moves.event, [FEED, CUT, WAIT, WORK, PAUSE]).astype(np.int64))
     seconds[moving] = _motion(moves, moving, halt[moving], machine)
     return seconds + waits(seconds, moves, machine) if heating else seconds
 

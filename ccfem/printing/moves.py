@@ -9,11 +9,11 @@ from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, in_brief
 
 EVENTS = (
     *("travel", "lay", "feed", "cut", "tool", "standby", "preheat", "heat", "work"),
-    *("heat bed", "fan", "wait", "layer", "start", "end"),
+    *("heat bed", "fan", "wait", "layer", "start", "end", "pause"),
 )
 """Kinds of rows: moves first, then events during which the nozzle stands still."""
 TRAVEL, LAY, FEED, CUT, TOOL, STANDBY, PREHEAT, HEAT, WORK = range(9)
-HEAT_BED, FAN, WAIT, LAYER, PATH_START, PATH_END = range(9, 15)
+HEAT_BED, FAN, WAIT, LAYER, PATH_START, PATH_END, PAUSE = range(9, 16)
 
 ROLES = ("travel", "contour", "infill", "fibre", "tail", "block", "skirt", "pad", "short", "sparse")
 """Roles of laid lines: "tail" is fibre after its cut, "short" replaces strands too short to cut.
@@ -24,6 +24,29 @@ ROLES = ("travel", "contour", "infill", "fibre", "tail", "block", "skirt", "pad"
 def role(name: str) -> int:
     """Find the index of a role by its name."""
     return ROLES.index(name)
+
+
+@dataclass(frozen=True)
+class Arcs:
+    """Arcs that stand for chains of moves, in their order.
+
+    Attributes
+    ----------
+    first, last : (k,) int arrays
+        Rows of `Moves` from where the arc begins to where it ends, both included.
+    centre : (k, 2) array, mm
+        Rounded to 0.001 mm.
+    sweep : (k,) array, radians
+        Angle that it passes, counter-clockwise from above.
+    """
+
+    first: IntArray
+    last: IntArray
+    centre: FloatArray
+    sweep: FloatArray
+
+    def __post_init__(self) -> None:
+        freeze(self, first=int, last=int, centre=float, sweep=float)
 
 
 @dataclass(frozen=True)
@@ -52,6 +75,8 @@ class Moves:
     layer : (n,) int array
     strand : (n,) int array
         Number of the strand that is laid; -1 for other rows, and for strands beside the part.
+    arcs : Arcs, optional
+        Chains of rows that firmware goes along as arcs.
     """
 
     event: IntArray
@@ -67,6 +92,7 @@ class Moves:
     role: IntArray
     layer: IntArray
     strand: IntArray
+    arcs: Arcs | None = None
 
     __repr__ = in_brief
 

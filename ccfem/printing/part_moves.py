@@ -1,6 +1,7 @@
 """From a plan to all actions of the machine: one sequence for every file that is written."""
 
 from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from ccfem.geometry.polylines import along_line, line_length, points_along, turn
 from ccfem.machine.machine import Machine
 from ccfem.machine.speeds import step_curvatures, table_speeds
 from ccfem.paths.toolpaths import FIBRE, SUPPORT
+from ccfem.printing.arcs import with_arcs
 from ccfem.printing.beside import Beside, beside
 from ccfem.printing.duration import durations
 from ccfem.printing.laid_layer import COORDINATE_DIGITS
@@ -23,6 +25,7 @@ from ccfem.printing.moves import (
     LAYER,
     PATH_END,
     PATH_START,
+    PAUSE,
     PREHEAT,
     STANDBY,
     TOOL,
@@ -41,7 +44,8 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
     """Turn the plan of a part into moves.
 
     Layer by layer: tool changes with their lifts and temperatures, first filament on a block beside
-    the part and on a bar, the skirt, lines of matrix, strands with their cuts.
+    the part and on a bar, the skirt, lines of matrix, strands with their cuts, pauses. Of a plan
+    whose file begins above the lowest layer, the rest of what is laid, at its place.
 
     Parameters
     ----------
@@ -59,7 +63,13 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
     below = 0.0
     for number in np.unique(paths.layer).tolist():
         top, thickness = float(plan.top[number]), float(plan.thickness[number])
+        if number < plan.first:
+            site.printed(top, paths.kind[paths.layer == number] == FIBRE)
+            below = top
+            continue
         begin_layer(recorder, number, top, below, machine)
+        if number in plan.pauses:
+            _pause(recorder, number, machine)
         for k in np.flatnonzero(paths.layer == number).tolist():
             start, end = int(paths.offsets[k]), int(paths.offsets[k + 1])
             line, normals = paths.points[start:end], paths.normals[start:end]
@@ -82,8 +92,21 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
     # Away from the part, before the end of the file moves the carriage home.
     recorder.rise(recorder.top + machine.process.tool_lift)
     moves = preheated(_numbered(recorder.moves()), machine)
+    if machine.gcode.arcs and not machine.kinematics.letters:
+        moves = with_arcs(moves, machine)
     _check_bed(moves, machine)
     return moves
+
+
+def _pause(recorder: Recorder, number: int, machine: Machine) -> None:
+    """Halt before a layer, with the carriage parked above all that is printed."""
+    height = recorder.top + machine.process.tool_lift
+    recorder.rise(height)
+    _draw_back(recorder, machine)
+    park = np.array([*machine.gcode.park, height])
+    shift = np.array(machine.gcode.offset[:2]) if recorder.tool == 1 else np.zeros(2)
+    recorder.travel(park + np.append(shift, 0.0), _UP)
+    recorder.note(PAUSE, number)
 
 
 def _speed(below: float, machine: Machine) -> float:
@@ -103,6 +126,14 @@ class _Site:
     def __init__(self, around: Beside, highest: float | None) -> None:
         self.around, self.height, self.bar = around, 0.0, 0.0
         self.strand, self.highest = around.strand, highest
+
+    def printed(self, top: float, fibre: BoolArray) -> None:
+        """Pass a layer that is printed already, with block and bar; mask of its strands."""
+        if not fibre.all():
+            self.height = max(self.height, top)
+            self.bar = self.bar if self.strand is None else self.height
+        if fibre.any():
+            self.strand = None
 
     def prime(
         self, recorder: Recorder, top: float, first: bool, changed: bool, machine: Machine
@@ -223,9 +254,11 @@ def _with_rows(moves: Moves, places: list[int], values: list[float], tools: list
     """Insert rows PREHEAT before the rows at the given places."""
     if not places:
         return moves
-    by_row = {}
+    by_row: dict[str, Any] = {}
     for field in fields(moves):
         old = getattr(moves, field.name)
+        if old is None:
+            continue
         new = np.zeros((len(places), *old.shape[1:]), dtype=old.dtype)
         at = np.array(places)
         if field.name in ("place", "normal", "layer", "strand"):
@@ -297,15 +330,10 @@ def change_tool(recorder: Recorder, tool: int, top: float, machine: Machine) -> 
     old = recorder.tool
     if tool == old:
         return False
-    process, profile = machine.process, machine.gcode
+    process = machine.process
     if old >= 0:
         recorder.rise(recorder.top + process.tool_lift)
-        if old == 0 and process.tool_retract > recorder.drawn_back:
-            recorder.feed(recorder.drawn_back - process.tool_retract, profile.retract_speed)
-            recorder.drawn_back = process.tool_retract
-        if old == 1 and machine.coextrusion:
-            back = max(process.tool_fibre_retract, recorder.beside_back)
-            recorder.draw_back_beside(back, profile.retract_speed)
+        _draw_back(recorder, machine)
         cool = machine.fibre_standby if old else machine.matrix_standby
         recorder.note(STANDBY, cool, old)
     recorder.tool = tool
@@ -313,6 +341,16 @@ def change_tool(recorder: Recorder, tool: int, top: float, machine: Machine) -> 
     recorder.note(WORK, _working(tool, top, machine))
     recorder.note(FAN, _fan(tool, top, machine))
     return True
+
+
+def _draw_back(recorder: Recorder, machine: Machine) -> None:
+    """Draw matrix back as far as a tool that waits needs."""
+    process, speed = machine.process, machine.gcode.retract_speed
+    if recorder.tool == 0 and process.tool_retract > recorder.drawn_back:
+        recorder.feed(recorder.drawn_back - process.tool_retract, speed)
+        recorder.drawn_back = process.tool_retract
+    if recorder.tool == 1 and machine.coextrusion:
+        recorder.draw_back_beside(max(process.tool_fibre_retract, recorder.beside_back), speed)
 
 
 def line_sizes(heights: FloatArray, room: float, machine: Machine) -> tuple[FloatArray, FloatArray]:

@@ -1,7 +1,7 @@
 """A whole part as it is printed: layers of matrix below, between and above the layers of fibre."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -25,6 +25,7 @@ from ccfem.paths.splitting.printed_strands import (
 )
 from ccfem.paths.splitting.slabs import Slab, check_cover, slabs_of
 from ccfem.paths.toolpaths import FIBRE, MATRIX, Toolpaths
+from ccfem.printing.bed_layout import BedLayout
 from ccfem.printing.laid_layer import COORDINATE_DIGITS, Below, LaidLayer, fibre_layer, matrix_layer
 from ccfem.printing.matrix_lines import MatrixFill, matrix_fills
 from ccfem.printing.support.overhang import overhang
@@ -65,6 +66,12 @@ class PrintPlan:
     touched : tuple of 3 floats, mm
         Length of the paths on curved layers along which the head touches what is printed: layer by
         layer, in the order chosen, and as it leans.
+    copies : int
+        How many times the part is printed: all but `warnings` is of all of them.
+    pauses : tuple of int
+        Layers before which the print halts.
+    first : int
+        Layer with which the file begins; those below are printed already.
     """
 
     paths: Toolpaths
@@ -79,6 +86,9 @@ class PrintPlan:
     warnings: tuple[str, ...] = ()
     ended: float = 0.0
     touched: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    copies: int = 1
+    pauses: tuple[int, ...] = ()
+    first: int = 0
     sparse: BoolArray = None  # type: ignore[assignment]
 
     __repr__ = in_brief
@@ -127,6 +137,7 @@ def plan_print(
     mesh: TetMesh,
     machine: Machine,
     support: bool = False,
+    spin: float = 0.0,
     plastic: Plastic = SOLID,
 ) -> PrintPlan:
     """Plan the print of a whole part.
@@ -152,6 +163,8 @@ def plan_print(
     support : bool, default False
         Whether columns of matrix, as pads are, stand below what would be laid in air
         (`ccfem.printing.support.overhang`).
+    spin : float, degrees
+        Turn about the vertical (`ccfem.printing.bed_layout.BedLayout`).
     plastic : Plastic
         Walls, skins, infill and seam. Default: solid.
 
@@ -164,15 +177,21 @@ def plan_print(
     """
     if isinstance(strands, Toolpaths):
         strands = printed_strands(strands, layers, mesh, machine)
-    frame = layers[0].plane.frame
+    upright = layers[0].plane.frame
+    frame = BedLayout(spin).frame(upright)
     corners = mesh.points[np.unique(mesh.corners)] @ frame.T
     lowest, highest = corners.min(axis=0), corners.max(axis=0)
     used = [layer for layer in layers if layer.index in strands.layers]
     origin = 0.5 * (lowest[:2] + highest[:2] - machine.gcode.bed[:2])
-    borders = {
-        index: shapely.transform(section, lambda points: points - origin)
-        for index, section in sections_of(used, mesh).items()
-    }
+
+    def seen(region: Region) -> Region:
+        """Region on the bed of one in the plane of the layers."""
+        turn = frame[:2] @ upright[:2].T
+        return shapely.transform(
+            region, lambda points: (points @ turn.T if spin else points) - origin
+        )
+
+    borders = {index: seen(section) for index, section in sections_of(used, mesh).items()}
     fibre = _on_bed(strands.fibre, used, frame, origin)
     short = _on_bed(strands.short, used, frame, origin)
     over = {
@@ -180,12 +199,13 @@ def plan_print(
         for index in borders
     }
     slabs = slabs_of(used, float(lowest[2]), float(highest[2]), machine, over)
-    fills = matrix_fills(slabs, layers, mesh, frame, origin, machine, plastic)
+    turned = spun(machine, spin)
+    fills = matrix_fills(slabs, layers, mesh, frame, origin, turned, plastic)
     placed = _Strands(fibre, short, borders)
     hanging = overhang(mesh, frame[2], machine) if support else None
     in_air = _NONE
     if hanging is not None:
-        in_air = shapely.transform(hanging.region, lambda points: points - origin)
+        in_air = seen(hanging.region)
     done = _layers(slabs, fills, placed, in_air, float(lowest[2]), machine)
     trims = [
         np.column_stack([np.full(len(places), number), places])
@@ -213,6 +233,14 @@ def plan_print(
     )
     check_bed(plan, machine)
     return plan
+
+
+def spun(machine: Machine, spin: float) -> Machine:
+    """Machine whose lines of matrix keep their direction on the bed below a part that is turned."""
+    if not spin:
+        return machine
+    angle = (machine.gcode.matrix_angle - spin) % 360.0
+    return replace(machine, gcode=replace(machine.gcode, matrix_angle=angle))
 
 
 def _on_bed(

@@ -1,12 +1,63 @@
-"""Time and filament of a whole print: one count for the head of its file and for every table."""
+"""Time, filament and cost of a whole print: one count for the head of its file and every table."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.machine.machine import Machine
 from ccfem.printing.duration import durations, waits
-from ccfem.printing.moves import Moves
+from ccfem.printing.moves import TRAVEL, Moves
+
+
+@dataclass(frozen=True)
+class SpoolUse:
+    """What a print takes of one kind of spool.
+
+    Attributes
+    ----------
+    what : str
+        "fibre", "matrix" or "coextruded".
+    length : float, m
+        That is fed.
+    full, left : float, m
+        On a full spool, and on the last one when the print ends.
+    count : int
+        Spools, that in the machine included.
+    changes : tuple of (int, int)
+        Layer before which a spool is changed, and how many strands or lines of this layer are laid
+        before: 0, unless one layer takes more than a spool. No strand or line is broken.
+    longest : float, m
+        Longest strand or line: none longer than a spool can be laid whole.
+    """
+
+    what: str
+    length: float
+    full: float
+    left: float
+    count: int
+    changes: tuple[tuple[int, int], ...]
+    longest: float
+
+    @property
+    def words(self) -> str:
+        """Line that says all of it."""
+        if self.longest > self.full:
+            return (
+                f"{self.what}: one piece takes {self.longest:.2f} m, more than the "
+                f"{self.full:.4g} m of a spool: set a longer one in machine.spools, or plan "
+                "shorter strands"
+            )
+        places = [
+            f"layer {layer}" + (f" and its piece {piece}" if piece else "")
+            for layer, piece in self.changes
+        ]
+        changed = f", change before {', '.join(places)}" if places else ""
+        return (
+            f"{self.what}: {self.length:.2f} m, needs {self.count} "
+            f"spool{'s' * (self.count > 1)}{changed}; {self.left:.2f} m are left"
+        )
 
 
 @dataclass(frozen=True)
@@ -24,6 +75,13 @@ class PrintTotals:
     matrix_fed, fibre_fed : float, mm
         Filament, that beside the part included.
     matrix_mass, fibre_mass : float, g
+    by_layer : mapping of int to float, s
+        Of it, each layer.
+    spools : tuple of SpoolUse
+        Of kinds whose length is known (`ccfem.machine.Spools`).
+    cost : mapping of str to float
+        Of "matrix", "fibre" and "machine", where they have prices (`ccfem.machine.Costs`).
+    currency : str
     """
 
     seconds: float
@@ -33,21 +91,100 @@ class PrintTotals:
     fibre_fed: float
     matrix_mass: float
     fibre_mass: float
+    by_layer: Mapping[int, float] = field(default_factory=dict)
+    spools: tuple[SpoolUse, ...] = ()
+    cost: Mapping[str, float] = field(default_factory=dict)
+    currency: str = ""
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Lines on spools and cost; none where nothing is known of them."""
+        lines = [spool.words for spool in self.spools]
+        if self.cost:
+            unit = f" {self.currency}" if self.currency else ""
+            parts = ", ".join(f"{what} {price:.2f}" for what, price in self.cost.items())
+            lines.append(f"cost: {sum(self.cost.values()):.2f}{unit} ({parts})")
+        return tuple(lines)
 
 
 def print_totals(moves: Moves, machine: Machine) -> PrintTotals:
     """Count what all moves of a print take."""
     moving = durations(moves, machine, heating=False)
-    heating = float(waits(moving, moves, machine).sum())
+    waiting = waits(moving, moves, machine)
+    heating = float(waiting.sum())
     fibre_fed = float(moves.feed[moves.tool == 1].sum())
     matrix_fed = float(moves.feed[moves.tool == 0].sum() + moves.beside.sum())
     area = 0.25 * np.pi * machine.matrix_diameter**2
+    seconds = float(moving.sum()) + heating
+    mass = 1e-3 * matrix_fed * area * machine.matrix_density
+    prices = machine.costs
+    cost = {
+        "matrix": (prices.matrix, 1e-3 * mass),
+        "fibre": (prices.fibre, 1e-3 * fibre_fed),
+        "machine": (prices.hour, seconds / 3600.0),
+    }
     return PrintTotals(
-        float(moving.sum()) + heating,
+        seconds,
         heating,
         float(moving[moves.tool == 1].sum()),
         matrix_fed,
         fibre_fed,
-        1e-3 * matrix_fed * area * machine.matrix_density,
+        mass,
         fibre_fed * machine.fibre_mass_per_length,
+        layer_seconds(moving + waiting, moves),
+        spool_uses(moves, machine),
+        {what: price * much for what, (price, much) in cost.items() if price is not None},
+        prices.currency,
+    )
+
+
+def layer_seconds(seconds: FloatArray, moves: Moves) -> dict[int, float]:
+    """Seconds of each layer, in the order of printing, of those of every row (n,)."""
+    numbers, first, which = np.unique(moves.layer, return_index=True, return_inverse=True)
+    total = np.bincount(which.ravel(), seconds, minlength=len(numbers))
+    return {int(numbers[k]): float(total[k]) for k in np.argsort(first, kind="stable").tolist()}
+
+
+def spool_uses(moves: Moves, machine: Machine) -> tuple[SpoolUse, ...]:
+    """Find what is taken of every kind of spool whose length is known."""
+    spools = machine.spools
+    fed = {
+        "fibre": (np.where(moves.tool == 1, moves.feed, 0.0), spools.fibre, spools.fibre_left),
+        "matrix": (np.where(moves.tool == 0, moves.feed, 0.0), spools.matrix, spools.matrix_left),
+        "coextruded": (moves.beside, spools.coextruded, spools.coextruded_left),
+    }
+    # A piece is what is fed between two ways through the air: a strand with its first feed, a line.
+    piece = np.cumsum(moves.event == TRAVEL)
+    _, rows = np.unique(piece, return_index=True)
+    layers = moves.layer[rows]
+    return tuple(
+        _use(what, 1e-3 * np.bincount(piece, feed)[piece[rows]], layers, full, left)
+        for what, (feed, full, left) in fed.items()
+        if full
+    )
+
+
+def _use(
+    what: str, pieces: FloatArray, layers: IntArray, full: float, left: float | None
+) -> SpoolUse:
+    """Take pieces (k,), m, from spools; one is changed before a layer for which it is too short."""
+    rest = full if left is None else left
+    changes: list[tuple[int, int]] = []
+    for layer in layers[np.sort(np.unique(layers, return_index=True)[1])].tolist():
+        lengths = pieces[layers == layer]
+        lengths = lengths[lengths != 0.0]
+        if lengths.sum() > rest and rest < full:
+            changes.append((layer, 0))
+            rest = full
+        if lengths.sum() <= rest:
+            rest -= float(lengths.sum())
+            continue
+        for number, length in enumerate(lengths.tolist()):
+            if length > rest:
+                changes.append((layer, number))
+                rest = full
+            rest -= length
+    longest = float(pieces.max(initial=0.0))
+    return SpoolUse(
+        what, float(pieces.sum()), full, rest, len(changes) + 1, tuple(changes), longest
     )

@@ -9,9 +9,19 @@ from ccfem.cases.part_keys import Part
 from ccfem.cases.part_loads import LOADS, SUPPORTS
 from ccfem.cases.part_tables import RULES
 from ccfem.fem.materials import isotropic, material_names, transversely_isotropic
-from ccfem.machine import GcodeProfile, Kinematics, Limits, Machine, Process, SpeedTable
+from ccfem.machine import (
+    Costs,
+    GcodeProfile,
+    Kinematics,
+    Limits,
+    Machine,
+    Process,
+    SpeedTable,
+    Spools,
+)
 from ccfem.paths.placement import FibrePlaces, FibreRegion
 from ccfem.paths.plastic import Plastic
+from ccfem.printing.bed_layout import BedTable
 
 __all__ = ["part_file_page"]
 
@@ -23,6 +33,7 @@ def part_file_page() -> str:
     parts = (
         f"# Part file\n\n{about}\n\n",
         f"## Keys at the top\n\n{keys(Part)}",
+        f"## Bed `[bed]`\n\n{keys(BedTable)}",
         f"## Material\n\n`material` is one of {names}, or a table.\n\n",
         f"### Isotropic\n\n{keys(isotropic)}",
         f"### Transversely isotropic\n\n{keys(transversely_isotropic)}",
@@ -38,6 +49,8 @@ def part_file_page() -> str:
         f"### Process `[machine.process]`\n\n{keys(Process)}",
         f"### Kinematics `[machine.kinematics]`\n\n{keys(Kinematics)}",
         f"### G-code `[machine.gcode]`\n\n{keys(GcodeProfile)}",
+        f"### Spools `[machine.spools]`\n\n{keys(Spools)}",
+        f"### Costs `[machine.costs]`\n\n{keys(Costs)}",
         "## Strategies `[strategies.NAME]`\n\nThe parameters of a [strategy](strategies.md) on "
         "this part.\n\n## Slicing `[slicing]`\n\n`method`, the name of a [slicer](slicers.md), and "
         "its parameters.\n\n",

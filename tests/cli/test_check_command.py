@@ -117,3 +117,17 @@ def test_check_and_plan_say_the_same(ccfem, tmp_path, text, machine, code, said)
             head = (tmp_path / "out" / "zigzag.gcode").read_text().partition("G21")[0]
             assert "; NOT PRINTABLE as planned: " in head
             assert said in head
+
+
+def test_check_proposes_a_build_direction_in_which_fibre_can_carry(ccfem, tmp_path):
+    (tmp_path / "strip.toml").write_text(PART)
+    (tmp_path / "upright.toml").write_text(f'build = "x"\n{PART}')
+    code, out, _ = ccfem("check", "upright.toml")
+    assert code == 0
+    (said,) = [line for line in out.splitlines() if line.startswith("remark: layers along")]
+    assert "remark: layers along z would let fibre take" in said
+    assert 'build = "z", or --turn ' in said
+    code, out, _ = ccfem("check", "upright.toml", "--turn", said.split("--turn ")[1])
+    assert code == 0
+    assert "remark: layers along" not in out
+    assert "remark: layers along" not in ccfem("check", "strip.toml")[1]

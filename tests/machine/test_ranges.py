@@ -13,6 +13,7 @@ from ccfem.machine.limits import Limits
 from ccfem.machine.print_process import Process
 from ccfem.machine.ranges import RANGES
 from ccfem.machine.speeds import SpeedTable
+from ccfem.machine.supplies import Costs, Spools
 
 TABLES = {
     "machine": Machine,
@@ -21,6 +22,8 @@ TABLES = {
     "process": Process,
     "kinematics": Kinematics,
     "limits": Limits,
+    "spools": Spools,
+    "costs": Costs,
 }
 
 

@@ -8,6 +8,8 @@ from benchmarks.print_checks.job import Job
 from ccfem.body.mesh.box import box_mesh
 from ccfem.machine import Machine, machine_table, updated
 from ccfem.paths.toolpaths import Toolpaths
+from ccfem.printing.bed_layout import BedLayout
+from ccfem.printing.copies import arranged
 from ccfem.printing.export.gcode import gcode
 from ccfem.printing.print_plan import plan_print
 from ccfem.slicing.slicers.planar import Planar
@@ -36,19 +38,23 @@ class SmallPart(Job):
 
     size, heights = np.array(SIZE), np.array(HEIGHTS)
 
-    def __init__(self, name, values=None, lines=LINES):
+    def __init__(self, name, values=None, lines=LINES, copies=(1,)):
         machine = updated(Machine(), machine_table(name), values or {})
         mesh = box_mesh(SIZE, (8, 3, 1))
         layers = Planar(heights=HEIGHTS).cut(mesh)
         paths = Toolpaths.concatenate(Toolpaths.from_plane(lines, layer) for layer in layers)
-        plan = plan_print(paths, layers, mesh, machine)
+        plan = arranged(plan_print(paths, layers, mesh, machine), BedLayout(copies=copies), machine)
         middle, half = 0.5 * np.array(machine.gcode.bed[:2]), 0.5 * self.size[:2]
         self.corner = middle - half
-        self.whole = shapely.box(*(middle - half), *(middle + half))
-        strands = [line + np.append(self.corner, 0.0) for line in paths]
+        # Copies are as far apart as the part from the block, 4 mm; here all fit round the middle.
+        grid = np.array([*copies, 1][:2])
+        places = np.array(list(np.ndindex(*grid))) - 0.5 * (grid - 1)
+        self.corners = self.corner + places * (self.size[:2] + 4.0)
+        self.whole = shapely.union_all([shapely.box(*c, *(c + 2 * half)) for c in self.corners])
+        strands = [line + np.append(corner, 0.0) for corner in self.corners for line in paths]
         text = gcode(plan, machine)
-        volume = float(self.size.prod())
-        area = self.whole.area
+        volume = float(self.size.prod()) * len(self.corners)
+        area = float(self.whole.area)
         sections = (lambda _: self.whole, lambda _: area)
         super().__init__(name, machine, plan, text, strands, *sections, volume)
 

@@ -35,6 +35,7 @@ from ccfem.geometry.facets import connected, facet_keys
 from ccfem.paths.plastic.plastic import SOLID
 from ccfem.printing.before_solving import in_air, refusal
 from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.slicer import has_field
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -316,7 +317,8 @@ def check(part: str | os.PathLike[str] | Case, **parameters: Any) -> Check:
         case.check_layers()
         known = case.known_layers()
         mesh, machine = problem.mesh, case.machine
-        refused = refusal(mesh, case.build, machine, known)
+        curved = has_field(case.slicing)
+        refused = refusal(mesh, case.build, machine, known, case.bed, curved)
         not_printable = tuple(filter(None, (refused, in_air(mesh, machine, known))))
     fibre = () if case.fibre is None else known
     plastic: tuple[str, ...] = ()

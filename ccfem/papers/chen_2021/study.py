@@ -115,7 +115,8 @@ def _rotations(mesh: TetMesh, displacement: FloatArray) -> FloatArray:
 
 PARTS_AT_HAND = (
     "The authors published their Loop, Shell, bar and Wrench, not the Piston. The Loop is run "
-    "here; `open_hole` and `lifting_eye` stand in for the others."
+    "here; `open_hole` and `lifting_eye` stand in for the others. Prints of Loop, Shell and bar "
+    "are held against their virtual tests by `ccfem reproduce evidence`."
 )
 """Which parts of the paper are published, and which are run."""
 POWERS = (0.0, 0.5, 1.0, 2.0)

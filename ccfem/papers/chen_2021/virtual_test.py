@@ -9,6 +9,7 @@ spread evenly over the height of 10 mm.
 """
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -45,17 +46,21 @@ MATRIX_STRENGTH = 33.0
 _PEAKS = {"none": 3.13, "zigzag": 3.64, "ours": 6.24}
 """Measured loads at failure, kN."""
 
-_HEIGHT = 10.0
 _FRAME = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """Axes of the tool, X, Y and Z, in the frame of the mesh."""
 
 
 def authors_paths(name: str, layers: int = LAYERS_TABLE_2) -> Toolpaths:
     """Paths of the authors' first `layers` layers, "ours" or "zigzag", evenly over the height."""
-    paths = read_waypoints(authors_folder() / "Loop" / PATHS[name], _FRAME)
+    return spread_paths(authors_folder() / "Loop" / PATHS[name], layers)
+
+
+def spread_paths(file: Path, layers: int, height: float = 10.0) -> Toolpaths:
+    """Read the first layers of a file of the authors, spread evenly over a height, mm."""
+    paths = read_waypoints(file, _FRAME)
     paths = paths.select(paths.layer < layers)
     points = np.array(paths.points)
-    points[:, 1] = (np.repeat(paths.layer, np.diff(paths.offsets)) + 0.5) * _HEIGHT / layers
+    points[:, 1] = (np.repeat(paths.layer, np.diff(paths.offsets)) + 0.5) * height / layers
     return replace(paths, points=points)
 
 

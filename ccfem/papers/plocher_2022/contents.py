@@ -33,7 +33,14 @@ from ccfem.papers.plocher_2022.plane_study import (
     reduced_stiffness,
 )
 from ccfem.papers.plocher_2022.plates import Plate, five_holes, single_hole
-from ccfem.papers.plocher_2022.study import MATERIALS, RASTER, CaseStudy, machine_of, run_study
+from ccfem.papers.plocher_2022.study import (
+    MATERIALS,
+    PRINTED,
+    RASTER,
+    CaseStudy,
+    machine_of,
+    run_study,
+)
 from ccfem.paths.planning import plan
 from ccfem.paths.raster.patterns import concentric_regions, medial_regions
 from ccfem.paths.raster.raster_plan import raster_plan
@@ -294,6 +301,13 @@ def _energy(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
         middle = [ratio[p] for p in ("grid 0", "concentric", "mat")]
         holds = ratio["mps"] < min(middle) and max(middle) < ratio["grid 45"]
         values[f"order of energies {name}"] = float(holds)
+    if name == "III" and have >= set(PRINTED):
+        printed = {p: soft[p] for p in PRINTED}
+        spread = max(printed.values()) / min(printed.values()) - 1.0
+        values["spread of stiffness of the printed patterns III S, %"] = 100.0 * spread
+        values["mat stiffest of the printed patterns III S"] = float(
+            min(printed, key=printed.__getitem__) == "mat"
+        )
     if have >= {"mps", "concentric", "mat"}:
         for key, suffix in (("ratio_C", ""), ("ratio_off_peaks_C", " off peaks")):
             order = [case.value(p, key) for p in ("mps", "concentric", "mat")]

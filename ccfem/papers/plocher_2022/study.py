@@ -65,6 +65,9 @@ PATTERNS: dict[str, tuple[str, dict[str, Any]]] = {
 }
 """The patterns in the order of the paper: name, then strategy and its parameters."""
 
+PRINTED = ("grid 45", "concentric", "mat", "mps")
+"""Patterns of case III that were printed of S-FRAM and bent."""
+
 RASTER: dict[str, tuple[str, dict[str, Any]]] = {
     "grid 45": ("grid", {"angle": 45.0, "lines": "paper", "mode": "raster"}),
     "grid 0": ("grid", {"angle": 0.0, "lines": "paper", "mode": "raster"}),

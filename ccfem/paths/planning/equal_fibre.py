@@ -17,7 +17,7 @@ from ccfem.fem.elasticity import PartStress
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.bracketing import around, close_in, interpolated
 from ccfem.paths.planning.infill import about_short_pieces
-from ccfem.paths.planning.mixing import layer_lengths, mixed
+from ccfem.paths.planning.mixing import cut_to_length, layer_lengths, mixed
 from ccfem.paths.planning.plan import check_layers, plan, plan_layers
 from ccfem.paths.planning.strategy import LengthStrategy, Planned, Strategy
 from ccfem.paths.planning.unfolding import may_fold
@@ -255,16 +255,11 @@ def plan_to_lengths(
         check_wanted(wanted)
     if isinstance(strategy, LengthStrategy):
         check_layers(strategy, layers, machine)
-        planners = strategy.to_lengths(stress, layers, machine, lengths)
+        part = (layers, stress, machine)
+        plans = _plans_at_lengths(strategy, *part, lengths)
         return [
-            _plan_at_length(
-                asked,
-                plan_layers(planner, layers, layers, stress, machine, may_fold(asked)),
-                layers,
-                machine,
-                wanted,
-            )
-            for (asked, planner), wanted in zip(planners, lengths, strict=True)
+            plan if plan.reached else _by_cutting(strategy, plan, *part, wanted)
+            for plan, wanted in zip(plans, lengths, strict=True)
         ]
     search = _Search(Dial(strategy), layers, stress, machine, tolerance)
     search.learn(known)
@@ -289,6 +284,52 @@ def extremes(
 
 def _length(planned: Planned) -> float:
     return planned.length_per_layer
+
+
+_LONGER = 1.05
+"""Share of the length wanted that is asked for where the plan to the length itself lays less."""
+
+
+def _plans_at_lengths(
+    strategy: LengthStrategy,
+    layers: Sequence[Layer],
+    stress: PartStress,
+    machine: Machine,
+    lengths: Sequence[float],
+) -> list[Planned]:
+    """Plan a strategy that takes the length itself."""
+    planners = strategy.to_lengths(stress, layers, machine, lengths)
+    return [
+        _plan_at_length(
+            asked,
+            plan_layers(planner, layers, layers, stress, machine, may_fold(asked)),
+            layers,
+            machine,
+            wanted,
+        )
+        for (asked, planner), wanted in zip(planners, lengths, strict=True)
+    ]
+
+
+def _by_cutting(
+    strategy: LengthStrategy,
+    plan: Planned,
+    layers: Sequence[Layer],
+    stress: PartStress,
+    machine: Machine,
+    wanted: float,
+) -> Planned:
+    """Plan to somewhat more and cut that to the length; the plan itself if that does not reach it.
+
+    Strands that are worth all or nothing leave room that the next longer plan does not have.
+    """
+    longer = _plans_at_lengths(strategy, layers, stress, machine, [_LONGER * wanted])[0]
+    if longer.length_per_layer < wanted:
+        return plan
+    whole = wanted * len(layers)
+    paths = cut_to_length(longer.toolpaths, whole, machine.shortest_strand)
+    cut = _plan_at_length(longer.strategy, paths, layers, machine, wanted)
+    return cut if cut.reached else plan
 
 
 def _plan_at_length(

@@ -10,7 +10,7 @@ the path; the rest is dragged out and laid by G1 without E.
 All that happens is decided before, in `ccfem.printing`; here it is only written.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from ccfem.base.whole import whole_file
 from ccfem.machine.kinematics import axis_values
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import FIBRE
+from ccfem.printing.duration import durations
 from ccfem.printing.laid_layer import COORDINATE_DIGITS
 from ccfem.printing.moves import (
     CUT,
@@ -31,15 +32,17 @@ from ccfem.printing.moves import (
     LAYER,
     PATH_END,
     PATH_START,
+    PAUSE,
     ROLES,
     TOOL,
     TRAVEL,
     WAIT,
+    Arcs,
     Moves,
 )
 from ccfem.printing.part_moves import part_moves
 from ccfem.printing.print_plan import PrintPlan
-from ccfem.printing.print_totals import print_totals
+from ccfem.printing.print_totals import layer_seconds, print_totals
 
 _TOGETHER = 100_000
 """Rows that are written at a time: a large print has millions."""
@@ -110,30 +113,45 @@ def gcode_pieces(
     moves: Moves, plan: PrintPlan, machine: Machine, title: str = "", doubts: Sequence[str] = ()
 ) -> Iterator[str]:
     """Yield the text of `gcode_of_moves` piece by piece: that of a large print fills memory."""
-    lines = _Lines(machine, plan)
+    lines = _Lines(machine, plan, _progress(moves, machine))
     axes, values = _axes(moves, machine), {**lines.values}
     start = np.concatenate([axes[:1], axes[:-1]])
     speeds = _speeds(moves, axes, start)
-    warm = machine.process if machine.process.warm_height > 0.0 else None
+    below = float(plan.top[plan.first - 1]) if plan.first else 0.0
+    warm = machine.process if machine.process.warm_height > below else None
     values["bed_temperature"] += warm.warm_bed if warm else 0.0
     values["matrix_temperature"] += warm.warm_matrix if warm else 0.0
     yield "\n".join(gcode_head(moves, plan, machine, title, doubts)) + "\n"
-    lines.fill("start", **values, layers=len(plan.top))
+    values |= {"layers": len(plan.top), "layer": plan.first, "height": below}
+    lines.fill("resume" if plan.first else "start", **values)
     moved, first = axes != start, True
     begins = np.isin(moves.event, (TRAVEL, LAY)).argmax() if len(moves) else 0
     moved[begins : begins + 1] = True  # the first move names all axes
-    of_moves = (moves.event, moves.tool, moves.feed, moves.beside, speeds, moves.amount)
-    of_lines = (moves.role, moves.width, moves.height, moves.strand)
+    arc_of = _arcs_of(moves)
+    centres: list[str] = []
+    if moves.arcs is not None:
+        moved[moves.arcs.last, :2] = True
+        centres = _centres(moves.arcs, moves)
+        feeds = [_summed(column, moves.arcs) for column in (moves.feed, moves.beside)]
+    else:
+        feeds = [moves.feed, moves.beside]
+    of_moves = (moves.event, moves.tool, *feeds, speeds, moves.amount)
+    of_lines = (moves.role, moves.width, moves.height, moves.strand, arc_of)
     for begin in range(0, len(moves), _TOGETHER):
         some = slice(begin, begin + _TOGETHER)
         places = lines.places(axes[some], moved[some], moves.tool[some])
         columns = (column[some].tolist() for column in (*of_moves, *of_lines))
-        for event, tool, feed, beside, speed, value, role, width, height, strand, place in zip(
+        for event, tool, feed, beside, speed, value, role, width, height, strand, arc, place in zip(
             *columns, places, strict=True
         ):
+            if arc == _IN_ARC:
+                continue
             if event in (TRAVEL, LAY):
                 if event == LAY:
                     lines.say(role, width, height)
+                if arc >= 0:
+                    lines.arc(centres[arc], tool, place, feed, beside, speed)
+                    continue
                 lines.move(event, tool, place, feed, beside, speed, first)
                 first = False
             elif event == FEED:
@@ -144,6 +162,40 @@ def gcode_pieces(
         lines.lines.clear()
     lines.fill("end", layers=len(plan.top))
     yield "\n".join(lines.lines) + "\n"
+
+
+_IN_ARC, _NO_ARC = -2, -1
+"""A row that its arc stands for, and one of no arc; others have the number of the arc they end."""
+
+
+def _arcs_of(moves: Moves) -> IntArray:
+    """Find the number of the arc that ends with each row (n,), `_IN_ARC` or `_NO_ARC`."""
+    arc_of = np.full(len(moves), _NO_ARC)
+    if moves.arcs is not None:
+        first, last = moves.arcs.first, moves.arcs.last
+        # Arcs do not overlap: rows within one are those that began and did not end.
+        change = np.zeros(len(moves) + 1, dtype=np.int64)
+        change[first] += 1
+        change[last] -= 1
+        arc_of[np.cumsum(change[:-1]) > 0] = _IN_ARC
+        arc_of[last] = np.arange(len(last))
+    return arc_of
+
+
+def _summed(column: FloatArray, arcs: Arcs) -> FloatArray:
+    """Values of rows, at the end of each arc that of all its rows."""
+    until = np.append(0.0, np.cumsum(column))
+    summed = np.array(column)
+    summed[arcs.last] = until[arcs.last + 1] - until[arcs.first]
+    return summed.round(_FEED_DIGITS)
+
+
+def _centres(arcs: Arcs, moves: Moves) -> list[str]:
+    """Command of each arc with its centre from its start, {} for the place where it ends."""
+    off = (arcs.centre - moves.start[arcs.first, :2]).round(COORDINATE_DIGITS) + 0.0
+    words = f"{{}} I%.{COORDINATE_DIGITS}f J%.{COORDINATE_DIGITS}f"
+    commands = np.where(arcs.sweep > 0.0, "G3 ", "G2 ").tolist()
+    return [kind + words % (x, y) for kind, (x, y) in zip(commands, off.tolist(), strict=True)]
 
 
 def _axes(moves: Moves, machine: Machine) -> FloatArray:
@@ -169,11 +221,32 @@ def _speeds(moves: Moves, axes: FloatArray, start: FloatArray) -> FloatArray:
     return np.asarray((moves.speed * share).round(4))
 
 
+def _progress(moves: Moves, machine: Machine) -> dict[int, dict[str, float]]:
+    """Time and share of the print until each layer begins; nothing where no line shows them."""
+    shown = ("{elapsed}", "{percent}", "{minutes}")
+    if not any(field in line for line in machine.gcode.layer for field in shown):
+        return {}
+    seconds = layer_seconds(durations(moves, machine), moves)
+    total, elapsed, progress = sum(seconds.values()), 0.0, {}
+    for number, taken in seconds.items():
+        left = total - elapsed
+        progress[number] = {
+            "elapsed": round(elapsed, 1),
+            "percent": float(100.0 * elapsed // max(total, 1.0)),
+            "minutes": float(round(left / 60.0)),
+        }
+        elapsed += taken
+    return progress
+
+
 class _Lines:
     """Lines of the file so far, and what was said last."""
 
-    def __init__(self, machine: Machine, plan: PrintPlan) -> None:
+    def __init__(
+        self, machine: Machine, plan: PrintPlan, progress: Mapping[int, Mapping[str, float]]
+    ) -> None:
         self.machine, self.profile, self.plan = machine, machine.gcode, plan
+        self.progress = progress
         self.values: dict[str, float] = {
             "bed_temperature": machine.bed_temperature,
             "matrix_temperature": machine.matrix_temperature,
@@ -242,6 +315,13 @@ class _Lines:
         rapid = "G0" if event == TRAVEL else "G1"
         self.lines.append(f"{rapid} {place}{axes}{self._at(speed)}")
 
+    def arc(
+        self, words: str, tool: int, place: str, feed: float, beside: float, speed: float
+    ) -> None:
+        """Add an arc to a place."""
+        fed = self._fed(tool, feed, beside)
+        self.lines.append(f"{words.format(place)}{fed}{self._at(speed)}")
+
     def feed(self, tool: int, feed: float, beside: float, speed: float) -> None:
         """Add a feed without a move."""
         self.lines.append(f"G1{self._fed(tool, feed, beside)}{self._at(speed)}")
@@ -275,6 +355,8 @@ class _Lines:
             self.fill("cut")
         elif event == WAIT:
             self.lines.append(f"G4 P{1000.0 * value:.10g}")
+        elif event == PAUSE:
+            self.fill("pause", layer=value, number=value + 1.0)
         elif event == TOOL:
             self.fill("tool", tool=tool)
         elif event == FAN:
@@ -291,7 +373,7 @@ class _Lines:
             f";LAYER:{number}",
         ]
         self._said, self._line = ("", "", ""), None
-        self.fill("layer", layer=number, number=number + 1)
+        self.fill("layer", layer=number, number=number + 1, **self.progress.get(number, {}))
 
 
 # The head of a G-code file: how long it takes, how much it needs, where it lies.
@@ -310,7 +392,7 @@ def gcode_head(
         What keeps the plan from being printed as it is, one line each; they come first.
     """
     total = print_totals(moves, machine)
-    strands = plan.paths.of_kind(FIBRE)
+    strands = plan.paths.select((plan.paths.kind == FIBRE) & (plan.paths.layer >= plan.first))
     places = moves.place[moves.event == LAY]
     low, high = places.min(axis=0), places.max(axis=0)
     lines = [

@@ -30,7 +30,7 @@ def write_robot_cell(path: str | Path, moves: Moves) -> None:
     else. Events are ``travel``, ``lay``, ``feed L`` of L mm where the nozzle stands, ``start`` and
     ``end`` of a strand, ``cut``, ``tool N``, and those with a value: ``standby``, ``preheat``,
     ``heat`` and ``work`` with the temperature of the tool, ``heat bed``, ``fan`` with a share,
-    ``wait`` with seconds.
+    ``wait`` with seconds, ``layer`` and ``pause`` with its number.
 
     Raises
     ------

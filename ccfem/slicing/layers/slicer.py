@@ -49,6 +49,11 @@ _DOWN = 1e-3
 """Share of the layers' area that may face downwards."""
 
 
+def has_field(slicer: Slicer) -> bool:
+    """Whether the layers of a slicer are the levels of a field, which `slice` returns: curved."""
+    return hasattr(slicer, "slice")
+
+
 def standing(layers: Sequence[Layer], build: Vector) -> Vector:
     """Choose the unit vector along which layers are stacked on a bed.
 

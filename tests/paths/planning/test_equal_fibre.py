@@ -287,6 +287,37 @@ def test_close_plans_on_either_side_are_shared_out_without_a_search(plate):
     assert len(Ragged.planned) <= 3 * len(layers)
 
 
+@dataclass(frozen=True)
+class WholeLines(Lines):
+    """Whole lines of 60 mm on each layer, as many as a length holds: it takes the length itself."""
+
+    def natural_length(self, layers, machine):
+        return LENGTH * int(WIDTH / self.spacing)
+
+    def for_part(self, stress, layers, machine):
+        return self
+
+    def to_lengths(self, stress, layers, machine, lengths):
+        most = self.natural_length(layers, machine)
+        spacings = [WIDTH / max(1, int(min(wanted, most) / LENGTH + 1e-9)) for wanted in lengths]
+        return [(replace(self, spacing=spacing),) * 2 for spacing in spacings]
+
+
+def test_a_longer_plan_is_cut_where_that_to_the_length_lays_less(plate):
+    """2,350 of 2,400 mm: 39 whole lines are 2,340, within a hundredth; 590 of 600 are 540."""
+    stress, layers = plate
+    lengths = [2350.0, 590.0, 1000.0, 2500.0]
+    whole, cut, far, most = plan_to_lengths(WholeLines(), layers, stress, MACHINE, lengths)
+    assert whole.length_per_layer == pytest.approx(2340.0)
+    assert cut.length_per_layer == pytest.approx(590.0)
+    assert (whole.reached, whole.note, cut.reached, cut.note) == (True, "", True, "")
+    assert cut.toolpaths.lengths.min() >= MACHINE.shortest_strand
+    # 1,050 mm hold 17 lines, 1,020 mm: enough for 1,000, which hold 16.
+    assert far.length_per_layer == pytest.approx(1000.0)
+    assert most.length_per_layer == pytest.approx(2400.0)
+    assert most.note == "lays 2400 of 2500 mm per layer: its most"
+
+
 @pytest.mark.parametrize("wanted", [0.0, -5.0, float("nan"), float("inf")])
 def test_no_length_is_refused(plate, wanted):
     stress, layers = plate

@@ -99,3 +99,59 @@ def test_what_cannot_be_printed_ends_in_one_line(ccfem, machine, message):
     assert err.count("\n") == 1
     assert message in err
     assert not folder.exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--gcode", "--copies", "400"], "400 copies of 60 x 24 mm do not fit on the bed"),
+        (["--gcode", "--centre", "2,2"], "with its middle at 2, 2 mm the part, or what is printed"),
+        (["--gcode", "--turn", "w=1"], "a turn must be AXIS=DEGREES, as x=90; got 'w=1'"),
+        (["--gcode", "--pause", "900"], "a pause must lie within the print, layer 1 to"),
+        (["--gcode", "--pause", "3 cm"], "a pause must be a layer, as 12, or a height, as 3.4mm"),
+        (["--gcode", "--from-layer", "900"], "--from-layer must be a layer of the print, 0 to"),
+        (["--pause", "3"], "pauses and a first layer are of a print: add --gcode"),
+        (["--copies", "2"], "--centre and --copies place a print on the bed: add --gcode"),
+    ],
+)
+def test_a_wrong_place_on_the_bed_or_in_the_print_ends_in_one_line(ccfem, words, said):
+    code, err, folder = ccfem(PART, *words)
+    assert (code, err.count("\n")) == (2, 1)
+    assert said in err
+    assert not folder.exists()
+
+
+def test_options_and_table_place_copies_and_say_that_all_is_of_all(ccfem, follow):
+    code, err, folder = ccfem(PART, "--gcode", "--copies", "1x2", "--turn", "z=90")
+    assert (code, err) == (0, "")
+    text = (folder / "zigzag.gcode").read_text()
+    seconds = float(re.search(r";TIME:(\d+)", text)[1])
+    run, about = follow(text), json.loads((folder / "results.json").read_text())
+    (total,) = [strategy["total"] for strategy in about["strategies"]]
+    assert len(run.lines(1)) == 2 * total["paths"] + 1  # and the first strand, on its bar
+    assert "; 2 copies, of all of which are fibre, matrix, time and file" in text
+    assert total["whole_print_time"] == pytest.approx(seconds, abs=1)
+    upright = PART.replace("[planform]", "[bed]\nturn = ['x=90']\ncopies = 2\n[planform]")
+    code, _, folder = ccfem(upright, "--gcode", "--force")
+    assert code == 0
+    again = (folder / "zigzag.gcode").read_text()
+    height = float(re.search(r";MAXZ:([\d.]+)", again)[1])
+    assert height == pytest.approx(24.0, abs=1e-3)
+
+
+def test_pauses_spools_and_costs_are_in_file_and_record(ccfem):
+    supplies = "[machine.spools]\nfibre = 2.0\n[machine.costs]\nhour = 12\ncurrency = 'EUR'\n"
+    code, _, folder = ccfem(PART + supplies, "--gcode", "--pause", "2", "--from-layer", "1")
+    assert code == 0
+    text = (folder / "zigzag.gcode").read_text()
+    (record,) = json.loads((folder / "results.json").read_text())["strategies"]
+    printed = record["print"]
+    assert (printed["copies"], printed["pauses"], printed["first_layer"]) == (1, [2], 1)
+    seconds = float(re.search(r";TIME:(\d+)", text)[1])
+    assert sum(printed["layer_seconds"].values()) == pytest.approx(seconds, abs=1.0)
+    assert min(map(int, printed["layer_seconds"])) == 1
+    assert printed["cost"]["machine"] == pytest.approx(12.0 * seconds / 3600.0, abs=2e-3)
+    (spool,) = printed["spools"]
+    assert f"; fibre: {spool['length']:.2f} m, needs {spool['count']} spools, change before" in text
+    assert text.count("\nM0\n") == 1
+    assert "; begins at layer 1, on" in text

@@ -1,0 +1,371 @@
+"""What was measured, row by row, and what is predicted for it: plain arithmetic on tested parts."""
+
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from ccfem.judging.virtual_testing.strand import RHO
+from ccfem.judging.virtual_testing.virtual_test import RESOLUTION
+
+STIFFNESS, BREAKING = "stiffness ratio", "ratio of breaking loads"
+SLOPE, LOAD = "slope, kN/mm", "breaking load, kN"
+ORDER = "stiffness and breaking load"
+"""Kind of a row of which only the order is known."""
+
+NONE = "none"
+"""Print without fibre."""
+
+_DESIGNS = (("zigzag", NONE), ("authors", NONE), ("authors", "zigzag"))
+_NAMES = {"authors": "authors'", NONE: "no fibre"}
+_MEASURED = {
+    STIFFNESS: "stiffness",
+    BREAKING: "breaking load",
+    SLOPE: SLOPE,
+    LOAD: LOAD,
+    ORDER: "stiffness and load",
+}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One measured value of a paper.
+
+    Attributes
+    ----------
+    part, specimen : str
+        What was tested, and which print of it.
+    over, over_part : str
+        Print that it is divided by, of that part; "" where the value is absolute.
+    kind : str
+        `STIFFNESS`, `BREAKING`, `SLOPE`, `LOAD` or `ORDER`; "" where nothing can be predicted.
+    measured : float
+        NaN where the text gives the order alone, or a sentence (`quantity`).
+    paper, source, published : str
+        Where it stands, and what else is published.
+    tests : int
+        Specimens of each print.
+    ours : bool
+        Whether a plan of ccfem stands for paths that were not published.
+    scale : str
+        Part whose print without fibre gives the matrix of an absolute value.
+    counted : bool
+        Whether medians and orders count it.
+    why : str
+        Why it is not predicted.
+    """
+
+    part: str
+    specimen: str
+    over: str
+    over_part: str
+    kind: str
+    measured: float
+    paper: str
+    source: str
+    published: str
+    tests: int
+    ours: bool = False
+    scale: str = ""
+    counted: bool = True
+    why: str = ""
+    remark: str = ""
+    text: str = ""
+
+    @property
+    def quantity(self) -> str:
+        """What was measured, in words."""
+        if self.text:
+            return self.text
+        first = _NAMES.get(self.specimen, self.specimen)
+        if not self.over:
+            return f"{_MEASURED[self.kind]}, {first}"
+        if self.over_part != self.part:
+            return f"{_MEASURED[self.kind]}, {first} / {self.over_part}"
+        return f"{_MEASURED[self.kind]}, {first} / {_NAMES.get(self.over, self.over)}"
+
+    @property
+    def rests_on(self) -> str:
+        """What the prediction takes from elsewhere."""
+        if not self.kind:
+            return ""
+        if self.part == "bending beam":
+            return "moduli of the paper's table 5"
+        if self.part == "cuboid, pushed":
+            return "the tensile test of the same cuboid"
+        if NONE == self.specimen == self.over:
+            return "nothing: elasticity alone"
+        matrix = {SLOPE: "E", LOAD: "E and strength of the matrix"}.get(self.kind)
+        given = f"; {matrix} of {self.scale} without fibre" if matrix else ""
+        return f"rho {RHO:g} mm^2{given}"
+
+    @property
+    def two_designs(self) -> bool:
+        """Whether two fibre plans of one part are compared, so that their order is a prediction."""
+        named = (self.specimen, self.over)
+        return bool(self.over) and NONE not in named and "stiffest" not in named
+
+
+@cache
+def rows() -> tuple[Row, ...]:
+    """All rows of ``published.toml``, in its order."""
+    text = Path(__file__).with_name("published.toml").read_text(encoding="utf-8")
+    groups = tomllib.loads(text)
+    made = [row for group in groups["specimens"] for row in _of_specimens(group)]
+    for entry in (*groups["ratio"], *groups["order"]):
+        given = dict(entry)
+        given["specimen"] = given.pop("print")
+        given.setdefault("over_part", given["part"])
+        made.append(Row(**{"measured": np.nan, **given}))
+    for entry in groups["absent"]:
+        given = dict(entry)
+        given["text"] = given.pop("quantity")
+        empty = {"specimen": "", "over": "", "over_part": "", "kind": "", "measured": np.nan}
+        empty["published"] = "nothing to compute from"
+        made.append(Row(**{**empty, **given}))
+    return tuple(made)
+
+
+def _of_specimens(group: Mapping[str, Any]) -> Iterator[Row]:
+    """Rows of one part: ratios of slopes and of loads, then slopes and loads themselves."""
+    common = {name: group[name] for name in ("part", "paper", "source", "published", "tests")}
+    common["why"] = group.get("why", "")
+    ours = group.get("ours", ())
+    for kind, measured in ((STIFFNESS, group["slope"]), (BREAKING, group["load"])):
+        for first, second in _DESIGNS:
+            yield Row(
+                specimen=first,
+                over=second,
+                over_part=group["part"],
+                kind=kind,
+                measured=measured[first] / measured[second],
+                ours=first in ours or second in ours,
+                **common,
+            )
+    for kind, measured in ((SLOPE, group["slope"]), (LOAD, group["load"])):
+        for name, value in measured.items():
+            yield Row(
+                specimen=name,
+                over="",
+                over_part="",
+                kind=kind,
+                measured=value,
+                ours=name in ours,
+                scale=group.get("scale", ""),
+                **common,
+            )
+
+
+def measured_of(part: str, specimen: str, kind: str) -> float:
+    """Measured slope, kN/mm, or load, kN, of a print."""
+    (value,) = (
+        row.measured
+        for row in rows()
+        if (row.part, row.specimen, row.kind, row.over) == (part, specimen, kind, "")
+    )
+    return value
+
+
+@dataclass(frozen=True)
+class PartResult:
+    """A part under its load, as predicted.
+
+    Attributes
+    ----------
+    readings : tuple of mapping of print to float
+        Stiffness of each print, N/mm, in a matrix of one modulus. The first is the prediction; the
+        others span its interval.
+    by_rho : mapping of print to mapping of float to float
+        Ratio to the stiffness without fibre at some rho, mm^2.
+    matrix_index : float
+        Peak of the averaged von Mises stress without fibre, MPa a N of load.
+    strand_force : mapping of print to float
+        Highest force in a strand, N a N of load.
+    """
+
+    readings: tuple[Mapping[str, float], ...]
+    by_rho: Mapping[str, Mapping[float, float]] | None = None
+    matrix_index: float = np.nan
+    strand_force: Mapping[str, float] | None = None
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Predicted value of a row, within an interval; `left_out` at rho fitted to other parts."""
+
+    value: float
+    low: float
+    high: float
+    left_out: float = np.nan
+
+
+def predicted(row: Row, tests: Mapping[str, PartResult]) -> Prediction:
+    """Predict a row from the parts that it needs (`parts_of`)."""
+    values = np.array([_value(row, tests, k) for k in range(len(tests[row.part].readings))])
+    left_out = np.nan
+    if row.over_part == row.part and row.part in SOLIDS:
+        rho = fitted_rho([part for part in FITTED if SOLIDS[part] != SOLIDS[row.part]], tests)
+        ratios = [ratio_at(rho, name, tests[row.part]) for name in (row.specimen, row.over)]
+        left_out = ratios[0] / ratios[1]
+    return Prediction(float(values[0]), float(values.min()), float(values.max()), left_out)
+
+
+def _value(row: Row, tests: Mapping[str, PartResult], reading: int) -> float:
+    """Predict with one of the readings of the part."""
+    tested = tests[row.part]
+    stiffness = tested.readings[reading][row.specimen]
+    if row.over:
+        return stiffness / tests[row.over_part].readings[reading][row.over]
+    scale = tests[row.scale]
+    if row.kind == SLOPE:
+        bare = scale.readings[0][NONE]
+        return stiffness * measured_of(row.scale, NONE, SLOPE) / bare
+    # The part without fibre breaks at the matrix stress at which the other one did; with fibre the
+    # load grows as the stiffness does.
+    bare = measured_of(row.scale, NONE, LOAD) * scale.matrix_index / tested.matrix_index
+    return bare * stiffness / tested.readings[reading][NONE]
+
+
+def parts_of(row: Row) -> tuple[str, ...]:
+    """Parts that have to be tested for a row."""
+    others = FITTED if row.over_part == row.part and row.part in SOLIDS else ()
+    named = (row.part, row.over_part, row.scale, *others)
+    return tuple(dict.fromkeys(name for name in named if name))
+
+
+# The one parameter of the ratios, fitted to all solids but the one that is predicted.
+
+
+SOLIDS = {"Loop": "Loop", "Shell, pulled": "Shell", "Shell, pushed": "Shell"}
+"""Solid of each part by which rho can be fitted."""
+
+FITTED = tuple(SOLIDS)
+
+
+def ratio_at(rho: float, specimen: str, tested: PartResult) -> float:
+    """Stiffness ratio of a print at a rho, mm^2, through those that were tested."""
+    if specimen == NONE:
+        return 1.0
+    assert tested.by_rho is not None
+    known = np.array(sorted(tested.by_rho[specimen].items()))
+    curve = np.polyfit(np.log(known[:, 0]), np.log(known[:, 1]), len(known) - 1)
+    return float(np.exp(np.polyval(curve, np.log(rho))))
+
+
+def fitted_rho(parts: Sequence[str], tests: Mapping[str, PartResult]) -> float:
+    """Fit rho, mm^2, to slopes over those without fibre, by least squares of their logarithms.
+
+    Only prints whose paths are published count.
+    """
+    return _least_misfit(
+        [
+            row
+            for row in rows()
+            if row.part in parts and row.kind == STIFFNESS and row.over == NONE != row.specimen
+            if not row.ours
+        ],
+        tests,
+    )
+
+
+def calibrated(part: str, tests: Mapping[str, PartResult]) -> tuple[float, float]:
+    """Fit rho, mm^2, to the zigzag of a part alone; it, and the ratio of the authors' paths."""
+    used = [row for row in rows() if (row.part, row.kind) == (part, STIFFNESS)]
+    rho = _least_misfit([r for r in used if (r.specimen, r.over) == ("zigzag", NONE)], tests)
+    return rho, ratio_at(rho, "authors", tests[part])
+
+
+def _least_misfit(used: Sequence[Row], tests: Mapping[str, PartResult]) -> float:
+    """Rho, mm^2, with which the ratios of some rows are met best."""
+
+    def misfit(rho: float) -> float:
+        off = [np.log(ratio_at(rho, r.specimen, tests[r.part]) / r.measured) for r in used]
+        return float(np.square(off).sum())
+
+    return float(minimize_scalar(misfit, bounds=(2.0, 8.0), method="bounded").x)
+
+
+# Errors, orders, medians.
+
+
+def error(row: Row, value: float) -> float:
+    """Predicted over measured, less 1, in %; NaN where no number was measured."""
+    return 100.0 * (value / row.measured - 1.0)
+
+
+def order(row: Row, prediction: Prediction) -> str:
+    """Say whether two designs are predicted in the order that was measured; "" for other rows.
+
+    "tie": predicted stiffnesses closer to each other than the resolution of the virtual test.
+    """
+    if not row.two_designs:
+        return ""
+    first_ahead = True if np.isnan(row.measured) else row.measured > 1.0
+    if abs(prediction.value - 1.0) < RESOLUTION:
+        return "tie"
+    return "right" if (prediction.value > 1.0) == first_ahead else "wrong"
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Errors of all rows that count, in % of the measured value.
+
+    Attributes
+    ----------
+    errors : mapping of kind to tuple of floats
+        By kind; those with paths of ours under the kind and ", ours too".
+    orders : mapping of verdict to tuple of Row
+        Pairs of designs whose order is "right", "wrong" or a "tie".
+    left_out : mapping of kind to tuple of floats
+        Errors with rho fitted to the other solids.
+    """
+
+    errors: Mapping[str, tuple[float, ...]]
+    orders: Mapping[str, tuple[Row, ...]]
+    left_out: Mapping[str, tuple[float, ...]]
+
+    def median(self, kind: str) -> float:
+        """Median of the sizes of the errors of a kind, %; NaN without any."""
+        errors = self.errors.get(kind, ())
+        return float(np.median(np.abs(errors))) if errors else np.nan
+
+    def median_left_out(self, kind: str) -> float:
+        """Median with rho fitted to the other solids, %."""
+        errors = self.left_out.get(kind, ())
+        return float(np.median(np.abs(errors))) if errors else np.nan
+
+
+ALSO_OURS = ", ours too"
+"""Behind the name of a kind: with prints for which a plan of ccfem stands."""
+
+
+def summary(judged: Mapping[Row, Prediction]) -> Summary:
+    """Sum up the rows that are predicted."""
+    errors: dict[str, list[float]] = {}
+    left_out: dict[str, list[float]] = {}
+    orders: dict[str, list[Row]] = {"right": [], "wrong": [], "tie": []}
+    for row, prediction in judged.items():
+        if not row.counted:
+            continue
+        verdict = order(row, prediction)
+        if verdict:
+            orders[verdict].append(row)
+        if row.kind == ORDER:
+            continue
+        off = error(row, prediction.value)
+        errors.setdefault(row.kind + ALSO_OURS, []).append(off)
+        if not row.ours:
+            errors.setdefault(row.kind, []).append(off)
+            if not np.isnan(prediction.left_out):
+                without = error(row, prediction.left_out)
+                left_out.setdefault(row.kind, []).append(without)
+    return Summary(
+        {kind: tuple(values) for kind, values in errors.items()},
+        {verdict: tuple(pairs) for verdict, pairs in orders.items()},
+        {kind: tuple(values) for kind, values in left_out.items()},
+    )
