@@ -174,3 +174,14 @@ def test_material_with_a_direction_has_no_law():
     carbon = transversely_isotropic(60000.0, 4100.0, 0.33, 2200.0)
     with pytest.raises(InputError, match="isotropic"):
         replace(case, problem=replace(case.problem, material=carbon)).printed_problem()
+
+
+def test_infill_keeps_its_direction_on_the_bed_below_a_part_that_is_turned():
+    """Turned by 45 degrees below lines at 45 degrees, a part has its grid along its own axes."""
+    case = _beam("grid", (6, 4, 4))
+    slanted = replace(case.machine, gcode=replace(case.machine.gcode, matrix_angle=45.0))
+    turned = replace(case, machine=slanted).on_bed({"turn": "z=45"})
+    straight, found = case.printed_problem(), turned.printed_problem()
+    np.testing.assert_allclose(found.stiffness, straight.stiffness, atol=1e-9)
+    other = replace(case, machine=slanted).printed_problem()
+    assert np.abs(other.stiffness - straight.stiffness).max() > 50.0
