@@ -3,7 +3,7 @@
 import numpy as np
 import shapely
 
-from benchmarks.print_checks.job import FILAMENT, PART, Job, Lines, own
+from benchmarks.print_checks.job import FILAMENT, Job, Lines, own
 from benchmarks.print_checks.printer import Run
 
 __all__ = ["amount", "feeding", "fullness", "places", "shapes", "volume"]
@@ -18,7 +18,7 @@ def fullness(job: Job, run: Run) -> tuple[float, list[tuple[float, float]]]:
     laid = lines.lays & lines.in_part & ~lines.beside_part
     matrix = FILAMENT * np.where(lines.tool == 1, lines.beside, lines.fed)
     height = lines.end[:, 2].round(3)
-    is_fibre = (lines.tool == 1) | (lines.kind == PART[2])
+    is_fibre = lines.of_fibre
     fibre = {}
     for z in np.unique(height[laid & is_fibre]).tolist():
         mine = laid & is_fibre & (height == z)
@@ -105,7 +105,8 @@ def shapes(job: Job, run: Run) -> list[str]:
 def amount(job: Job, run: Run) -> list[str]:
     """Fibre, matrix in its place and what is left out are what was planned."""
     fibre = sum(sum(s.length for s in steps) for steps in own(run).values())
-    short = sum(s.length for s in run.steps if s.lays and s.tool == 0 and s.kind == PART[2])
+    lines = Lines.of(run)
+    short = float(lines.length[lines.lays & lines.of_fibre & (lines.tool == 0)].sum())
     found = fibre + short + job.plan.dropped + job.plan.ended
     return [] if abs(found / job.planned - 1.0) < 1e-3 else [f"{found:g} of {job.planned:g} mm"]
 

@@ -16,7 +16,8 @@ __all__ = ["FILAMENT", "PART", "Job", "Lines", "own"]
 FILAMENT = 0.25 * np.pi * 1.75**2
 """Section of the filament of matrix, mm^2."""
 PART = ("External perimeter", "Solid infill", "Internal infill")
-"""What comments call lines of the part itself; fibre and matrix in its place have the last one."""
+"""What comments call lines of the part itself; fibre, matrix in its place and sparse infill have
+the last one."""
 
 
 @dataclass
@@ -93,8 +94,12 @@ class Lines:
         self.width = np.array([step.width for step in steps])
         self.height = np.array([step.height for step in steps])
         self.kind = np.array([step.kind for step in steps])
-        self.in_part = np.isin(self.kind, PART)
         self.lays = ~self.rapid & (self.length > 0.0)
+        self.in_part = np.isin(self.kind, PART)
+        # Sparse infill lies on layers with walls, and what takes the place of fibre does not.
+        level = self.end[:, 2].round(3)
+        walled = np.isin(level, level[self.lays & (self.kind == PART[0])])
+        self.of_fibre = (self.tool == 1) | ((self.kind == PART[2]) & ~walled)
         self.beside_part = np.array([step.strand.startswith("beside") for step in steps])
 
 

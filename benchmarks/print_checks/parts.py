@@ -66,13 +66,13 @@ def job_of(part: Part, machine_name: str) -> tuple[Job, dict[str, float]]:
     """Plan a part for a machine, write its file and follow it; seconds of each."""
     case = part.case
     machine, mesh = updated(case.machine, machine_table(machine_name)), case.problem.mesh
-    chosen, layers = PARTS[part.name], part.layers()
+    chosen, layers = PARTS.get(part.name, "concentric"), part.layers()
     began = time.process_time()
     strategy = create(chosen, dict(case.parameters.get(chosen, {})))
     paths = plan(strategy, layers, part.stress, machine)
     planned = time.process_time()
     hangs = overhang(mesh, case.build, machine) is not None
-    printed = plan_print(paths, layers, mesh, machine, hangs)
+    printed = plan_print(paths, layers, mesh, machine, hangs, case.plastic)
     text = gcode(printed, machine)
     written = time.process_time()
     strands, sections = on_bed(paths, mesh, case.build, machine.gcode.bed)

@@ -7,17 +7,20 @@ from functools import cached_property
 from typing import Any
 
 from ccfem.base.arrays import freeze
-from ccfem.base.checks import check_known, check_number
+from ccfem.base.checks import check_known, check_number, member_name
 from ccfem.base.display import Shown
-from ccfem.base.errors import Mistakes, shown
+from ccfem.base.errors import InputError, Mistakes, shown
 from ccfem.body.mesh.face_places import BodyFaces
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.stress_field import PartStress
 from ccfem.fem.elasticity.support_kinds import AnySupport
 from ccfem.machine.machine import Machine
 from ccfem.paths.placement.fibre_places import FibrePlaces
+from ccfem.paths.plastic.as_printed import as_printed
+from ccfem.paths.plastic.plastic import SOLID, Plastic
 from ccfem.printing.bed_layout import AS_IT_STANDS, BedLayout, bed_of
 from ccfem.printing.line_counts import MOST_STRANDS, about_strands, check_strands
+from ccfem.printing.print_plan import spun
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.slicer import Slicer
 from ccfem.slicing.slicers.planar import Planar
@@ -53,6 +56,9 @@ class Case(Shown):
     weights : mapping of load case to float
         Weights of the load cases and combinations when all are planned for; those not named do not
         count. Default: all load cases equally, without combinations.
+    plastic : Plastic
+        Walls, skins, infill and seam; by default solid. `problem` has solid plastic, and
+        `printed_problem` that which is printed.
     findings : tuple of str
         Problems found and repaired in a mesh from a file, one line each.
     body : BodyFaces, optional
@@ -70,6 +76,7 @@ class Case(Shown):
     findings: tuple[str, ...] = ()
     alternative_supports: tuple[AnySupport, ...] = ()
     fibre: FibrePlaces | None = None
+    plastic: Plastic = SOLID
     weights: Mapping[str, float] = field(default_factory=dict)
     body: BodyFaces | None = None
     bed: BedLayout = AS_IT_STANDS
@@ -141,6 +148,30 @@ class Case(Shown):
                 layers = self.fibre.on(layers, mesh, self.machine)
             self._flat_layers[chosen] = layers
         return self._flat_layers[chosen]
+
+    def printed_problem(self, slicer: Slicer | None = None) -> Problem:
+        """Problem of the plastic as it is printed: what is not there carries and weighs nothing.
+
+        Solid plastic leaves the problem as it is.
+
+        Raises
+        ------
+        InputError
+            For infill other than solid between curved layers, and in a material that is not
+            isotropic.
+        """
+        chosen = self.slicing if slicer is None else slicer
+        if self.plastic.solid:
+            return self.problem
+        if not isinstance(chosen, Planar):
+            raise InputError(
+                f"plastic.infill '{self.plastic.infill}' goes with flat layers, whose fibre is "
+                f"known before the part is solved; got the slicer {member_name(chosen)}: choose "
+                "--slicing planar, or infill = 'solid'"
+            )
+        chosen.check(self.problem.mesh, self.build, self.machine)
+        machine = spun(self.machine, self.bed.spin)  # infill keeps its direction on the bed
+        return as_printed(self.problem, self.known_layers(chosen), self.plastic, machine)
 
 
 def check_name(name: str, title: str) -> None:

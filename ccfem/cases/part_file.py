@@ -48,7 +48,13 @@ from ccfem.cases.part_loads import (
     supports_of,
     weights_of,
 )
-from ccfem.cases.part_tables import check_strategies, material_of, named_table, rules_of
+from ccfem.cases.part_tables import (
+    check_strategies,
+    material_of,
+    named_table,
+    plastic_of,
+    rules_of,
+)
 from ccfem.fem.elasticity.load_kinds import Load, SurfaceLoad, patches_in_use, patches_of
 from ccfem.fem.elasticity.loads import nodal_forces
 from ccfem.fem.elasticity.nodes import LoadedBody
@@ -59,6 +65,7 @@ from ccfem.fem.materials import Material
 from ccfem.machine.machine import Machine
 from ccfem.machine.named_machines import machine_from
 from ccfem.paths.placement.fibre_places import FibrePlaces
+from ccfem.paths.plastic.plastic import Plastic
 from ccfem.printing.bed_layout import BedLayout, bed_of
 from ccfem.slicing import slicers as slicers
 from ccfem.slicing.layers.slicer import Slicer, Vector
@@ -148,6 +155,8 @@ def part_case(content: TomlTable, path: Path, mesh: TetMesh | None = None) -> Ca
     if part.fibre is not None:
         with mistakes.noted():
             given.fibre = fibre_of(part.fibre, path.parent)
+    with mistakes.noted():
+        given.plastic = plastic_of(part.plastic)
     check_strategies(part.strategies, mistakes)
     rules = rules_of(part.patches, mistakes)
     with mistakes.noted():
@@ -221,6 +230,7 @@ def part_case(content: TomlTable, path: Path, mesh: TetMesh | None = None) -> Ca
         findings=(*findings, *(deck.remarks if deck else ()), *about_patches(bare, rules)),
         alternative_supports=others,
         fibre=given.fibre,
+        plastic=given.plastic,
         weights=weights,
         body=numbered_faces(mesh) if len(bare.patches) < len(mesh.patches) else None,
     )
@@ -268,6 +278,7 @@ class _Values:
     slicing: Slicer
     machine: Machine
     material: Material
+    plastic: Plastic
     fibre: FibrePlaces | None = None
 
 

@@ -248,6 +248,8 @@ class Part(Body):
         12 flat layers.
     fibre : table
         Which of the layers, and which regions of them, get fibre; by default all.
+    plastic : table
+        Walls, skins, infill and seam of the plastic; by default it is solid.
     patches : dict
         Patches of the boundary, each by a rule. Groups of a mesh file are patches already.
     machine : table
@@ -274,6 +276,7 @@ class Part(Body):
     heights: tuple[float, ...] | None = None
     slicing: dict[str, Any] | None = None
     fibre: dict[str, Any] | None = None
+    plastic: dict[str, Any] = field(default_factory=dict)
     patches: dict[str, Any] = field(default_factory=dict)
     machine: dict[str, Any] = field(default_factory=dict)
     strategies: dict[str, Any] = field(default_factory=dict)

@@ -1,6 +1,7 @@
-"""Tables of a part file to values: rules of patches, material, parameters of strategies."""
+"""Tables of a part file to values: rules of patches, material, plastic, strategies."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import fields
 from typing import Any
 
 from ccfem.base.errors import InputError, Mistakes, shown
@@ -14,6 +15,7 @@ from ccfem.fem.materials import (
     named_material,
     transversely_isotropic,
 )
+from ccfem.paths.plastic.plastic import SOLID, Plastic
 
 RULES: dict[str, Callable[..., PatchRule]] = {
     "plane": Plane,
@@ -65,6 +67,16 @@ def material_of(given: str | dict[str, Any] | None, where: str = "material") -> 
         return named_material(given)
     make = transversely_isotropic if "modulus_fibre" in given else isotropic
     return from_table(make, given, where)
+
+
+def plastic_of(table: object, base: Plastic = SOLID) -> Plastic:
+    """Read a table [plastic]; what it does not name stays as in `base`."""
+    if not isinstance(table, Mapping):
+        raise InputError(
+            f"plastic must be a table; got {shown(table)}: write [plastic] and its keys"
+        )
+    kept = {field.name: getattr(base, field.name) for field in fields(base)}
+    return from_table(Plastic, {**kept, **table}, "plastic")
 
 
 def check_strategies(tables: TomlTable, mistakes: Mistakes) -> None:

@@ -15,6 +15,7 @@ from ccfem.cases.part_loads import LOADS, SUPPORTS
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.materials import Material
 from ccfem.machine.machine import Machine
+from ccfem.paths.plastic.plastic import SOLID
 from ccfem.printing.bed_layout import bed_table
 from ccfem.slicing.slicers.planar import Planar
 
@@ -52,6 +53,7 @@ def part_text(case: Case, mesh: str, comment: str = "") -> str:
         "material": _material(problem.material),
         "slicing": {"method": member_name(case.slicing), **_changed(case.slicing, Planar())},
         "fibre": fibre_table(case.fibre),
+        "plastic": _changed(case.plastic, SOLID),
         "supports": _supports(problem),
         "alternative_supports": [_kind(entry, SUPPORTS) for entry in case.alternative_supports],
         "loads": {

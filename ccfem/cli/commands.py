@@ -65,6 +65,7 @@ from ccfem.cli.options import (
     VirtualTest,
 )
 from ccfem.cli.part_commands import add_part_commands
+from ccfem.cli.plastic_choice import SetPlastic
 from ccfem.cli.run import (
     Output,
     calibrated,
@@ -131,7 +132,7 @@ def support(
     chosen = layers_of(layers, None, slicing)
     slicer = as_slicer(part.slicing if chosen is None else chosen)
     part.check_layers(slicer)
-    stress = solve(part.problem, backend=backend)[load_case or names[0]]
+    stress = solve(part.printed_problem(slicer), backend=backend)[load_case or names[0]]
     stack, support_stack = slice_with_support(slicer, stress, part.build, part.machine, angle, lift)
     columns = support_stack.columns
     x, y, z = columns.up.tolist()
@@ -376,6 +377,7 @@ def check(
     machine: MachineName = None,
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
+    set_plastic: SetPlastic = None,
     turn: Turn = None,
     centre: Centre = None,
     copies: Copies = None,
@@ -397,7 +399,7 @@ def check(
     from ccfem.cli.check_part import check_part
 
     bed = bed_table_of(turn, centre, copies)
-    read = partial(load, case, set_case, False, machine, set_machine, set_fibre, bed)
+    read = partial(load, case, set_case, False, machine, set_machine, set_fibre, bed, set_plastic)
     if code := check_part(read, out):
         raise typer.Exit(code)
 
@@ -426,6 +428,7 @@ def compare(
     machine: MachineName = None,
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
+    set_plastic: SetPlastic = None,
     turn: Turn = None,
     backend: Backend = "auto",
     stress: StressFile = None,
@@ -460,7 +463,7 @@ def compare(
         if drawings is not None and slicings is not None:
             raise InputError("--drawings works with one slicing only; got --slicings: drop one")
         bed = bed_table_of(turn)
-        part = load(case, set_case, refine, machine, set_machine, set_fibre, bed)
+        part = load(case, set_case, refine, machine, set_machine, set_fibre, bed, set_plastic)
         part, strand = calibrated(part, virtual_test, calibration)
         chosen = named_strategies(part, names, parameters) if names or not files else {}
         return Request.of(
@@ -501,6 +504,7 @@ def plan(
     machine: MachineName = None,
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
+    set_plastic: SetPlastic = None,
     turn: Turn = None,
     backend: Backend = "auto",
     gcode: PrintFile = False,
@@ -547,7 +551,7 @@ def plan(
             raise InputError("--cell writes the moves of a print: add --gcode")
         course = Course(tuple(pause or ()), from_layer)
         bed = bed_table_of(turn, centre, copies)
-        part = load(case, set_case, refine, machine, set_machine, set_fibre, bed)
+        part = load(case, set_case, refine, machine, set_machine, set_fibre, bed, set_plastic)
         part, strand = calibrated(part, virtual_test is not False, calibration)
         untold = virtual_test is None and stiffness is None and load_case != "all"
         return Request.of(
@@ -597,6 +601,7 @@ def calibrate(
     machine: MachineName = None,
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
+    set_plastic: SetPlastic = None,
     out: Annotated[
         Path,
         typer.Option(
@@ -619,7 +624,9 @@ def calibrate(
         "strand": None,
         "load_case": load_case,
     }
-    read = partial(load, case, set_case, False, machine, set_machine, set_fibre)
+    read = partial(
+        load, case, set_case, False, machine, set_machine, set_fibre, set_plastic=set_plastic
+    )
     fit_material(read, unreinforced, reinforced, strategy, parameters, options, out)
 
 

@@ -11,6 +11,7 @@ from ccfem.cli.arguments import numbers_of, parameters_by_strategy
 from ccfem.cli.fibre_choice import SetFibre
 from ccfem.cli.machines import MachineName, SetMachine
 from ccfem.cli.options import Backend, CasePath, Force, LoadCase, Out, SetCase, SetOfOne, Strategy
+from ccfem.cli.plastic_choice import SetPlastic
 
 if TYPE_CHECKING:
     from ccfem.comparison.front_points import FibreFront
@@ -47,6 +48,7 @@ def front(
     machine: MachineName = None,
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
+    set_plastic: SetPlastic = None,
     backend: Backend = "auto",
     out: Out = None,
     force: Force = False,
@@ -67,7 +69,7 @@ def front(
     strengths = () if strength is None else numbers_of(strength)
     if strength is not None and not strengths:
         raise InputError(f"--strength expects numbers from 0 to 1 as 0,0.25,0.5; got '{strength}'")
-    part = load(case, set_case, False, machine, set_machine, set_fibre)
+    part = load(case, set_case, False, machine, set_machine, set_fibre, set_plastic=set_plastic)
     chosen = named_strategies(part, (strategy,), parameters)
     request = Request(part, chosen, load_case=load_case, backend=backend)
     where = out if out is not None else Path("results") / f"{part.name}-front"

@@ -54,7 +54,7 @@ def fit_material(
     for line in (*case.findings, *about_problem(case.problem)):
         print(f"warning: {line}")
     calibration = calibrate(
-        case.problem, without, with_fibre, paths, options["load_case"], out.stem
+        case.printed_problem(), without, with_fibre, paths, options["load_case"], out.stem
     )
     calibration.write(out)
     rho = "" if calibration.rho is None else f", rho {calibration.rho:.3g} mm^2"

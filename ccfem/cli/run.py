@@ -18,6 +18,7 @@ from ccfem.base.toml import assignment
 from ccfem.cli.arguments import numbers_of
 from ccfem.cli.fibre_choice import fibre_choice
 from ccfem.cli.machines import machine_choice
+from ccfem.cli.plastic_choice import plastic_choice
 
 if TYPE_CHECKING:
     from ccfem.cases.case import Case
@@ -47,6 +48,7 @@ def load(
     set_machine: Sequence[str] | None = None,
     set_fibre: Sequence[str] | None = None,
     bed: Mapping[str, Any] = MappingProxyType({}),
+    set_plastic: Sequence[str] | None = None,
 ) -> "Case":
     """Read a part file, or make a case from its name and parameters.
 
@@ -58,14 +60,15 @@ def load(
         Refine cells until they are fine enough by the estimated error.
     machine, set_machine
         As in `machine_choice`.
-    set_fibre
-        As in `fibre_choice`.
+    set_fibre, set_plastic
+        As in `fibre_choice` and `plastic_choice`.
     bed : mapping
         As in `ccfem.cli.arguments.bed_table_of`.
     """
     from ccfem.cases.reading import read
 
     printer, places = machine_choice(machine, set_machine), fibre_choice(set_fibre)
+    plastic = plastic_choice(set_plastic)
     _refuse_body(name)
     parameters = dict(assignment(text) for text in set_case or ())
     if parameters and name.endswith(".toml"):
@@ -77,6 +80,8 @@ def load(
         case = replace(case, machine=printer(case.machine))
     if places is not None:
         case = replace(case, fibre=places(case.fibre))
+    if plastic is not None:
+        case = replace(case, plastic=plastic(case.plastic))
     if bed:
         case = case.on_bed(bed)
     return _refined(case) if refine else case

@@ -19,7 +19,7 @@ def solve_part(case: Case, out: Path, load_case: str | None, backend: str) -> No
     files = {name: out if len(names) == 1 else result_path(out, name) for name in names}
     for file in files.values():
         check_writable(result_path(file))
-    fields = solve(case.problem, backend=backend)
+    fields = solve(case.printed_problem(), backend=backend)
     for name, file in files.items():
         write_result(fields[name], file)
         print_solution(fields[name], case.findings, file)

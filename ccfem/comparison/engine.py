@@ -158,7 +158,8 @@ class Solved:
         said = slicer_remarks(chosen, stress)
         stack = tuple(layers)
         about = (strand, case.build, below, propped, said, self.every_layer, self.longest_test)
-        return Part(stress, stack, case.machine, self.cases, *about, case.bed, self.course)
+        more = (case.bed, self.course, case.plastic)
+        return Part(stress, stack, case.machine, self.cases, *about, *more)
 
 
 def solved(request: Request, seconds: dict[str, float] | None = None) -> Solved:
@@ -180,7 +181,7 @@ def solved(request: Request, seconds: dict[str, float] | None = None) -> Solved:
     case, strand, backend = request.case, request.strand, request.backend
     check_slicings(request)
     with timed(seconds, "solve"):
-        fields = solve(case.problem, backend=backend)
+        fields = solve(case.printed_problem(request.only_slicer), backend=backend)
         if request.all_cases:
             cases = weighted_cases(case, fields)
         else:

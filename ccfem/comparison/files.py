@@ -372,6 +372,7 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
             "load_case": stress.case,
             "load": _load(stress),
             "material": case.problem.material.name,
+            "plastic": dataclasses.asdict(case.plastic),
             "build": case.build,
             "nodes": len(mesh.points),
             "cells": len(mesh.cells),

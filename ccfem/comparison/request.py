@@ -251,6 +251,8 @@ class Request:
             self._check_named()
         if isinstance(self.amount, Stiffness):
             self._check_stiffness()
+        if not self.case.plastic.solid:
+            self._check_plastic()
         if self.print_plans:
             self._check_print()
         elif self.support:
@@ -303,6 +305,16 @@ class Request:
             )
         if self.print_plans:
             raise InputError("prints are planned on one slicing: drop print_plans or slicings")
+
+    def _check_plastic(self) -> None:
+        """Refuse what changes the layers of a part whose plastic depends on them."""
+        if self.named or isinstance(self.amount, Stiffness | Spread):
+            raise InputError(
+                f"plastic.infill '{self.case.plastic.infill}' is solid near fibre, so that the "
+                "part without fibre changes with its layers: compare slicings, plan for a "
+                "stiffness and lay several lengths with infill = 'solid' "
+                "(--set-plastic infill=solid)"
+            )
 
     def _check_stiffness(self) -> None:
         if len(self.strategies) > 1:
@@ -363,6 +375,12 @@ class Request:
     def named(self) -> bool:
         """Whether slicings are compared with each other."""
         return list(self.slicings) != [""]
+
+    @property
+    def only_slicer(self) -> Slicer | None:
+        """Slicer of the only slicing; None for the part's own, and where several are compared."""
+        slicing = self.slicings.get("")
+        return None if slicing is None else slicing.slicer
 
     @property
     def all_cases(self) -> bool:

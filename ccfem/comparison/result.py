@@ -272,6 +272,12 @@ class Comparison:
         if self.case.fibre is not None:
             where = "fibre" if self.over_slicings else f"fibre on {len(self.layers)} layers"
             lines.append(f"{where}: {self.case.fibre.about()}")
+        if not self.case.plastic.solid:
+            filled = self.stress.problem.filled
+            lines.append(
+                f"plastic: {self.case.plastic.about()}; {filled:.0%} of the volume is filled, with "
+                "fibre and without: stiffness ratios are to that part"
+            )
         if self.over_slicings:
             thick = (f"{name} {self._count(name)}" for name in self.stacks)
             lines.append(f"layers: {', '.join(thick)}")

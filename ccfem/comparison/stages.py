@@ -33,6 +33,7 @@ from ccfem.paths.planning.given_paths import GivenPaths
 from ccfem.paths.planning.plan import plan
 from ccfem.paths.planning.strategy import LengthStrategy, Planned
 from ccfem.paths.planning.unfolding import may_fold
+from ccfem.paths.plastic.plastic import SOLID, Plastic
 from ccfem.paths.splitting.printed_strands import printed_strands
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.bed_layout import AS_IT_STANDS, BedLayout
@@ -98,6 +99,8 @@ class Part:
         Length of fibre above which a run is not tested virtually.
     remarks : tuple of str
         Of the slicer, one line each.
+    plastic : Plastic
+        Walls, skins, infill and seam of its print.
     """
 
     stress: PartStress
@@ -113,6 +116,7 @@ class Part:
     longest_test: float = float("inf")
     layout: BedLayout = AS_IT_STANDS
     course: Course = WITHOUT_HALT
+    plastic: Plastic = SOLID
 
     @property
     def flat_layers(self) -> tuple[Layer, ...]:
@@ -366,7 +370,7 @@ def evaluated(run: Run, part: Part) -> Run:
     def work() -> Run:
         most = None if part.every_layer else _MOST_LAYERS
         about = (part.layers, part.stress, part.machine, part.strand, part.build, most)
-        evaluation = evaluate(run.toolpaths, *about)
+        evaluation = evaluate(run.toolpaths, *about, part.cases.heaviest.problem.filled)
         # Who planned given paths is not known: their folds are no published pattern.
         given = isinstance(run.strategy, GivenPaths)
         by_design = not given and may_fold(run.strategy)
@@ -398,7 +402,7 @@ def with_print(run: Run, part: Part) -> Run:
         plan = (
             curved_plan(*what, build, part.support, spin)
             if curved
-            else plan_print(*what, part.propped, spin)
+            else plan_print(*what, part.propped, spin, part.plastic)
         )
         plan = on_course(arranged(plan, part.layout, part.machine), part.course, part.machine)
         moves = part_moves(plan, part.machine)

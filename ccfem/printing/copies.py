@@ -265,6 +265,7 @@ def _repeated(plan: PrintPlan, places: FloatArray) -> PrintPlan:
         laid=plan.laid[rows],
         room=plan.room[which],
         short=plan.short[which],
+        sparse=plan.sparse[which],
         dropped=count * plan.dropped,
         ended=count * plan.ended,
         outside=count * plan.outside,

@@ -49,6 +49,8 @@ class LaidLayer:
         Width that each line of matrix fills, over that of the machine's lines.
     short : (K,) bool array
         Lines of matrix in place of strands that are too short for the cutter.
+    sparse : (K,) bool array
+        Lines of sparse infill.
     outside : float, mm
         Length of fibre outside the part.
     """
@@ -57,6 +59,7 @@ class LaidLayer:
     laid: FloatArray
     room: FloatArray
     short: BoolArray
+    sparse: BoolArray
     warning: str = ""
     outside: float = 0.0
 
@@ -80,18 +83,20 @@ def matrix_layer(
         Top of the layer over the bed, and its own height.
     """
     matrix, which = _printed(fill.lines, height, number, MATRIX)
+    sparse = which >= len(fill.lines) - fill.sparse
     heights, warning = np.zeros(0), ""
     room = np.array(fill.widths)[which] / machine.matrix_width
     strands = (below.strands, below.height, machine, below.sections)
     if len(matrix):
-        matrix, heights, warning = with_flow(matrix, fill.section, thickness, *strands, room)
+        matrix, heights, warning = with_flow(matrix, fill.solid, thickness, *strands, room, sparse)
     pad, _ = _printed(pads, height, number, SUPPORT)
     if len(pad):
         pad, high = pad_flow(pad, thickness, *strands)
         matrix, heights = Toolpaths.concatenate([matrix, pad]), np.append(heights, high)
         room = np.append(room, np.ones(len(pad)))
+        sparse = np.append(sparse, np.zeros(len(pad), dtype=bool))
     warning = f"at {height:.4g} mm {warning}" if warning else ""
-    return LaidLayer(matrix, heights, room, np.zeros(len(matrix), dtype=bool), warning)
+    return LaidLayer(matrix, heights, room, np.zeros(len(matrix), dtype=bool), sparse, warning)
 
 
 def fibre_layer(
@@ -118,7 +123,8 @@ def fibre_layer(
     after = Below(
         [*below.strands, *by_matrix, *lines], below.sections + sections, below.height + thickness
     )
-    return LaidLayer(fibre, heights, np.ones(len(fibre)), short, "", outside), after
+    none = np.zeros(len(fibre), dtype=bool)
+    return LaidLayer(fibre, heights, np.ones(len(fibre)), short, none, "", outside), after
 
 
 def _printed(

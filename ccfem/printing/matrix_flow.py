@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from ccfem.base.arrays import FloatArray
+from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.errors import InputError
 from ccfem.geometry.polylines import starts_segment, subdivide
 from ccfem.geometry.shapes import Region, strings
@@ -45,6 +45,7 @@ def with_flow(
     machine: Machine,
     sections: Sequence[float] | None = None,
     shares: FloatArray | None = None,
+    sparse: BoolArray | None = None,
 ) -> tuple[Toolpaths, FloatArray, str]:
     """Lines of a matrix layer with the height that each of their steps lays.
 
@@ -53,7 +54,7 @@ def with_flow(
     paths : Toolpaths
         Of one layer of matrix.
     section : shapely (Multi)Polygon, mm
-        What the layer has to fill, in the plane of the paths.
+        What the layer has to fill, in the plane of the paths; without sparse infill.
     height : float, mm
         Of the layer.
     strands : sequence of (n, 2) arrays, mm
@@ -64,6 +65,8 @@ def with_flow(
         Section of each strand; by default `Machine.strand_area`.
     shares : (K,) array, optional
         Width of each path over that of the machine; by default 1.
+    sparse : (K,) bool array, optional
+        Paths of sparse infill, which end in the section, and are not scaled; by default none.
 
     Returns
     -------
@@ -98,13 +101,18 @@ def with_flow(
     run = (np.cumsum(keep) - 1)[start]
     long = np.bincount(run, length, len(kept))
     share = np.bincount(run, wanted * length, len(kept)) / np.maximum(long, 1e-300)
+    line = np.searchsorted(np.searchsorted(kept, offsets), np.arange(len(kept)), "right") - 1
     if shares is not None:
-        line = np.searchsorted(np.searchsorted(kept, offsets), np.arange(len(kept)), "right") - 1
         share *= shares[line]
+    scaled = np.ones(len(kept), dtype=bool) if sparse is None else ~sparse[line]
     inside = shapely.length(shapely.intersection(strings(strands), section))
     room = section.area * (height + below) - float(inside @ np.asarray(sections))
-    scale = room / (machine.matrix_width * (share * long).sum())
-    share *= np.clip(scale, 1.0 / _SCALE, _SCALE)
+    if sparse is not None and sparse.any():
+        ends = strings([line[:, :2] for line in paths.select(sparse)])
+        overlap = float(shapely.length(shapely.intersection(ends, section)).sum())
+        room -= machine.matrix_width * (height + below) * overlap
+    scale = room / (machine.matrix_width * (share * long)[scaled].sum())
+    share[scaled] *= np.clip(scale, 1.0 / _SCALE, _SCALE)
     # No line thinner than the machine prints; those in gaps are narrower instead.
     floor = np.full(len(share), least) if shares is None else least * shares[line]
     share = np.where(long > 0.0, np.maximum(share, floor), 0.0)

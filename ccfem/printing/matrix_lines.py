@@ -1,4 +1,4 @@
-"""Lines of matrix layers: a contour, a zigzag inside it, and lines in the gaps."""
+"""Lines of matrix layers: walls, zigzag or infill inside them, and lines in the gaps."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -11,14 +11,21 @@ from ccfem.base.arrays import FloatArray
 from ccfem.base.parallel import in_processes
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.hatch import zigzag
-from ccfem.geometry.offsets import offset_rings
-from ccfem.geometry.shapes import Region, corners_only, open_lines, strings
+from ccfem.geometry.infill_lines import gyroid_lines, parallel_lines
+from ccfem.geometry.offsets import inset, offset_rings
+from ccfem.geometry.polylines import along_line, is_closed, points_along
+from ccfem.geometry.shapes import Region, open_lines, strings
 from ccfem.machine.machine import Machine
+from ccfem.paths.plastic.plastic import SOLID, Plastic
+from ccfem.paths.plastic.sparse_regions import NOTHING, matrix_sections
 from ccfem.paths.splitting.slabs import Slab
-from ccfem.slicing.slicers.planar import Planar
+from ccfem.slicing.layers.layer import Layer
 
+_DIRECTED = 0.1
+"""Least size of the mean direction of infill, from 0 for none to 1 for parallel lines."""
 _OVERLAP = 0.25
-"""Overlap of the ends of the zigzag with the contour, in line widths. Our choice."""
+"""Overlap of the ends of zigzag and infill with what lies round them, in line widths. Our
+choice."""
 
 
 @dataclass(frozen=True)
@@ -27,22 +34,31 @@ class MatrixFill:
 
     Attributes
     ----------
+    section : shapely (Multi)Polygon, mm
+    solid : shapely (Multi)Polygon, mm
+        What of it is filled; the rest has sparse infill.
     lines : list of (n, 2) arrays, mm
     widths : list of float, mm
         Of each line; less than the machine's in gaps.
+    sparse : int
+        Number of lines of sparse infill; they are the last ones.
     """
 
     section: Region = field(default_factory=shapely.Polygon)
+    solid: Region = field(default_factory=shapely.Polygon)
     lines: list[FloatArray] = field(default_factory=list)
     widths: list[float] = field(default_factory=list)
+    sparse: int = 0
 
 
 def matrix_fills(
     slabs: Sequence[Slab],
+    fibre: Sequence[Layer],
     mesh: TetMesh,
     frame: FloatArray,
     origin: FloatArray,
     machine: Machine,
+    plastic: Plastic = SOLID,
 ) -> list[MatrixFill | None]:
     """Find the lines that fill each slab of matrix; None for a slab of fibre.
 
@@ -52,51 +68,126 @@ def matrix_fills(
     ----------
     slabs : sequence of Slab
         From the bed to the top.
+    fibre : sequence of Layer
+        Flat layers that may get fibre.
     mesh : TetMesh
         The part.
     frame : (3, 3) array
         Rows are the axes of the bed in the frame of the mesh.
     origin : (2,) array, mm
         Subtracted from X and Y along these axes.
+    plastic : Plastic
+        Default: solid.
     """
     width, profile = machine.matrix_width, machine.gcode
-    # In a narrower gap a line of the least height would be higher than its shape allows.
-    narrow = machine.least_line / machine.line_shape
     of_matrix = [k for k, slab in enumerate(slabs) if slab.fibre is None]
     fills: list[MatrixFill | None] = [None] * len(slabs)
     for k in of_matrix:
         fills[k] = MatrixFill()
-    middles = tuple(0.5 * (slabs[k].lower + slabs[k].upper) for k in of_matrix)
-
-    layers = Planar(heights=middles).cut(mesh, frame[2]) if middles else ()
+    plane, sections = matrix_sections(slabs, fibre, mesh, frame[2], plastic, machine)
+    if plane is None:
+        return fills
 
     def on_bed(points: FloatArray) -> FloatArray:
-        return layers[0].plane.to_space(points) @ frame[:2].T - origin  # at any height
+        return plane.to_space(points) @ frame[:2].T - origin  # at any height
 
-    def filled(section: Region, angle: float) -> MatrixFill:
-        contours = offset_rings(section, 0.5 * width, width, width, 1)
-        inside = zigzag(section, (1.5 - _OVERLAP) * width, width, width, float(np.radians(angle)))
-        lines = [ring for level in contours for ring in level] + inside
-        gaps, widths = gap_lines(section, lines, width, narrow)
+    def filled(section: Region, sparse: Region, angle: float, phase: float) -> MatrixFill:
+        solid = section if sparse.is_empty else shapely.difference(section, sparse)
+        lines, widths = _solid_lines(section, solid, float(np.radians(angle)), plastic, machine)
+        infill = _infill_lines(sparse, phase, plastic, machine)
+        drawn = [_begun(on_bed(line), plastic.seam, width) for line in lines]
         return MatrixFill(
             shapely.transform(section, on_bed),
-            [on_bed(line) for line in lines + gaps],
-            [width] * len(lines) + widths,
+            shapely.transform(solid, on_bed),
+            drawn + [on_bed(line) for line in infill],
+            widths + [width] * len(infill),
+            len(infill),
         )
 
-    # Layers of equal section, filled in the same direction, are filled once.
-    asked = [
-        (
-            corners_only(layer.plane.polygon),
-            (profile.matrix_angle + profile.matrix_turn * layer.index) % 360.0,
-        )
-        for layer in layers
-    ]
-    unequal = list(dict.fromkeys(asked))
+    # Layers of equal section, filled in the same directions, are filled once.
+    asked: dict[int, tuple[Region, Region, float, float]] = {}
+    below = NOTHING, 0.0
+    for number, k in enumerate(of_matrix):
+        if k in sections:
+            slab, section, sparse = sections[k]
+            height = 0.5 * (slab.lower + slab.upper) - slabs[0].lower
+            angle = (profile.matrix_angle + profile.matrix_turn * number) % 360.0
+            if shapely.difference(below[0], sparse).area > width**2:
+                angle = _across(_infill_lines(*below, plastic, machine), profile.matrix_angle)
+            phase = {"lines": number % 2, "gyroid": height}.get(plastic.infill, 0.0)
+            asked[k] = (section, sparse, angle, 0.0 if sparse.is_empty else float(phase))
+            below = asked[k][1], asked[k][3]
+    unequal = list(dict.fromkeys(asked.values()))
     made = dict(zip(unequal, in_processes(filled, *zip(*unequal, strict=True)), strict=True))
-    for layer, key in zip(layers, asked, strict=True):
-        fills[of_matrix[layer.index]] = made[key]
+    for k, key in asked.items():
+        fills[k] = made[key]
     return fills
+
+
+def _solid_lines(
+    section: Region, solid: Region, angle: float, plastic: Plastic, machine: Machine
+) -> tuple[list[FloatArray], list[float]]:
+    """Walls, zigzag and lines in gaps that fill the solid part of a section, and their widths."""
+    width = machine.matrix_width
+    # In a narrower gap a line of the least height would be higher than its shape allows.
+    narrow = machine.least_line / machine.line_shape
+    walls = offset_rings(section, 0.5 * width, width, width, plastic.walls)
+    if solid is section:
+        inside = zigzag(section, (plastic.walls + 0.5 - _OVERLAP) * width, width, width, angle)
+    else:
+        rest = shapely.intersection(solid, inset(section, plastic.walls * width))
+        inside = zigzag(rest, (0.5 - _OVERLAP) * width, width, width, angle)
+    lines = [ring for level in walls for ring in level] + inside
+    gaps, widths = gap_lines(solid, lines, width, narrow)
+    return lines + gaps, [width] * len(lines) + widths
+
+
+def _infill_lines(
+    sparse: Region, phase: float, plastic: Plastic, machine: Machine
+) -> list[FloatArray]:
+    """Lines of sparse infill, which end on what lies round them.
+
+    The phase is the height of a gyroid, mm, and 0 or 1 for lines of the one or the other direction.
+    """
+    if sparse.is_empty:
+        return []
+    width = machine.matrix_width
+    region, spacing = shapely.buffer(sparse, _OVERLAP * width), plastic.spacing(width)
+    if plastic.infill == "gyroid":
+        return gyroid_lines(region, phase, spacing)
+    angle = float(np.radians(machine.gcode.matrix_angle))
+    turns = (0.0, 1.0) if plastic.infill == "grid" else (phase,)
+    angles = [angle + 0.5 * np.pi * turn for turn in turns]
+    return [line for each in angles for line in parallel_lines(region, spacing, each)]
+
+
+def _across(lines: Sequence[FloatArray], angle: float) -> float:
+    """Direction, degrees, of skins that bridge infill: across most of its lines, if it has one."""
+    steps = np.concatenate([np.diff(line, axis=0) for line in lines])
+    # Directions without a sign are averaged at twice their angle.
+    twice = (steps @ np.array([1.0, 1.0j])) ** 2 / np.linalg.norm(steps, axis=1)
+    if abs(twice.sum()) < _DIRECTED * np.abs(twice).sum():
+        return angle
+    return float(np.degrees(0.5 * np.angle(twice.sum())) + 90.0) % 180.0
+
+
+def _begun(line: FloatArray, seam: str, width: float) -> FloatArray:
+    """Line on the bed that begins at its seam, if it is closed."""
+    if seam == "any" or not is_closed(line):
+        return line
+    ring, turn = line[:-1], np.zeros(len(line) - 1)
+    if seam == "corner":
+        # Corners are rounded: they turn between places a line width before and behind.
+        along = along_line(line)
+        before, after = (
+            points_along(line, along, (along[:-1] + off) % along[-1]) for off in (-width, width)
+        )
+        into, out = ring - before, after - ring
+        cross = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
+        turn = np.arctan2(cross, np.einsum("ij,ij->i", into, out)).round(2)
+    first = int(np.lexsort((ring[:, 0], -ring[:, 1].round(3), -turn))[0])
+    turned = np.roll(ring, -first, axis=0)
+    return np.concatenate([turned, turned[:1]])
 
 
 # Lines of matrix that a contour and a zigzag leave out: in narrow walls and beside holes.

@@ -15,8 +15,10 @@ EVENTS = (
 TRAVEL, LAY, FEED, CUT, TOOL, STANDBY, PREHEAT, HEAT, WORK = range(9)
 HEAT_BED, FAN, WAIT, LAYER, PATH_START, PATH_END, PAUSE = range(9, 16)
 
-ROLES = ("travel", "contour", "infill", "fibre", "tail", "block", "skirt", "pad", "short")
-"""Roles of laid lines: "tail" is fibre after its cut, "short" replaces strands too short to cut."""
+ROLES = ("travel", "contour", "infill", "fibre", "tail", "block", "skirt", "pad", "short", "sparse")
+"""Roles of laid lines: "tail" is fibre after its cut, "short" replaces strands too short to cut.
+
+"infill" is solid, and "sparse" is not."""
 
 
 def role(name: str) -> int:
@@ -120,6 +122,7 @@ class Moves:
     @property
     def in_part(self) -> BoolArray:
         """Rows that lay something of the part itself, (n,): no block, skirt or pad."""
-        roles = [role(name) for name in ("contour", "infill", "fibre", "tail", "short")]
+        names = ("contour", "infill", "sparse", "fibre", "tail", "short")
+        roles = [role(name) for name in names]
         beside = np.isin(self.role, [role("fibre"), role("tail")]) & (self.strand < 0)
         return (self.event == LAY) & np.isin(self.role, roles) & ~beside

@@ -84,7 +84,7 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
                 lay_strand(recorder, line, normals, thickness, machine)
             else:
                 what = "short" if plan.short[k] else "contour" if paths.closed[k] else "infill"
-                what = "pad" if paths.kind[k] == SUPPORT else what
+                what = "pad" if paths.kind[k] == SUPPORT else "sparse" if plan.sparse[k] else what
                 speed = _speed(below, machine)
                 heights, room = plan.laid[start : end - 1], float(plan.room[k])
                 lay_matrix(recorder, line, normals, heights, what, machine, speed, room)

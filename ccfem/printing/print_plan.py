@@ -14,6 +14,7 @@ from ccfem.geometry.offsets import offset_rings
 from ccfem.geometry.polylines import line_length, starts_segment
 from ccfem.geometry.shapes import Region, open_lines, strings
 from ccfem.machine.machine import Machine
+from ccfem.paths.plastic.plastic import SOLID, Plastic
 from ccfem.paths.splitting.printed_strands import (
     SHORT,
     PrintedStrands,
@@ -51,6 +52,8 @@ class PrintPlan:
         in gaps. Its section stays that of `laid` (`ccfem.printing.part_moves.line_sizes`).
     short : (K,) bool array, optional
         Which lines of matrix take the place of strands that are too short for the cutter.
+    sparse : (K,) bool array, optional
+        Which lines are sparse infill; by default none.
     dropped, ended : float, mm
         As in `PrintedStrands`.
     warnings : tuple of str
@@ -86,6 +89,7 @@ class PrintPlan:
     copies: int = 1
     pauses: tuple[int, ...] = ()
     first: int = 0
+    sparse: BoolArray = None  # type: ignore[assignment]
 
     __repr__ = in_brief
 
@@ -95,11 +99,13 @@ class PrintPlan:
             object.__setattr__(self, "laid", whole)
         if self.room is None:
             object.__setattr__(self, "room", np.ones(len(self.paths)))
-        if self.short is None:
-            object.__setattr__(self, "short", np.zeros(len(self.paths), dtype=bool))
+        for name in ("short", "sparse"):
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, np.zeros(len(self.paths), dtype=bool))
         if self.trims is None:
             object.__setattr__(self, "trims", np.zeros((0, 3)))
-        freeze(self, trims=float, top=float, thickness=float, laid=float, room=float, short=bool)
+        freeze(self, trims=float, top=float, thickness=float, laid=float, room=float)
+        freeze(self, short=bool, sparse=bool)
 
     def volume(self, machine: Machine) -> float:
         """Volume of matrix and of fibre inside the part, mm^3."""
@@ -132,15 +138,16 @@ def plan_print(
     machine: Machine,
     support: bool = False,
     spin: float = 0.0,
+    plastic: Plastic = SOLID,
 ) -> PrintPlan:
     """Plan the print of a whole part.
 
     Fibre layers lie at the heights that they were planned at, as high as the filament's section
     needs (`Machine.strand_height`). The space below, between and above them is filled with matrix
     layers of equal height, as few as `Machine.matrix_height` allows, so that the part gets its full
-    height. A matrix layer is a contour and a zigzag of the section at its middle, which turns from
-    one matrix layer to the next; over fibre it lays what the strands leave
-    (`ccfem.printing.matrix_flow`). A fibre layer holds fibre, and lines of matrix in place of
+    height. A matrix layer is walls and a zigzag of the section at its middle, which turns from
+    one matrix layer to the next, or sparse infill (`Plastic`); over fibre it lays what the strands
+    leave (`ccfem.printing.matrix_flow`). A fibre layer holds fibre, and lines of matrix in place of
     strands that are too short for the cutter; a layer without fibre is left out. No strand is cut
     here. The lowest layer is that of `Process.first_layer_height`. Within a layer the next path is
     always the one with the nearest end. The part stands in the middle of the bed.
@@ -158,6 +165,8 @@ def plan_print(
         (`ccfem.printing.support.overhang`).
     spin : float, degrees
         Turn about the vertical (`ccfem.printing.bed_layout.BedLayout`).
+    plastic : Plastic
+        Walls, skins, infill and seam. Default: solid.
 
     Raises
     ------
@@ -190,7 +199,8 @@ def plan_print(
         for index in borders
     }
     slabs = slabs_of(used, float(lowest[2]), float(highest[2]), machine, over)
-    fills = matrix_fills(slabs, mesh, frame, origin, _spun(machine, spin))
+    turned = spun(machine, spin)
+    fills = matrix_fills(slabs, layers, mesh, frame, origin, turned, plastic)
     placed = _Strands(fibre, short, borders)
     hanging = overhang(mesh, frame[2], machine) if support else None
     in_air = _NONE
@@ -219,12 +229,13 @@ def plan_print(
             *check_cover(slabs, machine),
         ),
         strands.ended,
+        sparse=np.concatenate([layer.sparse for layer in done]),
     )
     check_bed(plan, machine)
     return plan
 
 
-def _spun(machine: Machine, spin: float) -> Machine:
+def spun(machine: Machine, spin: float) -> Machine:
     """Machine whose lines of matrix keep their direction on the bed below a part that is turned."""
     if not spin:
         return machine

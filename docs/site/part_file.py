@@ -20,6 +20,7 @@ from ccfem.machine import (
     Spools,
 )
 from ccfem.paths.placement import FibrePlaces, FibreRegion
+from ccfem.paths.plastic import Plastic
 from ccfem.printing.bed_layout import BedTable
 
 __all__ = ["part_file_page"]
@@ -41,6 +42,7 @@ def part_file_page() -> str:
         f"## Loads `[[loads.CASE]]`\n\n{kinds('kind', LOADS)}",
         f"## Regions `[regions.NAME]`\n\n{kinds('rule', REGIONS)}",
         f"## Fibre `[fibre]`\n\n{_fibre()}",
+        f"## Plastic `[plastic]`\n\n{keys(Plastic)}",
         f"## Machine `[machine]`\n\n{keys(Machine)}",
         f"### Limits `[machine.limits]`\n\n{keys(Limits)}",
         f"### Speeds `[machine.speeds]`\n\n{keys(SpeedTable)}",

@@ -32,6 +32,7 @@ from ccfem.fem.elasticity.solve import support_sets
 from ccfem.fem.elasticity.supports import held
 from ccfem.fem.elasticity.system import prepare
 from ccfem.geometry.facets import connected, facet_keys
+from ccfem.paths.plastic.plastic import SOLID
 from ccfem.printing.before_solving import in_air, refusal
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.slicer import has_field
@@ -320,9 +321,13 @@ def check(part: str | os.PathLike[str] | Case, **parameters: Any) -> Check:
         refused = refusal(mesh, case.build, machine, known, case.bed, curved)
         not_printable = tuple(filter(None, (refused, in_air(mesh, machine, known))))
     fibre = () if case.fibre is None else known
+    plastic: tuple[str, ...] = ()
+    if known or case.plastic.solid:
+        with layers.noted():
+            plastic = _about_plastic(case)
     return Check(
         case,
-        (*_facts(case), *_about_fibre(case, fibre)),
+        (*_facts(case), *_about_fibre(case, fibre), *plastic),
         patch_rows(problem.mesh, _carried(case)),
         tuple(rows),
         tuple(dict.fromkeys(_warnings(case, rows, doubts))),
@@ -397,6 +402,28 @@ def _about_fibre(case: Case, layers: Sequence[Layer]) -> tuple[str, ...]:
     return (
         f"fibre on {len(layers)} layer{'s' * (len(layers) > 1)} ({shortened}), {area:.4g} mm^2 "
         f"each on average: {case.fibre.about()}",
+    )
+
+
+def _about_plastic(case: Case) -> tuple[str, ...]:
+    """Say how much of the part is plastic, and its mass; nothing of one that is solid by default.
+
+    Raises
+    ------
+    InputError
+        As `Case.printed_problem`.
+    """
+    if case.plastic == SOLID:
+        return ()
+    plastic, printed = case.plastic, case.printed_problem()
+    if plastic.solid:
+        return (f"plastic: {plastic.about()}",)
+    filled, mesh = printed.filled, printed.mesh
+    sparse = (1.0 - filled) / (1.0 - plastic.density)
+    grams = 1e-3 * case.machine.matrix_density * filled * float(mesh.volumes.sum())
+    return (
+        f"plastic: {plastic.about()} in {sparse:.0%} of the volume; {filled:.0%} of the volume is "
+        f"filled, {grams:.4g} g before fibre takes its place",
     )
 
 

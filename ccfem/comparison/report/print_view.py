@@ -25,6 +25,7 @@ _KIND_OF = {
     "skirt": 4,
     "pad": 3,
     "short": 1,
+    "sparse": 1,
 }
 """Place in `KINDS` of each role of a line."""
 

@@ -230,6 +230,11 @@ def jobs_of(study: Study, progress: Progress = silent) -> Jobs:
             check_known(f"load case of {case.name}", load_case, case.problem.cases)
         if not case.problem.cases:
             raise InputError(f"part '{label}' has no load case: give it at least one load")
+        if not case.plastic.solid:
+            raise InputError(
+                f"part '{label}' has the infill '{case.plastic.infill}', and a study solves a part "
+                "once for all slicings: leave out [plastic]"
+            )
         refused = [Mistakes() for _ in slicings]
         for (cut, slicer), note in zip(slicings, refused, strict=True):
             with note.noted(f"{label}, slicing {cut['slicing']}: "):

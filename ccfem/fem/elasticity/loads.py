@@ -356,8 +356,9 @@ def _centrifugal_forces(problem: Problem, load: Centrifugal) -> FloatArray:
 
 
 def _mass_density(problem: Problem, load: Gravity | Centrifugal) -> FloatArray:
-    """Mass density (m,), g/cm^3; the density of a cell, where the part has one, scales it."""
+    """Mass density (m,), g/cm^3; density and fill of a cell, where the part has them, scale it."""
     factor = np.ones(len(problem.mesh.cells)) if problem.density is None else problem.density
+    factor = factor if problem.fill is None else factor * problem.fill
     if load.mass_density is not None:
         return factor * load.mass_density
     result = np.empty(len(factor))

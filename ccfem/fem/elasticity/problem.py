@@ -68,6 +68,10 @@ class Problem(Shown):
         Factor on the stiffness, and on the mass, of each cell; default 1.
     stiffness : (m, 6, 6) array, MPa, optional
         Stiffness of each cell in the global frame; overrides that of materials and `axes`.
+    fill : (m,) array in (0, 1], optional
+        Share of each cell that is material, a factor on its mass alone; default 1.
+    strength : (m,) array in (0, 1], optional
+        Strength of each cell over that of its material, in the mean over the cell; default 1.
     regions : tuple of Region
         Cells of other materials; no cell in two of them.
     combinations : mapping of name to mapping of load case name to factor
@@ -94,6 +98,8 @@ class Problem(Shown):
     axes: FloatArray | None = None
     density: FloatArray | None = None
     stiffness: FloatArray | None = None
+    fill: FloatArray | None = None
+    strength: FloatArray | None = None
     regions: tuple[Region, ...] = ()
     combinations: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     order: Order = "auto"
@@ -108,7 +114,7 @@ class Problem(Shown):
     def __post_init__(self) -> None:
         freeze(self, supports=tuple, loads=tuple, regions=tuple, combinations=dict)
         freeze(self, case_supports=tuple)
-        freeze(self, axes=float, density=float, stiffness=float)
+        freeze(self, axes=float, density=float, stiffness=float, fill=float, strength=float)
         if self.mesh.flaw:
             raise InputError(self.mesh.flaw)
         self._check_arrays()
@@ -121,7 +127,9 @@ class Problem(Shown):
 
     def _check_arrays(self) -> None:
         m = len(self.mesh.cells)
-        for name, shape in (("axes", (m, 3, 3)), ("density", (m,)), ("stiffness", (m, 6, 6))):
+        shares = ("density", "fill", "strength")
+        shapes = {"axes": (m, 3, 3), "stiffness": (m, 6, 6), **dict.fromkeys(shares, (m,))}
+        for name, shape in shapes.items():
             value = getattr(self, name)
             if value is None:
                 continue
@@ -131,11 +139,13 @@ class Problem(Shown):
                 )
             if not np.isfinite(value).all():
                 raise InputError(f"problem.{name} must be finite; got NaN or infinity")
-        if self.density is not None and not 0.0 < self.density.min() <= self.density.max() <= 1.0:
-            raise InputError(
-                f"problem.density must lie in (0, 1]; got {self.density.min()} to "
-                f"{self.density.max()}: give void cells a small positive density"
-            )
+        for name in shares:
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value.min() <= value.max() <= 1.0:
+                raise InputError(
+                    f"problem.{name} must lie in (0, 1]; got {value.min()} to {value.max()}: give "
+                    f"void cells a small positive {name}"
+                )
         if self.axes is not None:
             off = np.abs(np.einsum("mji,mjk->mik", self.axes, self.axes) - np.eye(3))
             off = off.max(axis=(1, 2))
@@ -189,6 +199,18 @@ class Problem(Shown):
                         f"combination '{name}' adds up load cases '{first}' and '{other}', whose "
                         "supports differ: make it a load case with loads and supports of its own"
                     )
+
+    @property
+    def filled(self) -> float:
+        """Share of the part's volume that is material."""
+        volumes = self.mesh.volumes
+        return 1.0 if self.fill is None else float(volumes @ self.fill / volumes.sum())
+
+    def in_material(self, stress: FloatArray) -> FloatArray:
+        """Mean stress (m, ...) of the cells, MPa, over the share of strength that they have."""
+        if self.strength is None:
+            return stress
+        return np.asarray(stress / self.strength.reshape(-1, *(1,) * (stress.ndim - 1)))
 
     @property
     def body(self) -> TetMesh:

@@ -467,7 +467,7 @@ def _on(problem: Problem, mesh: TetMesh, parent: IntArray) -> Problem:
     """Return a problem on finer cells, each of which is a piece of a previous one."""
     arrays = {
         name: value[parent]
-        for name in ("axes", "density", "stiffness")
+        for name in ("axes", "density", "stiffness", "fill", "strength")
         if (value := getattr(problem, name)) is not None
     }
     regions = tuple(

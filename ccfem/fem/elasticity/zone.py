@@ -29,6 +29,8 @@ def averaged_mises(
 ) -> tuple[IntArray, FloatArray, FloatArray]:
     """Von Mises stress of the cells averaged by volume over a ball of 2 mm radius, MPa.
 
+    In cells that are weaker than their material it is that of the material.
+
     Parameters
     ----------
     case : str
@@ -47,7 +49,7 @@ def averaged_mises(
     mesh = problem.mesh
     centroid = mesh.centres
     judged = np.flatnonzero(np.isinf(distance_from_patches(problem, case, centroid, ZONE)))
-    mises = von_mises(stress)[:, None]
+    mises = von_mises(problem.in_material(stress))[:, None]
     return judged, ball_averages(centroid, mises, mesh.volumes, judged, BALL)[:, 0], centroid
 
 

@@ -138,6 +138,7 @@ def evaluate(
     strand: Strand | None = None,
     build: Sequence[float] | None = None,
     most: int | None = None,
+    filled: float = 1.0,
 ) -> Evaluation:
     """Evaluate the fibre paths of a part.
 
@@ -161,6 +162,8 @@ def evaluate(
         Layers, evenly spread over the stack, on which indices are taken that some layers of many
         tell: means and quantiles of angles, distances and coverage. Sums, and all that the limits
         of a machine bound, are always of all layers. Default: all layers.
+    filled : float, default 1
+        Share of the part's volume that is filled (`Problem.filled`), for the mass of the matrix.
 
     Raises
     ------
@@ -180,7 +183,7 @@ def evaluate(
     whole = _spread_over(len(layers), most)
     area = np.array([float(layer.areas.sum()) for layer in layers])
     material = _material(layers, stress, machine, strand or Strand())
-    basis = Basis(machine, material)
+    basis = Basis(machine, material, filled=filled)
     sampled = 1.0 if whole.all() else float(area[whole].sum() / area.sum())
 
     def measured(layer: Layer, every: bool) -> tuple[dict[str, Any], dict[str, float]]:

@@ -258,11 +258,14 @@ class Basis:
         Of a part that is full of strands.
     sampled : float, default 1
         Share of the layers' area on which samples were taken.
+    filled : float, default 1
+        Share of the part's volume that is filled.
     """
 
     machine: Machine
     material: Material
     sampled: float = 1.0
+    filled: float = 1.0
 
 
 # What an index is: name, unit, formula and range, for tables and their glossaries.

@@ -212,11 +212,11 @@ class MatrixPeaks:
 
         `displacement` (n, 3), mm, is that of the part with its fibre.
         """
-        stress = self._stress(displacement)
+        stress, problem = self._stress(displacement), self.part.problem
         mises = von_mises(stress)
-        average = self._averages(mises[:, None])[:, 0]
+        average = self._averages(problem.in_material(mises)[:, None])[:, 0]
         peak, norm, slope = self._norm(average / strength)
-        by_mises = self._back(slope[:, None] / strength)
+        by_mises = problem.in_material(self._back(slope[:, None] / strength))
         deviator = stress - np.trace(stress, axis1=1, axis2=2)[:, None, None] / 3.0 * np.eye(3)
         size = np.where(mises > 0.0, mises, 1.0)
         by_stress = to_voigt(1.5 * deviator) * _ENGINEERING * (by_mises / size[:, None])
@@ -224,7 +224,8 @@ class MatrixPeaks:
 
     def averaged(self, displacement: FloatArray, index: Index) -> Peak | None:
         """Index (k,) of averaged stresses (k, 3, 3); None where there is none, or none above 0."""
-        stress = self._averages(to_voigt(self._stress(displacement)))
+        in_material = self.part.problem.in_material
+        stress = self._averages(to_voigt(in_material(self._stress(displacement))))
         values = index(from_voigt(stress))
         if values is None or not values.max() > 0.0:
             return None
@@ -232,7 +233,7 @@ class MatrixPeaks:
         hot = np.flatnonzero(slope > _HOT * slope.max())
         by_stress = np.zeros_like(stress)
         by_stress[hot] = slope[hot, None] * _slopes(index, stress[hot])
-        return Peak(peak, norm, self._by_displacement(self._back(by_stress)))
+        return Peak(peak, norm, self._by_displacement(in_material(self._back(by_stress))))
 
     def peaks(
         self,

@@ -143,7 +143,7 @@ def _by_index(
     judged = np.flatnonzero(distance > ZONE)
     if not len(judged):
         return Failure()
-    values = stress.stress.reshape(-1, 9)
+    values = stress.problem.in_material(stress.stress).reshape(-1, 9)
     tensor = ball_averages(mesh.centres, values, mesh.volumes, judged, BALL).reshape(-1, 3, 3)
     normal = None if layers is None else layer_normals(layers, mesh.centres[judged])
     index = law.index(tensor, limits, normal)

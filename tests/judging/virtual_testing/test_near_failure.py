@@ -100,6 +100,23 @@ def test_an_index_that_judges_nothing_is_named(beam, monkeypatch, values):
     assert failure.note == "law of failure 'mute' did not judge the part, and gave no reason"
 
 
+def test_derivative_where_cells_are_weaker_than_their_material(beam):
+    cells = len(beam.mesh.cells)
+    strength = np.random.default_rng(5).uniform(0.2, 1.0, cells)
+    weak = solve(replace(beam.problem, strength=strength))["tip"]
+    u, rng = weak.displacement, np.random.default_rng(6)
+    direction = rng.normal(size=u.shape) * np.abs(u).max() * 0.01
+    for what in ("matrix", "interlayer"):
+        slope = float(np.vdot(judged(weak, what, u).by_displacement, direction))
+        ends = [np.log(judged(weak, what, u + h * direction).norm) for h in (1e-4, -1e-4)]
+        assert slope == pytest.approx((ends[0] - ends[1]) / 2e-4, rel=1e-5)
+    assert judged(weak, "matrix", u).index == pytest.approx(matrix_peak(weak)[0] / 50.0, rel=1e-12)
+    layers = Planar(count=2).cut(beam.mesh)
+    bond = interlayer(weak, layers).index
+    assert judged(weak, "interlayer", u).index == pytest.approx(bond, rel=1e-12)
+    assert bond > 1.2 * interlayer(beam, layers).index
+
+
 def test_derivative_on_cells_with_midside_nodes(beam):
     problem = replace(beam.problem, mesh=beam.mesh.quadratic(), order=2)
     fine = solve(problem)["tip"]

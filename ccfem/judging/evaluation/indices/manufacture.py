@@ -67,15 +67,15 @@ COLUMNS = (
     Column(
         "matrix_length",
         "mm",
-        "Length of a line of matrix, matrix width times matrix height, that fills what the fibre "
-        "leaves of the part.",
+        "Length of a line of matrix, matrix width times matrix height, that fills what fibre and "
+        "sparse infill leave of the part.",
         ">= 0; infinite where the machine gives the line no area",
     ),
     Column(
         "matrix_mass",
         "g",
-        "Volume that the fibre leaves of the part times the density of the matrix. Where a print "
-        "is planned: what its file states.",
+        "Volume that fibre and sparse infill leave of the part times the density of the matrix. "
+        "Where a print is planned: what its file states.",
         ">= 0",
     ),
     Column(
@@ -149,13 +149,15 @@ def _duration(length: FloatArray | float, speed: FloatArray | float) -> float:
     return float((length[needed] / speed[needed]).sum())
 
 
-def manufacture_indices(samples: ManufactureSamples, machine: Machine) -> dict[str, float]:
-    """Values of `COLUMNS`."""
+def manufacture_indices(
+    samples: ManufactureSamples, machine: Machine, filled: float = 1.0
+) -> dict[str, float]:
+    """Values of `COLUMNS`, of a part of which a share is filled."""
     length = samples.length
     total = float(length.sum())
     quantiles = np.quantile(length, [0.0, 0.5, 1.0]) if len(length) else np.full(3, np.nan)
     enough = length >= machine.shortest_strand * (1.0 - _ROUNDING)
-    matrix = max(float(samples.volume.sum()) - machine.filament_area * total, 0.0)
+    matrix = max(filled * float(samples.volume.sum()) - machine.filament_area * total, 0.0)
     line = machine.matrix_width * machine.matrix_height
     return {
         "fibre_length": total,
@@ -185,4 +187,4 @@ def sample(paths: LayerPaths) -> ManufactureSamples:
 
 def indices(samples: ManufactureSamples, basis: Basis) -> dict[str, float]:
     """Value of each of `COLUMNS`."""
-    return manufacture_indices(samples, basis.machine)
+    return manufacture_indices(samples, basis.machine, basis.filled)

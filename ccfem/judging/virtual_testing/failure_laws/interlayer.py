@@ -175,11 +175,11 @@ def layer_traction(
     opening, sliding : (k,) arrays, MPa
         Across the layers, positive where it opens them, and the size of that along them.
     tensor : (k, 3, 3) array, MPa
-        The averaged stress.
+        The averaged stress of the material.
     """
     mesh = stress.mesh
     centre = mesh.centres
-    values = stress.stress.reshape(-1, 9)
+    values = stress.problem.in_material(stress.stress).reshape(-1, 9)
     tensor = ball_averages(centre, values, mesh.volumes, cells, radius).reshape(-1, 3, 3)
     return *_across_and_along(tensor, layer_normals(layers, centre[cells])), tensor
 

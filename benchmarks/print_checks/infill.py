@@ -1,0 +1,316 @@
+"""Walls, skins and infill of printed files: volume by region, bridges, and what lies outside.
+
+Run ``python -m benchmarks.print_checks.infill [PART,...] [MACHINE,...] [--infill gyroid]
+[--pictures FOLDER]``. Two walls, three skins, 20 % of infill, fibre in six layers. The regions are
+found again here, on pixels of VTK's sections of the part: walls by distance transform, skins by
+what the layers above and below cover. The file is followed by a printer on paper (`printer`). The
+columns: volume of matrix and fibre over the room for it, in what is solid and in what is sparse;
+the longest bridge, mm, that a line makes, of infill and of skins on it; the share of the matrix
+laid on nothing, bridges included; how far a line's edge reaches beyond the border, mm.
+"""
+
+import argparse
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import shapely
+from scipy import ndimage
+
+from benchmarks.print_checks.all_checks import CHECKS
+from benchmarks.print_checks.height_map import sampled
+from benchmarks.print_checks.job import FILAMENT, PART, Job, Lines
+from benchmarks.print_checks.parts import Part, job_of
+from benchmarks.studies import own_parts
+from ccfem.cases import create_case
+from ccfem.cases.part_file import read_part
+from ccfem.fem.elasticity import solve
+from ccfem.paths.plastic import Plastic
+from ccfem.slicing.slicers.planar import Planar
+
+__all__ = ["Regions", "bridges", "part_of", "regions_of", "volumes"]
+
+PARTS = ("box", "loop", "hook")
+_PIXEL = 0.25
+"""Side of a pixel, in line widths: walls are whole numbers of pixels."""
+_ANCHOR, _SLIVER = 2.0, 0.2
+"""Reach of skins beyond what they cover, and width of what needs none, in line widths."""
+_STRAIGHT_ON = 0.7
+"""Cosine of the turn at a corner, where a line is held by the turn before it."""
+
+BOX = """
+name = "box"
+material = "pla"
+[planform]
+outline = [[0, 0], [60, 0], [60, 40], [0, 40]]
+height = 50
+edge_length = 6
+holes = [{centre = [15, 20], radius = 6}, {centre = [45, 20], radius = 6}]
+[patches.foot]
+rule = "plane"
+normal = "-x"
+offset = 0
+[patches.tip]
+rule = "plane"
+normal = "x"
+offset = 60
+[[supports]]
+patch = "foot"
+[[loads.bend]]
+kind = "force"
+patch = "tip"
+vector = [0, 0, -100]
+"""
+HOOK = """
+name = "hook"
+surface = "crane_hook.stl"
+edge_length = 4
+material = "pla"
+[patches.eye]
+rule = "cylinder"
+point = [4, 70, 0]
+axis = "z"
+radius = 6
+[patches.bowl]
+rule = "cylinder"
+point = [0, 0, 0]
+axis = "z"
+radius = 18
+[[supports]]
+patch = "eye"
+[[loads.hang]]
+kind = "force"
+patch = "bowl"
+vector = [0, -100, 0]
+"""
+
+
+def part_of(name: str, plastic: Plastic) -> Part:
+    """Solve a part with six layers of fibre; without a planform or surface it is a case."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / f"{name}.toml"
+        if name == "hook":
+            own_parts.crane_hook(file.with_name("crane_hook.stl"))
+        texts = {"box": BOX, "hook": HOOK}
+        if name in texts:
+            file.write_text(texts[name], encoding="utf-8")
+        case = read_part(file) if name in texts else create_case(name)
+    case = replace(case, slicing=Planar(count=6), plastic=plastic)
+    stress = solve(case.printed_problem())
+    return Part(case, name, stress[case.problem.cases[0]])
+
+
+@dataclass(frozen=True)
+class Regions:
+    """A layer of matrix on pixels: its top, the height that it fills, and its masks.
+
+    Attributes
+    ----------
+    inside, sparse : (a, b) bool arrays
+        Of the section, and of the part of it that is sparse.
+    low : (2,) array, mm
+        Corner of the pixels.
+    pixel : float, mm
+    """
+
+    top: float
+    height: float
+    inside: np.ndarray
+    sparse: np.ndarray
+    low: np.ndarray
+    pixel: float
+
+    def pixels(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Pixels that places (k, 2) lie in."""
+        at = np.floor((places - self.low) / self.pixel).astype(int)
+        at = np.clip(at, 0, np.array(self.sparse.shape) - 1)
+        return at[:, 0], at[:, 1]
+
+    @cached_property
+    def areas(self) -> tuple[float, float]:
+        """Area of what is solid and of what is sparse, mm^2."""
+        whole, sparse = (float(mask.sum()) * self.pixel**2 for mask in (self.inside, self.sparse))
+        return whole - sparse, sparse
+
+
+def regions_of(job: Job, plastic: Plastic) -> list[Regions]:
+    """Find the regions of all layers of matrix again, for a part of one outer shape."""
+    machine, lines = job.machine, Lines.of(job.done)
+    width, pixel = machine.matrix_width, _PIXEL * machine.matrix_width
+    mine = lines.lays & lines.in_part & ~lines.beside_part
+    height = lines.end[:, 2].round(3)
+    fibre = np.unique(height[mine & lines.of_fibre])
+    tops = np.setdiff1d(np.unique(height[mine]), fibre)
+    lower = np.concatenate([[0.0], tops[:-1]])
+    levels = np.union1d(np.append(0.0, tops), fibre)
+    bottoms = levels[np.searchsorted(levels, tops) - 1]
+    masks, low = [], np.array(job.section(0.5 * tops[0]).bounds[:2]) - 2.0
+    for bottom, top in zip(bottoms, tops, strict=True):
+        section = job.section(0.5 * (bottom + top))
+        count = np.ceil((np.array(section.bounds[2:]) + 2.0 - low) / pixel).astype(int)
+        x, y = (low[k] + (np.arange(count[k]) + 0.5) * pixel for k in (0, 1))
+        shapely.prepare(section)
+        masks.append(shapely.contains_xy(section, *np.meshgrid(x, y, indexing="ij")))
+    found, n = [], plastic.skins
+    reach = (plastic.fibre_skins - 0.5) * machine.highest_matrix(0.0)
+    for k, inside in enumerate(masks):
+        window = masks[k - n : k + n + 1] if n <= k < len(masks) - n else []
+        bare = inside & ~(np.logical_and.reduce(window) if window else np.zeros_like(inside))
+        sliver = 0.5 * _SLIVER * width
+        skin = _deep(bare, pixel) > sliver
+        sparse = _deep(inside, pixel) > plastic.walls * width
+        sparse &= _deep(~skin, pixel) > _ANCHOR * width + sliver
+        near = (fibre - machine.strand_height - tops[k] < reach) & (bottoms[k] - fibre < reach)
+        sparse &= not near.any()
+        sparse &= _deep(~(_deep(sparse, pixel) > width), pixel) <= width
+        found.append(Regions(tops[k], tops[k] - lower[k], inside, sparse, low, pixel))
+    return found
+
+
+def _deep(mask: np.ndarray, pixel: float) -> np.ndarray:
+    """Distance of the pixels of a mask from its border, mm; 0 outside, large without a border."""
+    if mask.all():
+        return np.full(mask.shape, 1e9)
+    return np.asarray((ndimage.distance_transform_edt(mask) - 0.5 * mask) * pixel)
+
+
+def volumes(job: Job, regions: list[Regions], density: float) -> tuple[float, float]:
+    """Volume of matrix and fibre over the room for them, in what is solid and in what is sparse."""
+    lines, machine = Lines.of(job.done), job.machine
+    mine = np.flatnonzero(lines.lays & lines.in_part & ~lines.beside_part)
+    laid, room, below = np.zeros(2), np.zeros(2), 0.0
+    for region in regions:
+        z = lines.end[mine, 2]
+        here = mine[(z > below + 1e-6) & (z < region.top + 1e-6)]
+        below = region.top
+        place, step = sampled(lines.start[here], lines.end[here], 0.1)
+        fibre = (lines.tool[here] == 1) * machine.filament_area * lines.length[here]
+        matrix = FILAMENT * np.where(lines.tool == 1, lines.beside, lines.fed)[here]
+        share = ((matrix + fibre) / np.bincount(step))[step]
+        sparse = region.sparse[region.pixels(place[:, :2])]
+        laid += share[~sparse].sum(), share[sparse].sum()
+        room += np.array(region.areas) * region.height * (1.0, density)
+    return float(laid[0] / room[0]), float(laid[1] / max(room[1], 1e-12))
+
+
+def bridges(job: Job, regions: list[Regions]) -> tuple[float, float, float]:
+    """Longest run of a line of infill, and of others, over nothing, mm; share of all such matrix.
+
+    A line is held where its middle lies over a line of the layer of matrix below.
+    """
+    lines, longest = Lines.of(job.done), [0.0, 0.0]
+    width, height = job.machine.matrix_width, lines.end[:, 2].round(3)
+    free, total = 0.0, 0.0
+    below: np.ndarray | None = None
+    for region in regions:
+        mine = np.flatnonzero(lines.lays & (lines.tool == 0) & (height == region.top))
+        mine = mine[lines.in_part[mine]]
+        place, step = sampled(lines.start[mine], lines.end[mine], 0.5 * region.pixel)
+        at = region.pixels(place[:, :2])
+        if below is not None:
+            held = below[at]
+            way = (lines.length[mine] / np.bincount(step))[step]
+            free, total = free + way[~held].sum(), total + way.sum()
+            # Runs go on over steps that join end to end without a corner.
+            gap = np.abs(lines.start[mine][1:] - lines.end[mine][:-1]).max(axis=1)
+            ahead = (lines.end[mine] - lines.start[mine]) / lines.length[mine, None]
+            corner = np.einsum("ij,ij->i", ahead[1:], ahead[:-1]) < _STRAIGHT_ON
+            part = np.append(0, np.cumsum((gap > 1e-6) | corner))[step]
+            for run in _runs(held, part):
+                kind = int(region.sparse[at[0][run], at[1][run]].mean() <= 0.5)
+                longest[kind] = max(longest[kind], float(way[run].sum()))
+        laid = np.zeros(region.inside.shape, dtype=bool)
+        laid[at] = True
+        below = _deep(~laid, region.pixel) <= 0.5 * width
+    return longest[0], longest[1], free / max(total, 1e-12)
+
+
+def _runs(held: np.ndarray, part: np.ndarray) -> Iterator[slice]:
+    """Find runs of places that nothing holds, none over a gap between lines."""
+    edges = np.flatnonzero((np.diff(held.astype(int)) != 0) | (np.diff(part) != 0)) + 1
+    for first, last in zip([0, *edges], [*edges, len(held)], strict=True):
+        if not held[first]:
+            yield slice(first, last)
+
+
+def beyond(job: Job, regions: list[Regions]) -> float:
+    """How far the edge of a line of matrix reaches beyond the border of the part, mm."""
+    lines, most = Lines.of(job.done), -np.inf
+    height = lines.end[:, 2].round(3)
+    lower = 0.0
+    for region in regions:
+        mine = lines.lays & lines.in_part & (lines.tool == 0) & (height == region.top)
+        border = job.section(region.top - 0.5 * (region.top - lower))
+        lower = region.top
+        ends = shapely.points(lines.end[mine][:, :2])
+        off = shapely.distance(ends, border.boundary)
+        inside = shapely.contains(border, ends)
+        edge = 0.5 * np.minimum(lines.width[mine], job.machine.matrix_width)
+        most = max(most, float((np.where(inside, -off, off) + edge).max()))
+    return most
+
+
+def main() -> int:
+    """Print the table; the number of findings."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("parts", nargs="?", default=",".join(PARTS))
+    parser.add_argument("machines", nargs="?", default="marlin_two_tools")
+    parser.add_argument("--infill", default="gyroid")
+    parser.add_argument("--pictures", type=Path)
+    given = parser.parse_args()
+    plastic = Plastic(given.infill, 0.2, 2, 3)
+    print("part     machine            solid  sparse  bridge  skin   free  beyond  minutes  grams")
+    said: list[str] = []
+    for name in given.parts.split(","):
+        part = part_of(name, plastic)
+        for machine in given.machines.split(","):
+            job, _ = job_of(part, machine)
+            regions = regions_of(job, plastic)
+            solid, sparse = volumes(job, regions, plastic.density)
+            infill, skin, free = bridges(job, regions)
+            head, over = job.done.head, beyond(job, regions)
+            grams = float(head["filament used [g]"].split(",")[0])
+            print(
+                f"{name:8} {machine:17} {solid:6.1%} {sparse:7.1%} {infill:7.1f} {skin:5.1f} "
+                f"{free:6.1%} {over:7.3f} {float(head['TIME']) / 60:8.0f} {grams:6.1f}",
+                flush=True,
+            )
+            checks = [check for check in CHECKS if check.__name__ not in ("volume", "air")]
+            found = {check.__name__: check(job, job.done) for check in checks}
+            said += [f"{name}, {machine}, {k}: {v[0]} ({len(v)})" for k, v in found.items() if v]
+            if given.pictures is not None:
+                _draw(job, regions, given.pictures / f"{name}_{machine}_{given.infill}.png")
+    print("\n".join(said))
+    return len(said)
+
+
+def _draw(job: Job, regions: list[Regions], file: Path) -> None:
+    """Draw layers of matrix from the bottom to the top, the sparse region in grey."""
+    from matplotlib.collections import LineCollection
+    from matplotlib.figure import Figure
+
+    file.parent.mkdir(parents=True, exist_ok=True)
+    lines, figure = Lines.of(job.done), Figure(figsize=(24, 12), layout="constrained")
+    height = lines.end[:, 2].round(3)
+    sparse = [k for k, region in enumerate(regions) if region.sparse.any()] or [0]
+    chosen = [0, *sparse[:: max(len(sparse) // 6, 1)][:6], len(regions) - 1]
+    for axis, k in zip(figure.subplots(2, 4).flat, chosen, strict=False):
+        region = regions[k]
+        size = region.low + region.pixel * np.array(region.sparse.shape)
+        extent = (region.low[0], size[0], region.low[1], size[1])
+        shade = 0.15 * region.inside + 0.25 * region.sparse
+        axis.imshow(shade.T, origin="lower", extent=extent, cmap="Greys", vmin=0.0, vmax=1.0)
+        mine = lines.lays & lines.in_part & (height == region.top) & (lines.tool == 0)
+        strokes = np.stack([lines.start[mine], lines.end[mine]], axis=1)[:, :, :2]
+        colours = np.where(lines.kind[mine] == PART[0], "#3b6ea5", "#c05020")
+        axis.add_collection(LineCollection(strokes, colors=colours.tolist(), linewidths=1.5))
+        axis.set_title(f"{region.top:g} mm")
+        axis.set_aspect("equal")
+    figure.savefig(file, dpi=60)
+
+
+if __name__ == "__main__":
+    raise SystemExit(min(main(), 1))
