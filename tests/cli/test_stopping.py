@@ -30,6 +30,7 @@ os.kill(os.getpid(), signal.SIGTERM)
 """
 RUNNING = """
 import os, signal, time
+signal.signal(signal.SIGINT, signal.default_int_handler)
 from pathlib import Path
 import typer
 from ccfem.cli.start import start
@@ -44,7 +45,6 @@ class Command:
     def __call__(self, standalone_mode):
         {moment}
 
-signal.signal(signal.SIGINT, signal.default_int_handler)
 typer.main.get_command = lambda app: Command()
 start()
 """
