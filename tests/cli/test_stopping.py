@@ -16,7 +16,7 @@ import os, signal, sys
 class Finder:
     def find_spec(self, name, path=None, target=None):
         if name == "typer": os.kill(os.getpid(), signal.{name})
-signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.{name}, signal.SIG_DFL)
 sys.meta_path.insert(0, Finder())
 from ccfem.cli.start import start
 start()
