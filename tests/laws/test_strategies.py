@@ -18,7 +18,7 @@ from ccfem.fem.materials import isotropic
 from ccfem.judging.evaluation import evaluate
 from ccfem.machine import Machine
 from ccfem.paths.planning import plan
-from ccfem.paths.planning.strategy import LengthStrategy, PartStrategy
+from ccfem.paths.planning.strategy import PartStrategy
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create, named
 
@@ -111,10 +111,11 @@ def planned_again(strategy, direction=0.0, variant=False, **change):
 
     What plans the part as a whole needs all of them; of the others the upper layer shows as much,
     and it is the one in which a direction turns from layer to layer. Of variants that is a part of
-    one layer, unless they share a length of fibre out among layers.
+    one layer, unless they design several groups of layers.
     """
     stress, layers = planned_on(**change)
-    if not isinstance(strategy, LengthStrategy if variant else PartStrategy):
+    whole = getattr(strategy, "groups", 1) > 1 if variant else isinstance(strategy, PartStrategy)
+    if not whole:
         layers = layers[1:]
     return layers, plan(turned_with(strategy, direction), layers, stress, MACHINE)
 
