@@ -96,23 +96,46 @@ def compiled(folder):
     return Path(os.environ["NUMBA_CACHE_DIR"]) / f"{folder.name}_{digest}"
 
 
-@pytest.fixture
-def copy(tmp_path):
-    """A copy of the project, and what runs a module in it."""
+RUNNING = """
+import contextlib, io, json, runpy, sys
+from ccfem.cli.main import main
+
+said = {}
+for command in json.load(sys.stdin):
+    sys.argv, text = command.split(), io.StringIO()
+    with contextlib.redirect_stdout(text):
+        if sys.argv[0] == "ccfem":
+            try:
+                main()
+            except SystemExit as end:
+                assert not end.code, command
+        else:
+            runpy.run_path(sys.argv[0])
+    said[command] = text.getvalue()
+json.dump(said, sys.stdout)
+"""
+"""Runs commands and programs one after the other, and says what each of them printed."""
+
+
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory):
+    """A copy of the project, and what runs Python in it."""
+    root = tmp_path_factory.mktemp("copy")
     for folder in ("ccfem", "data", "tests/laws", "tests/strategies"):
         ignored = shutil.ignore_patterns("__pycache__")
-        shutil.copytree(ROOT / folder, tmp_path / folder, ignore=ignored)
+        shutil.copytree(ROOT / folder, root / folder, ignore=ignored)
     # What is compiled is shared with the project, whoever compiles it first.
     for folder in {path.parent for path in (ROOT / "ccfem").rglob("*.py")}:
         compiled(folder).mkdir(parents=True, exist_ok=True)
-        (tmp_path / folder.relative_to(ROOT) / "__pycache__").symlink_to(compiled(folder))
-    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+        (root / folder.relative_to(ROOT) / "__pycache__").symlink_to(compiled(folder))
+    shutil.copy(ROOT / "pyproject.toml", root)
     others = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
 
-    def run(command):
+    def run(*words, given=None):
         done = subprocess.run(
-            [sys.executable, "-m", *command.split()],
-            cwd=tmp_path,
+            [sys.executable, *words],
+            cwd=root,
+            input=given,
             capture_output=True,
             text=True,
             check=False,
@@ -121,17 +144,86 @@ def copy(tmp_path):
         assert done.returncode == 0, done.stdout + done.stderr
         return done.stdout
 
-    return tmp_path, run
+    return root, run
+
+
+def section(title):
+    """Text of a section of CONTRIBUTING.md."""
+    return CONTRIBUTING.partition(f"## {title}\n")[2].partition("\n## ")[0]
+
+
+def commands(title):
+    """Commands of a section: `ccfem ...`, each in a line."""
+    return re.findall(r"^ +(ccfem .*)$", section(title), flags=re.M)
+
+
+BOTH_WAYS = """
+from ccfem.body.files import read_mesh, write_mesh
+from ccfem.body.files.formats import suffixes
+from ccfem.body.mesh import box_mesh
+mesh = box_mesh((2.0, 3.0, 4.0), (1, 1, 1))
+write_mesh(mesh, 'box.nodes')
+again = read_mesh('box.nodes')
+print(again.volumes.sum(), len(again.cells), '.nodes' in suffixes())
+"""
+PULLED = """
+from ccfem.body.mesh import box_mesh
+from ccfem.fem.elasticity import Force, Problem, Support, solve
+from ccfem.fem.materials import isotropic
+from ccfem.judging.virtual_testing import Strand, virtual_test
+from ccfem.judging.virtual_testing.strength import first_failure
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.slicers import Planar
+mesh = box_mesh((20.0, 4.0, 4.0), (15, 3, 3))
+mesh = mesh.with_patches({'corner': mesh.patch('x_min')[:1]})
+supports = (Support('x_min', 'x'), Support('corner', 'yz'))
+loads = {'pull': (Force('x_max', (80.0, 0.0, 0.0)),)}
+material = isotropic(2000.0, 0.0, tensile_strength=30.0)
+stress = solve(Problem(mesh, material, supports, loads))['pull']
+(layer,) = Planar(count=1).cut(mesh)
+line = Toolpaths.from_plane([[[1.0, 2.0], [19.0, 2.0]]], layer)
+test = virtual_test(line, stress, Strand(rho=5e-10), span=())
+print(*(first_failure(test).loads[law] for law in ('brittle_matrix', 'matrix')))
+"""
+QUICK = {
+    "ccfem compare": " --set-case element_size=4",
+    "--slicing graded": " --natural --no-virtual-test --out graded",
+}
+"""What is added to commands of CONTRIBUTING.md that hold these words, to make them quick."""
+
+
+@pytest.fixture(scope="module")
+def extended(copy):
+    """The copy with a file of every kind that CONTRIBUTING.md adds, and what is said in it.
+
+    All commands are run in one program, which takes seconds to start.
+    """
+    root, run = copy
+    (root / "ccfem/slicing/slicers/graded.py").write_text(blocks(CONTRIBUTING, "python")[2])
+    wanted = ["ccfem machines"]
+    for title in ("Add an index", "Add a mesh format", "Add a law of failure", "Add a machine"):
+        text = section(title)
+        (name,) = re.findall(r"`(ccfem/\S+\.(?:py|toml))`:\n", text)
+        (block,) = blocks(text, "toml" if name.endswith("toml") else "python")
+        (root / name).write_text(block)
+    for title in ("Add a slicer", "Add an index", "Add a law of failure", "Add a machine"):
+        for command in commands(title):
+            more = [more for words, more in QUICK.items() if words in command]
+            wanted.append(command + "".join(more))
+    for name, program in (("both_ways.py", BOTH_WAYS), ("pulled.py", PULLED)):
+        (root / name).write_text(program)
+        wanted.append(name)
+    return root, json.loads(run("-c", RUNNING, given=json.dumps(wanted)))
 
 
 def test_adding_a_strategy_works_as_told(copy):
     """Do what CONTRIBUTING.md says, to the letter, in a copy of the project."""
-    folder, run = copy
+    root, run = copy
     module, test, *_ = blocks(CONTRIBUTING, "python")
-    (folder / "ccfem/strategies/mean_tension.py").write_text(module)
-    (folder / "tests/strategies/test_mean_tension.py").write_text(test)
+    (root / "ccfem/strategies/mean_tension.py").write_text(module)
+    (root / "tests/strategies/test_mean_tension.py").write_text(test)
     (command,) = re.findall(r"^ +(pytest -n 0 .*mean_tension)$", CONTRIBUTING, flags=re.M)
-    assert re.search(r"\d+ passed", run(command))
+    assert re.search(r"\d+ passed", run("-m", *command.split()))
 
 
 def test_a_slicer_of_a_notebook_works_as_printed(capsys):
@@ -150,97 +242,43 @@ def test_a_slicer_of_a_notebook_works_as_printed(capsys):
         ccfem.compare("bar", ["zigzag"], layers=module.Graded)
 
 
-def test_adding_a_slicer_works_as_told(copy):
-    folder, run = copy
-    (folder / "ccfem/slicing/slicers/graded.py").write_text(blocks(CONTRIBUTING, "python")[2])
-    listed, compared = re.findall(r"^ +(ccfem .*graded.*)$", CONTRIBUTING, flags=re.M)
-    assert "Number of layers, at least 1." in run(listed)
-    run(f"{compared} --natural --no-virtual-test --out results")
-    heights = json.loads((folder / "results/results.json").read_text())["case"]["heights"]
+def test_adding_a_slicer_works_as_told(extended):
+    root, said = extended
+    assert "Number of layers, at least 1." in said["ccfem slicers graded"]
+    heights = json.loads((root / "graded/results.json").read_text())["case"]["heights"]
     # A bar 5 mm high: the middles of three steps of the unit interval, squared.
     assert heights == pytest.approx([5.0 * (k / 6.0) ** 2 for k in (1, 3, 5)])
 
 
-def python_of(section):
-    """The python block of a section of CONTRIBUTING.md, and the file that it is saved as."""
-    text = CONTRIBUTING.partition(f"## {section}\n")[2].partition("\n## ")[0]
-    (name,) = re.findall(r"`(ccfem/\S+\.py)`:\n", text)
-    (block,) = blocks(text, "python")
-    return text, name, block
+def table_of(folder):
+    return pd.read_csv(folder / "results.csv").set_index("layer")
 
 
-def test_adding_an_index_works_as_told(copy):
+def test_adding_an_index_works_as_told(extended):
     """One file: its column is in the table; a bar 5 mm high has middles at 1.25 and 3.75 mm."""
-    folder, run = copy
-    text, name, block = python_of("Add an index")
-    (folder / name).write_text(block)
-    (command,) = re.findall(r"^ +(ccfem compare .*)$", text, flags=re.M)
-    run(command)
-    table = pd.read_csv(folder / "levels/results.csv").set_index("layer")["mean_level"]
+    table = table_of(extended[0] / "levels")["mean_level"]
     assert table[["0", "1", "total"]].tolist() == pytest.approx([1.25, 3.75, 2.5], abs=0.02)
 
 
-def test_adding_a_mesh_format_works_as_told(copy):
+def test_adding_a_mesh_format_works_as_told(extended):
     """One file: a mesh written and read again is the same, and messages name the suffix."""
-    folder, run = copy
-    _, name, block = python_of("Add a mesh format")
-    (folder / name).write_text(block)
-    program = folder / "both_ways.py"
-    program.write_text(
-        "from ccfem.body.files import read_mesh, write_mesh\n"
-        "from ccfem.body.files.formats import suffixes\n"
-        "from ccfem.body.mesh import box_mesh\n"
-        "mesh = box_mesh((2.0, 3.0, 4.0), (1, 1, 1))\n"
-        "write_mesh(mesh, 'box.nodes')\n"
-        "again = read_mesh('box.nodes')\n"
-        "print(again.volumes.sum(), len(again.cells), '.nodes' in suffixes())\n"
-    )
-    volume, cells, known = run("both_ways").split()
+    volume, cells, known = extended[1]["both_ways.py"].split()
     assert (float(volume), int(cells), known) == (pytest.approx(24.0), 6, "True")
 
 
-def test_adding_a_law_of_failure_works_as_told(copy):
+def test_adding_a_law_of_failure_works_as_told(extended):
     """One file: a bar without Poisson's effect, 4 x 4 mm, breaks at 30 MPa times its section."""
-    folder, run = copy
-    text, name, block = python_of("Add a law of failure")
-    (folder / name).write_text(block)
-    program = folder / "pulled.py"
-    program.write_text(
-        "from ccfem.body.mesh import box_mesh\n"
-        "from ccfem.fem.elasticity import Force, Problem, Support, solve\n"
-        "from ccfem.fem.materials import isotropic\n"
-        "from ccfem.judging.virtual_testing import Strand, virtual_test\n"
-        "from ccfem.judging.virtual_testing.strength import first_failure\n"
-        "from ccfem.paths.toolpaths import Toolpaths\n"
-        "from ccfem.slicing.slicers import Planar\n"
-        "mesh = box_mesh((20.0, 4.0, 4.0), (15, 3, 3))\n"
-        "mesh = mesh.with_patches({'corner': mesh.patch('x_min')[:1]})\n"
-        "supports = (Support('x_min', 'x'), Support('corner', 'yz'))\n"
-        "loads = {'pull': (Force('x_max', (80.0, 0.0, 0.0)),)}\n"
-        "material = isotropic(2000.0, 0.0, tensile_strength=30.0)\n"
-        "stress = solve(Problem(mesh, material, supports, loads))['pull']\n"
-        "(layer,) = Planar(count=1).cut(mesh)\n"
-        "line = Toolpaths.from_plane([[[1.0, 2.0], [19.0, 2.0]]], layer)\n"
-        "test = virtual_test(line, stress, Strand(rho=5e-10), span=())\n"
-        "print(*(first_failure(test).loads[law] for law in ('brittle_matrix', 'matrix')))\n"
-    )
-    assert [float(load) for load in run("pulled").split()] == pytest.approx([480.0] * 2, rel=1e-5)
-    (command,) = re.findall(r"^ +(ccfem compare .*)$", text, flags=re.M)
-    run(f"{command} --set-case element_size=4")
-    table = pd.read_csv(folder / "brittle/results.csv").set_index("layer").loc["total"]
+    root, said = extended
+    loads = [float(load) for load in said["pulled.py"].split()]
+    assert loads == pytest.approx([480.0] * 2, rel=1e-5)
+    table = table_of(root / "brittle").loc["total"]
     assert 0.0 < table["first_failure_load"] <= table["brittle_matrix_load"]
 
 
-def test_adding_a_machine_works_as_told(copy):
+def test_adding_a_machine_works_as_told(extended):
     """One file: it is listed, printed and used, and builds on the machine that it names."""
-    folder, run = copy
-    text = CONTRIBUTING.partition("## Add a machine\n")[2].partition("\n## ")[0]
-    (name,) = re.findall(r"`(ccfem/\S+\.toml)`:\n", text)
-    (block,) = blocks(text, "toml")
-    (folder / name).write_text(block)
-    listed, compared = re.findall(r"^ +(ccfem .*narrow.*)$", text, flags=re.M)
-    assert "fibre_width = 0.8\n" in run(listed)
-    assert "A head for narrow strands" in run("ccfem machines")
-    run(f"{compared} --set-case element_size=4")
-    machine = json.loads((folder / "narrow/results.json").read_text())["machine"]
+    root, said = extended
+    assert "fibre_width = 0.8\n" in said["ccfem machines narrow"]
+    assert "A head for narrow strands" in said["ccfem machines"]
+    machine = json.loads((root / "narrow/results.json").read_text())["machine"]
     assert (machine["fibre_width"], machine["minimum_length"]) == (0.8, 30.0)

@@ -28,12 +28,21 @@ def modules() -> dict[str, Path]:
 
 
 @cache
+def nodes() -> dict[str, list[ast.AST]]:
+    """All nodes of the text of every module: parsed once, for all that look at them."""
+    return {
+        name: list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+        for name, path in modules().items()
+    }
+
+
+@cache
 def imports() -> dict[str, set[str]]:
     """Modules of ccfem that each imports, anywhere in its text: in functions and for types too."""
     known = modules()
     found: dict[str, set[str]] = {name: set() for name in known}
-    for name, path in known.items():
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for name in known:
+        for node in nodes()[name]:
             if isinstance(node, ast.Import):
                 found[name] |= {alias.name for alias in node.names if alias.name in known}
             elif isinstance(node, ast.ImportFrom) and node.module in known:
@@ -129,7 +138,7 @@ def test_only_pickles_of_processes_of_its_own_are_read():
     known = []
     for name, path in modules().items():
         text = path.read_text(encoding="utf-8")
-        for node in ast.walk(ast.parse(text)):
+        for node in nodes()[name]:
             if isinstance(node, ast.Import | ast.ImportFrom):
                 wanted = [alias.name for alias in node.names] + [getattr(node, "module", "") or ""]
                 if loading.intersection(word.partition(".")[0] for word in wanted):
@@ -172,8 +181,8 @@ def test_slow_to_compile_is_found():
 
 def compiled():
     """Compiled functions, by their dotted names."""
-    for name, path in modules().items():
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for name, those in nodes().items():
+        for node in those:
             if isinstance(node, ast.FunctionDef) and any(
                 "njit" in ast.unparse(decorator) for decorator in node.decorator_list
             ):
@@ -199,9 +208,9 @@ def test_compiled_functions_have_few_parameters_of_known_types():
     assert not untyped
 
 
-def unstable_sorts(tree):
-    """Where equal values are put in an order that the processor decides."""
-    for node in ast.walk(tree):
+def unstable_sorts(those):
+    """Where nodes put equal values in an order that the processor decides."""
+    for node in those:
         called = node.func if isinstance(node, ast.Call) else None
         if isinstance(called, ast.Attribute) and called.attr in ("argsort", "argpartition"):
             kind = [ast.unparse(word.value) for word in node.keywords if word.arg == "kind"]
@@ -211,7 +220,8 @@ def unstable_sorts(tree):
 
 def test_unstable_sort_is_found():
     text = "a = np.argsort(b)\nc = np.argsort(b, kind='stable')\nd = np.argpartition(b, 3)"
-    assert list(unstable_sorts(ast.parse(text))) == ["np.argsort(b)", "np.argpartition(b, 3)"]
+    unstable = list(unstable_sorts(ast.walk(ast.parse(text))))
+    assert unstable == ["np.argsort(b)", "np.argpartition(b, 3)"]
 
 
 def test_equal_values_keep_their_order_on_every_processor():
@@ -220,13 +230,12 @@ def test_equal_values_keep_their_order_on_every_processor():
     SciPy's reverse Cuthill-McKee sorts so inside; `ccfem.body.mesh.numbering` stands in for it.
     """
     found = []
-    for name, path in modules().items():
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        found += [f"{name}: {what}" for what in unstable_sorts(tree)]
+    for name, those in nodes().items():
+        found += [f"{name}: {what}" for what in unstable_sorts(those)]
         if name != "ccfem.body.mesh.numbering":
             found += [
                 f"{name} imports SciPy's reverse_cuthill_mckee"
-                for node in ast.walk(tree)
+                for node in those
                 if isinstance(node, ast.ImportFrom)
                 and str(node.module).startswith("scipy")
                 and "reverse_cuthill_mckee" in [alias.name for alias in node.names]
@@ -248,8 +257,8 @@ CLOCKS = {
 
 def test_no_result_depends_on_the_clock():
     readers = set()
-    for name, path in modules().items():
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for name, those in nodes().items():
+        for node in those:
             named = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             if "time" in named or (isinstance(node, ast.ImportFrom) and node.module == "time"):
                 readers.add(name)

@@ -16,7 +16,7 @@ import os, signal, sys
 class Finder:
     def find_spec(self, name, path=None, target=None):
         if name == "typer": os.kill(os.getpid(), signal.{name})
-signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.{name}, signal.SIG_DFL)
 sys.meta_path.insert(0, Finder())
 from ccfem.cli.start import start
 start()
@@ -30,6 +30,7 @@ os.kill(os.getpid(), signal.SIGTERM)
 """
 RUNNING = """
 import os, signal, time
+signal.signal(signal.SIGINT, signal.default_int_handler)
 from pathlib import Path
 import typer
 from ccfem.cli.start import start
@@ -44,7 +45,6 @@ class Command:
     def __call__(self, standalone_mode):
         {moment}
 
-signal.signal(signal.SIGINT, signal.default_int_handler)
 typer.main.get_command = lambda app: Command()
 start()
 """

@@ -93,22 +93,31 @@ def planned_on(load=1.0, degrees=0.0):
 
 
 @cache
-def paths_of(label):
+def planned(label):
+    """Layers of the plate, and paths of a strategy or of a variant there."""
+    if label in VARIANTS:
+        return planned_again(strategy_of(label), variant=True)
     stress, layers = planned_on()
-    return plan(strategy_of(label), layers, stress, MACHINE)
+    return layers, plan(strategy_of(label), layers, stress, MACHINE)
 
 
-def planned_again(strategy, direction=0.0, **change):
+def paths_of(label):
+    return planned(label)[1]
+
+
+@cache
+def planned_again(strategy, direction=0.0, variant=False, **change):
     """Layers on which a strategy is planned once more, and its paths there.
 
     What plans the part as a whole needs all of them; of the others the upper layer shows as much,
-    and it is the one in which a direction turns from layer to layer.
+    and it is the one in which a direction turns from layer to layer. Of variants that is a part of
+    one layer, unless they design several groups of layers.
     """
     stress, layers = planned_on(**change)
-    if not isinstance(strategy, PartStrategy):
+    whole = getattr(strategy, "groups", 1) > 1 if variant else isinstance(strategy, PartStrategy)
+    if not whole:
         layers = layers[1:]
-    paths = plan(turned_with(strategy, direction), layers, stress, MACHINE)
-    return [layer.index for layer in layers], paths
+    return layers, plan(turned_with(strategy, direction), layers, stress, MACHINE)
 
 
 def turned_with(strategy, turn):
@@ -121,7 +130,7 @@ def turned_with(strategy, turn):
 
 def on_layers(paths, layers):
     """Paths of some layers."""
-    return paths.select(np.isin(paths.layer, layers))
+    return paths.select(np.isin(paths.layer, [layer.index for layer in layers]))
 
 
 def assert_turned(layers, turned, paths, turn):
@@ -129,7 +138,7 @@ def assert_turned(layers, turned, paths, turn):
     paths = on_layers(paths, layers)
     assert len(turned) == len(paths)
     assert turned.lengths.sum() == pytest.approx(paths.lengths.sum(), rel=1e-3)
-    for k in layers:
+    for k in (layer.index for layer in layers):
         assert coincide(pieces(turned.on_layer(k)), pieces(paths.on_layer(k), turn), 0.02)
 
 
@@ -174,10 +183,10 @@ def test_strategy_is_a_value_with_defaults(name):
 
 @pytest.mark.parametrize("label", ALL)
 def test_lays_fibre_on_every_layer(label):
-    paths = paths_of(label)
+    layers, paths = planned(label)
     assert np.isfinite(paths.points).all()
-    assert set(paths.layer) == {0, 1}
-    heights = [layer.plane.height for layer in planned_on()[1]]
+    heights = {layer.index: layer.plane.height for layer in layers}
+    assert set(paths.layer) == set(heights)
     for path, layer in zip(paths, paths.layer, strict=True):
         np.testing.assert_allclose(path[:, 2], heights[layer], atol=1e-9)
     np.testing.assert_array_equal(np.unique(paths.normals, axis=0), [[0.0, 0.0, 1.0]])
@@ -186,7 +195,7 @@ def test_lays_fibre_on_every_layer(label):
 @pytest.mark.parametrize("name", NAMES)
 def test_same_input_gives_the_same_paths(name):
     """Variants are planned twice too, the second time turned, by a law of their own."""
-    layers, again = planned_again(made(name))
+    layers, again = planned_again.__wrapped__(made(name))
     paths = on_layers(paths_of(name), layers)
     np.testing.assert_array_equal(again.points, paths.points)
     np.testing.assert_array_equal(again.offsets, paths.offsets)
@@ -204,23 +213,23 @@ def test_variants_turn_with_the_part_whatever_the_load(label):
     """Paths that keep to the axes of the layer, `on_axes`, are only about as long when turned."""
     strategy, paths = strategy_of(label), paths_of(label)
     if not getattr(strategy, "on_axes", False):
-        layers, turned = planned_again(strategy, 33.0, load=1e-3, degrees=33.0)
+        layers, turned = planned_again(strategy, 33.0, variant=True, load=1e-3, degrees=33.0)
         assert_turned(layers, turned, paths, 33.0)
         return
-    layers, scaled = planned_again(strategy, load=1e-3)
-    paths = on_layers(paths, layers)
+    _, scaled = planned_again(strategy, variant=True, load=1e-3)
     np.testing.assert_array_equal(scaled.offsets, paths.offsets)
     np.testing.assert_allclose(scaled.points, paths.points, atol=1e-3)
-    _, turned = planned_again(strategy, 90.0, degrees=90.0)
+    _, turned = planned_again(strategy, 90.0, variant=True, degrees=90.0)
     assert turned.lengths.sum() == pytest.approx(paths.lengths.sum(), rel=0.1)
 
 
 @pytest.mark.parametrize("label", ALL)
 def test_paths_stay_inside_the_layer(label):
-    for layer in planned_on()[1]:
+    layers, paths = planned(label)
+    for layer in layers:
         allowed = shapely.buffer(layer.plane.polygon, 0.02)
         shapely.prepare(allowed)
-        assert shapely.covers(allowed, strands(paths_of(label).on_layer(layer.index))).all()
+        assert shapely.covers(allowed, strands(paths.on_layer(layer.index))).all()
 
 
 @pytest.mark.parametrize("label", ALL)
@@ -233,25 +242,25 @@ def test_paths_cross_neither_each_other_nor_themselves(label):
     """A strategy whose strands cross by intention, in the joints of a frame, has `crosses`."""
     if getattr(strategy_of(label), "crosses", False):
         return
-    for k in (0, 1):
-        segments = strands(paths_of(label).on_layer(k))
+    layers, paths = planned(label)
+    for layer in layers:
+        segments = strands(paths.on_layer(layer.index))
         crossing = shapely.STRtree(segments).query(segments, predicate="crosses")
         assert crossing.shape[1] == 0
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if hasattr(named()[name], "turns")])
 def test_nothing_turns_too_tightly_where_turns_are_cut(name):
-    layers, paths = planned_again(made(name, turns="cut"))
-    stress, sections = planned_on()
-    total = evaluate(paths, [sections[k] for k in layers], stress, MACHINE).total
+    layers, paths = planned_again(made(name, turns="cut"), variant=True)  # often a variant
+    total = evaluate(paths, layers, planned_on()[0], MACHINE).total
     assert total["curvature_ok"] >= 1.0 - ALLOWED.get(name, 0.0)
 
 
 @pytest.mark.parametrize("label", ALL)
 def test_evaluator_accepts_the_paths(label):
-    stress, (layer, _) = planned_on()
-    paths = paths_of(label).on_layer(0)
-    total = evaluate(paths, [layer], stress, MACHINE).total
+    (layer, *_), paths = planned(label)
+    paths = paths.on_layer(layer.index)
+    total = evaluate(paths, [layer], planned_on()[0], MACHINE).total
     assert total["fibre_length"] == pytest.approx(paths.lengths.sum())
     assert total["paths"] == len(paths)
 

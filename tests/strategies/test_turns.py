@@ -66,6 +66,14 @@ def part(shape, move):
     return solve(problem)["pull"], Planar(count=1).cut(mesh)
 
 
+@cache
+def planned(name, shape, move, turns="cut"):
+    """Paths of a strategy, quick where it is slow, on the layer of a part."""
+    strategy = create(name, {"turns": turns, **TESTED.get(name, {})})
+    stress, layers = part(shape, move)
+    return plan(strategy, layers, stress, MACHINE)
+
+
 @pytest.mark.parametrize("name", [name for name in WITH_TURNS if name not in TESTED])
 def test_by_default_strands_go_round_all_turns(name):
     kind = named()[name]
@@ -79,8 +87,7 @@ def test_by_default_strands_go_round_all_turns(name):
 @pytest.mark.parametrize(("shape", "move"), [(star, "turned"), (gear, "plain"), (ring, "mirrored")])
 @pytest.mark.parametrize("name", [name for name in WITH_TURNS if name not in NEEDS_JOINTS])
 def test_where_turns_are_cut_nothing_bends_too_tightly(name, shape, move):
-    stress, layers = part(shape, move)
-    paths = plan(create(name, {"turns": "cut", **TESTED.get(name, {})}), layers, stress, MACHINE)
+    (stress, layers), paths = part(shape, move), planned(name, shape, move)
     if len(paths):
         assert paths.lengths.min() >= MACHINE.minimum_length - 1e-6
         assert evaluate(paths, layers, stress, MACHINE).total["curvature_ok"] >= 0.99
@@ -89,10 +96,7 @@ def test_where_turns_are_cut_nothing_bends_too_tightly(name, shape, move):
 @pytest.mark.parametrize("name", sorted(TESTED))
 def test_bends_worth_most_stay_and_hardly_any_stiffness_goes(name):
     stress, layers = part(gear, "plain")
-    tight, cut = (
-        plan(create(name, {"turns": turns, **TESTED[name]}), layers, stress, MACHINE)
-        for turns in ("tight", "cut")
-    )
+    tight, cut = (planned(name, gear, "plain", turns) for turns in ("tight", "cut"))
     shares = [
         1.0 - evaluate(paths, layers, stress, MACHINE).total["curvature_ok"]
         for paths in (tight, cut)
@@ -106,11 +110,7 @@ def test_bends_worth_most_stay_and_hardly_any_stiffness_goes(name):
 @pytest.mark.parametrize("name", ["concentric", "offset", "mat"])
 def test_mirrored_parts_keep_as_much(name):
     """Where two strands meet in a turn the first is cut back: senses do not mirror."""
-    strategy = create(name, {"turns": "cut"})
-    found = [
-        plan(strategy, layers, stress, MACHINE).lengths.sum()
-        for stress, layers in (part(ring, "plain"), part(ring, "mirrored"))
-    ]
+    found = [planned(name, ring, move).lengths.sum() for move in ("plain", "mirrored")]
     assert found[1] == pytest.approx(found[0], rel=0.01)
 
 
