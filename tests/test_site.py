@@ -35,7 +35,7 @@ def test_every_command_of_a_page_exists(page):
     """Each line `ccfem ...` of a page is read as the command line reads it, and not run."""
     group = typer.main.get_command(app)
     for line in re.findall(r"^(?: {4}|.*&& )ccfem (.*)$", page.read_text(), flags=re.M):
-        words = shlex.split(re.split(r"\s{3,}", line)[0])  # what follows explains it
+        words = shlex.split(re.split(r"\s{3,}| > ", line)[0])  # what follows explains or writes it
         name, *rest = ["..." if word in ("COMMAND", "CASE") else word for word in words]
         if name != "...":
             group.commands[name].make_context(name, rest, resilient_parsing=False)

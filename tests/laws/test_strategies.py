@@ -114,7 +114,8 @@ def planned_again(strategy, direction=0.0, variant=False, **change):
     one layer, unless they design several groups of layers.
     """
     stress, layers = planned_on(**change)
-    whole = getattr(strategy, "groups", 1) > 1 if variant else isinstance(strategy, PartStrategy)
+    groups = {field.name: getattr(strategy, field.name) for field in fields(strategy)}.get("groups")
+    whole = (groups or 1) > 1 if variant else isinstance(strategy, PartStrategy)
     if not whole:
         layers = layers[1:]
     return layers, plan(turned_with(strategy, direction), layers, stress, MACHINE)
