@@ -7,7 +7,6 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 
-from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cli.commands import reproduce
 from ccfem.fem.elasticity.problem import Force, Problem, Support
@@ -23,7 +22,6 @@ from ccfem.papers.evidence.prints import (
     GAIN_OF_CUBOID,
     PARTS,
     ZHANG,
-    read_strips,
     shell_field,
     shell_paths,
 )
@@ -282,18 +280,6 @@ def test_strands_along_a_block_lend_what_they_carry_in_compression():
     assert first["along the load"] == 1.0
     share = (ratios[-1.0, FAR_END] - 1.0) / gain
     assert share * GAIN_OF_CUBOID == pytest.approx(far["along the load"] - 1.0, rel=0.02)
-
-
-def test_strips_are_read_from_two_point_lines(tmp_path):
-    (tmp_path / "2.obj").write_text("v 0 0 0\nv 3 4 0\n#7\nl 1 2\n")
-    (tmp_path / "1.obj").write_text("v 0 0 1\nv 0 0 2\nv 0 0 4\nl 1 2\nl 3 2\n")
-    strands = read_strips(tmp_path)
-    assert strands.lengths.tolist() == [1.0, 2.0, 5.0]
-    (tmp_path / "3.obj").write_text("v 0 0 1\nl 1 9\n")
-    with pytest.raises(InputError, match=r"lines 'l i j' in .*3\.obj"):
-        read_strips(tmp_path)
-    with pytest.raises(InputError, match="there are none: set CCFEM_ZHANG2025"):
-        read_strips(tmp_path / "empty")
 
 
 @pytest.mark.skipif(CHEN not in os.environ, reason="the authors' data is not here")

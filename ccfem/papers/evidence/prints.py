@@ -22,7 +22,6 @@ from typing import Any
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
-from ccfem.base.errors import InputError
 from ccfem.base.progress import Progress
 from ccfem.body.files import read_mesh
 from ccfem.body.mesh.patches import Cylinder, PatchRule, Plane, patches_from_rules
@@ -41,7 +40,8 @@ from ccfem.papers.chen_2021.virtual_test import authors_paths, spread_paths
 from ccfem.papers.contents import WhenAsked
 from ccfem.papers.evidence.rows import NONE, PartResult
 from ccfem.paths.planning import plan_to_length
-from ccfem.paths.toolpaths import FIBRE, Toolpaths
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.printing.export.path_table import read_strands
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
 
@@ -265,42 +265,8 @@ def _fang_bracket(progress: Progress) -> PartResult:
 
 def _zhang_bracket(progress: Progress) -> PartResult:
     folder = Path(os.environ[ZHANG]) / "T-bracket" / "StripPath"
-    return _tested(_bracket(), {"curved layers": _curved(), "dense": read_strips(folder)})
-
-
-def read_strips(folder: Path) -> Toolpaths:
-    """Read strands from a folder of OBJ files: points, and two-point lines, a path each.
-
-    The files do not number their layers from the bottom, and have no normals: layer 0 and the build
-    direction stand for them.
-
-    Raises
-    ------
-    InputError
-        Where the folder has no such file, or a line is not what the format says.
-    """
-    files = sorted(folder.glob("*.obj"))
-    if not files:
-        raise InputError(f"expected strands (*.obj) in {folder}; there are none: set {ZHANG}")
-    steps = []
-    for file in files:
-        lines = [line.split() for line in file.read_text(encoding="utf-8").splitlines()]
-        try:
-            points = np.array([line[1:4] for line in lines if line[:1] == ["v"]], dtype=float)
-            ends = np.array([line[1:3] for line in lines if line[:1] == ["l"]], dtype=int) - 1
-            steps.append(points[ends].reshape(-1, 3))
-        except (ValueError, IndexError):
-            raise InputError(f"expected points 'v x y z' and lines 'l i j' in {file}") from None
-    points = np.concatenate(steps)
-    count = len(points) // 2
-    return Toolpaths(
-        points=points,
-        normals=np.broadcast_to(_BUILD, points.shape),
-        offsets=2 * np.arange(count + 1),
-        layer=np.zeros(count, dtype=np.int64),
-        kind=np.full(count, FIBRE),
-        closed=np.zeros(count, dtype=bool),
-    )
+    dense = read_strands(folder, np.eye(3), np.array(_BUILD))
+    return _tested(_bracket(), {"curved layers": _curved(), "dense": dense})
 
 
 @dataclass(frozen=True)
