@@ -48,7 +48,10 @@ def test_pages_give_what_calibration_by_a_print_of_the_same_part_buys():
 def test_the_loop_is_the_one_of_the_paper():
     zigzag, ours, between = PHYSICAL
     assert between == pytest.approx(ours / zigzag, abs=0.005)
-    assert "published prints of Chen et al. 2021, one specimen each" in HONEST_PROMISE
+    right, total = figure(r"of published paths (\d+) of (\d+)")
+    assert f"it orders {right} pairs of {total}" in HONEST_PROMISE
+    right, total = figure(r"orders of two designs: (\d+) of (\d+) right")
+    assert f"it orders {right} of {total}" in HONEST_PROMISE
     for kind in ("stiffness ratios", "ratios of breaking loads"):
         median = float(figure(rf"- median error of {kind}: ([\d.]+) %"))
         ends = figure(rf"- median error of {kind}: .*?values, ([-+]\d+) to ([-+]\d+) %\)")
