@@ -23,6 +23,7 @@ import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 from benchmarks.reached import ROOT, Reach, owner_of, text_of
 
@@ -43,7 +44,7 @@ TWINS = (
 SWAPS: dict[type, type] = {old: new for a, b in TWINS for old, new in ((a, b), (b, a))}
 
 
-def places(node: ast.AST, owner: str = "") -> Iterator[tuple[str, ast.AST, str]]:
+def places(node: ast.AST, owner: str = "") -> Iterator[tuple[str, Any, str]]:
     """Owner, node and field of what can be broken; what is only printed (f-strings) is left out."""
     if isinstance(node, ast.BinOp | ast.BoolOp) and type(node.op) in SWAPS:
         yield owner, node, "op"

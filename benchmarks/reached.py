@@ -95,8 +95,9 @@ def owner_of(parent: ast.AST, child: ast.AST, owner: str) -> str:
     """Dotted name of the outermost function, or class, or constant, that a node belongs to."""
     if isinstance(parent, ast.Module) and isinstance(child, ast.Assign | ast.AnnAssign):
         return ast.unparse(child.targets[0] if isinstance(child, ast.Assign) else child.target)
-    inside = isinstance(parent, ast.Module | ast.ClassDef) and isinstance(child, SCOPES)
-    return f"{owner}.{child.name}".lstrip(".") if inside else owner
+    if isinstance(parent, ast.Module | ast.ClassDef) and isinstance(child, SCOPES):
+        return f"{owner}.{child.name}".lstrip(".")
+    return owner
 
 
 class Reach:
@@ -143,11 +144,12 @@ class Reach:
     def chosen(self, function: str) -> list[str]:
         """Choose tests: those that reach least else first, a test's further parameters last."""
         often = collections.Counter[str]()
-        ranked = []
+        ranked: list[tuple[int, int, str]] = []
         for test in sorted(self.of(function), key=lambda test: (self.width[test], test)):
             often[test.partition("[")[0]] += 1
             ranked.append((often[test.partition("[")[0]], len(ranked), test))
-        chosen, left = [], SECONDS
+        chosen: list[str] = []
+        left = SECONDS
         for _, _, test in sorted(ranked)[:TESTS]:
             if not chosen or self.seconds[test] < left:
                 chosen.append(test)

@@ -150,5 +150,5 @@ def main(count: int = 3000, seed: str = "1", wanted: tuple[str, ...] = ()) -> in
 
 if __name__ == "__main__":
     given = sys.argv[1:]
-    formats = tuple(given[2].split(",")) if len(given) > 2 else ()
-    sys.exit(bool(main(int(given[0]) if given else 3000, *given[1:2], wanted=formats)))
+    count, seed, formats, *_ = *given, *("3000", "1", "")[len(given) :]
+    sys.exit(bool(main(int(count), seed, tuple(filter(None, formats.split(","))))))

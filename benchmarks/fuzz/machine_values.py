@@ -13,6 +13,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -74,6 +75,10 @@ def print_bar(table: dict[str, Any], size: tuple[float, float, float] = (60.0, 8
     return gcode(run.print_plan, machine)
 
 
+def _print(table: dict[str, Any], _: Path) -> None:
+    print_bar(table)
+
+
 def main(count: int = 0) -> int:
     """Try `count` machines, or all; return how many are not met as they should be."""
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
@@ -86,7 +91,7 @@ def main(count: int = 0) -> int:
         os.chdir(folder)
         for name, table in chosen:
             before = time.perf_counter()
-            found = verdict(Path(folder), lambda _, table=table: print_bar(table) and None)
+            found = verdict(Path(folder), partial(_print, table))
             seconds = time.perf_counter() - before
             if seconds > longest:
                 longest, slowest = seconds, name

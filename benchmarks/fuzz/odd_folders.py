@@ -19,6 +19,7 @@ import sys
 import tempfile
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 
 from benchmarks.fuzz.__main__ import verdict
@@ -275,7 +276,7 @@ def main(count: int = 300, seed: str = "1", wanted: tuple[str, ...] = ()) -> int
             box = _box(Path(name) / str(k), shared)
             earlier = Path(name) / command / "out"
             words = odd_folder(box, command, earlier, random.Random(f"{seed} {k}"), ended)
-            found = verdict(box, lambda box, words=words: see(box, words))
+            found = verdict(box, partial(see, words=words))
             tally[f"{command} {found if found in ('read', 'refused') else 'WRONG'}"] += 1
             if found not in ("read", "refused"):
                 wrong += 1
@@ -287,5 +288,5 @@ def main(count: int = 300, seed: str = "1", wanted: tuple[str, ...] = ()) -> int
 
 if __name__ == "__main__":
     given = sys.argv[1:]
-    commands = tuple(given[2].split(",")) if len(given) > 2 else ()
-    sys.exit(bool(main(int(given[0]) if given else 300, *given[1:2], wanted=commands)))
+    count, seed, commands, *_ = *given, *("300", "1", "")[len(given) :]
+    sys.exit(bool(main(int(count), seed, tuple(filter(None, commands.split(","))))))

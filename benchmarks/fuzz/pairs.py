@@ -35,7 +35,8 @@ from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.machine import Machine
 from ccfem.slicing.layers.level_surfaces import level_surfaces
 from ccfem.slicing.layers.slicer import Slicer
-from ccfem.slicing.slicers import LoadOriented, Planar, Spatial, Surfaces, named
+from ccfem.slicing.slicers import LoadOriented, Spatial, Surfaces, named
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import named as strategies
 
 __all__ = ["bent_link", "see", "slicings", "write_surfaces"]
@@ -104,14 +105,14 @@ def see(
     pictures: bool,
     folder: Path,
     strand: Strand | None = DEFAULT_STRAND,
-) -> Comparison | Comparison:
+) -> Comparison:
     """Compare strategies on one slicing, or on several at once, and write all that it takes."""
     warnings.filterwarnings("error", category=UserWarning)
     case, natural = bent_link(), length is None
     with tempfile.TemporaryDirectory() as written:
         if isinstance(slicer, dict):
             total = None if length is None else 2.0 * length
-            found: Comparison | Comparison = compare(
+            found = compare(
                 case, strategies, slicings=slicer, natural=natural, fibre=total, strand=strand
             )
             write_results(found, Path(written), pictures=pictures)
@@ -131,17 +132,17 @@ def main(pictures: bool = False) -> int:
         write_surfaces(Path(name))
         made = slicings(Path(name))
         known = sorted(strategies())
-        jobs = [
+        jobs: list[tuple[str, Slicer | dict[str, Slicer], list[str], float | None]] = [
             (f"{each} on {where}, {amount}", slicer, [each], length)
             for where, slicer in made.items()
             for each in known
             for amount, length in _LENGTHS.items()
         ]
         jobs += [(f"all, {amount}", made, known, length) for amount, length in _LENGTHS.items()]
-        for title, *what in jobs:
+        for title, slicer, chosen, length in jobs:
             start = time.perf_counter()
             limit = 600.0 if title.startswith("all, ") else 60.0
-            found = verdict(Path(name), partial(see, *what, pictures), limit)
+            found = verdict(Path(name), partial(see, slicer, chosen, length, pictures), limit)
             tally[found if found in ("read", "refused") else "WRONG"] += 1
             print(f"{title}: {found}, {time.perf_counter() - start:.1f} s", flush=True)
     print(dict(tally))

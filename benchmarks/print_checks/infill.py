@@ -306,7 +306,7 @@ def _draw(job: Job, regions: list[Regions], file: Path) -> None:
         mine = lines.lays & lines.in_part & (height == region.top) & (lines.tool == 0)
         strokes = np.stack([lines.start[mine], lines.end[mine]], axis=1)[:, :, :2]
         colours = np.where(lines.kind[mine] == PART[0], "#3b6ea5", "#c05020")
-        axis.add_collection(LineCollection(strokes, colors=colours.tolist(), linewidths=1.5))
+        axis.add_collection(LineCollection(list(strokes), colors=colours.tolist(), linewidths=1.5))
         axis.set_title(f"{region.top:g} mm")
         axis.set_aspect("equal")
     figure.savefig(file, dpi=60)

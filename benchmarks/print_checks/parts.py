@@ -72,7 +72,7 @@ def job_of(part: Part, machine_name: str) -> tuple[Job, dict[str, float]]:
     paths = plan(strategy, layers, part.stress, machine)
     planned = time.process_time()
     hangs = overhang(mesh, case.build, machine) is not None
-    printed = plan_print(paths, layers, mesh, machine, hangs, case.plastic)
+    printed = plan_print(paths, layers, mesh, machine, hangs, plastic=case.plastic)
     text = gcode(printed, machine)
     written = time.process_time()
     strands, sections = on_bed(paths, mesh, case.build, machine.gcode.bed)

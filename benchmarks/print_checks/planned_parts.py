@@ -63,7 +63,7 @@ def planned(plan: str, folder: Path) -> Folder:
     results = folder / plan.replace(":", "-")
     if not results.exists():
         count = layers or LAYERS.get(name)
-        words = ("--layers", str(count)) if count else ()
+        words: tuple[str, ...] = ("--layers", str(count)) if count else ()
         words += ("--machine", machine or "marlin_two_tools", "--no-virtual-test", "--gcode")
         _ccfem("plan", part, "--strategy", strategy, *words, "--force", "--out", str(results))
     return Folder(results, mesh, strategy)

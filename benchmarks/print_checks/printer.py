@@ -8,6 +8,7 @@ import cmath
 import math
 import re
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -110,8 +111,8 @@ class Run:
     halts: list = field(default_factory=list)
     waited: float = 0.0
     head: dict = field(default_factory=dict)
-    lines: object = None
-    measured: object = None
+    lines: Any = None
+    measured: Any = None
 
     def strands(self) -> dict[str, list]:
         """List the steps of each strand by its name; those beside the part come last."""
@@ -136,7 +137,8 @@ def _moved(place: Place, shift: Place) -> Place:
 
 def follow(text: str, machine: str, offset=(0.0, 0.0, 0.0)) -> Run:
     """Follow a file to its end; the offset is one that the firmware does not know of."""
-    printer = _Printer(machine, tuple(float(x) for x in offset))
+    x, y, z = map(float, offset)
+    printer = _Printer(machine, (x, y, z))
     for line in text.splitlines():
         printer.read(line)
     return printer.run
@@ -156,7 +158,8 @@ class _Printer:
         self.kind, self.strand, self.ends = "", "", 0
         self.line = {"WIDTH": np.nan, "HEIGHT": np.nan}
         self.changed, self.cut, self.relative = -1, False, False
-        self.active, self.standby = {}, {}
+        self.active: dict[int, float] = {}
+        self.standby: dict[int, float] = {}
         self.heat, self.waited = {0: 20.0, 1: 20.0}, {0: False, 1: False}
 
     def read(self, line: str) -> None:
@@ -210,7 +213,7 @@ class _Printer:
             name, _, value = comment.partition(":")
             self.line[name] = float(value)
         elif comment.startswith("CCFEM:strand="):
-            self.strand = re.match(r"CCFEM:strand=(\w+)", comment)[1]
+            (self.strand,) = re.findall(r"^CCFEM:strand=(\w+)", comment)
             self.strand += f"-{self.ends}" if self.strand == "beside" else ""
         elif ":" in comment or "=" in comment:
             name, _, value = comment.replace("=", ":", 1).partition(":")

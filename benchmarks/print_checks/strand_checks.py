@@ -1,7 +1,6 @@
 """The rules for every strand (`strand_rules`), for the strands of a file as a printer lays them."""
 
 from collections.abc import Sequence
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -51,7 +50,7 @@ def cut_of(steps: Sequence[Step]) -> float:
     return next((float(along[k]) for k, step in enumerate(steps) if step.cut), np.nan)
 
 
-def measured(job: Job | SimpleNamespace, run: Run) -> list[Measured]:
+def measured(job: Any, run: Run) -> list[Measured]:
     """Strands of a run, measured once; what holds them is what the file lays below."""
     if run.measured is None:
         strands = strands_of(run)

@@ -13,8 +13,9 @@ else a stand-in of the same size.
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from statistics import median
@@ -88,7 +89,7 @@ def ours(mesh: TetMesh, backend: str = "auto") -> Run:
     fixed, _ = ends(mesh)
     free = np.repeat(~fixed[:, None], 3, axis=1)
     held = Held(free, np.zeros(free.shape), np.flatnonzero(~fixed))
-    system = System(Problem(mesh, isotropic(*MATERIAL), ()), where, held, {})
+    system = System(Problem(mesh, isotropic(*MATERIAL), ()), held, {})
     solver = system.factorise(matrix, backend)
     solution = solver.solve(held.right_hand_side(matrix, forces_on(mesh)))
     u = held.expand(solution.values)
@@ -118,7 +119,7 @@ def scikit_fem(mesh: TetMesh) -> Run:
     )
 
 
-def alternate(runs: dict[str, Callable[[], Run]], repeat: int) -> dict[str, list[Run]]:
+def alternate(runs: Mapping[str, Callable[[], Run]], repeat: int) -> dict[str, list[Run]]:
     """Run each in turn, `repeat` times; they must find the same displacement."""
     found: dict[str, list[Run]] = {name: [] for name in runs}
     for _ in range(repeat):
@@ -184,7 +185,7 @@ def main(repeat: int = 3, large: bool = False, alone_: str = typer.Option("", "-
     for name, rounds in parts:
         mesh = part(name)
         print(f"{name}, linear: {len(mesh.cells)} cells, {3 * len(mesh.points)} unknowns")
-        runs = {"ccfem": lambda m=mesh: ours(m), "scikit-fem": lambda m=mesh: scikit_fem(m)}
+        runs = {"ccfem": partial(ours, mesh), "scikit-fem": partial(scikit_fem, mesh)}
         report(alternate(runs, rounds))
         own, peer = (peak_memory(name, 1, backend) for backend in ("auto", "scikit-fem"))
         print(f"  peak memory: ccfem {own:.0f} MB, scikit-fem {peer:.0f} MB")
@@ -192,7 +193,7 @@ def main(repeat: int = 3, large: bool = False, alone_: str = typer.Option("", "-
     mesh = part(first).quadratic()
     print(f"{first}, quadratic: {len(mesh.cells)} cells, {3 * len(mesh.points)} unknowns")
     direct = "pypardiso" if find_spec("pypardiso") else "superlu"
-    report(alternate({b: lambda b=b: ours(mesh, b) for b in ("two-level", direct)}, repeat))
+    report(alternate({b: partial(ours, mesh, b) for b in ("two-level", direct)}, repeat))
     own, peer = (peak_memory(first, 2, backend) for backend in ("two-level", direct))
     print(f"  peak memory: two-level {own:.0f} MB, {direct} {peer:.0f} MB")
 

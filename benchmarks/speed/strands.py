@@ -41,7 +41,7 @@ def timed(name: str) -> dict[str, float]:
     part, (solution,) = problem.parts[0].specimen, found.objective.solution
     strained = ((1.0, solution.displacement),)
     extraction = strategy.extraction(problem.model, found.fields, strained, machine)
-    (whole,) = stage("levels", lambda: extraction.whole(layers, group, (length,)))
+    ((whole, *_),) = stage("levels", lambda: extraction.candidates(layers, group, (length,)))
     kept = stage("pruning", lambda: prune(whole, part, length, machine, rounds=ROUNDS))
     mesh, judge = part.unreinforced.mesh, stiffness_judge(part, machine)
     last = stage(f"{MOVES} moves", lambda: moved(kept, layers, mesh, machine, judge, MOVES))

@@ -18,7 +18,7 @@ import subprocess
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -109,7 +109,7 @@ def _cut(points: Sequence[Sequence[float]] | Line, length: float = LENGTH) -> Li
     return np.vstack([line[along < length - 1e-9], last])
 
 
-def _rows(heights: Sequence[float]) -> list[Line]:
+def _rows(heights: Iterable[float]) -> list[Line]:
     """Straight rows from the root on."""
     return [_cut([(0.0, y), (LENGTH, y)]) for y in heights]
 

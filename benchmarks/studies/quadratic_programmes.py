@@ -24,6 +24,7 @@ import textwrap
 import warnings
 from functools import partial
 from time import process_time
+from typing import Any
 
 import numpy as np
 import osqp
@@ -40,10 +41,10 @@ from ccfem.fem.elasticity import (
     Spring,
     Support,
     prepare,
-    solve,
 )
 from ccfem.fem.elasticity.assembly import cell_gradients
 from ccfem.fem.elasticity.held import Held
+from ccfem.fem.elasticity.solve import EXPECTED, find_contact, solve
 from ccfem.fem.materials import isotropic
 from ccfem.paths.fields import scalar
 from ccfem.paths.planning import plan
@@ -246,9 +247,9 @@ def contact_by_osqp(matrix, held, cases):
 
 def pressed(*divisions):
     def own():
-        solver, answers = system.factorise(matrix, "auto", solve.EXPECTED * len(cases)), []
+        solver, answers = system.factorise(matrix, "auto", EXPECTED * len(cases)), []
         for forces in cases:
-            reached = solve.find_contact(matrix, held, forces, solver, 1e-8)
+            reached = find_contact(matrix, held, forces, solver, 1e-8)
             solver = reached.solver
             answers.append(reached.held.expand(reached.solution.values))
         return answers
@@ -265,13 +266,13 @@ def pressed(*divisions):
     system = prepare(Problem(mesh, isotropic(100.0, 0.3), supports, loads, order=1))
     matrix, held, cases = system.assemble(), system.held, list(system.forces.values())
     solvers = {
-        "own": (own, solve.find_contact, Held.following),
+        "own": (own, find_contact, Held.following),
         "OSQP": (lambda: contact_by_osqp(matrix, held, cases), contact_by_osqp),
     }
     return cases, held.unknowns, solvers, rated
 
 
-PROGRAMMES = {
+PROGRAMMES: dict[str, Any] = {
     "field": (field, ("loop", 6), ("l_shape", 2), ("suspension", 2)),
     "heights": (heights, ("arm_bracket",), ("corner_bracket",), ("t_bracket",)),
     "strands": (strands, ("open_hole", 2), ("loop", 6)),
@@ -283,7 +284,8 @@ def lines_of(*functions):
     """Lines of the bodies of functions, without docstrings, comments and empty lines."""
     total = 0
     for function in functions:
-        body = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
+        source = textwrap.dedent(inspect.getsource(function))
+        body: Any = ast.parse(source).body[0]
         parts = body.body[1:] if ast.get_docstring(body) else body.body
         nodes = [node for part in parts for node in ast.walk(part)]
         total += len({node.lineno for node in nodes if hasattr(node, "lineno")})

@@ -22,7 +22,7 @@ from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.judging.virtual_testing.several_cases import cases_failure, virtual_tests
 from ccfem.paths.planning.equal_fibre import plan_to_length
-from ccfem.paths.planning.strategy import full_length
+from ccfem.paths.planning.strategy import Strategy, full_length
 from ccfem.strategies.fibre_aware.plan_cases import plan_cases
 from ccfem.strategies.fibre_aware.upper_bound import upper_bound
 from ccfem.strategies.isocurve import Isocurve
@@ -56,7 +56,7 @@ def compared(name: str, parameters: Mapping[str, object], pictures: Path | None)
         spent[f"for {field.case}"] = time.process_time() - started
         tested[f"for {field.case}"] = virtual_tests(planned.toolpaths, cases, machine=machine)
     best = np.array([found.ratios[k] for k, found in enumerate(tested.values())])
-    together = {
+    together: dict[str, Strategy] = {
         "isocurve": Isocurve(),
         "stream_function": strategy,
         "stream_function, moved": replace(strategy, moves=MOVES),

@@ -115,7 +115,7 @@ def losses(
     begun_there = design(exact, start, strategy.evaluations)
     rows["designed field, begun there"] = float(begun_there.objective.ratio[0])
     strained = ((1.0, found.objective.solution[0].displacement),)
-    extraction = strategy.extraction(model, found.fields, strained, machine)
+    extraction = strategy.extraction(model, list(found.fields), strained, machine)
     one = len(layers) // 2
     shifts = np.arange(strategy.phases) / strategy.phases
     tried = [extraction.layer_paths(layers[one], extraction.fields[group[one]], x) for x in shifts]
