@@ -10,7 +10,7 @@ import shapely
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.geometry.offsets import rings
 from ccfem.geometry.polylines import farthest_point, is_closed, line_length, straight_pieces
-from ccfem.geometry.shapes import Region, open_lines, strings
+from ccfem.geometry.shapes import Region, bands, open_lines, strings
 from ccfem.geometry.shells import concentric
 
 _ARC = 16
@@ -101,7 +101,7 @@ def _kept_off(
     """Parts of lines that keep a distance from others."""
     if not lines or not others:
         return lines
-    taken = shapely.union_all(shapely.buffer(strings(others), distance))
+    taken = shapely.union_all(bands(strings(others), distance))
     return open_lines(shapely.difference(strings(lines), taken))
 
 
@@ -153,9 +153,7 @@ def _parallels(
     while (count is None or level < count) and idle < 3:
         level += 1
         distance = (level - 1 + first) * pitch
-        covered = shapely.union_all(
-            shapely.buffer(strings, distance, cap_style=cap, quad_segs=_ARC)
-        )
+        covered = shapely.union_all(bands(strings, distance, cap_style=cap, quad_segs=_ARC))
         # Channels that are too narrow are closed.
         covered = shapely.buffer(shapely.buffer(covered, half, quad_segs=4), -half, quad_segs=4)
         fronts = [

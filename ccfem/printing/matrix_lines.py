@@ -14,7 +14,7 @@ from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.infill_lines import gyroid_lines, parallel_lines
 from ccfem.geometry.offsets import inset, offset_rings
 from ccfem.geometry.polylines import along_line, is_closed, points_along
-from ccfem.geometry.shapes import Region, open_lines, strings
+from ccfem.geometry.shapes import Region, bands, open_lines, strings
 from ccfem.machine.machine import Machine
 from ccfem.paths.plastic.plastic import SOLID, Plastic
 from ccfem.paths.plastic.sparse_regions import NOTHING, matrix_sections
@@ -228,9 +228,10 @@ def gap_lines(
     widths : list of float, mm
         Of the gap along each line, its mean.
     """
-    # GEOS stumbles over the union of thousands of buffers, and its buffer of all may be invalid.
-    covered = shapely.buffer(shapely.multilinestrings(strings(lines)), 0.5 * width, quad_segs=_ARC)
-    gaps = shapely.difference(section, shapely.make_valid(covered))
+    # All at once: GEOS stumbles over the union of thousands of buffers.
+    together = shapely.multilinestrings(strings(lines))
+    (covered,) = bands([together], 0.5 * width, quad_segs=_ARC)
+    gaps = shapely.difference(section, covered)
     reach = 0.5 * max(narrow, _NARROW * width)
     wide = shapely.buffer(gaps, -reach, quad_segs=_ARC)
     opened = shapely.intersection(shapely.buffer(wide, 1.01 * reach, quad_segs=_ARC), gaps)

@@ -28,7 +28,7 @@ from ccfem.geometry.polylines import (
     points_along,
     resample,
 )
-from ccfem.geometry.shapes import Region
+from ccfem.geometry.shapes import Region, bands
 from ccfem.geometry.symmetry import mirror_lines, reflected
 from ccfem.machine.machine import Machine
 from ccfem.paths.linking.single_path import link_tracks
@@ -260,7 +260,7 @@ def rest_of(section: Region, lines: Sequence[FloatArray], width: float, reach: f
         Radius of the disc.
     """
     strings = [shapely.LineString(line) for line in lines if len(line) > 1]
-    covered = shapely.union_all(shapely.buffer(strings, 0.5 * width, cap_style="flat"))
+    covered = shapely.union_all(bands(strings, 0.5 * width, cap_style="flat"))
     rest = shapely.buffer(shapely.difference(section, covered), -reach)
     return shapely.buffer(rest, reach)
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
+from ccfem.geometry.shapes import bands
 from ccfem.judging.evaluation.layer_paths import PlanePaths
 
 _FINE = 0.01
@@ -52,7 +53,7 @@ def open_places(paths: PlanePaths, width: float) -> OpenPlaces:
         if b - a > 1
     ]
     lines = [shapely.simplify(line, _FINE * width) for line in lines]
-    covered = shapely.union_all(shapely.buffer(lines, 0.5 * width, cap_style="flat"))
+    covered = shapely.union_all(bands(lines, 0.5 * width, cap_style="flat"))
     rest = shapely.difference(shapely.force_2d(section), covered)
     # Slightly less than half a width, so that a place exactly as wide as a strand counts as wide.
     disc = 0.499 * width
