@@ -14,6 +14,7 @@ from ccfem.body.mesh.face_places import BodyFaces
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.stress_field import PartStress
 from ccfem.fem.elasticity.support_kinds import AnySupport
+from ccfem.judging.virtual_testing.scatter import DEFAULT_SCATTER, Scatter
 from ccfem.machine.machine import Machine
 from ccfem.paths.placement.fibre_places import FibrePlaces
 from ccfem.paths.plastic.as_printed import as_printed
@@ -59,6 +60,8 @@ class Case(Shown):
     plastic : Plastic
         Walls, skins, infill and seam; by default solid. `problem` has solid plastic, and
         `printed_problem` that which is printed.
+    scatter : Scatter
+        How far prints of the part differ.
     findings : tuple of str
         Problems found and repaired in a mesh from a file, one line each.
     body : BodyFaces, optional
@@ -77,6 +80,7 @@ class Case(Shown):
     alternative_supports: tuple[AnySupport, ...] = ()
     fibre: FibrePlaces | None = None
     plastic: Plastic = SOLID
+    scatter: Scatter = DEFAULT_SCATTER
     weights: Mapping[str, float] = field(default_factory=dict)
     body: BodyFaces | None = None
     bed: BedLayout = AS_IT_STANDS

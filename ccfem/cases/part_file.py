@@ -62,6 +62,7 @@ from ccfem.fem.elasticity.problem import Problem, Region
 from ccfem.fem.elasticity.support_kinds import AnySupport
 from ccfem.fem.elasticity.supports import held
 from ccfem.fem.materials import Material
+from ccfem.judging.virtual_testing.scatter import Scatter
 from ccfem.machine.machine import Machine
 from ccfem.machine.named_machines import machine_from
 from ccfem.paths.placement.fibre_places import FibrePlaces
@@ -157,6 +158,8 @@ def part_case(content: TomlTable, path: Path, mesh: TetMesh | None = None) -> Ca
             given.fibre = fibre_of(part.fibre, path.parent)
     with mistakes.noted():
         given.plastic = plastic_of(part.plastic)
+    with mistakes.noted():
+        given.scatter = from_table(Scatter, part.scatter, "scatter")
     check_strategies(part.strategies, mistakes)
     rules = rules_of(part.patches, mistakes)
     with mistakes.noted():
@@ -231,6 +234,7 @@ def part_case(content: TomlTable, path: Path, mesh: TetMesh | None = None) -> Ca
         alternative_supports=others,
         fibre=given.fibre,
         plastic=given.plastic,
+        scatter=given.scatter,
         weights=weights,
         body=numbered_faces(mesh) if len(bare.patches) < len(mesh.patches) else None,
     )
@@ -279,6 +283,7 @@ class _Values:
     machine: Machine
     material: Material
     plastic: Plastic
+    scatter: Scatter
     fibre: FibrePlaces | None = None
 
 

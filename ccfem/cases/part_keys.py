@@ -250,6 +250,8 @@ class Part(Body):
         Which of the layers, and which regions of them, get fibre; by default all.
     plastic : table
         Walls, skins, infill and seam of the plastic; by default it is solid.
+    scatter : table
+        How far prints differ in their moduli and in the places of strands.
     patches : dict
         Patches of the boundary, each by a rule. Groups of a mesh file are patches already.
     machine : table
@@ -277,6 +279,7 @@ class Part(Body):
     slicing: dict[str, Any] | None = None
     fibre: dict[str, Any] | None = None
     plastic: dict[str, Any] = field(default_factory=dict)
+    scatter: dict[str, Any] = field(default_factory=dict)
     patches: dict[str, Any] = field(default_factory=dict)
     machine: dict[str, Any] = field(default_factory=dict)
     strategies: dict[str, Any] = field(default_factory=dict)

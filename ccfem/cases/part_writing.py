@@ -14,6 +14,7 @@ from ccfem.cases.part_fibre import fibre_table
 from ccfem.cases.part_loads import LOADS, SUPPORTS
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.materials import Material
+from ccfem.judging.virtual_testing.scatter import DEFAULT_SCATTER
 from ccfem.machine.machine import Machine
 from ccfem.paths.plastic.plastic import SOLID
 from ccfem.printing.bed_layout import bed_table
@@ -54,6 +55,7 @@ def part_text(case: Case, mesh: str, comment: str = "") -> str:
         "slicing": {"method": member_name(case.slicing), **_changed(case.slicing, Planar())},
         "fibre": fibre_table(case.fibre),
         "plastic": _changed(case.plastic, SOLID),
+        "scatter": _changed(case.scatter, DEFAULT_SCATTER),
         "supports": _supports(problem),
         "alternative_supports": [_kind(entry, SUPPORTS) for entry in case.alternative_supports],
         "loads": {

@@ -158,7 +158,7 @@ class Solved:
         said = slicer_remarks(chosen, stress)
         stack = tuple(layers)
         about = (strand, case.build, below, propped, said, self.every_layer, self.longest_test)
-        more = (case.bed, self.course, case.plastic)
+        more = (case.bed, self.course, case.plastic, case.scatter)
         return Part(stress, stack, case.machine, self.cases, *about, *more)
 
 

@@ -373,6 +373,7 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
             "load": _load(stress),
             "material": case.problem.material.name,
             "plastic": dataclasses.asdict(case.plastic),
+            "scatter": dataclasses.asdict(case.scatter),
             "build": case.build,
             "nodes": len(mesh.points),
             "cells": len(mesh.cells),

@@ -8,6 +8,7 @@ import numpy as np
 from ccfem.comparison.runs import Run, Tested
 from ccfem.judging.evaluation.layer_paths import Column
 from ccfem.judging.virtual_testing.failure_laws import named
+from ccfem.judging.virtual_testing.scatter import RatioScatter
 from ccfem.judging.virtual_testing.strength import FirstFailure
 
 _RATIO = "stiffness of the part with its fibres over that without"
@@ -43,6 +44,11 @@ def _of_law(law: str, column: Column) -> _Index:
     return _Index(column.name, column.unit, column.formula, column.range, load)
 
 
+def _of_scatter(value: Callable[[RatioScatter], float]) -> Callable[[Tested], float | None]:
+    """Value of the scatter of the stiffness ratio."""
+    return lambda tested: None if tested.scatter is None else value(tested.scatter)
+
+
 def _under_alternative(index: _Index) -> _Index:
     """Index under the alternative supports of the part."""
     return _Index(
@@ -76,6 +82,38 @@ _TESTED = (
         f"The {_RATIO}, if strands carried compression fully; no verdict rests on it.",
         ">= stiffness_ratio_partial",
         lambda tested: tested.bracket.bonded.ratio,
+    ),
+    _Index(
+        "stiffness_ratio_scatter",
+        "1",
+        "Standard deviation of stiffness_ratio_tension over its mean, from print to print, by the "
+        "[scatter] of the part: to first order, strand energies being the sensitivities.",
+        ">= 0",
+        _of_scatter(lambda scatter: scatter.deviation),
+    ),
+    _Index(
+        "fibre_sensitivity",
+        "1",
+        "d ln(stiffness_ratio_tension) / d ln(EA): the share of the strain energy in fibres.",
+        "0 to 1",
+        _of_scatter(lambda scatter: scatter.fibre),
+    ),
+    _Index(
+        "matrix_sensitivity",
+        "1",
+        "d ln(stiffness_ratio_tension) / d ln(E) of the matrix, in the part with fibre and "
+        "without.",
+        "-fibre_sensitivity where no springs hold the part",
+        _of_scatter(lambda scatter: scatter.matrix),
+    ),
+    _Index(
+        "strand_scatter",
+        "1",
+        "The part of stiffness_ratio_scatter that differs from strand to strand: axial stiffness "
+        "and place. Two designs from the same spools have this and the difference of the "
+        "sensitivities between them.",
+        ">= 0",
+        _of_scatter(lambda scatter: scatter.alone),
     ),
     _Index(
         "stiffness",
@@ -251,6 +289,7 @@ HEADLINE = (
     Headline(
         "stiffness_ratio_tension_alternative", "stiffness ratio, other supports", "", "{:.2f}"
     ),
+    Headline("stiffness_ratio_scatter", "scatter of the ratio", "", "± {:.0%}"),
     Headline("displacement", "displacement, mm", "low", "{:.3g}"),
     Headline("first_failure_load", "first failure, N", "high", "{:.0f}"),
     Headline("first_failure_load_alternative", "first failure, other supports, N", "", "{:.0f}"),

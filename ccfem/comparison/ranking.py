@@ -23,6 +23,9 @@ ALTERNATIVES = tuple(f"{mode}_alternative" for mode in _MODES)
 _DIGITS = 2
 """Decimals with which tables show a ratio of stiffnesses."""
 
+_SURE = 2.0
+"""Standard deviations of the scatter between two runs that an order has to exceed."""
+
 _STIFFNESSES = (
     "stiffness",
     "stiffness_ratio_tension",
@@ -158,18 +161,41 @@ def all_have(runs: Sequence[Run], mode: str) -> bool:
     return all(np.isfinite(merit(run, mode)) for run in runs)
 
 
+def scatter_between(one: Run, other: Run) -> float:
+    """Return the standard deviation of ln(stiffness of one run over another's).
+
+    Both are printed from the same spools. 0 where it is not known: of runs without a test, and of
+    merits over several load cases.
+    """
+    first, second = (run.tested.scatter if run.tested else None for run in (one, other))
+    if first is None or second is None or one.cases or other.cases:
+        return 0.0
+    return first.against(second)
+
+
 def order_of(one: Run, other: Run) -> str:
     """Say which of two runs is stiffer, as far as their table shows it.
 
     Returns
     -------
     str
-        FIRST or SECOND if one is stiffer than the other by more than `RESOLUTION`, fibres carrying
-        tension only, and the table shows none of its stiffnesses, with some compression or under
-        alternative supports, below that of the other. SAME if no stiffness differs by more than
-        `RESOLUTION`. Else UNDECIDED, and wherever a stiffness under the part's own supports is
-        missing. What one of both lacks under alternative supports does not count.
+        FIRST or SECOND if one is stiffer than the other by more than `RESOLUTION` and more than
+        twice the standard deviation of `scatter_between`, fibres carrying tension only, and the
+        table shows none of its stiffnesses, with some compression or under alternative supports,
+        below that of the other. SAME if no stiffness differs by more than `RESOLUTION`. Else
+        UNDECIDED, and wherever a stiffness under the part's own supports is missing. What one of
+        both lacks under alternative supports does not count.
     """
+    return _order(one, other, float(np.exp(_SURE * scatter_between(one, other))))
+
+
+def lost_in_scatter(one: Run, other: Run) -> bool:
+    """Whether two runs have no order only because prints scatter."""
+    return order_of(one, other) == UNDECIDED != _order(one, other, 1.0)
+
+
+def _order(one: Run, other: Run, least: float) -> str:
+    """Order of two runs as of `order_of`, one of which has to be `least` times as stiff."""
     modes = (*_MODES, *(mode for mode in ALTERNATIVES if all_have((one, other), mode)))
     first, second = (np.array([merit(run, mode) for mode in modes]) for run in (one, other))
     if not np.isfinite([first, second]).all():
@@ -179,6 +205,6 @@ def order_of(one: Run, other: Run) -> str:
     for order, high, low in ((FIRST, first, second), (SECOND, second, first)):
         pairs = zip(high.tolist(), low.tolist(), strict=True)
         below = any(round(a, _DIGITS) < round(b, _DIGITS) for a, b in pairs)
-        if high[0] > (1.0 + RESOLUTION) * low[0] and not below:
+        if high[0] > max(1.0 + RESOLUTION, least) * low[0] and not below:
             return order
     return UNDECIDED

@@ -8,9 +8,11 @@ from ccfem.comparison.ranking import (
     ALTERNATIVES,
     all_have,
     is_tested,
+    lost_in_scatter,
     off_length,
     order_of,
     ranking,
+    scatter_between,
     stiffness_ratio,
 )
 from ccfem.comparison.request import Wanted
@@ -59,7 +61,7 @@ def remarks(runs: Sequence[Run], wanted: Wanted, bound: UpperBound | None = None
             lines.setdefault(line, []).append(run.name)
     lines_said = [f"{', '.join(names)}: {line}" for line, names in lines.items()]
     tested = [run for run in order if is_tested(run) and not off_length(run, wanted)]
-    lines_said += [*_about_orders(tested), *_if_bonded(tested)]
+    lines_said += [*_about_orders(tested), *_if_bonded(tested), *_about_scatter(tested)]
     return (
         [*lines_said, bound_remark(tested, bound)] if bound is not None and tested else lines_said
     )
@@ -122,15 +124,21 @@ def _about_orders(tested: Sequence[Run]) -> list[str]:
     both = any(all_have((run,), ALTERNATIVES[0]) for run in tested)
     of = "fibres without and with some compression"
     of += ", or both models of the supports," if both else ""
+    lost = "lost in scatter"
     reasons = {
         UNDECIDED: ("undecided against", f", for {of} do not agree on an order"),
+        lost: ("undecided against", ": less than twice what prints scatter"),
         SAME: ("no difference to", f": less than {RESOLUTION:.0%}, the resolution of the test"),
     }
+
+    def order_or_why(run: Run, other: Run) -> str:
+        return lost if lost_in_scatter(run, other) else order_of(run, other)
+
     lines = []
     for order, (words, reason) in reasons.items():
         pairs = []
         for k, run in enumerate(tested):
-            others = [other.name for other in tested[k + 1 :] if order_of(run, other) == order]
+            others = [other.name for other in tested[k + 1 :] if order_or_why(run, other) == order]
             if others:
                 pairs.append(f"{run.name}: {words} {', '.join(others)}")
         if pairs:
@@ -149,6 +157,20 @@ def _if_bonded(tested: Sequence[Run]) -> list[str]:
         f"{tested[most].name} would be stiffer than {tested[0].name}: {ratios[most]:.2f} and "
         f"{ratios[0]:.2f} times the unreinforced stiffness"
     ]
+
+
+def _about_scatter(tested: Sequence[Run]) -> list[str]:
+    """Say how far prints of the best runs scatter, alone and against each other."""
+    known = [run.tested.scatter for run in tested if run.tested and run.tested.scatter]
+    if not known:
+        return []
+    alone = known[0].deviation
+    said = f"scatter of prints ([scatter], one standard deviation): {tested[0].name} ± {alone:.1%}"
+    if len(known) == len(tested) > 1 and not tested[0].cases:
+        both = scatter_between(tested[0], tested[1])
+        cancels = ": what they share cancels" if both < 0.5 * alone else ""
+        said += f"; over {tested[1].name}, from the same spools, ± {both:.1%}{cancels}"
+    return [said]
 
 
 def _about_links(total: Mapping[str, float]) -> list[str]:

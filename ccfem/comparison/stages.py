@@ -16,6 +16,7 @@ from ccfem.comparison.tested_cases import in_all_cases
 from ccfem.fem.elasticity.stress_field import PartStress, StressField, WeightedCases
 from ccfem.judging.evaluation import evaluate
 from ccfem.judging.evaluation.strand_rules import StrandVerdict, strand_verdict, why_not
+from ccfem.judging.virtual_testing.scatter import DEFAULT_SCATTER, Scatter, ratio_scatter
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.judging.virtual_testing.strands import Strands, carrying_strands
@@ -101,6 +102,8 @@ class Part:
         Of the slicer, one line each.
     plastic : Plastic
         Walls, skins, infill and seam of its print.
+    scatter : Scatter
+        How far prints of it differ.
     """
 
     stress: PartStress
@@ -117,6 +120,7 @@ class Part:
     layout: BedLayout = AS_IT_STANDS
     course: Course = WITHOUT_HALT
     plastic: Plastic = SOLID
+    scatter: Scatter = DEFAULT_SCATTER
 
     @property
     def flat_layers(self) -> tuple[Layer, ...]:
@@ -483,11 +487,13 @@ def _test(
 ) -> Tested:
     """Test strands in every mode, and find what fails first."""
     bracket = virtual_bracket(strands, specimen, strand, (), tolerance=_TOLERANCE)
+    about = (part.scatter, part.build or (0.0, 0.0, 1.0))
+    scatter = ratio_scatter(bracket.tension, *about)
     try:
         failure = first_failure(bracket.tension, strand, layers=part.layers)
     except InputError as error:
-        return Tested(bracket, None, str(error))
-    return Tested(bracket, failure, matrix_before=before)
+        return Tested(bracket, None, str(error), scatter=scatter)
+    return Tested(bracket, failure, matrix_before=before, scatter=scatter)
 
 
 def _stage(run: Run, stage: str, work: Callable[[], Run], reason: str = "failure") -> Run:

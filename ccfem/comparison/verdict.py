@@ -10,10 +10,12 @@ from ccfem.comparison.ranking import (
     ALTERNATIVES,
     all_have,
     is_tested,
+    lost_in_scatter,
     merit,
     off_length,
     order_of,
     ranking,
+    scatter_between,
     stiffness_ratio,
 )
 from ccfem.comparison.request import InAll, Wanted
@@ -26,11 +28,11 @@ def verdict(runs: Sequence[Run], wanted: Wanted) -> str:
     """Say in one sentence which strategy is best, in what respect, and at how much fibre.
 
     Only runs count that can be printed and have the wanted length. One is the stiffest if it is
-    stiffer than every other of them by more than the resolution of the test, fibres carrying
-    tension only, and none is stiffer with some compression in them or under the alternative
-    supports, as the table shows them (`order_of`). "No difference" is stated if all stiffnesses of
-    the best agree within the resolution; else the best are "undecided". Runs that do not count are
-    named, with those that are stiffer than the best.
+    stiffer than every other of them by more than the resolution of the test and twice the scatter
+    between them, fibres carrying tension only, and none is stiffer with some compression in them or
+    under the alternative supports, as the table shows them (`order_of`). "No difference" is stated
+    if all stiffnesses of the best agree within the resolution; else the best are "undecided". Runs
+    that do not count are named, with those that are stiffer than the best.
 
     Parameters
     ----------
@@ -112,7 +114,7 @@ def _by_stiffness(order: Sequence[Run], wanted: Wanted) -> str:
     return (
         f"Undecided between {_names(group)}, {_amount(wanted)}: "
         f"{_ratios(group)} times the unreinforced stiffness where fibres carry tension only, "
-        f"{_ratios(group, PARTIAL)} with some compression{_under_other(group)}."
+        f"{_ratios(group, PARTIAL)} with some compression{_under_other(group)}{_lost(group)}."
     )
 
 
@@ -155,6 +157,18 @@ def _under_other(runs: Sequence[Run]) -> str:
         f"{_ratios(runs, mode)} ({name})" for mode, name in names.items() if all_have(runs, mode)
     ]
     return f"; under the alternative supports {', '.join(said)}" if said else ""
+
+
+def _lost(runs: Sequence[Run]) -> str:
+    """Say which of the best runs the first is ahead of, but for what prints scatter."""
+    first, *others = runs
+    said = [
+        f"{stiffness_ratio(first) / stiffness_ratio(run):.2f} ± {scatter_between(first, run):.1%} "
+        f"times {run.name}"
+        for run in others
+        if lost_in_scatter(first, run)
+    ]
+    return f"; prints scatter too much: {first.name} is {', '.join(said)}" if said else ""
 
 
 def _fibre(run: Run, wanted: Wanted) -> str:

@@ -9,6 +9,7 @@ from ccfem.cases.part_keys import Part
 from ccfem.cases.part_loads import LOADS, SUPPORTS
 from ccfem.cases.part_tables import RULES
 from ccfem.fem.materials import isotropic, material_names, transversely_isotropic
+from ccfem.judging.virtual_testing.scatter import Scatter
 from ccfem.machine import (
     Costs,
     GcodeProfile,
@@ -43,6 +44,7 @@ def part_file_page() -> str:
         f"## Regions `[regions.NAME]`\n\n{kinds('rule', REGIONS)}",
         f"## Fibre `[fibre]`\n\n{_fibre()}",
         f"## Plastic `[plastic]`\n\n{keys(Plastic)}",
+        f"## Scatter `[scatter]`\n\n{keys(Scatter)}",
         f"## Machine `[machine]`\n\n{keys(Machine)}",
         f"### Limits `[machine.limits]`\n\n{keys(Limits)}",
         f"### Speeds `[machine.speeds]`\n\n{keys(SpeedTable)}",
