@@ -14,6 +14,7 @@ from ccfem.cli.run import NOT_PRINTABLE, complain
 from ccfem.comparison.plot.canvas import check_picture, save
 from ccfem.comparison.plot.part_picture import part_page, part_picture
 from ccfem.fem.elasticity.solve import solve
+from ccfem.judging.virtual_testing.pinned_joints import about_pins
 from ccfem.printing.build_directions import better_direction
 from ccfem.slicing.slicers.planar import Planar
 
@@ -41,8 +42,9 @@ def check_part(read: Callable[[], Case], picture: Path | None) -> int:
         picture = check_picture(Path(f"{checked.case.name}-check.png"))
     page = check_writable(picture.with_suffix(".html"))
     print(checked.known)
-    if not checked.mistakes and (said := _direction(checked.case)):
-        print(said)
+    if not checked.mistakes:
+        for line in _of_a_solve(checked.case):
+            print(f"remark: {line}")
     save(part_picture(checked), picture)
     with whole_file(page) as temporary:
         temporary.write_text(part_page(checked), encoding="utf-8")
@@ -58,15 +60,14 @@ _QUICK = 15.0
 """Estimated seconds of a solve that a check may take."""
 
 
-def _direction(case: Case) -> str:
-    """Say which build direction would let fibre take much more; empty for none, or if it is long.
+def _of_a_solve(case: Case) -> list[str]:
+    """Say what the first load case shows, solved on the cells that there are, if that is quick.
 
-    The first load case is solved on the cells that there are.
+    That is a build direction in which fibre would take much more, and a pin that tears out.
     """
     slicing, problem = case.slicing, case.problem
-    quick = solve_costs(problem)[0].seconds <= _QUICK
-    if not quick or not isinstance(slicing, Planar) or slicing.axis != "build":
-        return ""
+    if solve_costs(problem)[0].seconds > _QUICK:
+        return []
     name = next(iter(problem.loads))
     rough = replace(
         problem,
@@ -78,6 +79,9 @@ def _direction(case: Case) -> str:
     try:
         stress = solve(rough)[name]
     except SolveError as error:
-        return f"remark: no build direction is compared, for the part is not solved: {error}"
-    said = better_direction(stress, case.build, case.machine)
-    return said and f"remark: {said}"
+        return [
+            f"neither build directions nor pins are judged, for the part is not solved: {error}"
+        ]
+    turned = isinstance(slicing, Planar) and slicing.axis == "build"
+    said = better_direction(stress, case.build, case.machine) if turned else ""
+    return [line for line in (said, about_pins(stress)) if line]

@@ -470,6 +470,7 @@ def _run_record(run: Run) -> dict[str, Any]:
         "load_cases": run.cases.values() if run.cases else None,
         "first_failure": vars(run.tested.failure) if run.tested and run.tested.failure else None,
         "first_failure_alternative": _alternative_failure(run),
+        "pinned_joints": [vars(joint) for joint in run.tested.joints] if run.tested else None,
     }
 
 

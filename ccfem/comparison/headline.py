@@ -186,6 +186,15 @@ _TESTED = (
         _of_failure(lambda failure, tested: failure.load),
     ),
     _Index(
+        "pinned_joint_load",
+        "N",
+        "Load at which a pin first tears out of a hole or crushes its wall: the least of bearing, "
+        "net section and shear-out of all loaded or held holes, by mean stresses and the strength "
+        "of the matrix alone. Not part of first_failure_load, which leaves out what is near loads.",
+        "> 0; missing where no pin presses on the wall of a hole, or a strength is unknown",
+        lambda tested: tested.joints[0].load if tested.joints else None,
+    ),
+    _Index(
         "interlayer_load",
         "N",
         "Load at which printed layers come apart: the stress tensor averaged over a 2 mm ball, "
@@ -293,6 +302,7 @@ HEADLINE = (
     Headline("displacement", "displacement, mm", "low", "{:.3g}"),
     Headline("first_failure_load", "first failure, N", "high", "{:.0f}"),
     Headline("first_failure_load_alternative", "first failure, other supports, N", "", "{:.0f}"),
+    Headline("pinned_joint_load", "pin, matrix alone, N", "", "{:.0f}"),
     Headline("interlayer_load", "delamination load, N", "", "{:.0f}"),
     Headline("fibre_per_layer", "fibre, mm a layer", "", "{:.0f}"),
     Headline("fibre_mass", "fibre, g", "", "{:.3g}"),
@@ -398,7 +408,7 @@ _UPPER = "stiffness_ratio_partial"
 
 
 def _beside(run: Run, column: str, values: Mapping[str, float]) -> str:
-    """Text beside a value: the range of a stiffness ratio, what fails first."""
+    """Text beside a value: the range of a stiffness ratio, what fails first and how."""
     if column == "stiffness_ratio_tension":
         low, high = (f"{values.get(name, np.nan):.2f}" for name in (column, _UPPER))
         return f"to {high}" if low != high else ""
@@ -407,4 +417,6 @@ def _beside(run: Run, column: str, values: Mapping[str, float]) -> str:
         tested = tested.alternative
     if column.startswith("first_failure_load") and tested is not None and tested.failure:
         return tested.failure.what
+    if column == "pinned_joint_load" and tested is not None:
+        return tested.joints[0].mode
     return ""

@@ -21,6 +21,7 @@ from ccfem.judging.evaluation.evaluation import Evaluation
 from ccfem.judging.evaluation.layer_paths import plane_paths
 from ccfem.judging.evaluation.open_places import open_places
 from ccfem.judging.virtual_testing.equilibrium import BONDED
+from ccfem.judging.virtual_testing.pinned_joints import said_of_pins
 from ccfem.judging.virtual_testing.virtual_test import RESOLUTION, SAME, UNDECIDED
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.upper_bound import LOOSE, UpperBound
@@ -61,7 +62,12 @@ def remarks(runs: Sequence[Run], wanted: Wanted, bound: UpperBound | None = None
             lines.setdefault(line, []).append(run.name)
     lines_said = [f"{', '.join(names)}: {line}" for line, names in lines.items()]
     tested = [run for run in order if is_tested(run) and not off_length(run, wanted)]
-    lines_said += [*_about_orders(tested), *_if_bonded(tested), *_about_scatter(tested)]
+    lines_said += [
+        *_about_orders(tested),
+        *_if_bonded(tested),
+        *_about_scatter(tested),
+        *_about_joints(tested),
+    ]
     return (
         [*lines_said, bound_remark(tested, bound)] if bound is not None and tested else lines_said
     )
@@ -171,6 +177,12 @@ def _about_scatter(tested: Sequence[Run]) -> list[str]:
         cancels = ": what they share cancels" if both < 0.5 * alone else ""
         said += f"; over {tested[1].name}, from the same spools, ± {both:.1%}{cancels}"
     return [said]
+
+
+def _about_joints(tested: Sequence[Run]) -> list[str]:
+    """Say at which load a pin tears out of the best run, by the matrix alone: all are alike."""
+    best = tested[0].tested if tested else None
+    return list(filter(None, [said_of_pins(best.joints)])) if best else []
 
 
 def _about_links(total: Mapping[str, float]) -> list[str]:

@@ -10,6 +10,7 @@ from ccfem.base.arrays import freeze, in_brief
 from ccfem.comparison.tested_cases import TestedCases
 from ccfem.judging.evaluation import Evaluation
 from ccfem.judging.evaluation.strand_rules import StrandVerdict
+from ccfem.judging.virtual_testing.pinned_joints import PinnedJoint
 from ccfem.judging.virtual_testing.scatter import RatioScatter
 from ccfem.judging.virtual_testing.strength import FirstFailure
 from ccfem.judging.virtual_testing.virtual_test import Bracket
@@ -41,6 +42,8 @@ class Tested:
         Stiffness ratio that no paths of the compared length can exceed; NaN without a bound.
     cases : TestedCases, optional
         The tests under all load cases, if paths are planned for several.
+    joints : tuple of PinnedJoint
+        Holes that pins press on, the weakest first; none where a strength is unknown.
     scatter : RatioScatter, optional
         Of the stiffness ratio in tension only.
     """
@@ -53,6 +56,7 @@ class Tested:
     most: float = float("nan")
     cases: TestedCases | None = None
     scatter: RatioScatter | None = None
+    joints: tuple[PinnedJoint, ...] = ()
 
     __repr__ = in_brief
 

@@ -16,9 +16,10 @@ from ccfem.comparison.tested_cases import in_all_cases
 from ccfem.fem.elasticity.stress_field import PartStress, StressField, WeightedCases
 from ccfem.judging.evaluation import evaluate
 from ccfem.judging.evaluation.strand_rules import StrandVerdict, strand_verdict, why_not
+from ccfem.judging.virtual_testing.pinned_joints import pinned_joints
 from ccfem.judging.virtual_testing.scatter import DEFAULT_SCATTER, Scatter, ratio_scatter
 from ccfem.judging.virtual_testing.specimen import Specimen
-from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.judging.virtual_testing.strand import Limits, Strand
 from ccfem.judging.virtual_testing.strands import Strands, carrying_strands
 from ccfem.judging.virtual_testing.strength import first_failure, matrix_peak
 from ccfem.judging.virtual_testing.virtual_test import virtual_bracket
@@ -487,13 +488,15 @@ def _test(
 ) -> Tested:
     """Test strands in every mode, and find what fails first."""
     bracket = virtual_bracket(strands, specimen, strand, (), tolerance=_TOLERANCE)
-    about = (part.scatter, part.build or (0.0, 0.0, 1.0))
-    scatter = ratio_scatter(bracket.tension, *about)
+    test = bracket.tension
+    scatter = ratio_scatter(test, part.scatter, part.build or (0.0, 0.0, 1.0))
     try:
-        failure = first_failure(bracket.tension, strand, layers=part.layers)
+        failure = first_failure(test, strand, layers=part.layers)
     except InputError as error:
         return Tested(bracket, None, str(error), scatter=scatter)
-    return Tested(bracket, failure, matrix_before=before, scatter=scatter)
+    limits = Limits.of(test.solution.problem.material, strand)
+    joints = pinned_joints(test.solution, specimen.forces, test.force, limits)
+    return Tested(bracket, failure, matrix_before=before, scatter=scatter, joints=joints)
 
 
 def _stage(run: Run, stage: str, work: Callable[[], Run], reason: str = "failure") -> Run:

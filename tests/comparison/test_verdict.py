@@ -338,6 +338,10 @@ def test_the_table_has_every_index_in_order_of_rank(compared):
             for name, value in run.evaluation.total.items():
                 assert row[name] == value or (row[name] != row[name] and value != value), name
             assert row["stiffness"] == run.tested.bracket.tension.stiffness
+            loads = [joint.load for joint in run.tested.joints]
+            assert row.get("pinned_joint_load", np.inf) == min(loads, default=np.inf)
+            assert len(loads) == (2 if compared.case.name == "loop" else 0)
+            assert any("of 2 holes" in line for line in compared.remarks) == bool(loads)
             assert row["displacement"] * row["stiffness"] == pytest.approx(
                 run.tested.bracket.tension.force
             )

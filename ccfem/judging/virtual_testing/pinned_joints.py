@@ -1,0 +1,233 @@
+"""Pinned joints: at which load the matrix round a loaded hole gives way, by engineering formulas.
+
+First failure leaves out what lies near loads and supports, so that it does not see a pin that tears
+out of its hole. The three ways in which it does are judged here as in the design of pinned joints
+and lugs: by mean stresses on the areas that would part, which are measured in the mesh.
+
+* bearing: the pin crushes the wall, ``F / (d t)`` against the compressive strength;
+* net section: the material beside the hole breaks, ``F / ((W - d) t)`` against the tensile one;
+* shear-out: what lies ahead of the pin is pushed out between two planes that touch the hole along
+  the force, ``F / (2 e t)`` against the tensile strength over the root of 3 (von Mises).
+
+The strengths are those of the matrix. Strands, also those that ring the hole, are not counted: no
+strength of printed ones in such a joint is known here.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ccfem.base.arrays import FloatArray, IntArray, freeze
+from ccfem.body.mesh.smooth_faces import Face, given_faces
+from ccfem.fem.elasticity import StressField
+from ccfem.fem.elasticity.load_kinds import patches_in_use
+from ccfem.geometry.facets import connected
+from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.strand import Limits
+from ccfem.judging.virtual_testing.strands import cut_steps
+
+BEARING, NET_SECTION, SHEAR_OUT = "bearing", "net section", "shear-out"
+
+_HEIGHTS = 5
+"""Places along the axis at which a hole's surroundings are measured."""
+_HALF = 120.0
+"""Least turn of a loaded wall, degrees: a fillet turns by less, half a hole by more."""
+_IDLE = 1e-3
+"""Share of the load of the part below which a hole is not loaded across its axis."""
+_OFF = 0.01
+"""Distance of the planes of shear-out from the hole, in radii: chords of the wall lie inside it."""
+_GAP = 0.05
+"""Gap in the material along a ray, mm, that is rounding: a line of plastic is wider."""
+
+
+@dataclass(frozen=True)
+class PinnedJoint:
+    """A hole across which a pin presses, and when the matrix round it gives way.
+
+    Attributes
+    ----------
+    patch : str
+        Of a load or a support on its wall.
+    centre : (3,) array, mm
+        On the axis, in the middle of the wall.
+    force : (3,) array, N
+        Of the pin on the part, across the axis, under the load of the test.
+    diameter, thickness : float, mm
+        Of the hole; length of its loaded wall along the axis.
+    net_area, shear_area : float, mm^2
+        Of the material beside the hole across the force, and of both planes of shear-out.
+    loads : mapping of mode to float, N
+        Load of the part at which each mode happens. Infinite for the net section where it is
+        pressed; none of a mode without material that could part.
+    """
+
+    patch: str
+    centre: FloatArray
+    force: FloatArray
+    diameter: float
+    thickness: float
+    net_area: float
+    shear_area: float
+    loads: Mapping[str, float]
+
+    def __post_init__(self) -> None:
+        freeze(self, centre=float, force=float, loads=dict)
+
+    @property
+    def mode(self) -> str:
+        """The mode that happens first."""
+        return min(self.loads, key=self.loads.__getitem__)
+
+    @property
+    def load(self) -> float:
+        """Load of the part at which it does, N."""
+        return self.loads[self.mode]
+
+    @property
+    def about(self) -> str:
+        """One phrase: what happens first, where, at which load, and what else might."""
+        others = [
+            f"{mode} {load:.0f}"
+            for mode, load in self.loads.items()
+            if mode != self.mode and np.isfinite(load)
+        ]
+        more = f" ({', '.join(others)})" if others else ""
+        return f"{self.mode} of '{self.patch}' at {self.load:.0f} N{more}"
+
+
+def pinned_joints(
+    stress: StressField, forces: FloatArray, size: float, limits: Limits
+) -> tuple[PinnedJoint, ...]:
+    """Judge every hole whose wall carries a load or a support, the weakest first.
+
+    Parameters
+    ----------
+    stress : StressField
+        With its reactions.
+    forces : (n, 3) array, N
+        Of the loads at the nodes.
+    size : float, N
+        Of the load of the part; loads at failure are in its terms.
+    limits : Limits
+        Its strength of the matrix is the tensile one.
+    """
+    problem, mesh = stress.problem, stress.mesh
+    outer = forces + stress.reactions
+    names = patches_in_use(problem.all_supports, {stress.case: problem.loads_of(stress.case)})
+    joints = []
+    for name in names:
+        facets = mesh.patch(name)
+        for face in given_faces(mesh.points, facets, _pieces(facets)):
+            if face.kind != "cylinder" or not face.hollow or face.turn < _HALF:
+                continue
+            piece = facets[face.facets]
+            force = outer[np.unique(mesh.facet_nodes(piece))].sum(axis=0)
+            force = force - (force @ face.direction) * face.direction
+            if np.linalg.norm(force) > _IDLE * size:
+                joints.append(_joint(stress, face, name, piece, force, size, limits))
+    return tuple(sorted(joints, key=lambda joint: joint.load))
+
+
+def about_pins(stress: StressField) -> str:
+    """Say at which load a pin tears out of a part without fibre; empty where no pin is judged."""
+    strength = stress.material.tensile_strength
+    if strength is None or stress.problem.case_supports:
+        return ""
+    specimen = Specimen.of(stress)
+    size = specimen.force(stress.reactions)
+    joints = pinned_joints(stress, specimen.forces, size, Limits.of(stress.material))
+    return said_of_pins(joints)
+
+
+def said_of_pins(joints: Sequence[PinnedJoint]) -> str:
+    """Remark on the weakest of some joints, which comes first; empty without any."""
+    if not joints:
+        return ""
+    return (
+        f"pins in holes, not part of first failure: {joints[0].about}, of {len(joints)} "
+        f"hole{'s' * (len(joints) > 1)}, by the matrix alone; strands round a hole are not counted"
+    )
+
+
+def _pieces(facets: IntArray) -> list[IntArray]:
+    """Rows of facets (k, 3) that hang together by their nodes: a patch may be several holes."""
+    nodes, local = np.unique(facets, return_inverse=True)
+    local = local.reshape(facets.shape)
+    label = connected(np.concatenate([local[:, :2], local[:, 1:]]), len(nodes))[local[:, 0]]
+    return [np.flatnonzero(label == k) for k in np.unique(label)]
+
+
+def _joint(
+    stress: StressField,
+    wall: Face,
+    patch: str,
+    facets: IntArray,
+    force: FloatArray,
+    size: float,
+    limits: Limits,
+) -> PinnedJoint:
+    """Measure the surroundings of one hole, and judge them."""
+    mesh, axis, radius = stress.mesh, wall.direction, wall.radius
+    heights = (mesh.points[np.unique(facets)] - wall.centre) @ axis
+    low, thickness = float(heights.min()), float(np.ptp(heights))
+    steps = low + (np.arange(_HEIGHTS) + 0.5) / _HEIGHTS * thickness
+    middles = wall.centre + steps[:, None] * axis
+    pull = float(np.linalg.norm(force))
+    ahead = force / pull
+    aside = np.cross(axis, ahead)
+    touching = (1.0 + _OFF) * radius * aside
+    beside = [_rays(stress, middles + way * radius * aside, way * aside) for way in (1.0, -1.0)]
+    shorn = [_rays(stress, middles + way * touching, ahead) for way in (1.0, -1.0)]
+    net_area, shear_area = (
+        thickness / _HEIGHTS * sum(float(ray.filled.sum()) for ray in rays)
+        for rays in (beside, shorn)
+    )
+    stretched = sum(
+        float(np.einsum("k,kij,i,j->", ray.filled, stress.stress[ray.cell], ahead, ahead))
+        for ray in beside
+    )
+    material = stress.problem.material
+    bearing = limits.matrix
+    if material.compressive_strength is not None:
+        bearing = material.compressive_strength
+    held = {
+        BEARING: bearing * 2.0 * radius * thickness,
+        NET_SECTION: limits.matrix * net_area if stretched > 0.0 else np.inf,
+        SHEAR_OUT: limits.matrix / np.sqrt(3.0) * shear_area,
+    }
+    return PinnedJoint(
+        patch,
+        centre=wall.centre + (low + 0.5 * thickness) * axis,
+        force=force,
+        diameter=2.0 * radius,
+        thickness=thickness,
+        net_area=net_area,
+        shear_area=shear_area,
+        loads={mode: size * float(most) / pull for mode, most in held.items() if most > 0.0},
+    )
+
+
+class _Rays(NamedTuple):
+    """What rays cross up to their first gap: cells (k,), and the length in each that is filled."""
+
+    cell: IntArray
+    filled: FloatArray
+
+
+def _rays(stress: StressField, start: FloatArray, along: FloatArray) -> _Rays:
+    """Follow rays from points (r, 3), on the wall of a hole, through the part."""
+    mesh, fill = stress.mesh, stress.problem.fill
+    reach = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+    step = np.broadcast_to(reach * along, start.shape)
+    cut = cut_steps(start, step.copy(), np.full(len(start), reach), mesh)
+    end, kept = np.zeros(len(start)), []
+    for k in np.lexsort((cut.begin, cut.step)).tolist():
+        ray = cut.step[k]
+        if cut.begin[k] * reach <= end[ray] + _GAP:
+            end[ray] = max(end[ray], cut.end[k] * reach)
+            kept.append(k)
+    length = (cut.end - cut.begin)[kept] * cut.share[kept] * reach
+    cell = cut.cell[kept]
+    return _Rays(cell, length if fill is None else length * fill[cell])

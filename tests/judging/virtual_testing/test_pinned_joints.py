@@ -1,0 +1,84 @@
+"""Pinned joints against lugs whose areas and loads are known in closed form."""
+
+import numpy as np
+import pytest
+import shapely
+
+from ccfem.body.mesh.patches import Cylinder, Plane, patches_from_rules
+from ccfem.body.meshing import extrude
+from ccfem.fem.elasticity import Bearing
+from ccfem.fem.elasticity.problem import Force, Problem, Support
+from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.system import prepare
+from ccfem.fem.materials import isotropic
+from ccfem.judging.virtual_testing.pinned_joints import about_pins, pinned_joints
+from ccfem.judging.virtual_testing.strand import Limits
+
+WIDTH, DIAMETER, THICKNESS, END = 20.0, 8.0, 4.0, 12.0
+TENSILE, CRUSHING = 50.0, 60.0
+MATERIAL = isotropic(3000.0, 0.35, tensile_strength=TENSILE, compressive_strength=CRUSHING)
+
+
+def lug(round_end=False):
+    """A strip from x = -30 on, 20 mm wide, with a hole at the origin, 12 mm before its end."""
+    strip = shapely.box(-30.0, -WIDTH / 2, 0.0 if round_end else END, WIDTH / 2)
+    if round_end:
+        strip = strip.union(shapely.Point(0.0, 0.0).buffer(WIDTH / 2, quad_segs=32))
+    hole = shapely.Point(0.0, 0.0).buffer(DIAMETER / 2, quad_segs=32)
+    mesh = extrude(strip.difference(hole), THICKNESS, 4.0)
+    rules = {
+        "hole": Cylinder((0.0, 0.0, 0.0), "z", DIAMETER / 2),
+        "root": Plane("x", "min"),
+        "end": Plane("x", "max", tolerance=0.5),
+    }
+    return patches_from_rules(mesh, rules)
+
+
+def joints(mesh, load, held="root"):
+    problem = Problem(mesh, MATERIAL, (Support(held),), {"pull": load}, order=1)
+    stress = solve(problem)["pull"]
+    forces = prepare(problem).forces_in("pull")
+    return pinned_joints(stress, forces, 100.0, Limits.of(MATERIAL))
+
+
+def test_a_pulled_lug_fails_as_in_closed_form():
+    (joint,) = joints(lug(), (Bearing("hole", (100.0, 0.0, 0.0)),))
+    assert joint.patch == "hole"
+    np.testing.assert_allclose(joint.force, [100.0, 0.0, 0.0], atol=1e-6)
+    np.testing.assert_allclose(joint.centre, [0.0, 0.0, THICKNESS / 2], atol=1e-3)
+    assert joint.loads["bearing"] == pytest.approx(CRUSHING * DIAMETER * THICKNESS, rel=1e-3)
+    net = TENSILE * (WIDTH - DIAMETER) * THICKNESS
+    assert joint.loads["net section"] == pytest.approx(net, rel=1e-3)
+    shear = TENSILE / np.sqrt(3.0) * 2.0 * END * THICKNESS
+    assert joint.loads["shear-out"] == pytest.approx(shear, rel=1e-3)
+    assert joint.mode == "bearing"
+    assert joint.about == "bearing of 'hole' at 1920 N (net section 2400, shear-out 2771)"
+
+
+def test_a_round_end_is_shorter_beside_the_middle_and_a_push_stretches_nothing():
+    (pulled,) = joints(lug(round_end=True), (Bearing("hole", (100.0, 0.0, 0.0)),))
+    ahead = np.sqrt((WIDTH / 2) ** 2 - (1.01 * DIAMETER / 2) ** 2)  # less by its chords
+    assert pulled.shear_area == pytest.approx(2.0 * ahead * THICKNESS, rel=0.02)
+    (pushed,) = joints(lug(round_end=True), (Bearing("hole", (-100.0, 0.0, 0.0)),))
+    assert pushed.loads["net section"] == np.inf
+    assert pushed.shear_area == pytest.approx(2.0 * 30.0 * THICKNESS, rel=1e-3)
+    assert pushed.mode == "bearing"
+    (aside,) = joints(lug(round_end=True), (Bearing("hole", (0.0, 100.0, 0.0)),))
+    assert aside.net_area == pytest.approx((WIDTH / 2 + 30.0 - DIAMETER) * THICKNESS, rel=1e-3)
+
+
+def test_a_held_hole_is_judged_by_its_reaction_and_an_idle_one_is_not():
+    pull = (Force("root", (-100.0, 0.0, 0.0)),)
+    (held,) = joints(lug(), pull, "hole")
+    np.testing.assert_allclose(held.force, [100.0, 0.0, 0.0], atol=1e-4)
+    assert held.loads["net section"] == pytest.approx(TENSILE * 12.0 * THICKNESS, rel=1e-3)
+    assert joints(lug(), pull, "end") == ()
+
+
+def test_a_remark_on_the_part_without_fibre_names_the_weakest_pin():
+    loads = {"pull": (Bearing("hole", (250.0, 0.0, 0.0)),)}
+    stress = solve(Problem(lug(), MATERIAL, (Support("root"),), loads, order=1))["pull"]
+    said = about_pins(stress)
+    assert "bearing of 'hole' at 1920 N (net section 2400, shear-out 2771), of 1 hole," in said
+    bare = Problem(lug(), isotropic(3000.0, 0.35), (Support("root"),), loads, order=1)
+    assert about_pins(solve(bare)["pull"]) == ""  # no strength, nothing to say
