@@ -182,7 +182,7 @@ def _about_scatter(tested: Sequence[Run]) -> list[str]:
 def _about_joints(tested: Sequence[Run]) -> list[str]:
     """Say at which load a pin tears out of the best run, by the matrix alone: all are alike."""
     best = tested[0].tested if tested else None
-    return list(filter(None, [said_of_pins(best.joints)])) if best else []
+    return list(filter(None, [said_of_pins(best.joints)])) if best and not best.cases else []
 
 
 def _about_links(total: Mapping[str, float]) -> list[str]:

@@ -81,7 +81,15 @@ def cases_remarks(
     tested = [
         run for run in ranking(runs, wanted) if is_tested(run) and not off_length(run, wanted)
     ]
-    if bound is None or not tested or not tested[0].cases:
+    if not tested or not tested[0].cases:
+        return texts
+    if (pin := tested[0].cases.weakest_pin) is not None:
+        factor, case, joint = pin
+        texts.append(
+            f"pins in holes, over all cases: {joint.about} in '{case}', {factor:.2f} times its "
+            "load, by the matrix alone; strands round a hole are not counted"
+        )
+    if bound is None:
         return texts
     ratios = tested[0].cases.tension.ratios
     gap = bound.duality_gap

@@ -7,6 +7,7 @@ from ccfem.base.arrays import FloatArray, in_brief
 from ccfem.base.errors import InputError
 from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.judging.virtual_testing.equilibrium import IN_COMPRESSION, TENSION
+from ccfem.judging.virtual_testing.pinned_joints import PinnedJoint, pinned_joints
 from ccfem.judging.virtual_testing.several_cases import (
     CasesFailure,
     CasesTest,
@@ -14,7 +15,7 @@ from ccfem.judging.virtual_testing.several_cases import (
     specimens,
     virtual_tests,
 )
-from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.judging.virtual_testing.strand import Limits, Strand
 from ccfem.judging.virtual_testing.strands import Strands
 from ccfem.slicing.layers import Layer
 from ccfem.strategies.fibre_aware.upper_bound import UpperBound
@@ -33,6 +34,8 @@ class TestedCases:
         Fibres that carry no compression, a fifth of it, and all of it.
     failure : CasesFailure or None
         Of the tests in tension; None where a strength is unknown.
+    joints : tuple of tuples of PinnedJoint
+        Holes that pins press on in each case, the weakest first; empty where a strength is unknown.
     bound : UpperBound, optional
         What no paths of the compared length can exceed; None without a bound.
     """
@@ -41,6 +44,7 @@ class TestedCases:
     partial: CasesTest
     bonded: CasesTest
     failure: CasesFailure | None
+    joints: tuple[tuple[PinnedJoint, ...], ...] = ()
     bound: UpperBound | None = None
 
     __repr__ = in_brief
@@ -63,6 +67,19 @@ class TestedCases:
         """Least share of all cases, by which runs are ranked."""
         return float(self.shares(mode).min())
 
+    @property
+    def weakest_pin(self) -> tuple[float, str, PinnedJoint] | None:
+        """Least load at which a pin tears out over that of its case, the case, and the joint."""
+        tests = self.tension.tests
+        pins = [
+            (joints[0].load / test.force, name, joints[0])
+            for name, test, joints in zip(
+                self.names, tests, self.joints or [()] * len(tests), strict=True
+            )
+            if joints
+        ]
+        return min(pins, key=lambda pin: pin[0], default=None)
+
     def values(self) -> dict[str, float]:
         """Every value by its column; those of a case have its name in brackets."""
         values: dict[str, float] = {}
@@ -79,6 +96,11 @@ class TestedCases:
             values["above_bound"] = self.bound.gap(self.tension.ratios)
         if self.failure is not None:
             values["first_failure_factor"] = self.failure.factor
+        for name, joints in zip(self.names, self.joints, strict=False):
+            if joints:
+                values[f"pinned_joint_load[{name}]"] = joints[0].load
+        if (weakest := self.weakest_pin) is not None:
+            values["pinned_joint_factor"] = weakest[0]
         return values
 
 
@@ -98,5 +120,10 @@ def in_all_cases(
     try:
         failure = cases_failure(modes[0], strand, layers=layers)
     except InputError:  # the strength of matrix or strand is unknown: `Tested.note` says so
-        failure = None
-    return TestedCases(modes[0], modes[1], modes[2], failure)
+        return TestedCases(modes[0], modes[1], modes[2], None)
+    limits = Limits.of(parts[0].unreinforced.material, strand)
+    joints = tuple(
+        pinned_joints(test.solution, part.forces, test.force, limits)
+        for test, part in zip(modes[0].tests, parts, strict=True)
+    )
+    return TestedCases(modes[0], modes[1], modes[2], failure, joints)

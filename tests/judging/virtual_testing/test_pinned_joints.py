@@ -6,13 +6,17 @@ import shapely
 
 from ccfem.body.mesh.patches import Cylinder, Plane, patches_from_rules
 from ccfem.body.meshing import extrude
+from ccfem.comparison.tested_cases import in_all_cases
 from ccfem.fem.elasticity import Bearing
 from ccfem.fem.elasticity.problem import Force, Problem, Support
 from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.fem.elasticity.system import prepare
 from ccfem.fem.materials import isotropic
 from ccfem.judging.virtual_testing.pinned_joints import about_pins, pinned_joints
-from ccfem.judging.virtual_testing.strand import Limits
+from ccfem.judging.virtual_testing.strand import Limits, Strand
+from ccfem.judging.virtual_testing.strands import cut_strands
+from ccfem.paths.toolpaths import Toolpaths
 
 WIDTH, DIAMETER, THICKNESS, END = 20.0, 8.0, 4.0, 12.0
 TENSILE, CRUSHING = 50.0, 60.0
@@ -73,6 +77,26 @@ def test_a_held_hole_is_judged_by_its_reaction_and_an_idle_one_is_not():
     np.testing.assert_allclose(held.force, [100.0, 0.0, 0.0], atol=1e-4)
     assert held.loads["net section"] == pytest.approx(TENSILE * 12.0 * THICKNESS, rel=1e-3)
     assert joints(lug(), pull, "end") == ()
+
+
+def test_over_several_cases_the_least_multiple_of_a_load_counts():
+    loads = {
+        "pull": (Bearing("hole", (100.0, 0.0, 0.0)),),
+        "push": (Bearing("hole", (-400.0, 0.0, 0.0)),),
+    }
+    problem = Problem(lug(), MATERIAL, (Support("root"),), loads, order=1)
+    line = np.array([[-29.0, 7.0, 2.0], [5.0, 7.0, 2.0]])
+    none = np.zeros(1, dtype=int)
+    up = np.array([[0.0, 0.0, 1.0]] * 2)
+    paths = Toolpaths(line, up, np.array([0, 2]), none, none, none.astype(bool))
+    cases = WeightedCases.of(solve(problem))
+    tested = in_all_cases(cut_strands(paths, problem.mesh), cases, Strand(), ())
+    crushed = CRUSHING * DIAMETER * THICKNESS
+    values = tested.values()
+    for name in loads:
+        assert values[f"pinned_joint_load[{name}]"] == pytest.approx(crushed, rel=1e-3)
+    assert values["pinned_joint_factor"] == pytest.approx(crushed / 400.0, rel=1e-3)
+    assert tested.weakest_pin[1] == "push"
 
 
 def test_a_remark_on_the_part_without_fibre_names_the_weakest_pin():
