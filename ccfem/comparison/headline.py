@@ -113,7 +113,7 @@ _TESTED = (
         "and place. Two designs from the same spools have this and the difference of the "
         "sensitivities between them.",
         ">= 0",
-        _of_scatter(lambda scatter: scatter.alone),
+        _of_scatter(lambda scatter: scatter.independent),
     ),
     _Index(
         "stiffness",

@@ -170,11 +170,13 @@ def _about_scatter(tested: Sequence[Run]) -> list[str]:
     known = [run.tested.scatter for run in tested if run.tested and run.tested.scatter]
     if not known:
         return []
-    alone = known[0].deviation
-    said = f"scatter of prints ([scatter], one standard deviation): {tested[0].name} ± {alone:.1%}"
+    deviation = known[0].deviation
+    said = (
+        f"scatter of prints ([scatter], one standard deviation): {tested[0].name} ± {deviation:.1%}"
+    )
     if len(known) == len(tested) > 1 and not tested[0].cases:
         both = scatter_between(tested[0], tested[1])
-        cancels = ": what they share cancels" if both < 0.5 * alone else ""
+        cancels = ": what they share cancels" if both < 0.5 * deviation else ""
         said += f"; over {tested[1].name}, from the same spools, ± {both:.1%}{cancels}"
     return [said]
 

@@ -93,8 +93,8 @@ class PinnedJoint:
             for mode, load in self.loads.items()
             if mode != self.mode and np.isfinite(load)
         ]
-        more = f" ({', '.join(others)})" if others else ""
-        return f"{self.mode} of '{self.patch}' at {self.load:.0f} N{more}"
+        rest = f" ({', '.join(others)})" if others else ""
+        return f"{self.mode} of '{self.patch}' at {self.load:.0f} N{rest}"
 
 
 def pinned_joints(
@@ -192,7 +192,7 @@ def _joint(
     bearing = limits.matrix
     if material.compressive_strength is not None:
         bearing = material.compressive_strength
-    held = {
+    strengths = {
         BEARING: bearing * 2.0 * radius * thickness,
         NET_SECTION: limits.matrix * net_area if stretched > 0.0 else np.inf,
         SHEAR_OUT: limits.matrix / np.sqrt(3.0) * shear_area,
@@ -205,7 +205,7 @@ def _joint(
         thickness=thickness,
         net_area=net_area,
         shear_area=shear_area,
-        loads={mode: size * float(most) / pull for mode, most in held.items() if most > 0.0},
+        loads={mode: size * float(most) / pull for mode, most in strengths.items() if most > 0.0},
     )
 
 

@@ -78,7 +78,7 @@ class RatioScatter:
     position: float
 
     @property
-    def alone(self) -> float:
+    def independent(self) -> float:
         """Standard deviation of ln(ratio) by all that differs from strand to strand."""
         return float(np.hypot(self.strands, self.position))
 
@@ -86,7 +86,7 @@ class RatioScatter:
     def deviation(self) -> float:
         """Standard deviation of ln(ratio), nearly that of the ratio over its mean."""
         common = (self.fibre * self.given.fibre, self.matrix * self.given.matrix)
-        return float(np.linalg.norm([*common, self.alone]))
+        return float(np.linalg.norm([*common, self.independent]))
 
     def against(self, other: "RatioScatter") -> float:
         """Return the standard deviation of ln(stiffness over that of another design).
@@ -96,7 +96,7 @@ class RatioScatter:
         """
         fibre = (self.fibre - other.fibre) * self.given.fibre
         matrix = (self.matrix - other.matrix) * self.given.matrix
-        return float(np.linalg.norm([fibre, matrix, self.alone, other.alone]))
+        return float(np.linalg.norm([fibre, matrix, self.independent, other.independent]))
 
 
 def ratio_scatter(
@@ -128,9 +128,9 @@ def ratio_scatter(
         pieces = carried * strands.share * strands.length * strain**2
         return np.bincount(strands.path, pieces).astype(float)
 
-    alone = energies(strain)
-    total = float(alone.sum())
-    slopes = np.zeros_like(alone)  # of the energies, by one standard deviation of the place
+    by_strand = energies(strain)
+    total = float(by_strand.sum())
+    slopes = np.zeros_like(by_strand)  # of the energies, by one standard deviation of the place
     if scatter.position > 0.0:
         change = _change_aside(strands, mesh, u, scatter.position, np.array(build))
         slopes = 0.5 * (energies(strain + change) - energies(strain - change))
@@ -139,7 +139,7 @@ def ratio_scatter(
         scatter,
         fibre=fibre,
         matrix=_in_springs(test.unreinforced) - _in_springs(test.solution) - fibre,
-        strands=scatter.strands * share * float(np.linalg.norm(alone)),
+        strands=scatter.strands * share * float(np.linalg.norm(by_strand)),
         position=share * float(np.linalg.norm(slopes)),
     )
 

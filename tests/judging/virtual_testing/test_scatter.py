@@ -60,15 +60,15 @@ def ratio(part, fibres=None, axial=RHO * MODULUS, mode="tension"):
 def test_sensitivities_are_those_of_finite_differences(bed, mode):
     part = Specimen.of(solve(cantilever(bed=bed))["bend"])
     fibres = strands(part.unreinforced.mesh)
-    found = ratio_scatter(virtual_test(fibres, part, Strand(RHO), mode, ()))
+    sensitivity = ratio_scatter(virtual_test(fibres, part, Strand(RHO), mode, ()))
     step, axial = 1e-3, RHO * MODULUS
     by_fibre = [np.log(ratio(part, None, axial * (1 + s), mode)) for s in (step, -step)]
     by_matrix = [
         np.log(ratio(cantilever(MODULUS * (1 + s), bed), mode=mode)) for s in (step, -step)
     ]
-    assert found.fibre == pytest.approx((by_fibre[0] - by_fibre[1]) / (2 * step), rel=1e-4)
-    assert found.matrix == pytest.approx((by_matrix[0] - by_matrix[1]) / (2 * step), rel=1e-4)
-    assert (found.matrix == pytest.approx(-found.fibre, rel=1e-6)) == (not bed)
+    assert sensitivity.fibre == pytest.approx((by_fibre[0] - by_fibre[1]) / (2 * step), rel=1e-4)
+    assert sensitivity.matrix == pytest.approx((by_matrix[0] - by_matrix[1]) / (2 * step), rel=1e-4)
+    assert (sensitivity.matrix == pytest.approx(-sensitivity.fibre, rel=1e-6)) == (not bed)
 
 
 def test_a_hundred_solves_scatter_as_the_sensitivities_say():
