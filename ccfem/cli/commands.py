@@ -16,7 +16,6 @@ from ccfem.base.errors import InputError
 from ccfem.base.progress import progress_bar
 from ccfem.cli.arguments import bed_table_of, drawings_of, names_of, parameters_by_strategy, path_of
 from ccfem.cli.fibre_amounts import front
-from ccfem.cli.fibre_choice import SetFibre
 from ccfem.cli.machines import MachineName, SetMachine, machines
 from ccfem.cli.optimising import optimise
 from ccfem.cli.options import (
@@ -64,8 +63,8 @@ from ccfem.cli.options import (
     Turn,
     VirtualTest,
 )
+from ccfem.cli.part_choices import SetFibre, SetPlastic
 from ccfem.cli.part_commands import add_part_commands
-from ccfem.cli.plastic_choice import SetPlastic
 from ccfem.cli.run import (
     Output,
     calibrated,

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ccfem.cli.arguments import numbers_of, parameters_by_strategy
-from ccfem.cli.fibre_choice import SetFibre
 from ccfem.cli.machines import MachineName, SetMachine
 from ccfem.cli.options import Backend, CasePath, Force, LoadCase, Out, SetCase, SetOfOne, Strategy
-from ccfem.cli.plastic_choice import SetPlastic
+from ccfem.cli.part_choices import SetFibre, SetPlastic
 
 if TYPE_CHECKING:
     from ccfem.comparison.front_points import FibreFront

@@ -16,9 +16,8 @@ from ccfem.base.errors import InputError
 from ccfem.base.progress import Progress, progress_bar
 from ccfem.base.toml import assignment
 from ccfem.cli.arguments import numbers_of
-from ccfem.cli.fibre_choice import fibre_choice
 from ccfem.cli.machines import machine_choice
-from ccfem.cli.plastic_choice import plastic_choice
+from ccfem.cli.part_choices import fibre_choice, plastic_choice
 
 if TYPE_CHECKING:
     from ccfem.cases.case import Case

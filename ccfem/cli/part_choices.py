@@ -1,4 +1,4 @@
-"""The option that says which layers get fibre."""
+"""The options that say which layers of a part get fibre, and what its plastic is printed as."""
 
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Annotated
@@ -10,6 +10,7 @@ from ccfem.base.toml import assignment
 
 if TYPE_CHECKING:
     from ccfem.paths.placement.fibre_places import FibrePlaces
+    from ccfem.paths.plastic.plastic import Plastic
 
 SetFibre = Annotated[
     list[str] | None,
@@ -20,12 +21,21 @@ SetFibre = Annotated[
         "to=9.6, every=2, between=1, covered=true; repeatable.",
     ),
 ]
+SetPlastic = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set-plastic",
+        metavar="KEY=VALUE,..",
+        help="Walls, skins, infill and seam, by keys of [plastic] in a part file: "
+        "infill=gyroid,density=0.2,walls=2,skins=3,fibre_skins=1,seam=behind; repeatable.",
+    ),
+]
 
 
 def fibre_choice(
     texts: Sequence[str] | None,
 ) -> "Callable[[FibrePlaces | None], FibrePlaces] | None":
-    """Turn the option into what it makes of a part's choice; None where it is not given.
+    """Turn ``--set-fibre`` into what it makes of a part's choice; None where it is not given.
 
     Raises
     ------
@@ -43,3 +53,20 @@ def fibre_choice(
         table["layers"] = [table["layers"]]
     fibre_of(table)
     return lambda places: fibre_of(table, base=places)
+
+
+def plastic_choice(texts: Sequence[str] | None) -> "Callable[[Plastic], Plastic] | None":
+    """Turn ``--set-plastic`` into what it makes of a part's plastic; None where it is not given.
+
+    Raises
+    ------
+    InputError
+        As `fibre_choice`.
+    """
+    if not texts:
+        return None
+    from ccfem.cases.part_tables import plastic_of
+
+    table = dict(assignment(piece) for text in texts for piece in text.split(","))
+    plastic_of(table)
+    return lambda plastic: plastic_of(table, plastic)
