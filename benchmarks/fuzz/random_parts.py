@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -137,7 +138,7 @@ def main(count: int = 100, seed: str = "1") -> int:
         part = random_part(random.Random(f"{seed} {k}"))
         start = time.perf_counter()
         with tempfile.TemporaryDirectory() as name:
-            met = verdict(Path(name), lambda folder, part=part: print_part(part, folder), _SECONDS)
+            met = verdict(Path(name), partial(print_part, part), _SECONDS)
         wrong = met not in ("read", "refused")
         tally["WRONG" if wrong else met] += 1
         if wrong:
