@@ -18,13 +18,16 @@ from ccfem.base.errors import InputError, known_names, shown
 from ccfem.body.files.deck import read_deck
 from ccfem.body.files.formats.inp import mesh_of
 from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.cases.deck_constraints import DEGREES, Coupling, DeckConstraints, tied
 from ccfem.cases.deck_materials import TAKE_OUT, CellMaterials, DeckMaterials, DeckReading
 from ccfem.cases.deck_steps import BODY, DeckSteps, FaceLoad, State
 from ccfem.fem.elasticity.load_kinds import (
     BodyForce,
     Centrifugal,
+    Force,
     Gravity,
     Load,
+    Moment,
     NodeForces,
     Pressure,
     Temperature,
@@ -33,7 +36,13 @@ from ccfem.fem.elasticity.load_kinds import (
     points_of,
 )
 from ccfem.fem.elasticity.problem import Region
-from ccfem.fem.elasticity.support_kinds import AnySupport, NodeSupport, Support
+from ccfem.fem.elasticity.support_kinds import (
+    AnySupport,
+    LocalSupport,
+    NodeSupport,
+    RigidPatch,
+    Support,
+)
 from ccfem.fem.materials import Material
 from ccfem.geometry.facets import are_among, facet_keys
 
@@ -102,12 +111,20 @@ def read_analysis(path: Path, scale: float = 1.0, step: str | None = None) -> De
         With a line for everything that cannot be taken over.
     """
     model, deck = read_deck(path)
-    reading = DeckReading(model, deck, scale)
-    steps, known = DeckSteps(reading, mesh_of(model, path)), DeckMaterials(reading)
+    model, cells, mistakes, remarks = tied(model, deck, path)
+    reading = DeckReading(model, deck, scale, cells)
+    reading.mistakes.lines += mistakes
+    reading.remarks += remarks
+    mesh = mesh_of(model, cells, path)
+    constraints = DeckConstraints(reading, mesh)
+    for block, scope in deck.rest:
+        constraints.take(block, scope)
+    constraints.end()
+    steps, known = DeckSteps(reading, mesh, constraints), DeckMaterials(reading)
     for block, scope in deck.rest:
         if block.keyword in DeckMaterials.KEYWORDS:
             known.take(block, scope)
-        else:
+        elif block.keyword not in DeckConstraints.KEYWORDS:
             with reading.noted(block):
                 steps.take(block)
     steps.end_step()
@@ -148,6 +165,7 @@ class _Conversion:
 
     def __init__(self, steps: DeckSteps, expand: bool) -> None:
         self.steps, self.reading, self.mesh, self.expand = steps, steps.reading, steps.mesh, expand
+        self.constraints = steps.constraints
         self._patches = dict(steps.mesh.patches)
 
     def chosen(
@@ -195,36 +213,90 @@ class _Conversion:
 
         The nodes of each set are held as patches where they make facets, the others as nodes.
         """
-        fixed = np.zeros((len(self.mesh.points), 3), dtype=bool)
-        value = np.zeros(fixed.shape)
+        value = np.zeros((len(self.mesh.points), 3))
+        at_reference: dict[int, dict[str, float]] = {}
+        holds = []
         for hold in state.holds:
+            node = int(hold.nodes[0])
+            if node in self.constraints.reference:
+                number, _ = self.constraints.reference[node]
+                for letter in hold.components:
+                    at_reference.setdefault(number, {})[letter] = hold.value
+                continue
+            holds.append(hold)
             for c in map("xyz".index, hold.components):
-                fixed[hold.nodes, c], value[hold.nodes, c] = True, hold.value
+                value[hold.nodes, c] = hold.value
         groups: dict[tuple[str, int, float], list[IntArray]] = {}
-        for hold in state.holds:
+        for hold in holds:
             for c in map("xyz".index, hold.components):
                 key = (hold.title, c, hold.value)
                 groups.setdefault(key, []).append(hold.nodes[value[hold.nodes, c] == hold.value])
         # Components that hold the same nodes of a set make one support.
-        joined: dict[tuple[str, bytes], dict[int, float]] = {}
+        joined: dict[tuple[str, bytes, int], dict[int, float]] = {}
         for (title, c, at), parts in groups.items():
-            chosen = np.unique(np.concatenate(parts))
-            if len(chosen):
-                joined.setdefault((title, chosen.tobytes()), {})[c] = at
-        nodes = self.mesh.facet_nodes(self.steps.border)
+            together = np.unique(np.concatenate(parts))
+            system_of = self.constraints.system_of[together]
+            for system in np.unique(system_of).tolist():
+                chosen = together[system_of == system]
+                joined.setdefault((title, chosen.tobytes(), system), {})[c] = at
         supports: list[AnySupport] = []
-        for (title, chosen_bytes), values in joined.items():
-            inside = np.zeros(len(fixed), dtype=bool)
-            inside[np.frombuffer(chosen_bytes, dtype=np.int64)] = True
-            letters = "".join("xyz"[c] for c in sorted(values))
-            x, y, z = (values.get(c, 0.0) for c in range(3))
-            facets = self.steps.border[inside[nodes].all(axis=1)]
-            if len(facets):
-                supports.append(Support(self._patch(title, facets), letters, (x, y, z)))
-                inside[self.mesh.facet_nodes(facets)] = False
-            if inside.any():
-                supports.append(NodeSupport(title, self._places(inside), letters, (x, y, z)))
-        return tuple(dict.fromkeys(supports)), bool(value[fixed].any())
+        for (title, chosen_bytes, system), values in joined.items():
+            chosen = np.frombuffer(chosen_bytes, dtype=np.int64)
+            supports += self._held_nodes(title, chosen, system, values)
+        for number, coupling in enumerate(self.constraints.couplings):
+            supports += self._coupled(coupling, at_reference.get(number, {}))
+        moves = any(any(held.values()) for held in at_reference.values())
+        return tuple(dict.fromkeys(supports)), moves or bool(value.any())
+
+    def _held_nodes(
+        self, title: str, chosen: IntArray, system: int, values: Mapping[int, float]
+    ) -> Iterator[AnySupport]:
+        """Supports of nodes (k,) along the axes of a system: values by component."""
+        inside = np.zeros(len(self.mesh.points), dtype=bool)
+        inside[chosen] = True
+        ends = self.reading.split.ends
+        inside[len(inside) - len(ends) :] = inside[ends].all(axis=1)
+        letters = "".join("xyz"[c] for c in sorted(values))
+        x, y, z = (values.get(c, 0.0) for c in range(3))
+        facets = self.steps.border[inside[self.mesh.facet_nodes(self.steps.border)].all(axis=1)]
+        local = self.constraints.systems[system] if system >= 0 else None
+        if local is not None and letters == "xyz" and not any(values.values()):
+            local = None  # held along all axes
+        if len(facets):
+            patch = self._patch(title, facets)
+            if local is None:
+                yield Support(patch, letters, (x, y, z))
+            else:
+                first, second = (self.reading.scale * local.points).tolist()
+                yield LocalSupport(patch, (first, second), local.system, letters, (x, y, z))
+            inside[self.mesh.facet_nodes(facets)] = False
+        inside[len(inside) - len(ends) :] = False
+        if inside.any():
+            places = self._places(inside)
+            axes = () if local is None else local.at(self.mesh.points[inside]).swapaxes(1, 2)
+            own = tuple(((*a,), (*b,), (*c,)) for a, b, c in np.asarray(axes).tolist())
+            yield NodeSupport(title, places, letters, (x, y, z), own)
+
+    def _coupled(self, coupling: Coupling, held: Mapping[str, float]) -> Iterator[AnySupport]:
+        """Support of the faces of a coupling whose reference node is held at values by degree."""
+        if not coupling.rigid:
+            if held:
+                raise InputError(
+                    f"*DISTRIBUTING on '{coupling.title}' passes loads on, and its reference node "
+                    f"is held: couple it by *KINEMATIC, or {TAKE_OUT}"
+                )
+            return
+        patch = self._patch(coupling.title, coupling.facets)
+        if set(held) == set(DEGREES) and not any(held.values()):
+            yield Support(patch)
+            return
+        held_at = [held.get(letter, 0.0) for letter in DEGREES]
+        x, y, z = held_at[:3]
+        u, v, w = np.degrees(held_at[3:]).tolist()
+        moved, turned = ("".join(c for c in part if c in held) for part in ("xyz", "uvw"))
+        about = turned.translate(str.maketrans("uvw", "xyz"))
+        px, py, pz = (self.reading.scale * coupling.place).tolist()
+        yield RigidPatch(patch, moved, about, (x, y, z), (u, v, w), (px, py, pz))
 
     def _places(self, chosen: BoolArray | IntArray) -> tuple[Vector, ...]:
         """Places of nodes, mm."""
@@ -256,17 +328,40 @@ class _Conversion:
 
     def _forces(self, state: State) -> Iterator[Load]:
         """Sum up the forces at nodes: those of a step replace those of the steps before."""
-        force = np.zeros((len(self.mesh.points), 3))
+        force = np.zeros((len(self.mesh.points), 6 if self.constraints.couplings else 3))
         since = np.zeros(force.shape, dtype=np.int64)
         for load in state.nodes:
             c, nodes = load.component, load.nodes
             force[nodes, c] = np.where(since[nodes, c] < load.step, 0.0, force[nodes, c])
             force[nodes, c] += load.value
             since[nodes, c] = load.step
+        for node, (number, _) in self.constraints.reference.items():
+            yield from self._spread(self.constraints.couplings[number], force[node])
+            force[node] = 0.0
         loaded = np.flatnonzero(force.any(axis=1))
         if len(loaded):
-            vectors = tuple((x, y, z) for x, y, z in force[loaded].tolist())
-            yield NodeForces(self._places(loaded), vectors)
+            vectors = force[loaded, :3]
+            for k, system in enumerate(self.constraints.systems):
+                own = np.flatnonzero(self.constraints.system_of[loaded] == k)
+                axes = system.at(self.mesh.points[loaded[own]])
+                vectors[own] = np.einsum("kij,kj->ki", axes, vectors[own])
+            yield NodeForces(self._places(loaded), tuple((x, y, z) for x, y, z in vectors.tolist()))
+
+    def _spread(self, coupling: Coupling, total: FloatArray) -> Iterator[Load]:
+        """Force and moment (6,) of a reference node as they act on the faces that hang on it."""
+        if not total.any():
+            return
+        patch, scale = self._patch(coupling.title, coupling.facets), self.reading.scale
+        area, _ = self.mesh.facet_areas(coupling.facets)
+        centroid = area @ self.mesh.points[coupling.facets].mean(axis=1) / area.sum()
+        arm = coupling.place - centroid
+        force, moment = total[:3], total[3:] + np.cross(arm, total[:3])
+        if force.any():
+            fx, fy, fz = force.tolist()
+            yield Force(patch, (fx, fy, fz))
+        if np.linalg.norm(moment) > _SAME * np.linalg.norm(force) * np.linalg.norm(arm):
+            mx, my, mz = (scale * moment).tolist()
+            yield Moment(patch, (mx, my, mz))
 
     def _on_faces(self, state: State) -> Iterator[Load]:
         """Pressures and tractions, one of each size on a patch; those on one set add up."""

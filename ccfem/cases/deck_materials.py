@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError, Mistakes, shown
 from ccfem.base.tensor import rotate_stiffness
+from ccfem.body.files.cells import SplitCells
 from ccfem.body.files.deck import (
     ELEMENTS,
     NODES,
@@ -44,19 +45,21 @@ class DeckReading:
         What cannot be taken over, with its line.
     remarks : list of str
         What was left out and need not be wrong, with its line.
-    cell_of : (e,) int array
-        Tetrahedron of each element; -1 for triangles.
+    split : SplitCells
+        The tetrahedra of its cells.
+    element_of : (m,) int array
+        Row of the element that each of them is of.
     """
 
     model: Model
     deck: Deck
     scale: float
+    split: SplitCells
     mistakes: Mistakes = field(default_factory=Mistakes)
     remarks: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        solid = ~self.model.flat
-        self.cell_of = np.where(solid, np.cumsum(solid) - 1, -1)
+        self.element_of = np.flatnonzero(~self.model.flat)[self.split.parent]
 
     @property
     def pressure(self) -> float:
@@ -92,16 +95,14 @@ class DeckReading:
     def cells(
         self, items: Sequence[str], scopes: Sequence[str] = ("",)
     ) -> tuple[IntArray, IntArray]:
-        """Elements of sets and labels that are tetrahedra, at least one: rows and cells."""
+        """Elements of sets and labels that have a volume, at least one: rows and cells."""
         members = [listed(ELEMENTS, list(items))]
         rows = [chosen_rows(self.model, scope, ELEMENTS, members) for scope in scopes]
         both = np.unique(np.concatenate(rows))
-        both = both[self.cell_of[both] >= 0]
+        both = both[~self.model.flat[both]]
         if not len(both):
-            raise InputError(
-                f"the deck has no tetrahedron in {shown(', '.join(items))}: {TAKE_OUT}"
-            )
-        return both, self.cell_of[both]
+            raise InputError(f"the deck has no solid in {shown(', '.join(items))}: {TAKE_OUT}")
+        return both, np.flatnonzero(np.isin(self.element_of, both))
 
     def scopes_of(self, scope: Scope) -> list[str]:
         """Names in the model of a scope of the deck: of a part, all its instances."""

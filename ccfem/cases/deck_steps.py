@@ -18,10 +18,10 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError, shown
-from ccfem.body.files.cells import outside
-from ccfem.body.files.deck import FACES, Block, element_faces
-from ccfem.body.files.formats.inp import surface_facets
+from ccfem.body.files.deck import Block, element_faces
+from ccfem.body.files.formats.inp import facets_of_surface
 from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.cases.deck_constraints import DEGREES, DeckConstraints
 from ccfem.cases.deck_materials import (
     TAKE_OUT,
     DeckReading,
@@ -61,19 +61,17 @@ _PROCEDURES = {
 _ACTING = ("BOUNDARY", "CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE")
 """Keywords of what acts on a part."""
 _HELD = {
-    "ENCASTRE": "xyz",
+    "ENCASTRE": "xyzuvw",
     "PINNED": "xyz",
-    "XSYMM": "x",
-    "YSYMM": "y",
-    "ZSYMM": "z",
-    "XASYMM": "yz",
-    "YASYMM": "xz",
-    "ZASYMM": "xy",
+    "XSYMM": "xvw",
+    "YSYMM": "yuw",
+    "ZSYMM": "zuv",
+    "XASYMM": "yzu",
+    "YASYMM": "xzv",
+    "ZASYMM": "xyw",
 }
-"""Components that named boundary conditions hold; solids have no rotations."""
-_ROTATIONS = 6
-"""Last degree of freedom that is a displacement or a rotation."""
-_FACE = {"P1": "S1", "P2": "S2", "P3": "S3", "P4": "S4"}
+"""Degrees of freedom that named boundary conditions hold; solids have no rotations."""
+_FACE = {f"P{k}": f"S{k}" for k in range(1, 7)}
 _NUMBERS = {"GRAV": 4, "CENTRIF": 7}
 """Numbers of loads on the volume that have more than one."""
 BODY = {"BX": 0, "BY": 1, "BZ": 2}
@@ -83,7 +81,7 @@ BODY = {"BX": 0, "BY": 1, "BZ": 2}
 
 
 class Hold(NamedTuple):
-    """A line of *BOUNDARY."""
+    """A line of *BOUNDARY: letters of `DEGREES`, rotations on reference nodes alone."""
 
     title: str
     nodes: IntArray
@@ -92,7 +90,7 @@ class Hold(NamedTuple):
 
 
 class NodeLoad(NamedTuple):
-    """A line of *CLOAD."""
+    """A line of *CLOAD: a place in `DEGREES`, moments on reference nodes alone."""
 
     nodes: IntArray
     component: int
@@ -159,9 +157,9 @@ class DeckStep:
 class DeckSteps:
     """Supports, loads and steps of a deck, as its keywords come by."""
 
-    def __init__(self, reading: DeckReading, mesh: TetMesh) -> None:
-        self.reading, self.mesh = reading, mesh
-        self.border = outside(mesh)
+    def __init__(self, reading: DeckReading, mesh: TetMesh, constraints: DeckConstraints) -> None:
+        self.reading, self.mesh, self.constraints = reading, mesh, constraints
+        self.border = constraints.border
         self.in_cell = np.zeros(len(mesh.points), dtype=bool)
         self.in_cell[mesh.cells] = True
         self._state = State()
@@ -335,20 +333,28 @@ class DeckSteps:
                 else:
                     first, last, value = numbers([*items[1:4], "", ""], 3)
                     last = last or first
-                    if not 1 <= first <= last <= _ROTATIONS or (first % 1, last % 1) != (0.0, 0.0):
+                    if not 1 <= first <= last <= len(DEGREES) or first % 1 or last % 1:
                         raise InputError(
-                            f"degrees of freedom are 1 to {_ROTATIONS}, or one of "
+                            f"degrees of freedom are 1 to {len(DEGREES)}, or one of "
                             f"{', '.join(_HELD)}; got {shown(', '.join(items[1:3]))}: {TAKE_OUT}"
                         )
-                    letters = "xyz"[int(first) - 1 : int(last)]
-                    if last > len("xyz") and value:
-                        raise InputError(f"solids have no rotations to be given: {TAKE_OUT}")
-                loose = np.count_nonzero(~self.in_cell[nodes])
-                if loose:
-                    self.reading.remark(block, f"holds {loose} nodes of no tetrahedron in vain")
+                    letters = DEGREES[int(first) - 1 : int(last)]
                 title = f"line {block.number}" if items[0].isdecimal() else items[0]
-                if letters and loose < len(nodes):
-                    chosen = nodes[self.in_cell[nodes]]
+                references, chosen = self.constraints.apart(nodes, self.in_cell)
+                for node, offset in references:
+                    here = self.constraints.degrees(letters, offset)
+                    # Displacements are lengths, rotations are not.
+                    for part, unit in (("xyz", self.reading.scale), ("uvw", 1.0)):
+                        held = "".join(letter for letter in here if letter in part)
+                        if held:
+                            yield Hold(title, node, held, value * factor * unit)
+                if len(chosen) and value and set(letters) - set("xyz"):
+                    raise InputError(f"solids have no rotations to be given: {TAKE_OUT}")
+                loose = len(nodes) - len(references) - len(chosen)
+                if loose:
+                    self.reading.remark(block, f"holds {loose} nodes of no solid in vain")
+                letters = "".join(letter for letter in letters if letter in "xyz")
+                if letters and len(chosen):
                     yield Hold(title, chosen, letters, value * factor * self.reading.scale)
 
     def _node_loads(self, block: Block, factor: float, now: int) -> Iterator[NodeLoad]:
@@ -358,14 +364,24 @@ class DeckSteps:
                 check_count(items, 3)
                 nodes = self.reading.nodes(items[0])
                 component, value = numbers(items[1:3], 2)
-                if component not in (1.0, 2.0, 3.0):
+                if component % 1 or not 1 <= component <= len(DEGREES):
                     raise InputError(
-                        f"forces act along 1, 2 or 3; got {shown(items[1:2])}, and solids take no "
-                        f"moments: {TAKE_OUT}"
+                        f"forces and moments are 1 to {len(DEGREES)}; got {shown(items[1])}: "
+                        f"{TAKE_OUT}"
                     )
-                if not self.in_cell[nodes].all():
-                    raise InputError(f"{shown(items[0])} has nodes of no tetrahedron: {TAKE_OUT}")
-                yield NodeLoad(nodes, int(component) - 1, value * factor, now)
+                references, chosen = self.constraints.apart(nodes, self.in_cell)
+                for node, offset in references:
+                    for letter in self.constraints.degrees(DEGREES[int(component) - 1], offset):
+                        yield NodeLoad(node, DEGREES.index(letter), value * factor, now)
+                if len(chosen) and component > 3:
+                    raise InputError(
+                        f"forces act along 1, 2 or 3, and solids take no moments; got "
+                        f"{shown(items[1])}: {TAKE_OUT}"
+                    )
+                if len(references) + len(chosen) < len(nodes):
+                    raise InputError(f"{shown(items[0])} has nodes of no solid: {TAKE_OUT}")
+                if len(chosen):
+                    yield NodeLoad(chosen, int(component) - 1, value * factor, now)
 
     def _distributed(self, block: Block, state: State, factor: float, now: int) -> State:
         """Add the lines of a *DLOAD or a *DSLOAD to what acts."""
@@ -429,15 +445,7 @@ class DeckSteps:
 
     def _on_surface(self, name: str, label: str, rest: list[float], now: int) -> FaceLoad:
         """Load of a line of *DSLOAD."""
-        scope, _, tail = name.rpartition(".")
-        model = self.reading.model
-        for key, title in ((scope.upper(), tail.upper()), ("", name.upper())):
-            content = model.scopes.get(key)
-            if content is not None and (FACES, title) in content.sets:
-                facets = surface_facets(model, key, content.sets[FACES, title], self.border)
-                break
-        else:
-            raise InputError(f"the deck has no surface {shown(name)}: {TAKE_OUT}")
+        facets = facets_of_surface(self.reading.model, name, self.border)
         if label == "P":
             return self._face_load(name, facets, rest[0], None, now, "DSLOAD")
         if label != "TRVEC" or not any(rest[1:4]):
@@ -487,4 +495,6 @@ class DeckSteps:
                         f"{TAKE_OUT}"
                     )
                 result[self.reading.nodes(items[0])] = factor * numbers(items[1:2], 1)[0]
+        ends = self.reading.split.ends  # middles of diagonals, of which the deck knows nothing
+        result[len(result) - len(ends) :] = result[ends].mean(axis=1)
         return result

@@ -312,7 +312,7 @@ def test_parts_and_instances_are_followed(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("*TIE, NAME=T\na, b\n", r"line \d+: \*TIE: it is not taken over"),
+        ("*TIE, NAME=T\na, b\n", r"line \d+: \*TIE: the deck has no surface 'a'"),
         ("*NONSENSE\n", r"\*NONSENSE: it is not taken over"),
         ("*BOUNDARY\nfoot, 11, 11, 300.\n", r"degrees of freedom are 1 to 6"),
         ("*BOUNDARY\nnobody, 1\n", "does not have"),

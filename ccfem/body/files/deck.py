@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.errors import InputError, shown
 from ccfem.base.whole import existing_file
+from ccfem.body.files.cells import CELL_FACES, triangles_of
 
 # From lines to keywords.
 
@@ -114,13 +115,29 @@ _REFUSED = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM")
 _KINDS = (
     (r"D?C3D4", "tetra", 4),
     (r"D?C3D10", "tetra10", 10),
+    (r"D?C3D8|SC8", "hexahedron", 8),
+    (r"D?C3D20", "hexahedron20", 20),
+    (r"D?C3D6|SC6", "wedge", 6),
+    (r"D?C3D15", "wedge15", 15),
+    (r"D?C3D5", "pyramid", 5),
+    (r"D?C3D13", "pyramid13", 13),
+    (r"D?C3D27", "polyhedron27", 0),
     (r"(CPS|CPE|S|M3D|SFM3D|R3D|DS|STRI)3|S3R", "triangle", 3),
-    (r"(CPS|CPE|M3D|SFM3D|DS)6|STRI65", "triangle6", 6),
-    (r"D?C3D(8|20|27)|SC8", "hexahedron", 0),
-    (r"D?C3D(6|15)|SC6", "wedge", 0),
-    (r"D?C3D(5|13)", "pyramid", 0),
+    (r"(CPS|CPE|M3D|SFM3D|DS|S)6|STRI65", "triangle6", 6),
+    (r"(CPS|CPE|S|M3D|SFM3D|R3D|DS)4", "quad", 4),
+    (r"(CPS|CPE|S|M3D|SFM3D|DS)8", "quad8", 8),
+    (r"(S|M3D)9", "quad9", 9),
 )
 """Element types by the start of their name (variants end in letters), and their nodes."""
+_CORNERS = {
+    "triangle": 3,
+    "quad": 4,
+    "tetra": 4,
+    "pyramid": 5,
+    "wedge": 6,
+    "hexahedron": 8,
+    "polyhedron": 8,
+}
 NODES, ELEMENTS, FACES = "node set", "element set", "surface"
 """Kinds of named sets: a name may stand for one of each."""
 _DIGITS = 16
@@ -142,7 +159,7 @@ class Members:
     instance : str
         Whose labels and names they are, in capitals; empty for those of the scope itself.
     face : str
-        Of elements, in a surface: S1 to S4, or empty for the elements themselves.
+        Of elements, in a surface: S1 to S6, or empty for the elements themselves.
     """
 
     kind: str
@@ -403,8 +420,10 @@ class Model:
         Of `NODES` and `ELEMENTS` in each scope.
     nodes : (e, q) array
         Rows of the nodes of all elements; -1 behind the last one.
+    corners : (e,) array
+        Number of corners of each element.
     flat : (e,) array
-        Which elements are triangles.
+        Which elements are triangles or quadrangles.
     """
 
     scopes: dict[str, Scope]
@@ -412,6 +431,7 @@ class Model:
     blocks: list[tuple[str, IntArray]]
     rows: dict[tuple[str, str], _Rows]
     nodes: IntArray
+    corners: IntArray
     flat: BoolArray
 
 
@@ -493,10 +513,11 @@ def _model(scopes: dict[str, Scope]) -> Model:
         np.pad(at, ((0, 0), (0, widest - at.shape[1])), constant_values=-1) for _, at in blocks
     ]
     nodes = np.concatenate([np.zeros((0, widest), dtype=np.int64), *padded])
-    flat = np.repeat(
-        [kind.startswith("triangle") for kind, _ in blocks], [len(at) for _, at in blocks]
-    )
-    flat = flat.astype(bool)  # also where there are none
+    kinds = np.repeat(np.arange(len(blocks)), [len(at) for _, at in blocks])
+    flat = np.array([kind.startswith(("triangle", "quad")) for kind, _ in blocks], dtype=bool)[
+        kinds
+    ]
+    corners = np.array([_CORNERS[kind.rstrip("0123456789")] for kind, _ in blocks], dtype=np.int64)
     for known in (rows[ELEMENTS, name] for name in scopes):
         again = np.flatnonzero(np.diff(known.labels) == 0)
         differ = (nodes[known.rows[again]] != nodes[known.rows[again + 1]]).any(axis=1)
@@ -505,7 +526,7 @@ def _model(scopes: dict[str, Scope]) -> Model:
                 f"element {known.labels[again[differ][0]]} is given twice with different nodes: "
                 "number the elements through"
             )
-    return Model(scopes, np.concatenate(points), blocks, rows, nodes, flat)
+    return Model(scopes, np.concatenate(points), blocks, rows, nodes, corners[kinds], flat)
 
 
 def _distinct_nodes(scope: Scope) -> tuple[IntArray, FloatArray]:
@@ -580,22 +601,18 @@ def chosen_rows(model: Model, scope: str, kind: str, members: list[Members]) -> 
     return np.unique(np.concatenate(chosen))
 
 
-_FACE_CORNERS = {"S1": [0, 1, 2], "S2": [0, 3, 1], "S3": [1, 3, 2], "S4": [2, 3, 0]}
-"""Corner nodes of the faces of a tetrahedron."""
-
-
 def element_faces(model: Model, rows: IntArray, face: str) -> IntArray:
-    """Facets (k, 3) of elements (rows): a face of tetrahedra, as "S1", or triangles, "SPOS".
+    """Facets (k, 3) of elements (rows): a face of solids, as "S1", or flat elements, "SPOS".
 
-    Without the name of a face they are all faces and all triangles.
+    Without the name of a face they are all faces and all flat elements; quadrangles are cut.
     """
-    flat = model.flat[rows]
+    flat, corners = model.flat[rows], model.corners[rows]
     facets = [np.zeros((0, 3), dtype=np.int64)]
-    if face in ("", "SPOS", "SNEG"):
-        facets.append(model.nodes[rows[flat], :3])
-    facets += [
-        model.nodes[rows[~flat]][:, corners]
-        for name, corners in _FACE_CORNERS.items()
-        if face in ("", name)
-    ]
+    for count in (3, 4) if face in ("", "SPOS", "SNEG") else ():
+        facets.append(triangles_of(model.nodes[rows[flat & (corners == count)], :count]))
+    for count, faces in CELL_FACES.items():
+        nodes = model.nodes[rows[~flat & (corners == count)]]
+        for number, of_face in enumerate(faces, 1):
+            if len(nodes) and face in ("", f"S{number}"):
+                facets.append(triangles_of(nodes[:, of_face]))
     return np.concatenate(facets)

@@ -8,9 +8,32 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-_NODES = {5: 3, 10: 4, 22: 6, 24: 10}
+_FACETS = {5: 3, 22: 6, 9: 4, 23: 8, 28: 9}
+_SOLIDS = {
+    10: 4,
+    24: 10,
+    14: 5,
+    27: 13,
+    13: 6,
+    26: 15,
+    32: 18,
+    11: 8,
+    12: 8,
+    25: 20,
+    29: 27,
+}
+_NODES = {**_FACETS, **_SOLIDS}
 """Nodes of the cells whose nodes are wanted, by VTK's number of their type."""
-_LAGRANGE = {(69, 3): 5, (69, 6): 22, (71, 4): 10, (71, 10): 24}
+_LAGRANGE = {
+    (69, 3): 5,
+    (69, 6): 22,
+    (70, 4): 9,
+    (71, 4): 10,
+    (71, 10): 24,
+    (72, 8): 12,
+    (73, 6): 13,
+    (74, 5): 14,
+}
 """Types of the same cells, by that of Lagrange cells, as DOLFINx writes them, and their nodes."""
 
 
@@ -80,13 +103,13 @@ def read_xdmf(path: str) -> dict[str, Any]:
     blocks = [found] if whole else [found.GetBlock(k) for k in range(found.GetNumberOfBlocks())]
     blocks = [block for block in blocks if block is not None and block.IsA("vtkUnstructuredGrid")]
     grids = [_grid_arrays(block) for block in blocks]
-    volumes = [k for k, grid in enumerate(grids) if {10, 24} & set(grid["types"].tolist())]
+    volumes = [k for k, grid in enumerate(grids) if set(_SOLIDS) & set(grid["types"].tolist())]
     if not volumes:
-        raise ValueError("no grid of tetrahedra")
+        raise ValueError("no grid of cells with a volume")
     main = grids[volumes[0]]
     for k, grid in enumerate(grids):
         cells = {name: nodes for name, nodes in grid.items() if name.startswith("cells:")}
-        if k in volumes or not set(cells) <= {"cells:5", "cells:22"}:
+        if k in volumes or not set(cells) <= {f"cells:{kind}" for kind in _FACETS}:
             continue
         if len(grid["points"]) != len(main["points"]):
             raise ValueError("its grids do not share their points")

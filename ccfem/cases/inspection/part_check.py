@@ -458,7 +458,7 @@ def _warnings(case: Case, rows: Sequence[LoadRow], doubts: Sequence[str]) -> lis
     if sliver:
         lines.append(sliver)
     for row in rows:
-        if row.size == 0.0:
+        if row.size == 0.0 and not row.what.startswith("moment on "):
             lines.append(
                 f"load case '{row.case}': {row.what} has no resultant because its parts cancel: "
                 "check that the patch faces one way"

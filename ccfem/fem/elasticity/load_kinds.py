@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ccfem.base.checks import ACCELERATION, FORCE, MASS_DENSITY, TRACTION, WARMTH, Range
+from ccfem.base.checks import ACCELERATION, FORCE, MASS_DENSITY, MOMENT, TRACTION, WARMTH, Range
 from ccfem.base.errors import InputError
 from ccfem.base.formula import check_formula
 
@@ -44,6 +44,18 @@ class Bearing:
 
     The pressure acts along the facet normals and varies as the cosine of the angle to the force,
     on the half that the pin touches; it is scaled to the total force.
+    """
+
+    patch: str
+    vector: Vector
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A total moment, N mm, spread over a patch by tractions without a resultant force.
+
+    The tractions are those that a rigid plate on a soft bed passes on: each is at right angles to
+    the arm from the centroid of the patch and grows with it.
     """
 
     patch: str
@@ -169,7 +181,7 @@ class Displacement:
     vector: Vector
 
 
-SurfaceLoad = Force | Traction | Pressure | Bearing | PointForce | NodeForces
+SurfaceLoad = Force | Traction | Pressure | Bearing | Moment | PointForce | NodeForces
 VolumeLoad = BodyForce | Gravity | Centrifugal
 Load = SurfaceLoad | VolumeLoad | Temperature | Displacement
 
@@ -199,6 +211,8 @@ def sizes_of(load: Load) -> tuple[tuple[str, float, Range], ...]:
         return (("change of temperature", float(max(np.ravel(load.change), key=abs)), WARMTH),)
     if isinstance(load, NodeForces):
         return ((in_words(load), float(max(np.ravel(load.vectors), key=abs)), FORCE),)
+    if isinstance(load, Moment):
+        return ((in_words(load), max(load.vector, key=abs), MOMENT),)
     if isinstance(load, Pressure):
         return ((in_words(load), load.magnitude, TRACTION),)
     if isinstance(load, Force | Bearing | PointForce | Traction):

@@ -33,6 +33,7 @@ from ccfem.fem.elasticity.load_kinds import (
     Force,
     Gravity,
     Load,
+    Moment,
     NodeForces,
     PointForce,
     Pressure,
@@ -43,6 +44,7 @@ from ccfem.fem.elasticity.load_kinds import (
     sizes_of,
 )
 from ccfem.fem.elasticity.nodes import (
+    FACET_PRODUCTS,
     LoadedBody,
     SupportedProblem,
     facet_normals,
@@ -186,6 +188,26 @@ def _bearing(mesh: LoadedBody, load: Bearing) -> FloatArray:
     return _consistent_forces(mesh, facets, forces + area[:, None] / area.sum() * rest)
 
 
+def _moment(mesh: LoadedBody, load: Moment) -> FloatArray:
+    """Tractions ``a x (x - centroid)``, with a such that the nodal forces have the moment.
+
+    The forces are consistent: those of a linear traction on straight facets are exact.
+    """
+    facets = patch_facets(mesh, load.patch)
+    if mesh.points.shape[1] != 3:
+        raise InputError(f"a moment goes with a part in space; got patch '{load.patch}' of a sheet")
+    nodes = mesh.facet_nodes(facets)
+    products = mesh.facet_areas(facets)[0][:, None, None] * FACET_PRODUCTS[nodes.shape[1]]
+    weight = products.sum(axis=2)
+    centroid = np.einsum("kn,kni->i", weight, mesh.points[nodes]) / weight.sum()
+    arm = mesh.points[nodes] - centroid
+    second = np.einsum("knm,kni,kmj->ij", products, arm, arm)
+    turn = np.linalg.solve(np.trace(second) * np.eye(3) - second, np.asarray(load.vector))
+    result = np.zeros(mesh.points.shape)
+    np.add.at(result, nodes, products @ np.cross(turn, arm))
+    return result
+
+
 def _point(mesh: LoadedBody, load: PointForce) -> FloatArray:
     result = np.zeros(mesh.points.shape)
     result[nearest_node(mesh, load.point, "a point force")] = _load_vector(mesh, load)
@@ -204,6 +226,7 @@ _KINDS: dict[type, Callable[..., FloatArray]] = {
     Traction: _traction,
     Pressure: _pressure,
     Bearing: _bearing,
+    Moment: _moment,
     PointForce: _point,
     NodeForces: _nodes,
 }

@@ -73,6 +73,21 @@ class SupportedProblem(Protocol):
         ...
 
 
+FACET_PRODUCTS = {
+    3: (np.ones((3, 3)) + np.eye(3)) / 12.0,
+    6: np.array(
+        [
+            [6, -1, -1, 0, -4, 0],
+            [-1, 6, -1, 0, 0, -4],
+            [-1, -1, 6, -4, 0, 0],
+            [0, 0, -4, 32, 16, 16],
+            [-4, 0, 0, 16, 32, 16],
+            [0, -4, 0, 16, 16, 32],
+        ]
+    )
+    / 180.0,
+}
+"""Integrals of the products of the shape functions over a facet of unit area, by its nodes."""
 _SAME = 1e-9
 """Distance of two places over the size of the part that counts as none."""
 _COARSE = 50.0

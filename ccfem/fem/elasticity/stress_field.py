@@ -24,6 +24,7 @@ from ccfem.fem.elasticity.recovery import cell_strain, nodal_stress
 from ccfem.fem.elasticity.support_kinds import (
     AnySupport,
     EdgeSupport,
+    LocalSupport,
     NodeSupport,
     PointSpring,
     PointSupport,
@@ -225,7 +226,8 @@ def support_forces(problem: Problem, reactions: FloatArray) -> dict[str, FloatAr
 
 def _claim(mesh: TetMesh, support: AnySupport) -> tuple[str, IntArray, IntArray]:
     """Name of a support, its nodes, and the components that it may hold there."""
-    letters = "xyz" if isinstance(support, RigidPatch) else getattr(support, "components", "xyz")
+    turned = isinstance(support, RigidPatch | LocalSupport) or getattr(support, "axes", ())
+    letters = "xyz" if turned else getattr(support, "components", "xyz")
     components = np.array([k for k in range(3) if "xyz"[k] in letters], dtype=np.int64)
     if isinstance(support, EdgeSupport):
         label = f"edge of {support.patches[0]} and {support.patches[1]}"

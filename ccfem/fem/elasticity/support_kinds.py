@@ -1,16 +1,19 @@
 """Kinds of supports: patches, edges, points, rigid patches, pins, springs and elastic beds."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
+from ccfem.base.arrays import FloatArray
 from ccfem.base.checks import BED, SPRING, Range
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.patches import unit_vector
 from ccfem.fem.elasticity.load_kinds import Vector
 
 _ZERO = (0.0, 0.0, 0.0)
+_UNIT = 1e-9
+"""Deviation from unit vectors at right angles that is taken for rounding."""
 _LARGEST_ANGLE = 25.0
 """Rotation, degrees, above which linear theory lengthens a part that turns by a tenth:
 ``sqrt(1 + angle^2)``."""
@@ -92,18 +95,93 @@ class NodeSupport:
     points : tuple of tuples of 3 floats, mm
     components : str, default "xyz"
     value : tuple of 3 floats, mm, default zero
+    axes : tuple of 3 tuples of 3 floats each, optional
+        For each point the unit vectors that its components are along; default those of the space.
     """
 
     name: str
     points: tuple[Vector, ...]
     components: str = "xyz"
     value: Vector = _ZERO
+    axes: tuple[tuple[Vector, Vector, Vector], ...] = ()
 
     def __post_init__(self) -> None:
         _check_components(self, self.components, f"nodes '{self.name}'")
         if not self.points:
             raise InputError(f"the support at nodes '{self.name}' has no point: give some")
         _check_finite(self, "points")
+        if self.axes:
+            axes = np.asarray(self.axes, dtype=np.float64)
+            off = np.abs(np.einsum("kij,klj->kil", axes, axes) - np.eye(3)).max()
+            if len(axes) != len(self.points) or not off <= _UNIT:
+                raise InputError(
+                    f"the axes of the support at nodes '{self.name}' must be three unit vectors at "
+                    f"right angles a point; got {len(axes)} for {len(self.points)} points, off by "
+                    f"up to {off:.2g}: correct them"
+                )
+
+
+@dataclass(frozen=True)
+class LocalSupport:
+    """Components along axes of its own held on a patch: of a turned or a cylindrical system.
+
+    Attributes
+    ----------
+    points : tuple of 2 tuples of 3 floats, mm
+        Of a rectangular system a vector along its x axis and one in its xy plane, both from the
+        origin. Of a cylindrical one two points on its axis: x is then radial, y tangential, and z
+        along the axis, from the first to the second.
+    system : "rectangular" or "cylindrical", default "rectangular"
+    components : str, default "xyz"
+        Which components are held, along these axes.
+    value : tuple of 3 floats, mm, default zero
+        Displacement that the held components take, along these axes.
+    """
+
+    patch: str
+    points: tuple[Vector, Vector]
+    system: Literal["rectangular", "cylindrical"] = "rectangular"
+    components: str = "xyz"
+    value: Vector = _ZERO
+
+    def __post_init__(self) -> None:
+        _check_components(self, self.components, f"patch '{self.patch}'")
+        if len(self.points) != 2:
+            raise InputError(
+                f"the axes of patch '{self.patch}' need two points; got {self.points}: give two"
+            )
+        _check_finite(self, "points", "value")
+        local_axes(self.system, self.points, np.zeros((0, 3)))
+
+
+def local_axes(system: str, points: Any, places: FloatArray) -> FloatArray:
+    """Axes (k, 3, 3) as columns at places (k, 3) of a system of two points: see `LocalSupport`.
+
+    Raises
+    ------
+    InputError
+        Where the points show no axes, or a place lies on the axis of a cylindrical system.
+    """
+    first, second = np.asarray(points, dtype=np.float64)
+    round_ = system == "cylindrical"
+    third = second - first if round_ else np.cross(first, second)
+    size = np.linalg.norm(third)
+    if not 0.0 < size < np.inf:
+        raise InputError(f"two points show no axes; got {points}: give others")
+    third = np.tile(third / size, (len(places), 1))
+    if round_:
+        along = places - first
+        along = along - np.einsum("ki,ki->k", along, third)[:, None] * third
+    else:
+        along = np.tile(first, (len(places), 1))
+    radius = np.linalg.norm(along, axis=1)
+    if not (radius > _UNIT * np.linalg.norm(places - first, axis=1)).all():
+        raise InputError(
+            f"a place lies on the axis of a cylindrical system through {tuple(first.tolist())}, "
+            "where nothing is radial: leave it out, or move the axis"
+        )
+    along /= radius[:, None]
+    return np.stack([along, np.cross(third, along), third], axis=2)
 
 
 @dataclass(frozen=True)
@@ -290,6 +368,7 @@ AnySupport = (
     | EdgeSupport
     | PointSupport
     | NodeSupport
+    | LocalSupport
     | SlidingSupport
     | PressingSupport
     | RigidPatch

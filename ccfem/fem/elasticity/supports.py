@@ -14,6 +14,7 @@ from ccfem.fem.elasticity.assembly import add_blocks
 from ccfem.fem.elasticity.held import Body, Held, Ties
 from ccfem.fem.elasticity.load_kinds import Displacement
 from ccfem.fem.elasticity.nodes import (
+    FACET_PRODUCTS,
     LoadedBody,
     SupportedProblem,
     edge_nodes,
@@ -29,6 +30,7 @@ from ccfem.fem.elasticity.support_kinds import (
     AnySupport,
     EdgeSupport,
     Foundation,
+    LocalSupport,
     NodeSupport,
     Pin,
     PointSpring,
@@ -38,6 +40,7 @@ from ccfem.fem.elasticity.support_kinds import (
     SlidingSupport,
     Spring,
     Support,
+    local_axes,
 )
 
 
@@ -79,7 +82,9 @@ def held_in(problem: SupportedProblem, case: str, at_rest: Held) -> Held:
     for patch, vector in moves.items():
         holding = [s for s in problem.supports if type(s) in _KINDS and _moves(s) == patch]
         holding = [s for s in holding if not isinstance(s, PressingSupport)]
+        turned = [s for s in holding if isinstance(s, LocalSupport)]
         known = {letter for s in holding for letter in getattr(s, "components", "xyz")}
+        known |= set("xyz" if turned else "")
         wanted = {letter for letter, size in zip("xyz", vector, strict=True) if size}
         if not np.isfinite(vector).all() or not wanted <= known:
             raise InputError(
@@ -157,6 +162,12 @@ class _Collected:
                 )
             self.free[nodes, k] = False
             self.value[nodes, k] = value[k]
+
+    def along(self, nodes: IntArray, axes: FloatArray, components: str, values: FloatArray) -> None:
+        """Hold components of nodes (k,) along axes (k, 3, 3), as columns, at values (k, 3)."""
+        for component in sorted(set(components)):
+            k = "xyz".index(component)
+            self.oblique.append((nodes, axes[:, :, k], values[:, k]))
 
     def holds(self) -> Holds:
         """Directions that are held, including those of springs and pressing supports."""
@@ -257,7 +268,20 @@ def _point(collected: _Collected, support: PointSupport, move: Sequence[float] |
 
 def _nodes(collected: _Collected, support: NodeSupport, move: Sequence[float] | None) -> None:
     nodes = nearest_nodes(collected.mesh, support.points, f"the support '{support.name}'")
+    if support.axes:
+        axes = np.asarray(support.axes, dtype=np.float64).swapaxes(1, 2)
+        collected.along(nodes, axes, support.components, np.tile(support.value, (len(nodes), 1)))
+        return
     collected.components(nodes, support.components, support.value, f"nodes '{support.name}'")
+
+
+def _local(collected: _Collected, support: LocalSupport, move: Sequence[float] | None) -> None:
+    nodes = patch_nodes(collected.mesh, support.patch)
+    axes = local_axes(support.system, support.points, collected.mesh.points[nodes])
+    values = np.tile(support.value, (len(nodes), 1))
+    if move is not None:
+        values = np.einsum("kji,j->ki", axes, np.asarray(move))
+    collected.along(nodes, axes, support.components, values)
 
 
 def _sliding(collected: _Collected, support: SlidingSupport, move: Sequence[float] | None) -> None:
@@ -331,6 +355,7 @@ _KINDS: dict[type, Callable[..., None]] = {
     EdgeSupport: _edge,
     PointSupport: _point,
     NodeSupport: _nodes,
+    LocalSupport: _local,
     SlidingSupport: _sliding,
     PressingSupport: _pressing,
     RigidPatch: _rigid,
@@ -460,22 +485,6 @@ def _pressing_axes(
 
 Soft = Spring | PointSpring | Foundation
 
-_LINEAR = (np.ones((3, 3)) + np.eye(3)) / 12.0
-_QUADRATIC = (
-    np.array(
-        [
-            [6, -1, -1, 0, -4, 0],
-            [-1, 6, -1, 0, 0, -4],
-            [-1, -1, 6, -4, 0, 0],
-            [0, 0, -4, 32, 16, 16],
-            [-4, 0, 0, 16, 32, 16],
-            [0, -4, 0, 16, 16, 32],
-        ]
-    )
-    / 180.0
-)
-"""Integrals of the products of the shape functions over a facet of unit area."""
-
 
 def soft_supports(problem: SupportedProblem) -> tuple[Soft, ...]:
     """Supports of a problem that are elastic."""
@@ -530,7 +539,7 @@ def _elements(mesh: LoadedBody, support: Soft) -> tuple[IntArray, FloatArray]:
     facets = patch_facets(mesh, support.patch)
     area, _ = mesh.facet_areas(facets)
     nodes = mesh.facet_nodes(facets)
-    shapes = _LINEAR if nodes.shape[1] == 3 else _QUADRATIC
+    shapes = FACET_PRODUCTS[nodes.shape[1]]
     if isinstance(support, Spring):
         bed = np.diag(support.stiffness) / area.sum()
         blocks = np.einsum("k,ab,ij->kaibj", area, shapes, bed)

@@ -1,4 +1,4 @@
-"""Abaqus and CalculiX input decks (``.inp``): tetrahedra, and sets and surfaces as patches.
+"""Abaqus and CalculiX input decks (``.inp``): solids, and sets and surfaces as patches.
 
 How a deck is read is in `ccfem.body.files.deck`. Patches come from surfaces (of element faces, of
 whole elements, or of nodes), from sets of triangles (shells, membranes), and from node sets: a
@@ -15,7 +15,7 @@ import numpy as np
 
 from ccfem.base.arrays import BoolArray, IntArray
 from ccfem.base.errors import InputError, shown
-from ccfem.body.files.cells import outside, tetrahedra
+from ccfem.body.files.cells import SplitCells, outside, tetrahedra
 from ccfem.body.files.deck import (
     ELEMENTS,
     FACES,
@@ -39,14 +39,15 @@ def read(path: Path) -> TetMesh:
         When the deck has no tetrahedra, or data that does not read.
     """
     try:
-        return mesh_of(read_deck(path)[0], path)
+        model = read_deck(path)[0]
+        return mesh_of(model, tetrahedra(model.points, model.blocks, path), path)
     except InputError as error:
         raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
 
 
-def mesh_of(model: Model, path: Path) -> TetMesh:
+def mesh_of(model: Model, cells: SplitCells, path: Path) -> TetMesh:
     """Tetrahedra of a deck with its sets and surfaces as patches; the file is for messages."""
-    mesh = TetMesh(model.points, tetrahedra(model.blocks, path))
+    mesh = cells.mesh(path)
     return mesh.with_patches(_patches(model, mesh, path))
 
 
@@ -87,7 +88,25 @@ def _of_nodes(model: Model, scope: str, members: list[Members], border: IntArray
     return np.asarray(inside[border].all(axis=1))
 
 
-def surface_facets(model: Model, scope: str, members: list[Members], border: IntArray) -> IntArray:
+def facets_of_surface(model: Model, name: str, border: IntArray) -> IntArray:
+    """Facets (k, 3) of a surface by its name, of nodes those of the outside.
+
+    Raises
+    ------
+    InputError
+        For a name that no surface has.
+    """
+    scope, _, tail = name.upper().rpartition(".")
+    for key, title in ((scope, tail), ("", name.upper())):
+        content = model.scopes.get(key)
+        if content is not None and (FACES, title) in content.sets:
+            members = content.sets[FACES, title]
+            of_nodes = _of_nodes(model, key, [m for m in members if m.kind == NODES], border)
+            return np.concatenate([_of_elements(model, key, members, border), border[of_nodes]])
+    raise InputError(f"the deck has no surface {shown(name)}: name one of its surfaces")
+
+
+def _of_elements(model: Model, scope: str, members: list[Members], border: IntArray) -> IntArray:
     """Facets (k, 3) of a surface of element faces: named ones, and those of elements outside."""
     facets = [np.zeros((0, 3), dtype=np.int64)]
     for part in members:

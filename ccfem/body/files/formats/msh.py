@@ -11,13 +11,13 @@ import numpy as np
 
 from ccfem.base.arrays import IntArray
 from ccfem.base.errors import InputError
-from ccfem.body.files.cells import tetrahedra, with_groups
+from ccfem.body.files.cells import tetrahedra, triangles_of, with_groups
 from ccfem.body.isolated.process import ChildError, read_isolated
 from ccfem.body.mesh import TetMesh
 
 
 def read(path: Path) -> TetMesh:
-    """Read a Gmsh mesh; physical groups of triangles become patches.
+    """Read a Gmsh mesh; physical groups of triangles and quadrangles become patches.
 
     A group without a name is called by its number. Quadratic tetrahedra come in VTK order: Gmsh
     swaps the last two mid-side nodes and meshio swaps them back.
@@ -39,7 +39,7 @@ def read(path: Path) -> TetMesh:
 def read_by_gmsh(path: Path) -> TetMesh:
     """Read a mesh of another program that Gmsh knows: MED, Nastran, Medit.
 
-    Groups of triangles become patches by their name; those of Nastran and Medit have none and are
+    Groups of facets become patches by their name; those of Nastran and Medit have none and are
     called by the number of their property or region.
     """
     if importlib.util.find_spec("gmsh") is None:
@@ -61,10 +61,11 @@ def _with_groups(arrays: dict[str, Any], path: Path) -> TetMesh:
     """Mesh with patches of arrays as `ccfem.body.isolated.gmsh_files` returns them."""
     parts = {name: name.split(":", 2) for name in arrays}
     blocks = {p[1]: (p[2], arrays[name]) for name, p in parts.items() if p[0] == "cells"}
-    mesh = TetMesh(arrays["points"][:, :3], tetrahedra(blocks.values(), path))
+    mesh = tetrahedra(arrays["points"][:, :3], blocks.values(), path).mesh(path)
     groups: dict[str, list[IntArray]] = {}
     for name, (kind, *rest) in parts.items():
         if kind == "group":
-            corners = blocks[rest[0]][1][:, :3]
-            groups.setdefault(rest[1], []).append(corners[arrays[name]])
+            word, nodes = blocks[rest[0]]
+            corners = nodes[arrays[name], : 4 if word.startswith("quad") else 3]
+            groups.setdefault(rest[1], []).append(triangles_of(corners))
     return with_groups(mesh, {name: np.concatenate(each) for name, each in groups.items()})

@@ -11,25 +11,38 @@ import numpy as np
 
 from ccfem.base.errors import InputError, shown
 from ccfem.base.whole import text_of
-from ccfem.body.files.cells import outside, tetrahedra, with_groups
+from ccfem.body.files.cells import outside, tetrahedra, triangles_of, with_groups
 from ccfem.body.mesh import TetMesh
 
 _BEAMS = (11, 21, 22, 23, 24)
 """Types of elements with a line of orientation before their nodes."""
-_TRIANGLES = {41: [0, 1, 2], 91: [0, 1, 2], 42: [0, 2, 4], 92: [0, 2, 4]}
-"""Corners of linear and quadratic triangles: nodes in the middle of sides lie between them."""
-_WORDS = {111: "tetra", 118: "tetra10", 112: "wedge", 115: "hexahedron", 116: "hexahedron20"}
-"""Solids in meshio's words."""
-_MIDDLES = [0, 2, 4, 9, 1, 3, 5, 6, 7, 8]
-"""Nodes of a quadratic tetrahedron in the order of ccfem."""
-_NODES = {111: 4, 118: 10, 112: 6, 115: 8, 116: 20}
+_FACETS = {
+    **{key: [0, 1, 2] for key in (41, 91)},
+    **{key: [0, 2, 4] for key in (42, 92)},
+    **{key: [0, 1, 2, 3] for key in (44, 94)},
+    **{key: [0, 2, 4, 6] for key in (45, 95)},
+}
+"""Corners of triangles and quadrangles: nodes in the middle of sides lie between them."""
+_SOLIDS = {
+    111: ("tetra", [0, 1, 2, 3]),
+    118: ("tetra10", [0, 2, 4, 9, 1, 3, 5, 6, 7, 8]),
+    112: ("wedge", [*range(6)]),
+    113: ("wedge15", [0, 2, 4, 9, 11, 13, 1, 3, 5, 10, 12, 14, 6, 7, 8]),
+    115: ("hexahedron", [*range(8)]),
+    116: (
+        "hexahedron20",
+        [0, 2, 4, 6, 12, 14, 16, 18, 1, 3, 5, 7, 13, 15, 17, 19, 8, 9, 10, 11],
+    ),
+}
+"""Solids in meshio's words, and their nodes in its order."""
+_NODES = {kind: len(order) for kind, (_, order) in _SOLIDS.items()}
 _GROUPS = (2435, 2452, 2467, 2477)
 _NODE, _ELEMENT = 7, 8
 """Kinds of members of groups."""
 
 
 def read(path: Path) -> TetMesh:
-    """Read a universal file; groups of triangles, or of nodes, become patches."""
+    """Read a universal file; groups of facets, or of nodes, become patches."""
     numbers: list[int] = []
     points: list[list[float]] = []
     elements: dict[int, tuple[int, list[int]]] = {}
@@ -53,22 +66,24 @@ def read(path: Path) -> TetMesh:
         raise InputError(f"{path} holds no nodes (data set 2411): export the mesh as .unv again")
     row = {number: k for k, number in enumerate(numbers)}
     blocks: dict[str, list[list[int]]] = {}
-    triangles: dict[int, list[int]] = {}
+    triangles: dict[int, list[list[int]]] = {}
     try:
         for number, (kind, nodes) in elements.items():
-            if kind in _TRIANGLES:
-                triangles[number] = [row[nodes[k]] for k in _TRIANGLES[kind]]
-            elif kind in _WORDS:
-                blocks.setdefault(_WORDS[kind], []).append([row[node] for node in nodes])
+            if kind in _FACETS:
+                corners = np.array([[row[nodes[k]] for k in _FACETS[kind]]])
+                triangles[number] = triangles_of(corners).tolist()
+            elif kind in _SOLIDS:
+                name, order = _SOLIDS[kind]
+                blocks.setdefault(name, []).append([row[nodes[k]] for k in order])
     except (KeyError, IndexError):
         raise InputError(
             f"{path}: element {number} names nodes that the file does not have: export it again"
         ) from None
-    cells = tetrahedra([(name, np.array(rows)) for name, rows in blocks.items()], path)
-    mesh = TetMesh(np.array(points), cells[:, _MIDDLES] if cells.shape[1] == 10 else cells)
+    cells = [(name, np.array(rows)) for name, rows in blocks.items()]
+    mesh = tetrahedra(np.array(points), cells, path).mesh(path)
     border, facets = outside(mesh), {}
     for name, members in groups.items():
-        named = [triangles[n] for what, n in members if what == _ELEMENT and n in triangles]
+        named = [t for what, n in members if what == _ELEMENT for t in triangles.get(n, ())]
         on = [row[n] for what, n in members if what == _NODE and n in row]
         named += border[np.isin(border, on).all(axis=1)].tolist()
         facets[name] = np.array(named, dtype=np.int64).reshape(-1, 3)

@@ -11,28 +11,30 @@ from numpy.typing import ArrayLike
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError
-from ccfem.body.files.cells import tetrahedra, with_groups
+from ccfem.body.files.cells import tetrahedra, triangles_of, with_groups
 from ccfem.body.files.vtk_xml import write_vtk_xml
 from ccfem.body.isolated.process import ChildError, read_isolated
 from ccfem.body.mesh import TetMesh
 
 _PATCH = "patch:"
-_TYPES = {
-    5: "triangle",
+SOLIDS = {
     10: "tetra",
-    11: "voxel",
+    11: "hexahedron",
     12: "hexahedron",
     13: "wedge",
     14: "pyramid",
-    22: "triangle6",
     24: "tetra10",
     25: "hexahedron20",
     26: "wedge15",
     27: "pyramid13",
     29: "hexahedron27",
-    42: "polyhedron",
+    32: "wedge18",
 }
-_TRIANGLE, _TRIANGLE6 = 5, 22
+"""Cells with a volume in meshio's words by VTK's number of their type; voxels in their order."""
+_OTHER_SOLIDS = {15, 16, 31, 33, 37, 41, 42, *range(63, 69), *range(71, 75), *range(78, 82)}
+"""Types of cells with a volume that are not taken."""
+_CORNERS = {5: 3, 22: 3, 9: 4, 23: 4, 28: 4}
+"""Corners of triangles and quadrangles by VTK's number of their type."""
 _TAGS = ("patch", "gmsh:physical", "CellEntityIds", "PhysicalIds")
 """Integer cell data that number the groups of triangles in files of other programs."""
 
@@ -40,14 +42,12 @@ _TAGS = ("patch", "gmsh:physical", "CellEntityIds", "PhysicalIds")
 def read(path: Path) -> TetMesh:
     """Read a VTK unstructured grid.
 
-    Patches come from the field data ``patch:NAME`` that `write` writes, and from triangle
-    cells with an integer cell array named patch, gmsh:physical, CellEntityIds or PhysicalIds
+    Patches come from the field data ``patch:NAME`` that `write` writes, and from triangles and
+    quadrangles with an integer cell array named patch, gmsh:physical, CellEntityIds or PhysicalIds
     (called by their number).
     """
     grid = read_grid(path)
-    blocks = {_TYPES.get(kind, f"VTK cell type {kind}"): kind for kind in grid.cells}
-    cells = tetrahedra([(name, grid.cells[kind]) for name, kind in blocks.items()], path)
-    mesh = TetMesh(grid.points, cells)
+    mesh = tetrahedra(grid.points, grid.blocks, path).mesh(path)
     groups = {
         name.removeprefix(_PATCH): facets.reshape(-1, 3)
         for name, facets in grid.field.items()
@@ -80,6 +80,19 @@ class Grid:
     cell: dict[str, Any]
     field: dict[str, Any]
     components: dict[tuple[str, str], list[str]]
+
+    @property
+    def blocks(self) -> list[tuple[str, IntArray]]:
+        """Cells in meshio's words and order."""
+        blocks = []
+        for kind, nodes in self.cells.items():
+            other = "polyhedron of VTK's" if kind in _OTHER_SOLIDS else "VTK cell"
+            in_order = nodes[:, [0, 1, 3, 2, 4, 5, 7, 6]] if kind == _VOXEL else nodes
+            blocks.append((SOLIDS.get(kind, f"{other} type {kind}"), in_order))
+        return blocks
+
+
+_VOXEL = 11
 
 
 def read_grid(path: Path) -> Grid:
@@ -122,17 +135,17 @@ def read_grid(path: Path) -> Grid:
 
 
 def _tagged_triangles(grid: Grid) -> dict[str, IntArray]:
-    """Corner nodes (k, 3) of the triangles of each number."""
+    """Corner nodes (k, 3) of the triangles of each number, quadrangles cut."""
     tag = next((name for name in _TAGS if name in grid.cell), None)
     groups: dict[str, list[IntArray]] = {}
     if tag is None or grid.cell[tag].dtype.kind not in "iu" or grid.cell[tag].ndim != 1:
         return {}
-    for kind in (_TRIANGLE, _TRIANGLE6):
+    for kind, count in _CORNERS.items():
         if kind not in grid.cells:
             continue
-        numbers = grid.cell[tag][grid.types == kind]
+        numbers, corners = grid.cell[tag][grid.types == kind], grid.cells[kind][:, :count]
         for number in np.unique(numbers):
-            groups.setdefault(str(number), []).append(grid.cells[kind][numbers == number][:, :3])
+            groups.setdefault(str(number), []).append(triangles_of(corners[numbers == number]))
     return {name: np.concatenate(parts) for name, parts in groups.items()}
 
 

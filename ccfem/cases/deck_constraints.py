@@ -1,0 +1,327 @@
+"""Constraints of a deck: *TRANSFORM, *COUPLING, *RIGID BODY and *TIE.
+
+A reference node moves the faces coupled to it as a rigid body (*KINEMATIC, *RIGID BODY), or what
+acts on it is spread over them (*DISTRIBUTING). A *TIE joins surfaces whose meshes coincide: their
+nodes become the same. What no means of the solver takes is a mistake, with its line.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.errors import InputError, shown
+from ccfem.body.files.cells import SplitCells, outside, tetrahedra
+from ccfem.body.files.deck import (
+    ELEMENTS,
+    NODES,
+    Block,
+    Deck,
+    Model,
+    Scope,
+    chosen_rows,
+    listed,
+    moved,
+)
+from ccfem.body.files.formats.inp import facets_of_surface
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.cases.deck_materials import TAKE_OUT, DeckReading, check_parameters, numbers
+from ccfem.fem.elasticity.support_kinds import local_axes
+from ccfem.geometry.facets import are_among, connected
+
+DEGREES = "xyzuvw"
+"""Degrees of freedom 1 to 6: displacements along x, y and z, and rotations about them."""
+_SAME = 1e-6
+"""Distance of two nodes over the size of the part within which they coincide."""
+_SYSTEMS = {"R": "rectangular", "C": "cylindrical"}
+
+
+@dataclass(frozen=True)
+class LocalSystem:
+    """Axes of a *TRANSFORM: see `ccfem.fem.elasticity.support_kinds.LocalSupport`.
+
+    Attributes
+    ----------
+    points : (2, 3) array
+        In the unit of the deck.
+    """
+
+    system: str
+    points: FloatArray
+
+    def at(self, places: FloatArray) -> FloatArray:
+        """Axes (k, 3, 3) as columns at places (k, 3)."""
+        return local_axes(self.system, self.points, places)
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """Faces (k, 3) that hang on a reference node.
+
+    Attributes
+    ----------
+    place : (3,) array
+        Of the reference node, in the unit of the deck.
+    rigid : bool
+        Whether they move with it as a rigid body; else it passes loads on alone.
+    """
+
+    title: str
+    facets: IntArray
+    place: FloatArray
+    rigid: bool
+
+
+class DeckConstraints:
+    """Systems and couplings of a deck, as their keywords come by.
+
+    Attributes
+    ----------
+    border : (b, 3) int array
+        Facets of the outside.
+    systems : list of LocalSystem
+    system_of : (n,) int array
+        System of the components of each node; -1 for those of the space.
+    couplings : list of Coupling
+    reference : dict of int to (int, int)
+        Coupling of each reference node, and the number of its first degree of freedom: 0, or 3 of a
+        node whose displacements stand for rotations.
+    """
+
+    KEYWORDS = ("TRANSFORM", "COUPLING", "KINEMATIC", "DISTRIBUTING", "RIGID BODY", "TIE")
+
+    def __init__(self, reading: DeckReading, mesh: TetMesh) -> None:
+        self._reading, self._mesh = reading, mesh
+        self.border = outside(mesh)
+        self.systems: list[LocalSystem] = []
+        self.system_of = np.full(len(mesh.points), -1)
+        self.couplings: list[Coupling] = []
+        self.reference: dict[int, tuple[int, int]] = {}
+        self._open: Block | None = None
+
+    def take(self, block: Block, scope: Scope) -> None:
+        """Take a keyword of `KEYWORDS`; what is wrong with it is noted."""
+        with self._reading.noted(block):
+            if block.keyword in ("KINEMATIC", "DISTRIBUTING"):
+                self._couple(block)
+            elif block.keyword == "COUPLING":
+                self.end()
+                self._open = block
+            elif block.keyword == "RIGID BODY":
+                self._rigid_body(block)
+            elif block.keyword == "TRANSFORM":
+                self._transform(block, scope)
+
+    def end(self) -> None:
+        """Close a *COUPLING that no *KINEMATIC or *DISTRIBUTING followed."""
+        block, self._open = self._open, None
+        if block is not None:
+            with self._reading.noted(block):
+                raise InputError("it needs *KINEMATIC or *DISTRIBUTING below it: add one")
+
+    def apart(
+        self, nodes: IntArray, in_cell: BoolArray
+    ) -> tuple[list[tuple[IntArray, int]], IntArray]:
+        """Tell reference nodes, with the number of their first degree, from nodes of cells."""
+        known = [node for node in nodes.tolist() if node in self.reference]
+        references = [(np.array([node]), self.reference[node][1]) for node in known]
+        return references, nodes[in_cell[nodes]]
+
+    def degrees(self, letters: str, offset: int) -> str:
+        """Degrees of freedom of a reference node whose first one has a number.
+
+        Raises
+        ------
+        InputError
+            For one that there is not.
+        """
+        places = [offset + DEGREES.index(letter) for letter in letters]
+        if max(places) >= len(DEGREES):
+            raise InputError(f"a ROT NODE has degrees of freedom 1 to 3: {TAKE_OUT}")
+        return "".join(DEGREES[place] for place in places)
+
+    def _refer(self, item: str, coupling: Coupling, offset: int = 0) -> None:
+        """Note the reference node of a coupling."""
+        nodes = self._reading.nodes(item)
+        if len(nodes) != 1:
+            raise InputError(f"expected one reference node; got {shown(item)}: name one")
+        node = int(nodes[0])
+        if (self._mesh.cells == node).any() or node in self.reference:
+            raise InputError(
+                f"reference node {shown(item)} belongs to a solid or another coupling: {TAKE_OUT}"
+            )
+        if self.system_of[node] >= 0:
+            raise InputError(f"*TRANSFORM of a reference node is not followed: {TAKE_OUT}")
+        if offset == 0:
+            self.couplings.append(coupling)
+        self.reference[node] = len(self.couplings) - 1, offset
+
+    def _place(self, item: str) -> FloatArray:
+        """Place (3,) of a reference node."""
+        return np.asarray(self._reading.model.points[self._reading.nodes(item)[0]])
+
+    def _couple(self, block: Block) -> None:
+        """Take a *KINEMATIC or a *DISTRIBUTING with the *COUPLING above it."""
+        coupling, self._open = self._open, None
+        if coupling is None:
+            raise InputError(f"it stands below no *COUPLING: {TAKE_OUT}")
+        check_parameters(coupling, "CONSTRAINT NAME", "REF NODE", "SURFACE")
+        rigid = block.keyword == "KINEMATIC"
+        check_parameters(block, *(() if rigid else ("WEIGHTING METHOD",)))
+        if block.parameters.get("WEIGHTING METHOD", "UNIFORM").upper() != "UNIFORM":
+            raise InputError(f"weights other than uniform ones are not followed: {TAKE_OUT}")
+        coupled = set()
+        for number, items in self._reading.lines(block):
+            with self._reading.noted(block, number):
+                first, last = (int(x) for x in numbers([*items, "", ""], 2))
+                coupled |= set(range(first, (last or first) + 1))
+        if rigid and coupled and not {1, 2, 3} <= coupled:
+            raise InputError(
+                f"degrees of freedom 1 to 3 are coupled together; got {sorted(coupled)}: {TAKE_OUT}"
+            )
+        name, item = (coupling.parameters.get(key, "") for key in ("SURFACE", "REF NODE"))
+        facets = facets_of_surface(self._reading.model, name, self.border)
+        facets = self.border[are_among(self.border, facets)]
+        if not len(facets):
+            raise InputError(f"surface {shown(name)} has no face on the outside: {TAKE_OUT}")
+        self._refer(item, Coupling(name, facets, self._place(item), rigid))
+
+    def _rigid_body(self, block: Block) -> None:
+        """Take a *RIGID BODY of nodes that make faces."""
+        check_parameters(block, "NSET", "TIE NSET", "ELSET", "REF NODE", "ROT NODE", "ISOTHERMAL")
+        parameters, model = block.parameters, self._reading.model
+        name = parameters.get("NSET") or parameters.get("TIE NSET") or parameters.get("ELSET", "")
+        kind = ELEMENTS if "ELSET" in parameters else NODES
+        rows = chosen_rows(model, "", NODES, [listed(kind, [name])])
+        inside = np.zeros(len(self._mesh.points), dtype=bool)
+        inside[rows] = True
+        facets = self.border[inside[self.border].all(axis=1)]
+        inside[self._mesh.facet_nodes(facets)] = False
+        item = parameters.get("REF NODE", "")
+        place = self._place(item)
+        inside[self._reading.nodes(item)] = False
+        if inside.any() or not len(facets):
+            raise InputError(
+                f"a rigid body is followed where its nodes make faces of the outside; "
+                f"{np.count_nonzero(inside)} nodes of {shown(name)} do not: {TAKE_OUT}"
+            )
+        coupling = Coupling(name, facets, place, rigid=True)
+        self._refer(item, coupling)
+        if "ROT NODE" in parameters:
+            self._refer(parameters["ROT NODE"], coupling, offset=3)
+
+    def _transform(self, block: Block, scope: Scope) -> None:
+        """Take a *TRANSFORM: axes of the components of the nodes of a set."""
+        check_parameters(block, "NSET", "TYPE")
+        kind = block.parameters.get("TYPE", "R").upper()
+        if kind not in _SYSTEMS:
+            raise InputError(f"TYPE={kind} is not followed, R and C are: {TAKE_OUT}")
+        items = [item for line in block.lines for item in line.split(",")]
+        points = np.reshape(numbers(items, 6)[:6], (2, 3))
+        name = block.parameters.get("NSET", "")
+        for key in self._reading.scopes_of(scope):
+            nodes = chosen_rows(self._reading.model, key, NODES, [listed(NODES, [name])])
+            moves = self._reading.model.scopes[key].moves
+            here = moved(points, moves)
+            if kind == "R":
+                here = here - moved(np.zeros((1, 3)), moves)
+            system = LocalSystem(_SYSTEMS[kind], here)
+            if any(node in self.reference for node in nodes.tolist()):
+                raise InputError(f"*TRANSFORM of a reference node is not followed: {TAKE_OUT}")
+            self.systems.append(system)
+            self.system_of[nodes] = len(self.systems) - 1
+
+
+# Surfaces that are tied.
+
+
+def tied(model: Model, deck: Deck, path: Path) -> tuple[Model, SplitCells, list[str], list[str]]:
+    """Model whose tied surfaces share their nodes, its tetrahedra, mistakes, and remarks."""
+    cells = tetrahedra(model.points, model.blocks, path)
+    blocks = [block for block, _ in deck.rest if block.keyword == "TIE"]
+    if not blocks:
+        return model, cells, [], []
+    before = TetMesh(cells.points, cells.cells)
+    pairs, mistakes, remarks = [np.zeros((0, 2), dtype=np.int64)], [], []
+    for block in blocks:
+        try:
+            known = ("NAME", "POSITION TOLERANCE", "ADJUST", "TYPE", "NO ROTATION")
+            check_parameters(block, *known)
+            for line in block.lines:
+                pairs.append(_coinciding(model, before, [x.strip() for x in line.split(",")]))
+                remarks.append(f"{block.where}: *TIE glues {len(pairs[-1])} coinciding nodes")
+        except InputError as error:
+            mistakes.append(f"{block.where}: *TIE: {error}")
+    piece = connected(np.concatenate(pairs), len(model.points))
+    _, first = np.unique(piece, return_index=True)
+    joined = _renumbered(model, first[piece])
+    cells = tetrahedra(joined.points, joined.blocks, path)
+    mistakes += _open_faces(joined, TetMesh(cells.points, cells.cells), blocks, first[piece])
+    return joined, cells, mistakes, remarks
+
+
+def _coinciding(model: Model, mesh: TetMesh, names: list[str]) -> IntArray:
+    """Pairs (k, 2) of the nodes of two surfaces that coincide."""
+    if len(names) < 2:
+        raise InputError(f"expected two surfaces; got {shown(', '.join(names))}: name two")
+    border, nodes = outside(mesh), []
+    for name in names[:2]:
+        facets = facets_of_surface(model, name, border)
+        facets = border[are_among(border, facets)]
+        of_file = np.unique(mesh.facet_nodes(facets))
+        nodes.append(of_file[of_file < len(model.points)])
+        if not len(facets):
+            raise InputError(f"surface {shown(name)} has no face on the outside: {TAKE_OUT}")
+    slave, master = nodes
+    near = _SAME * float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
+    distance, at = cKDTree(model.points[master]).query(model.points[slave])
+    same = distance <= near
+    if not same.all() and np.count_nonzero(same) < len(master):
+        raise InputError(
+            f"{np.count_nonzero(~same)} of {len(slave)} nodes of {shown(names[0])} lie on no node "
+            f"of {shown(names[1])}, and meshes that do not match are not tied: mesh both alike, or "
+            "take it out"
+        )
+    return np.column_stack([slave[same], master[at[same]]])
+
+
+def _renumbered(model: Model, leader: IntArray) -> Model:
+    """Model in which each node is that which leads it."""
+    rows = {
+        key: replace(known, rows=leader[known.rows]) if key[0] == NODES else known
+        for key, known in model.rows.items()
+    }
+    nodes = np.where(model.nodes >= 0, leader[model.nodes], -1)
+    return replace(
+        model,
+        blocks=[(kind, leader[at] if at.size else at) for kind, at in model.blocks],
+        rows=rows,
+        nodes=nodes,
+    )
+
+
+def _open_faces(
+    model: Model, mesh: TetMesh, blocks: Iterable[Block], leader: IntArray
+) -> list[str]:
+    """Mistakes of ties whose faces do not match although their nodes do."""
+    border, mistakes = outside(mesh), []
+    shared = np.zeros(len(mesh.points), dtype=bool)
+    shared[: len(leader)] = np.bincount(leader, minlength=len(leader)) > 1
+    for block in blocks:
+        for line in block.lines:
+            names = [item.strip() for item in line.split(",")][:2]
+            try:
+                facets = np.concatenate([facets_of_surface(model, x, border) for x in names])
+            except InputError:  # it is a mistake already
+                continue
+            still = facets[are_among(facets, border)]
+            count = int(shared[still].all(axis=1).sum())
+            if count:
+                mistakes.append(
+                    f"{block.where}: *TIE: {count} faces of its surfaces do not match although "
+                    "their nodes do: mesh both alike, or take it out"
+                )
+    return mistakes
