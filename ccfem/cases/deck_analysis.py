@@ -267,8 +267,9 @@ class _Conversion:
             if local is None:
                 yield Support(patch, letters, (x, y, z))
             else:
-                first, second = (self.reading.scale * local.points).tolist()
-                yield LocalSupport(patch, (first, second), local.system, letters, (x, y, z))
+                (a, b, c), (d, e, f) = (self.reading.scale * local.points).tolist()
+                points = ((a, b, c), (d, e, f))
+                yield LocalSupport(patch, points, local.system, letters, (x, y, z))
             inside[self.mesh.facet_nodes(facets)] = False
         inside[len(inside) - len(ends) :] = False
         if inside.any():

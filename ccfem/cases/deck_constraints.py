@@ -8,6 +8,7 @@ nodes become the same. What no means of the solver takes is a mistake, with its 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -36,7 +37,10 @@ DEGREES = "xyzuvw"
 """Degrees of freedom 1 to 6: displacements along x, y and z, and rotations about them."""
 _SAME = 1e-6
 """Distance of two nodes over the size of the part within which they coincide."""
-_SYSTEMS = {"R": "rectangular", "C": "cylindrical"}
+_SYSTEMS: dict[str, Literal["rectangular", "cylindrical"]] = {
+    "R": "rectangular",
+    "C": "cylindrical",
+}
 
 
 @dataclass(frozen=True)
@@ -49,7 +53,7 @@ class LocalSystem:
         In the unit of the deck.
     """
 
-    system: str
+    system: Literal["rectangular", "cylindrical"]
     points: FloatArray
 
     def at(self, places: FloatArray) -> FloatArray:
