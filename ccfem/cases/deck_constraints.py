@@ -175,7 +175,7 @@ class DeckConstraints:
         check_parameters(coupling, "CONSTRAINT NAME", "REF NODE", "SURFACE")
         rigid = block.keyword == "KINEMATIC"
         check_parameters(block, *(() if rigid else ("WEIGHTING METHOD",)))
-        if block.parameters.get("WEIGHTING METHOD", "UNIFORM").upper() != "UNIFORM":
+        if block.parameters.get("WEIGHTINGMETHOD", "UNIFORM").upper() != "UNIFORM":
             raise InputError(f"weights other than uniform ones are not followed: {TAKE_OUT}")
         coupled = set()
         for number, items in self._reading.lines(block):
@@ -186,7 +186,7 @@ class DeckConstraints:
             raise InputError(
                 f"degrees of freedom 1 to 3 are coupled together; got {sorted(coupled)}: {TAKE_OUT}"
             )
-        name, item = (coupling.parameters.get(key, "") for key in ("SURFACE", "REF NODE"))
+        name, item = (coupling.parameters.get(key, "") for key in ("SURFACE", "REFNODE"))
         facets = facets_of_surface(self._reading.model, name, self.border)
         facets = self.border[are_among(self.border, facets)]
         if not len(facets):
@@ -197,14 +197,14 @@ class DeckConstraints:
         """Take a *RIGID BODY of nodes that make faces."""
         check_parameters(block, "NSET", "TIE NSET", "ELSET", "REF NODE", "ROT NODE", "ISOTHERMAL")
         parameters, model = block.parameters, self._reading.model
-        name = parameters.get("NSET") or parameters.get("TIE NSET") or parameters.get("ELSET", "")
+        name = parameters.get("NSET") or parameters.get("TIENSET") or parameters.get("ELSET", "")
         kind = ELEMENTS if "ELSET" in parameters else NODES
         rows = chosen_rows(model, "", NODES, [listed(kind, [name])])
         inside = np.zeros(len(self._mesh.points), dtype=bool)
         inside[rows] = True
         facets = self.border[inside[self.border].all(axis=1)]
         inside[self._mesh.facet_nodes(facets)] = False
-        item = parameters.get("REF NODE", "")
+        item = parameters.get("REFNODE", "")
         place = self._place(item)
         inside[self._reading.nodes(item)] = False
         if inside.any() or not len(facets):
@@ -214,8 +214,8 @@ class DeckConstraints:
             )
         coupling = Coupling(name, facets, place, rigid=True)
         self._refer(item, coupling)
-        if "ROT NODE" in parameters:
-            self._refer(parameters["ROT NODE"], coupling, offset=3)
+        if "ROTNODE" in parameters:
+            self._refer(parameters["ROTNODE"], coupling, offset=3)
 
     def _transform(self, block: Block, scope: Scope) -> None:
         """Take a *TRANSFORM: axes of the components of the nodes of a set."""

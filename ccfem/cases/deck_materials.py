@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.checks import MASS_DENSITY
 from ccfem.base.errors import InputError, Mistakes, shown
 from ccfem.base.tensor import rotate_stiffness
 from ccfem.body.files.cells import SplitCells
@@ -136,7 +137,7 @@ def check_count(items: Sequence[str], most: int) -> None:
 
 def check_parameters(block: Block, *known: str) -> None:
     """Refuse parameters of a keyword that are not followed."""
-    unknown = sorted(set(block.parameters) - set(known))
+    unknown = sorted(set(block.parameters) - {name.replace(" ", "") for name in known})
     if unknown:
         raise InputError(f"{', '.join(unknown)} is not followed: {TAKE_OUT}")
 
@@ -419,13 +420,19 @@ class DeckMaterials:
         one = self._constants[key]
         if one.stiffness is None:
             raise InputError(f"material {shown(one.name)} has no *ELASTIC: give it one")
+        density = one.mass_density
+        if (
+            density is not None
+            and not MASS_DENSITY.possible[0] <= density <= MASS_DENSITY.possible[1]
+        ):
+            self._reading.remarks.append(
+                f"the density of material {shown(one.name)} is left out: it would be {density:g} "
+                "g/cm^3, in units of mm, N, s and t, or of scale in place of mm"
+            )
+            density = None
         name = one.name if one.name.isprintable() else "material"
         return Material(
-            name,
-            one.stiffness,
-            source="the deck",
-            mass_density=one.mass_density,
-            expansion=one.expansion,
+            name, one.stiffness, source="the deck", mass_density=density, expansion=one.expansion
         )
 
     def _oriented(self, block: Block, scope: Scope) -> _Axes:

@@ -83,10 +83,15 @@ def _lines(
 
 
 def _heading(line: str) -> tuple[str, dict[str, str]]:
-    """Keyword and parameters of a heading; parameters without a value have an empty one."""
+    """Keyword and parameters of a heading; parameters without a value have an empty one.
+
+    Blanks in names of parameters have no meaning, as in ``REF NODE``: they are left out.
+    """
     keyword, *rest = line[1:].split(",")
     pairs = (item.partition("=") for item in rest)
-    parameters = {name.strip().upper(): value.strip().strip('"') for name, _, value in pairs}
+    parameters = {
+        "".join(name.upper().split()): value.strip().strip('"') for name, _, value in pairs
+    }
     return " ".join(keyword.upper().split()), parameters
 
 
