@@ -218,8 +218,8 @@ StressFile = Annotated[
     typer.Option(
         "--stress",
         metavar="FILE",
-        help="Plan and evaluate on the stress of another program on the same mesh: .vtu or .vtk "
-        "with an array of tensors, .frd of CalculiX, or .csv by element or node.",
+        help="Plan and evaluate on the stress of another program on the same mesh: .vtu, .vtk or "
+        ".xdmf with an array of tensors, .frd of CalculiX, or .csv by element or node.",
     ),
 ]
 StressUnit = Annotated[
@@ -230,7 +230,7 @@ StressUnit = Annotated[
 ]
 StressArray = Annotated[
     str | None,
-    typer.Option("--stress-array", metavar="NAME", help="Array of a .vtu or .vtk file."),
+    typer.Option("--stress-array", metavar="NAME", help="Array of a .vtu, .vtk or .xdmf file."),
 ]
 StressComponents = Annotated[
     str | None,
@@ -241,7 +241,7 @@ StressComponents = Annotated[
 StressStep = Annotated[
     int | None,
     typer.Option(
-        "--stress-step", metavar="NUMBER", help="Step of a .frd file with stress of several."
+        "--stress-step", metavar="NUMBER", help="Step of a .frd or .xdmf file that has several."
     ),
 ]
 SetOfStrategies = Annotated[

@@ -415,7 +415,7 @@ def test_displacement_stress_and_reactions_are_those_of_calculix(tmp_path, mesh)
     rows_of = calculix.compared(tmp_path / "deck.inp")
     assert [row.split(" | ")[0] for row in rows_of] == ["step_1", "step_2", "step_3"]
     for row in rows_of:
-        assert all(float(part.rstrip("%")) < 0.2 for part in row.split(" | ")[2:])
+        assert all(float(part.rstrip("%")) < 0.2 for part in row.split(" | ")[2:5])
 
 
 def test_the_benchmark_says_that_calculix_is_missing(tmp_path, monkeypatch):

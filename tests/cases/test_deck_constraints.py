@@ -221,7 +221,7 @@ def test_tied_bars_are_one(tmp_path):
         (coupled("KINEMATIC").replace("NODE=900", "NODE=1"), "belongs to a solid"),
         ("*KINEMATIC\n1, 3\n", "stands below no .COUPLING"),
         ("*TRANSFORM, NSET=Nall, TYPE=S\n0, 0, 0, 0, 0, 1\n", "TYPE=S is not followed"),
-        ("*RIGID BODY, ANALYTICAL SURFACE=R, REF NODE=900\n", "ANALYTICAL SURFACE is not followed"),
+        ("*RIGID BODY, ANALYTICAL SURFACE=R, REF NODE=900\n", "ANALYTICALSURFACE is not followed"),
         ("*NSET, NSET=two\n1, 2\n*RIGID BODY, NSET=two, REF NODE=900\n", "2 nodes of 'two' do not"),
         ("*TIE, NAME=T\nnear, far\n", "8 of 8 nodes of 'near' lie on no node of 'far'"),
         (coupled("DISTRIBUTING") + "*BOUNDARY\n900, 1\n", "passes loads on, and its reference"),

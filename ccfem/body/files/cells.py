@@ -51,6 +51,8 @@ _SOLIDS = {
     "hexahedron27": (8, 27),
 }
 """Corners and nodes of the cells that are taken, by meshio's words."""
+CORNERS = {"triangle": 3, "quad": 4, "tetra": 4, "pyramid": 5, "wedge": 6, "hexahedron": 8}
+"""Corners of cells by the beginning of their words."""
 _OTHER_SOLIDS = ("tetra", "hexahedron", "wedge", "pyramid", "polyhedron")
 """Beginnings of the words for cells with a volume."""
 _PLURALS = {5: "pyramids", 6: "wedges", 8: "hexahedra"}

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.errors import InputError, shown
 from ccfem.base.whole import existing_file
-from ccfem.body.files.cells import CELL_FACES, triangles_of
+from ccfem.body.files.cells import CELL_FACES, CORNERS, triangles_of
 
 # From lines to keywords.
 
@@ -134,15 +134,6 @@ _KINDS = (
     (r"(S|M3D)9", "quad9", 9),
 )
 """Element types by the start of their name (variants end in letters), and their nodes."""
-_CORNERS = {
-    "triangle": 3,
-    "quad": 4,
-    "tetra": 4,
-    "pyramid": 5,
-    "wedge": 6,
-    "hexahedron": 8,
-    "polyhedron": 8,
-}
 NODES, ELEMENTS, FACES = "node set", "element set", "surface"
 """Kinds of named sets: a name may stand for one of each."""
 _DIGITS = 16
@@ -522,7 +513,9 @@ def _model(scopes: dict[str, Scope]) -> Model:
     flat = np.array([kind.startswith(("triangle", "quad")) for kind, _ in blocks], dtype=bool)[
         kinds
     ]
-    corners = np.array([_CORNERS[kind.rstrip("0123456789")] for kind, _ in blocks], dtype=np.int64)
+    corners = np.array(
+        [CORNERS.get(kind.rstrip("0123456789"), 0) for kind, _ in blocks], dtype=np.int64
+    )
     for known in (rows[ELEMENTS, name] for name in scopes):
         again = np.flatnonzero(np.diff(known.labels) == 0)
         differ = (nodes[known.rows[again]] != nodes[known.rows[again + 1]]).any(axis=1)

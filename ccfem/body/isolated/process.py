@@ -117,8 +117,8 @@ _MEMORY, _PER_BYTE = 1.5e9, 40.0
 """Address space for any file, and what each of its bytes may take more."""
 
 
-def read_isolated(function: str, path: Path) -> dict[str, Any]:
-    """Call a reader of `ccfem.body.isolated` with a file: see `in_own_process`."""
+def read_isolated(function: str, path: Path, **more: Any) -> dict[str, Any]:
+    """Call a reader of `ccfem.body.isolated` with a file, and more: see `in_own_process`."""
     size = path.stat().st_size
     work = _SECONDS + size / _PER_SECOND
     return in_own_process(
@@ -127,4 +127,5 @@ def read_isolated(function: str, path: Path) -> dict[str, Any]:
         work=work,
         memory=_MEMORY + _PER_BYTE * size,
         path=str(path.absolute()),
+        **more,
     )

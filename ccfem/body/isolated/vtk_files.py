@@ -87,17 +87,20 @@ def read_grid(path: str) -> dict[str, Any]:
     return arrays
 
 
-def read_xdmf(path: str) -> dict[str, Any]:
-    """Points, types and nodes of the cells of an XDMF file, as `read_grid`.
+def read_xdmf(path: str, step: int = 1) -> dict[str, Any]:
+    """Points, types, nodes and data of the cells of an XDMF file, as `read_grid`.
 
-    Of a series, the first step counts. Grids of triangles on the same points, as DOLFINx writes the
-    tags of facets, join that of the tetrahedra; their numbers become the cell array ``patch``.
+    Of a series one step counts, from 1; ``steps`` is how many it has. Data of all grids of the same
+    points and cells, as DOLFINx writes functions beside their mesh, come together. Grids of facets
+    on the same points, as it writes their tags, join that of the solids; their numbers become the
+    cell array ``patch``.
     """
     import pyvista
     from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
 
     reader = vtkXdmfReader()
-    _output(reader, _plain_xdmf(path))
+    plain, steps = _plain_xdmf(path, step)
+    _output(reader, plain)
     found = reader.GetOutputDataObject(0)
     whole = not found.IsA("vtkMultiBlockDataSet")
     blocks = [found] if whole else [found.GetBlock(k) for k in range(found.GetNumberOfBlocks())]
@@ -107,6 +110,13 @@ def read_xdmf(path: str) -> dict[str, Any]:
     if not volumes:
         raise ValueError("no grid of cells with a volume")
     main = grids[volumes[0]]
+    for other in (grids[k] for k in volumes[1:]):
+        if len(other["points"]) == len(main["points"]) and len(other["types"]) == len(
+            main["types"]
+        ):
+            data = {key: a for key, a in other.items() if key.startswith(("point:", "cell:"))}
+            main = {**data, **main}
+    main["steps"] = np.array(steps)
     for k, grid in enumerate(grids):
         cells = {name: nodes for name, nodes in grid.items() if name.startswith("cells:")}
         if k in volumes or not set(cells) <= {f"cells:{kind}" for kind in _FACETS}:
@@ -130,21 +140,28 @@ def _grid_arrays(grid: Any) -> dict[str, Any]:
 
     seen = pyvista.wrap(grid)
     cells = {f"cells:{kind}": nodes for kind, nodes in seen.cells_dict.items()}
+    for where, data in (("point", seen.point_data), ("cell", seen.cell_data)):
+        cells |= {f"{where}:{name}": np.asarray(data[name]) for name in data}
     return {"points": np.asarray(seen.points), "types": np.asarray(seen.celltypes), **cells}
 
 
-def _plain_xdmf(path: str) -> str:
-    """Copy of an XDMF file in the folder of this process, with what VTK cannot follow put in place.
+def _plain_xdmf(path: str, step: int) -> tuple[str, int]:
+    """Copy of an XDMF file in the folder of this process, and the number of steps of its series.
 
-    That are inclusions of the geometry and topology of another grid, all steps but the first, and
-    relative names of the files that hold the numbers.
+    What VTK cannot follow is put in its place: inclusions of the geometry and topology of another
+    grid, all steps but one, and relative names of the files that hold the numbers.
     """
+    steps = 1
     root = ElementTree.parse(path).getroot()
     parents = {child: parent for parent in root.iter() for child in parent}
     for series in root.iter("Grid"):
         if series.get("CollectionType") == "Temporal":
-            for later in series.findall("Grid")[1:]:
-                series.remove(later)
+            known = series.findall("Grid")
+            steps = max(steps, len(known))
+            if step > len(known):
+                raise ValueError(f"its series has {len(known)} steps, and no step {step}")
+            for other in (grid for k, grid in enumerate(known, 1) if k != step):
+                series.remove(other)
     for element in list(root.iter()):
         if not element.tag.endswith("}include"):
             continue
@@ -159,7 +176,7 @@ def _plain_xdmf(path: str) -> str:
             file, _, place = item.text.strip().rpartition(":")
             item.text = f"{Path(path).resolve().parent / file}:{place}"
     ElementTree.ElementTree(root).write("copy.xdmf")
-    return "copy.xdmf"
+    return "copy.xdmf", steps
 
 
 def _node_table(

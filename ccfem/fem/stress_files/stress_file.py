@@ -1,98 +1,33 @@
 """Stress that another program found, read from its file onto a mesh of ccfem."""
 
 import csv
-import math
 import os
 import re
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ccfem.base.arrays import FloatArray, IntArray, freeze
+from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError, shown
 from ccfem.base.tensor import from_voigt, to_voigt
 from ccfem.base.whole import existing_file, text_of
-from ccfem.body.files.formats.vtu import Grid, read_grid
+from ccfem.body.files.cells import CORNERS, tetrahedra
+from ccfem.body.files.formats.vtu import FLAT, SOLIDS, Grid, read_grid
 from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity.stress_field import LARGEST_STRESS, GivenStress, impossible_stress
+from ccfem.fem.stress_files.calculix_stress import frd_stress
+from ccfem.fem.stress_files.stress_arrays import (
+    COMPONENTS,
+    StressData,
+    component_of,
+    component_order,
+)
 from ccfem.geometry.facets import positions
 
-# Stress as a file holds it, before it is mapped to a mesh.
-
-
-COMPONENTS = ("xx", "yy", "zz", "yz", "xz", "xy")
-"""Voigt components in their order."""
-
-
-@dataclass(frozen=True)
-class StressData:
-    """Stress at nodes, in cells, or both.
-
-    Attributes
-    ----------
-    points : (n, 3) array, or None
-        Nodes, mm; None where the file has numbers only, and these are those of the mesh.
-    corners : (c, 4) int array, or None
-        Corner nodes of the cells.
-    nodal : (n, 6) array, or None
-        Voigt.
-    cell : (c, 6) array, or None
-        Voigt.
-    unit : str
-        Of the stress, as the file says; empty where it does not.
-    nodes, cells : (n,) and (c,) int array, or None
-        Numbers by which the file calls its nodes and cells; None where it counts them from 0.
-    chosen : str
-        Which of several results of the file it is.
-    usual : (unit, reason)
-        Unit that the program which wrote the file takes, where the file does not say it.
-    """
-
-    points: FloatArray | None
-    corners: IntArray | None
-    nodal: FloatArray | None
-    cell: FloatArray | None
-    unit: str = ""
-    nodes: IntArray | None = None
-    cells: IntArray | None = None
-    chosen: str = ""
-    usual: tuple[str, str] = ("", "")
-
-    def __post_init__(self) -> None:
-        freeze(self, points=float, corners=int, nodal=float, cell=float, nodes=int, cells=int)
-
-
-def component_of(name: str) -> int:
-    """Voigt component that xx, Sxx, sigma_xz, S11, SZX or Stress xx component is; -1 for none."""
-    letters = re.sub(r"[^a-z0-9]", "", name.lower())
-    match = re.fullmatch(r"(?:s|sig|sigma|stress|t)?([xyz123]{2})(?:component)?", letters)
-    if match is None:
-        return -1
-    pair = "".join(sorted(match[1].translate(str.maketrans("123", "xyz"))))
-    return COMPONENTS.index(pair)
-
-
-def component_order(names: Sequence[str], what: str) -> list[int]:
-    """Column of each Voigt component by the names of the columns.
-
-    Raises
-    ------
-    InputError
-        Where a component is missing or comes twice.
-    """
-    components = [component_of(name) for name in names]
-    if sorted(k for k in components if k >= 0) != list(range(6)):
-        given = ", ".join(repr(name) for name in names)
-        raise InputError(
-            f"{what} must name the components xx, yy, zz, yz, xz and xy, each once (as Sxx or S11 "
-            f"too); got {given}: name them"
-        )
-    return [components.index(k) for k in range(6)]
+# From a file to the mesh of a part.
 
 
 _MPA = {"pa": 1e-6, "kpa": 1e-3, "mpa": 1.0, "n/mm^2": 1.0, "n/mm2": 1.0, "gpa": 1e3}
@@ -114,7 +49,7 @@ def read_stress(
     Parameters
     ----------
     path : path
-        ``.vtu``, legacy ``.vtk``, ``.frd`` of CalculiX, or ``.csv`` by element or node
+        ``.vtu``, legacy ``.vtk``, ``.xdmf``, ``.frd`` of CalculiX, or ``.csv`` by element or node
         (`ccfem.fem.stress_files.stress_file`).
     mesh : TetMesh
         Of the part. The file must have stress for each of its corners or cells: nodes are found by
@@ -123,15 +58,15 @@ def read_stress(
         Pa, kPa, MPa, N/mm^2 or GPa; needed where the file does not say. A ``.frd`` never does: its
         stress is taken for MPa, since its nodes have to lie where those of the part do, in mm.
     array : str, optional
-        Name of the stress in a ``.vtu`` or ``.vtk`` file; by default the only one that is called as
-        stress is (`STRESS_NAMES`), or the six arrays of its components.
+        Name of the stress in a ``.vtu``, ``.vtk`` or ``.xdmf`` file; by default the only one that
+        is called as stress is (`STRESS_NAMES`), or the six arrays of its components.
     held_or_loaded : tuple of str
         As in `GivenStress`.
     step : int, optional
-        Step of a ``.frd`` file, whose last increment is read; needed where several have stress.
-        Modes are no such step: their stress has no size.
+        Step of a ``.frd`` file, whose last increment is read, or of an ``.xdmf`` series, from 1;
+        needed where there are several. Modes are no such step: their stress has no size.
     components : str, optional
-        Order of six components that a ``.vtu`` or ``.vtk`` file does not name, as
+        Order of six components that such a file does not name, as
         ``xx,yy,zz,xy,yz,xz``.
 
     Returns
@@ -148,7 +83,7 @@ def read_stress(
     """
     path = existing_file(path, "stress file")
     suffix = path.suffix.lower()
-    grids, steps = (".vtu", ".vtk"), (".frd",)
+    grids, steps = (".vtu", ".vtk", ".xdmf"), (".frd", ".xdmf")
     for option, value, only in (
         ("array", array, grids),
         ("step", step, steps),
@@ -156,17 +91,19 @@ def read_stress(
     ):
         if value is not None and suffix not in only:
             raise InputError(
-                f"only {' and '.join(only)} files have the {option} {shown(str(value))} of a "
+                f"only {', '.join(only)} files have the {option} {shown(str(value))} of a "
                 f"stress to choose; got {path}: leave --stress-{option} out"
             )
     if suffix in grids:
-        data = grid_stress(path, array, components)
+        data = grid_stress(path, array, components, step)
     elif suffix == ".frd":
         data = frd_stress(path, step)
     elif suffix == ".csv":
         data = table_stress(path)
     else:
-        raise InputError(f"stress is read from .vtu, .vtk, .frd or .csv; got {path}: convert it")
+        raise InputError(
+            f"stress is read from .vtu, .vtk, .xdmf, .frd or .csv; got {path}: convert it"
+        )
     assumed = [data.chosen] if data.chosen else []
     if unit is None and not data.unit and data.usual[0]:
         unit, reason = data.usual
@@ -228,7 +165,7 @@ def _on_mesh(data: StressData, mesh: TetMesh, path: Path) -> tuple[FloatArray, F
         node = _nodes(data.points, mesh, corners, path)
         if data.nodal is not None:
             nodal = np.where(node[:, None] >= 0, data.nodal[node], np.nan)
-        at = positions(node[mesh.corners], data.corners)
+        at = _cells(data.corners, node, len(data.points), mesh)
         if (at < 0).any():
             raise InputError(
                 f"{path} has other cells than the part: {int((at < 0).sum())} of "
@@ -244,6 +181,31 @@ def _on_mesh(data: StressData, mesh: TetMesh, path: Path) -> tuple[FloatArray, F
         nodal = _averaged(mesh, cell)
     assert cell is not None
     return nodal, cell
+
+
+_WORDS = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron"}
+"""Cells by their number of corners."""
+
+
+def _cells(blocks: tuple[IntArray, ...], node: IntArray, count: int, mesh: TetMesh) -> IntArray:
+    """Row of the file (m,) that each cell of the mesh lies in; -1 for none.
+
+    Cells of the file are split as those of the part were: by the numbers of the part's nodes.
+    """
+    of_part = np.full(count, -1)
+    corners = np.unique(mesh.corners)
+    of_part[node[corners]] = corners
+    known, rows, before = [], [], 0
+    for nodes in (of_part[block] for block in blocks):
+        present = np.flatnonzero((nodes >= 0).all(axis=1))
+        known.append((_WORDS[nodes.shape[1]], nodes[present]))
+        rows.append(before + present)
+        before += len(nodes)
+    if not sum(map(len, rows)):
+        return np.full(len(mesh.cells), -1)
+    split = tetrahedra(mesh.points, known, "")
+    at = positions(mesh.corners, split.cells)
+    return np.where(at >= 0, np.concatenate(rows)[split.parent[at]], -1)
 
 
 def _by_number(
@@ -389,208 +351,6 @@ def _name_and_unit(cell: str) -> tuple[str, str]:
     return match[1], match[2] or ""
 
 
-# Stress at the nodes from result files of CalculiX (``.frd``, ASCII).
-
-
-_TETRAHEDRA = {3: 4, 6: 10}
-"""Nodes of the tetrahedra among the element types (CalculiX 2.20 user's manual, section 11)."""
-_STARTS = (13, 25, 37, 49, 61, 73)
-"""Columns where the values of a node begin, twelve wide each."""
-
-
-@dataclass(frozen=True)
-class _Result:
-    """Stress of one increment or mode, as lines, with its step and its time or frequency."""
-
-    step: int
-    value: float
-    is_mode: bool
-    lines: list[str]
-
-    @classmethod
-    def of(cls, heading: list[str], lines: list[str]) -> "_Result":
-        """Take step, value and kind of a result from the lines 1PSTEP and 100C above it."""
-        step, value, kind = 1, 0.0, 0
-        for line in heading:
-            if line.split()[:1] == ["1PSTEP"]:
-                step = int(line.split()[-1])
-            elif line.lstrip().startswith("100C"):
-                value, kind = float(line[12:24].strip() or 0.0), int(line[56:58].strip() or 0)
-        # Of a buckling step the first result is the stress before, at the value 0.
-        return cls(step, value, kind == _FREQUENCY or (kind == _BUCKLING and value != 0.0), lines)
-
-    def __str__(self) -> str:
-        kind = "mode" if self.is_mode else "time"
-        return f"step {self.step} ({kind} {self.value:.6g})"
-
-
-_FREQUENCY, _BUCKLING = 2, 4
-"""Kinds of analysis in the line 100C whose results may be modes."""
-_LISTED = 8
-"""Results that a message lists."""
-
-
-def frd_stress(path: Path, step: int | None = None) -> StressData:
-    """Stress in a file that CalculiX wrote with ``*NODE FILE`` and ``*EL FILE``.
-
-    Parameters
-    ----------
-    step : int, optional
-        Its last increment is read; needed where several steps have stress.
-
-    Raises
-    ------
-    InputError
-        When the file has no tetrahedra or no stress of that step, or other elements besides, or is
-        cut off.
-    """
-    try:
-        lines = path.read_text(encoding="ascii", errors="replace").splitlines()
-    except OSError as error:
-        raise InputError(f"expected a result file of CalculiX at {path}: {error}") from None
-    points: dict[int, list[float]] = {}
-    cells: list[list[int]] = []
-    results: list[_Result] = []
-    for block, heading, body in _result_blocks(lines, path):
-        with _as_written(block, path):
-            if block == "2C":
-                points = _node_rows(body, 3)
-            elif block == "3C":
-                cells = _cells(body, path)
-            elif block == "STRESS":
-                results.append(_Result.of(heading, body))
-    if not points or not cells:
-        raise InputError(f"{path} has no mesh of tetrahedra: give the .frd file of a ccx run")
-    result = _of_step(results, step, path)
-    with _as_written("STRESS", path):
-        names = [line.split()[1] for line in result.lines if line.startswith(" -5")]
-        stress = _node_rows([line for line in result.lines if line.startswith(" -1")], 6)
-    order = component_order(names[:6], f"{path}: the block STRESS")
-    data = _mapped(points, cells, stress, order, path)
-    chosen = f"of {path.name} the stress of {result} is taken" if len(results) > 1 else ""
-    return replace(data, chosen=chosen, usual=("MPa", "its nodes are in mm"))
-
-
-@contextmanager
-def _as_written(block: str, path: Path) -> Iterator[None]:
-    """Turn what goes wrong with the columns of a block into one line."""
-    try:
-        yield
-    except (ValueError, IndexError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(
-            f"{path}: the block {block} is not as CalculiX writes it in ASCII ({error}): write "
-            "the file with ccx and its default output"
-        ) from None
-
-
-def _of_step(results: list[_Result], step: int | None, path: Path) -> _Result:
-    """Last result of a step that is no mode; of the only one where no step is given."""
-    listed = list(dict.fromkeys(map(str, results)))
-    held = ", ".join(listed[:_LISTED]) + (", ..." if len(listed) > _LISTED else "")
-    last = {result.step: result for result in results if not result.is_mode}
-    if not results:
-        raise InputError(f"{path} has no stress: ask ccx for it with *EL FILE and S")
-    if not last:
-        raise InputError(
-            f"{path} has the stress of modes only, which has no size: {held}: give results of loads"
-        )
-    if step is None and len(last) > 1:
-        raise InputError(
-            f"{path} has the stress of several steps: {held}: choose a step with --stress-step"
-        )
-    if step is not None and step not in last:
-        raise InputError(
-            f"{path} has no stress of loads in step {step}; it has that of {held}: choose another "
-            "step with --stress-step"
-        )
-    return last[next(iter(last)) if step is None else step]
-
-
-def _result_blocks(lines: list[str], path: Path) -> Iterator[tuple[str, list[str], list[str]]]:
-    """Nodes (2C), elements (3C), and results by their name, with the lines before and in them."""
-    name = ""
-    heading: list[str] = []
-    body: list[str] = []
-    for line in lines:
-        key = line.strip()
-        if key.startswith(("2C", "3C")):
-            name, body = key[:2], []
-        elif line.startswith(" -4"):
-            name, body = key.split()[1] if len(key.split()) > 1 else "", []
-        elif line.startswith(" -3") and name:
-            yield name, heading, body
-            name, heading = "", []
-        elif name:
-            body.append(line)
-        else:
-            heading.append(line)
-    if name:
-        raise InputError(f"{path} is cut off in its block {name}: copy it again, or run ccx again")
-
-
-def _node_rows(lines: list[str], count: int) -> dict[int, list[float]]:
-    """First `count` values of each node: columns of twelve after the number of the node."""
-    rows = {}
-    for line in lines:
-        rows[int(line[3:13])] = values = [float(line[k : k + 12]) for k in _STARTS[:count]]
-        if not all(map(math.isfinite, values)):
-            raise ValueError(f"{shown(line.strip())} is not finite")
-    return rows
-
-
-def _cells(body: list[str], path: Path) -> list[list[int]]:
-    """Corner nodes of each element."""
-    cells: list[list[int]] = []
-    wanted: list[tuple[int, int]] = []
-    for line in body:
-        if line.startswith(" -1"):
-            kind = int(line[13:18])
-            if kind not in _TETRAHEDRA:
-                raise InputError(
-                    f"{path} has elements of type {kind}; expected tetrahedra (C3D4 or C3D10) only"
-                )
-            wanted.append((int(line[3:13]), _TETRAHEDRA[kind]))
-            cells.append([])
-        elif line.startswith(" -2"):
-            cells[-1] += [int(line[k : k + 10]) for k in range(3, len(line.rstrip()), 10)]
-    for nodes, (number, count) in zip(cells, wanted, strict=True):
-        if len(nodes) != count:
-            raise ValueError(f"element {number} has {len(nodes)} nodes in place of {count}")
-    return [nodes[:4] for nodes in cells]
-
-
-def _mapped(
-    points: dict[int, list[float]],
-    cells: list[list[int]],
-    stress: dict[int, list[float]],
-    order: list[int],
-    path: Path,
-) -> StressData:
-    """Stress with the nodes numbered from 0 in the order of the file."""
-    missing = sorted(set(points) - set(stress))
-    if missing:
-        raise InputError(
-            f"{path}: {len(missing)} nodes have no stress, the first is {missing[0]}: write the "
-            "stress of all elements"
-        )
-    place = {number: k for k, number in enumerate(points)}
-    unknown = {node for nodes in cells for node in nodes} - set(place)
-    if unknown:
-        raise InputError(
-            f"{path}: an element names node {min(unknown)}, which the block 2C does not have: copy "
-            "the file again, or run ccx again"
-        )
-    return StressData(
-        np.array(list(points.values())),
-        np.array([[place[node] for node in nodes] for nodes in cells]),
-        np.array([stress[number] for number in points])[:, order],
-        None,
-        nodes=np.array(list(points)),
-    )
-
-
 # Stress tensors in VTK unstructured grids, with names of their components and their unit.
 
 
@@ -611,14 +371,23 @@ _FREECAD = "Stress xx component"
 """Name of a component in files of FreeCAD, whose mesh is in mm and whose stress is in Pa."""
 
 
-def grid_stress(path: Path, array: str | None = None, components: str | None = None) -> StressData:
+def grid_stress(
+    path: Path,
+    array: str | None = None,
+    components: str | None = None,
+    step: int | None = None,
+) -> StressData:
     """Stress at the nodes and in the cells of a grid, as far as it has an array of that name.
 
     Arrays of nine components are full tensors, row by row; those of six must name their components
     (xx, yy, zz, yz, xz, xy in any order, as xx, Sxx or S11), or `components` does. Without a name
     it is the only one of `STRESS_NAMES`, or the six arrays whose names are components.
     """
-    grid, usual = read_grid(path), ("", "")
+    grid, usual = read_grid(path, step or 1), ("", "")
+    if step is None and grid.steps > 1:
+        raise InputError(
+            f"{path} has {grid.steps} steps: choose one with --stress-step, as 1 for the first"
+        )
     known = sorted({*grid.point, *grid.cell})
     names = [name for name in known if name.lower() in STRESS_NAMES]
     single = [name for name in known if component_of(name) >= 0]
@@ -635,11 +404,17 @@ def grid_stress(path: Path, array: str | None = None, components: str | None = N
             f"{shown(array or 'stress')}; there are: {', '.join(known) or 'none'}: name the one "
             "that holds the stress with --stress-array"
         )
-    tetrahedra = [nodes for kind, nodes in grid.cells.items() if kind in (10, 24)]
-    if len(tetrahedra) != 1 or len(tetrahedra[0]) != len(grid.types):
-        raise InputError(f"{path}: expected tetrahedra of one kind only; mesh the part with those")
+    kinds = [kind for kind in grid.cells if kind in SOLIDS]
+    if not kinds or set(grid.cells) - set(SOLIDS) - set(FLAT):
+        raise InputError(f"{path}: expected tetrahedra, hexahedra or wedges; mesh the part so")
+    corners = tuple(
+        nodes[:, : CORNERS[word.rstrip("0123456789")]].astype(np.int64)
+        for kind, (word, nodes) in zip(grid.cells, grid.blocks, strict=True)
+        if kind in kinds
+    )
+    if cell is not None:
+        cell = cell[np.concatenate([np.flatnonzero(grid.types == kind) for kind in kinds])]
     unit = _text(grid.field.get(UNIT, np.array([])))
-    corners = np.asarray(tetrahedra[0], dtype=np.int64)[:, :4]
     said = name not in (array, "stress")
     chosen = f"of {path.name} the array {shown(name)} is taken" if said else ""
     return StressData(grid.points, corners, nodal, cell, unit, chosen=chosen, usual=usual)

@@ -11,6 +11,7 @@ from ccfem.body.mesh.check import check_mesh
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity import Problem, Support, Traction, solve
 from ccfem.fem.materials import isotropic
+from ccfem.fem.stress_files import read_stress
 
 SIDES = {
     8: np.array([[0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3], [1, 2, 3, 0, 5, 6, 7, 4, 4, 5, 6, 7]]).T,
@@ -155,6 +156,27 @@ def test_cells_of_a_grid_with_quadrangles_as_patches(tmp_path):
     assert mesh.volumes.sum() == pytest.approx(12.0)
     area, _ = mesh.facet_areas(mesh.patch("7"))
     assert area.sum() == pytest.approx(4.0)
+
+
+def test_stress_on_hexahedra_goes_to_their_tetrahedra(tmp_path):
+    points, cells = bricks()
+    grid = pyvista.UnstructuredGrid({12: cells}, points)
+    grid.save(tmp_path / "mesh.vtu")
+    with pytest.warns(UserWarning, match="are split"):
+        mesh = read_mesh(tmp_path / "mesh.vtu")
+    # The file has its cells and nodes in another order.
+    chance = np.random.default_rng(2)
+    new, order = chance.permutation(len(points)), chance.permutation(len(cells))
+    moved = np.empty_like(points)
+    moved[new] = points
+    again = pyvista.UnstructuredGrid({12: new[cells[order]]}, moved)
+    again.cell_data["stress"] = np.zeros((len(cells), 9))
+    again.cell_data["stress"][:, 0] = order
+    again.point_data["stress"] = np.column_stack([moved[:, 0], np.zeros((len(points), 8))])
+    again.save(tmp_path / "result.vtu")
+    given = read_stress(tmp_path / "result.vtu", mesh, "MPa")
+    np.testing.assert_allclose(given.stress[:, 0, 0], np.repeat(np.arange(len(cells)), 6))
+    np.testing.assert_allclose(given.nodal[:, 0, 0], mesh.points[:, 0])
 
 
 @pytest.mark.parametrize(

@@ -255,7 +255,7 @@ def test_stress_on_another_mesh_is_refused(written, field):
         read_stress(written, box_mesh((61.0, 24.0, 4.0), (20, 8, 2)))
     with pytest.raises(InputError, match="holds stress in MPa; got the unit Pa"):
         read_stress(written, field.mesh, "Pa")
-    with pytest.raises(InputError, match=r"read from \.vtu, \.vtk, \.frd or"):
+    with pytest.raises(InputError, match=r"read from \.vtu, \.vtk, \.xdmf, \.frd or"):
         read_stress(written.rename(written.with_suffix(".odb")), field.mesh)
 
 
@@ -504,11 +504,12 @@ def test_stress_of_several_steps(tmp_path, results, headings, step, times, said)
 def test_what_a_file_has_no_choice_of_is_refused(tmp_path, results, field, written):
     (tmp_path / "part.frd").write_text(results[0])
     with pytest.raises(
-        InputError, match=r"only \.vtu and \.vtk files .* array 'S' .* leave --stress-array out"
+        InputError,
+        match=r"only \.vtu, \.vtk, \.xdmf files .* array 'S' .* leave --stress-array out",
     ):
         read_stress(tmp_path / "part.frd", results[1], array="S")
     with pytest.raises(
-        InputError, match=r"only \.frd files .* step '2' .* leave --stress-step out"
+        InputError, match=r"only \.frd, \.xdmf files .* step '2' .* leave --stress-step out"
     ):
         read_stress(written, field.mesh, step=2)
 
@@ -516,7 +517,7 @@ def test_what_a_file_has_no_choice_of_is_refused(tmp_path, results, field, writt
 def test_a_result_file_must_be_one(tmp_path):
     mesh = box_mesh((1.0, 1.0, 1.0), (1, 1, 1))
     (tmp_path / "empty.frd").write_text("    1C\n 9999\n")
-    with pytest.raises(InputError, match="has no mesh of tetrahedra"):
+    with pytest.raises(InputError, match="has no mesh of solids"):
         read_stress(tmp_path / "empty.frd", mesh, "MPa")
     with pytest.raises(InputError, match="stress file"):
         read_stress(tmp_path / "none.frd", mesh, "MPa")

@@ -6,6 +6,7 @@ import pytest
 from ccfem.base.errors import InputError
 from ccfem.body.files import read_mesh
 from ccfem.body.mesh.box import box_mesh
+from ccfem.fem.stress_files import read_stress
 
 INCLUDE = '<xi:include xpointer="xpointer(/Xdmf/Domain/Grid/Geometry)" />'
 
@@ -105,3 +106,29 @@ def test_spoiled_files_are_one_line(mesh, tmp_path, change):
     with pytest.raises(InputError, match=r"part\.xdmf") as caught:
         read_mesh(tmp_path / "part.xdmf")
     assert "\n" not in str(caught.value)
+
+
+def test_stress_of_a_series_by_array_and_step(mesh, tmp_path):
+    """As DOLFINx writes it: the mesh by itself, then a step after the other on it."""
+    tensors = np.zeros((2, len(mesh.points), 3, 3))
+    tensors[0, :, 0, 0] = mesh.points[:, 0]
+    tensors[1] = 2.0 * tensors[0]
+    topology_of = '<xi:include xpointer="xpointer(/Xdmf/Domain/Grid/Topology)" />'
+
+    def step(values):
+        rows = item(values.reshape(-1, 9), "Float")
+        field = f'<Attribute Name="sig" AttributeType="Tensor" Center="Node">{rows}</Attribute>'
+        return grid(topology_of, INCLUDE, field)
+
+    series = grid(*map(step, tensors), kind='GridType="Collection" CollectionType="Temporal"')
+    path = tmp_path / "result.xdmf"
+    path.write_text(document(body(mesh), series))
+    with pytest.raises(InputError, match="has 2 steps: choose one with --stress-step"):
+        read_stress(path, mesh, "Pa", array="sig")
+    with pytest.raises(InputError, match="its series has 2 steps, and no step 3"):
+        read_stress(path, mesh, "Pa", array="sig", step=3)
+    with pytest.raises(InputError, match="no array 'tau'; there are: sig"):
+        read_stress(path, mesh, "Pa", array="tau", step=1)
+    given = read_stress(path, mesh, "Pa", array="sig", step=2)
+    np.testing.assert_allclose(given.nodal[:, 0, 0], 2e-6 * mesh.points[:, 0])
+    assert not given.nodal[:, 1:].any()

@@ -33,7 +33,7 @@ SOLIDS = {
 """Cells with a volume in meshio's words by VTK's number of their type; voxels in their order."""
 _OTHER_SOLIDS = {15, 16, 31, 33, 37, 41, 42, *range(63, 69), *range(71, 75), *range(78, 82)}
 """Types of cells with a volume that are not taken."""
-_CORNERS = {5: 3, 22: 3, 9: 4, 23: 4, 28: 4}
+FLAT = {5: 3, 22: 3, 9: 4, 23: 4, 28: 4}
 """Corners of triangles and quadrangles by VTK's number of their type."""
 _TAGS = ("patch", "gmsh:physical", "CellEntityIds", "PhysicalIds")
 """Integer cell data that number the groups of triangles in files of other programs."""
@@ -71,6 +71,8 @@ class Grid:
         Data of points, of cells, and of the whole.
     components : dict of (where, name) to list of str
         Names of the components of data, where they have some.
+    steps : int
+        Of the series that it is of.
     """
 
     points: FloatArray
@@ -80,6 +82,7 @@ class Grid:
     cell: dict[str, Any]
     field: dict[str, Any]
     components: dict[tuple[str, str], list[str]]
+    steps: int = 1
 
     @property
     def blocks(self) -> list[tuple[str, IntArray]]:
@@ -95,8 +98,8 @@ class Grid:
 _VOXEL = 11
 
 
-def read_grid(path: Path) -> Grid:
-    """Read an unstructured grid."""
+def read_grid(path: Path, step: int = 1) -> Grid:
+    """Read an unstructured grid; of a series in XDMF the step, from 1."""
     with path.open("rb") as file:
         start = file.read(4096)
     if path.suffix.lower() == ".vtk":
@@ -110,8 +113,10 @@ def read_grid(path: Path) -> Grid:
     if not all(mark in start for mark in marks):
         raise InputError(f"{path} is not a VTK unstructured grid: it must {must}")
     try:
-        how = "read_xdmf" if path.suffix.lower() == ".xdmf" else "read_grid"
-        arrays = read_isolated(f"vtk_files:{how}", path)
+        if path.suffix.lower() == ".xdmf":
+            arrays = read_isolated("vtk_files:read_xdmf", path, step=step)
+        else:
+            arrays = read_isolated("vtk_files:read_grid", path)
     except ChildError as error:
         raise InputError(
             f"{path} is not a VTK unstructured grid that can be read: {error}: write it again"
@@ -131,6 +136,7 @@ def read_grid(path: Path) -> Grid:
             (name.partition(":")[0], name.partition(":")[2]): names.tolist()
             for name, names in parts["components"].items()
         },
+        int(arrays.get("steps", 1)),
     )
 
 
@@ -140,7 +146,7 @@ def _tagged_triangles(grid: Grid) -> dict[str, IntArray]:
     groups: dict[str, list[IntArray]] = {}
     if tag is None or grid.cell[tag].dtype.kind not in "iu" or grid.cell[tag].ndim != 1:
         return {}
-    for kind, count in _CORNERS.items():
+    for kind, count in FLAT.items():
         if kind not in grid.cells:
             continue
         numbers, corners = grid.cell[tag][grid.types == kind], grid.cells[kind][:, :count]
