@@ -26,6 +26,8 @@ from ccfem.fem.elasticity import (
     Force,
     Foundation,
     Gravity,
+    LocalSupport,
+    Moment,
     NodeForces,
     NodeSupport,
     Pin,
@@ -111,6 +113,12 @@ name = "ends"
 points = [[0, 0, 0], [0, 2, 0]]
 components = "z"
 [[supports]]
+kind = "local"
+patch = "y_min"
+points = [[0, 0, 0], [1, 0, 0]]
+system = "cylindrical"
+components = "xz"
+[[supports]]
 kind = "sliding"
 patch = "y_max"
 normal = "-y"
@@ -152,6 +160,7 @@ normal = "-y"
         EdgeSupport(("x_min", "y_min"), "y"),
         PointSupport((0.0, 0.0, 0.0), "z"),
         NodeSupport("ends", ((0.0, 0.0, 0.0), (0.0, 2.0, 0.0)), "z"),
+        LocalSupport("y_min", ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), "cylindrical", "xz"),
         SlidingSupport("y_max", "-y", 0.1),
         RigidPatch("x_max", "", "x", angle=(1.0, 0.0, 0.0), centre=(20.0, 1.0, 0.5)),
         Pin("z_min", (10.0, 1.0, 0.0), (0.0, 0.0, 2.0), slides=True),
@@ -341,6 +350,7 @@ def test_every_kind_is_weighed_on_a_surface_before_it_is_meshed():
         Force("right", (1.0, 0.0, 0.0)),
         Traction("right", (1.0, 0.0, 0.0)),
         Pressure("right", 1.0),
+        Moment("right", (0.0, 0.0, 1.0)),
         PointForce((20.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
         NodeForces(((20.0, 0.0, 0.0), (20.0, 2.0, 0.0)), ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))),
         Centrifugal(10.0, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
@@ -354,6 +364,7 @@ def test_every_kind_is_weighed_on_a_surface_before_it_is_meshed():
         EdgeSupport(("left", "below")),
         PointSupport((20.0, 0.0, 0.0)),
         NodeSupport("tip", ((20.0, 0.0, 0.0),)),
+        LocalSupport("right", ((1.0, 1.0, 0.0), (0.0, 1.0, 0.0))),
         SlidingSupport("below"),
         RigidPatch("right"),
         Pin("right", (20.0, 1.0, 0.5), "z"),
