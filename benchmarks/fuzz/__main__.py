@@ -25,7 +25,7 @@ from benchmarks.fuzz.mutants import MESH, good_files, mutants, part_of_sizes
 from ccfem.base.errors import InputError
 from ccfem.body.files import read_mesh, read_surface
 from ccfem.body.files.surface import is_surface
-from ccfem.cases.part_file import read_part
+from ccfem.cases.part_file import deck_part, read_part
 from ccfem.fem.elasticity import solve
 from ccfem.fem.elasticity.system import prepare
 from ccfem.fem.stress_files import read_stress
@@ -37,7 +37,12 @@ SECONDS, MEMORY = 20.0, 2e9
 def read(path: Path) -> None:
     """Read a file as ccfem does by its name."""
     if "stress" in path.stem:
-        read_stress(path, MESH)
+        read_stress(path, MESH, "MPa" if path.suffix == ".xdmf" else None,
+                    step=2 if path.suffix == ".xdmf" else None)  # fmt: skip
+    elif "analysis" in path.stem:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)
+            deck_part(path)
     elif "paths" in path.stem:
         read_paths(path, np.eye(3))
     elif path.suffix == ".toml":

@@ -97,6 +97,11 @@ def good_files(folder: Path) -> list[Path]:
     (folder / "box.obj").write_text("\n".join(rows) + "\n")
     (folder / "box.inp").write_text(_deck(mesh))
     (folder / "scopes.inp").write_text(_assembly(mesh))
+    (folder / "analysis.inp").write_text(_analysis())
+    bricks = pyvista.ImageData(dimensions=(5, 3, 2), spacing=(5.0, 5.0, 5.0))
+    bricks = bricks.cast_to_unstructured_grid()  # voxels
+    bricks.save(folder / "bricks.vtu", binary=False)
+    (folder / "stress.xdmf").write_text(_xdmf(mesh))
     (folder / "box.msh").write_text(_msh(mesh))
     with zipfile.ZipFile(folder / "box.3mf", "w") as archive:
         archive.writestr("_rels/.rels", '<Relationship Target="/a.model" Type="a/3dmodel"/>')
@@ -158,6 +163,47 @@ def _assembly(mesh) -> str:
     lines += ["*NSET, NSET=FOOT, INSTANCE=B-2", "FOOT", "*NSET, NSET=BOTH", "B-1.FOOT, FOOT, B-2.3"]
     lines += ["*SURFACE, NAME=SKIN", "B-2.FIRST, S1", "*SURFACE, TYPE=NODE, NAME=END", "B-1.FOOT"]
     return "\n".join([*lines, "*END ASSEMBLY"]) + "\n"
+
+
+def _analysis() -> str:
+    """Deck of tied hexahedra and a wedge, with axes of a cylinder, couplings, and heat."""
+    block = [(x, y, z) for z in (0, 5) for x, y in ((0, 0), (5, 0), (5, 5), (0, 5))]
+    lines = ["*NODE, NSET=NALL"]
+    lines += [f"{k}, {x}, {y}, {z}" for k, (x, y, z) in enumerate(block, 1)]
+    lines += [f"{k}, {x + 5}, {y}, {z}" for k, (x, y, z) in enumerate(block, 11)]
+    lines += ["21, 15, 0, 0", "22, 15, 0, 5", "31, 15, 2.5, 2.5", "32, 0, 2.5, 2.5"]
+    lines += ["*ELEMENT, TYPE=C3D8, ELSET=EALL", "1, 1, 2, 3, 4, 5, 6, 7, 8"]
+    lines += ["2, 11, 12, 13, 14, 15, 16, 17, 18", "*ELEMENT, TYPE=C3D6, ELSET=EALL"]
+    lines += ["3, 12, 21, 13, 16, 22, 17", "*SURFACE, NAME=RIGHT", "1, S4", "*SURFACE, NAME=LEFT"]
+    lines += ["2, S6", "*SURFACE, NAME=FOOT", "1, S6", "*SURFACE, NAME=TIP", "3, S4"]
+    lines += ["*TIE, NAME=T", "LEFT, RIGHT", "*TRANSFORM, NSET=AXIAL, TYPE=C", "0, 0, -9, 0, 0, 9"]
+    lines += [
+        "*NSET, NSET=AXIAL",
+        "13, 17",
+        "*COUPLING, CONSTRAINT NAME=A, REF NODE=32, SURFACE=FOOT",
+    ]
+    lines += ["*KINEMATIC", "1, 3", "*COUPLING, CONSTRAINT NAME=B, REFNODE=31, SURFACE=TIP"]
+    lines += ["*DISTRIBUTING", "1, 6", "*MATERIAL, NAME=M", "*ELASTIC", "1000., 0.3", "*EXPANSION"]
+    lines += ["1e-5", "*SOLID SECTION, ELSET=EALL, MATERIAL=M", "*BOUNDARY", "32, 1, 6", "AXIAL, 1"]
+    lines += ["*INITIAL CONDITIONS, TYPE=TEMPERATURE", "NALL, 20.", "*STEP", "*STATIC", "*CLOAD"]
+    lines += ["31, 5, 40.", "31, 1, 2.", "*DLOAD", "2, P2, 0.5", "*TEMPERATURE", "NALL, 30."]
+    return "\n".join([*lines, "*END STEP"]) + "\n"
+
+
+def _xdmf(mesh) -> str:
+    """Series of two steps with an array of full tensors at the nodes."""
+    rows = " ".join(f"{x} 0 0 0 0 0 0 0 0" for x in mesh.points[:, 0].tolist())
+    cells, points = (" ".join(map(str, a.ravel().tolist())) for a in (mesh.cells, mesh.points))
+    n, m = len(mesh.points), len(mesh.cells)
+    step = (
+        f'<Grid Name="g"><Topology TopologyType="Tetrahedron" NumberOfElements="{m}">'
+        f'<DataItem Dimensions="{m} 4" NumberType="Int" Format="XML">{cells}</DataItem></Topology>'
+        f'<Geometry GeometryType="XYZ"><DataItem Dimensions="{n} 3" Format="XML">{points}'
+        '</DataItem></Geometry><Attribute Name="stress" AttributeType="Tensor" Center="Node">'
+        f'<DataItem Dimensions="{n} 9" Format="XML">{rows}</DataItem></Attribute></Grid>'
+    )
+    series = f'<Grid GridType="Collection" CollectionType="Temporal">{step}{step}</Grid>'
+    return f'<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>{series}</Domain></Xdmf>\n'
 
 
 def _msh(mesh) -> str:

@@ -17,6 +17,7 @@ from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.errors import InputError, known_names, shown
 from ccfem.body.files.deck import read_deck
 from ccfem.body.files.formats.inp import mesh_of
+from ccfem.body.mesh.check import check_coordinates
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases.deck_constraints import DEGREES, Coupling, DeckConstraints, tied
 from ccfem.cases.deck_materials import TAKE_OUT, CellMaterials, DeckMaterials, DeckReading
@@ -111,6 +112,9 @@ def read_analysis(path: Path, scale: float = 1.0, step: str | None = None) -> De
         With a line for everything that cannot be taken over.
     """
     model, deck = read_deck(path)
+    used = np.zeros(len(model.points), dtype=bool)
+    used[model.nodes[model.nodes >= 0]] = True
+    check_coordinates(model.points, used)
     model, cells, mistakes, remarks = tied(model, deck, path)
     reading = DeckReading(model, deck, scale, cells)
     reading.mistakes.lines += mistakes

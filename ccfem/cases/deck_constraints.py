@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.checks import FARTHEST
 from ccfem.base.errors import InputError, shown
 from ccfem.body.files.cells import SplitCells, outside, tetrahedra
 from ccfem.body.files.deck import (
@@ -165,7 +166,12 @@ class DeckConstraints:
 
     def _place(self, item: str) -> FloatArray:
         """Place (3,) of a reference node."""
-        return np.asarray(self._reading.model.points[self._reading.nodes(item)[0]])
+        place = self._reading.model.points[self._reading.nodes(item)[0]]
+        if not (np.abs(place) <= FARTHEST).all():
+            raise InputError(
+                f"a reference node must lie within {FARTHEST:g}; got {place.tolist()}: correct it"
+            )
+        return np.asarray(place)
 
     def _couple(self, block: Block) -> None:
         """Take a *KINEMATIC or a *DISTRIBUTING with the *COUPLING above it."""
@@ -180,8 +186,14 @@ class DeckConstraints:
         coupled = set()
         for number, items in self._reading.lines(block):
             with self._reading.noted(block, number):
-                first, last = (int(x) for x in numbers([*items, "", ""], 2))
-                coupled |= set(range(first, (last or first) + 1))
+                first, last = numbers([*items, "", ""], 2)
+                last = last or first
+                if not 1 <= first <= last <= len(DEGREES) or first % 1 or last % 1:
+                    raise InputError(
+                        f"degrees of freedom are 1 to {len(DEGREES)}; got "
+                        f"{shown(', '.join(items))}: correct them"
+                    )
+                coupled |= set(range(int(first), int(last) + 1))
         if rigid and coupled and not {1, 2, 3} <= coupled:
             raise InputError(
                 f"degrees of freedom 1 to 3 are coupled together; got {sorted(coupled)}: {TAKE_OUT}"
@@ -233,6 +245,7 @@ class DeckConstraints:
             if kind == "R":
                 here = here - moved(np.zeros((1, 3)), moves)
             system = LocalSystem(_SYSTEMS[kind], here)
+            system.at(np.zeros((0, 3)))  # that there are axes
             if any(node in self.reference for node in nodes.tolist()):
                 raise InputError(f"*TRANSFORM of a reference node is not followed: {TAKE_OUT}")
             self.systems.append(system)
@@ -280,7 +293,7 @@ def _coinciding(model: Model, mesh: TetMesh, names: list[str]) -> IntArray:
         if not len(facets):
             raise InputError(f"surface {shown(name)} has no face on the outside: {TAKE_OUT}")
     slave, master = nodes
-    near = _SAME * float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
+    near = _SAME * float(np.linalg.norm(np.ptp(model.points[np.concatenate(nodes)], axis=0)))
     distance, at = cKDTree(model.points[master]).query(model.points[slave])
     same = distance <= near
     if not same.all() and np.count_nonzero(same) < len(master):

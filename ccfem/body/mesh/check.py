@@ -138,7 +138,7 @@ def check_mesh(mesh: TetMesh, merge: bool = False) -> tuple[TetMesh, MeshReport]
     """
     used = np.zeros(len(mesh.points), dtype=bool)
     used[mesh.cells] = True
-    _check_coordinates(mesh.points, used)
+    check_coordinates(mesh.points, used)
     diagonal = float(np.linalg.norm(np.ptp(mesh.points[used], axis=0)))
     leader, coincident = _leaders(mesh.points, used, diagonal)
     merged = merge and coincident > 0
@@ -199,7 +199,7 @@ def about_slivers(mesh: TetMesh) -> str:
     )
 
 
-def _check_coordinates(points: FloatArray, used: BoolArray) -> None:
+def check_coordinates(points: FloatArray, used: BoolArray) -> None:
     """Refuse used nodes whose coordinates are not finite, or those of another scale."""
     wrong = np.flatnonzero(used & ~np.isfinite(points).all(axis=1))
     if len(wrong):

@@ -164,22 +164,26 @@ def local_axes(system: str, points: Any, places: FloatArray) -> FloatArray:
     """
     first, second = np.asarray(points, dtype=np.float64)
     round_ = system == "cylindrical"
-    third = second - first if round_ else np.cross(first, second)
-    size = np.linalg.norm(third)
-    if not 0.0 < size < np.inf:
-        raise InputError(f"two points show no axes; got {points}: give others")
-    third = np.tile(third / size, (len(places), 1))
-    if round_:
-        along = places - first
-        along = along - np.einsum("ki,ki->k", along, third)[:, None] * third
-    else:
-        along = np.tile(first, (len(places), 1))
-    radius = np.linalg.norm(along, axis=1)
-    if not (radius > _UNIT * np.linalg.norm(places - first, axis=1)).all():
-        raise InputError(
-            f"a place lies on the axis of a cylindrical system through {tuple(first.tolist())}, "
-            "where nothing is radial: leave it out, or move the axis"
-        )
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused
+        third = second - first if round_ else np.cross(first, second)
+        size = np.linalg.norm(third)
+        if not 0.0 < size < np.inf:
+            given = [first.tolist(), second.tolist()]
+            raise InputError(f"two points show no axes; got {given}: give others")
+        third = np.tile(third / size, (len(places), 1))
+        if round_:
+            along = places - first
+            far = np.linalg.norm(along, axis=1)
+            along = along - np.einsum("ki,ki->k", along, third)[:, None] * third
+        else:
+            along, far = np.tile(first, (len(places), 1)), np.zeros(len(places))
+        radius = np.linalg.norm(along, axis=1)
+        if not ((radius > _UNIT * far) & (radius < np.inf)).all():
+            raise InputError(
+                "a place lies on the axis of a cylindrical system through "
+                f"{tuple(first.tolist())}, where nothing is radial, or too far from it: leave it "
+                "out, or move the axis"
+            )
     along /= radius[:, None]
     return np.stack([along, np.cross(third, along), third], axis=2)
 
