@@ -226,7 +226,8 @@ def support_forces(problem: Problem, reactions: FloatArray) -> dict[str, FloatAr
 
 def _claim(mesh: TetMesh, support: AnySupport) -> tuple[str, IntArray, IntArray]:
     """Name of a support, its nodes, and the components that it may hold there."""
-    turned = isinstance(support, RigidPatch | LocalSupport) or getattr(support, "axes", ())
+    turned = isinstance(support, RigidPatch | LocalSupport)
+    turned |= isinstance(support, NodeSupport) and bool(support.axes)
     letters = "xyz" if turned else getattr(support, "components", "xyz")
     components = np.array([k for k in range(3) if "xyz"[k] in letters], dtype=np.int64)
     if isinstance(support, EdgeSupport):

@@ -158,6 +158,35 @@ def test_cells_of_a_grid_with_quadrangles_as_patches(tmp_path):
     assert area.sum() == pytest.approx(4.0)
 
 
+def test_a_universal_file_of_quadratic_hexahedra_and_quadrangles(tmp_path):
+    """Nodes go round the lower corners, up the sides, and round the upper corners."""
+    points, cells = quadratic(*bricks())
+    around = [0, 8, 1, 9, 2, 10, 3, 11, 16, 17, 18, 19, 4, 12, 5, 13, 6, 14, 7, 15]
+    foot = cells[(points[cells[:, [0, 3, 7, 4]], 0] == 0.0).all(axis=1)]
+    quads = foot[:, [0, 11, 3, 19, 7, 15, 4, 16]]
+    lines = ["    -1", "  2411"]
+    for k, (x, y, z) in enumerate(points.tolist(), 1):
+        lines += [f"{k:10d}{1:10d}{1:10d}{11:10d}", f"{x:25.16E}{y:25.16E}{z:25.16E}"]
+    lines += ["    -1", "    -1", "  2412"]
+    rows = [(116, nodes) for nodes in cells[:, around].tolist()]
+    rows += [(95, nodes) for nodes in quads.tolist()]
+    for k, (kind, nodes) in enumerate(rows, 1):
+        lines.append(f"{k:10d}{kind:10d}{1:10d}{1:10d}{7:10d}{len(nodes):10d}")
+        row = "".join(f"{node + 1:10d}" for node in nodes)
+        lines += [row[start : start + 80] for start in range(0, len(row), 80)]
+    members = [f"{8:10d}{k:10d}{0:10d}{0:10d}" for k in range(len(cells) + 1, len(rows) + 1)]
+    lines += ["    -1", "    -1", "  2467", f"{1:10d}" + 6 * f"{0:10d}" + f"{len(members):10d}"]
+    lines += ["foot", *("".join(members[i : i + 2]) for i in range(0, len(members), 2)), "    -1"]
+    (tmp_path / "box.unv").write_text("\n".join(lines) + "\n")
+    with pytest.warns(UserWarning, match="12 hexahedra are split into 72 tetrahedra"):
+        mesh = read_mesh(tmp_path / "box.unv")
+    assert mesh.order == 2
+    assert mesh.volumes.sum() == pytest.approx(12.0)
+    assert not len(mesh.curved)
+    area, _ = mesh.facet_areas(mesh.patch("foot"))
+    assert area.sum() == pytest.approx(4.0)
+
+
 def test_stress_on_hexahedra_goes_to_their_tetrahedra(tmp_path):
     points, cells = bricks()
     grid = pyvista.UnstructuredGrid({12: cells}, points)
