@@ -170,6 +170,7 @@ class _Conversion:
     def __init__(self, steps: DeckSteps, expand: bool) -> None:
         self.steps, self.reading, self.mesh, self.expand = steps, steps.reading, steps.mesh, expand
         self.constraints = steps.constraints
+        self._border_nodes = steps.mesh.facet_nodes(steps.border)
         self._patches = dict(steps.mesh.patches)
 
     def chosen(
@@ -262,7 +263,7 @@ class _Conversion:
         inside[len(inside) - len(ends) :] = inside[ends].all(axis=1)
         letters = "".join("xyz"[c] for c in sorted(values))
         x, y, z = (values.get(c, 0.0) for c in range(3))
-        facets = self.steps.border[inside[self.mesh.facet_nodes(self.steps.border)].all(axis=1)]
+        facets = self.steps.border[inside[self._border_nodes].all(axis=1)]
         local = self.constraints.systems[system] if system >= 0 else None
         if local is not None and letters == "xyz" and not any(values.values()):
             local = None  # held along all axes

@@ -178,9 +178,13 @@ class DeckConstraints:
         coupling, self._open = self._open, None
         if coupling is None:
             raise InputError(f"it stands below no *COUPLING: {TAKE_OUT}")
-        check_parameters(coupling, "CONSTRAINT NAME", "REF NODE", "SURFACE")
+        known = ("CONSTRAINT NAME", "REF NODE", "SURFACE", "INFLUENCE RADIUS", "ALPHA")
+        check_parameters(coupling, *known)
+        radius = coupling.parameters.get("INFLUENCERADIUS", "WHOLE SURFACE").upper()
+        if radius != "WHOLE SURFACE":
+            raise InputError(f"INFLUENCE RADIUS={radius} is not followed: {TAKE_OUT}")
         rigid = block.keyword == "KINEMATIC"
-        check_parameters(block, *(() if rigid else ("WEIGHTING METHOD",)))
+        check_parameters(block, *(() if rigid else ("WEIGHTING METHOD", "COUPLING")))
         if block.parameters.get("WEIGHTINGMETHOD", "UNIFORM").upper() != "UNIFORM":
             raise InputError(f"weights other than uniform ones are not followed: {TAKE_OUT}")
         coupled = set()
