@@ -198,6 +198,19 @@ def test_forces_and_supports_along_turned_axes(tmp_path):
     assert field.support_forces["foot"] == pytest.approx([-8.0, 0.0, 0.0], abs=1e-6)
 
 
+def test_heat_reaches_the_middles_of_diagonals(tmp_path):
+    text, points = bar()
+    text += material() + "*EXPANSION\n1e-3\n" + HELD.replace("foot, 1, 3", "foot, 1\n1, 2, 3\n4, 3")
+    text = text.replace("*SOLID SECTION", "*SOLID SECTION", 1)
+    warm = "".join(f"{k}, {3.0 * x!r}\n" for k, (x, _, _) in enumerate(points, 1))
+    text = text.replace("*EXPANSION\n1e-3\n", "")
+    text = text.replace("*SOLID SECTION,", "*EXPANSION\n1e-3\n*SOLID SECTION,")
+    text += "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nNall, 0.\n" + step(f"*TEMPERATURE\n{warm}")
+    _, field = solved(tmp_path, text)
+    # Free: alpha times the integral of 3 x over the length, on the axis and off it alike.
+    assert tip(field)[:, 0].mean() == pytest.approx(1e-3 * 1.5 * LENGTH**2, rel=0.02)
+
+
 def test_tied_bars_are_one(tmp_path):
     first, _ = bar((2, 1, 1), length=0.5 * LENGTH)
     second, _ = bar((2, 1, 1), start=0.5 * LENGTH, length=0.5 * LENGTH, first=500)
