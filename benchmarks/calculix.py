@@ -194,10 +194,9 @@ def _differences(
     split = tetrahedra(model.points, model.blocks, "deck")
     row = cKDTree(TetMesh(split.points, split.cells).centres).query(mesh.centres)[1]
     parent, weight = split.parent[row], mesh.volumes
-    mean = np.stack(
-        [np.bincount(parent, weight * c) for c in field.stress.reshape(-1, 9).T], axis=1
-    )
-    mean = mean.reshape(-1, 3, 3) / np.bincount(parent, weight)[:, None, None]
+    parts = field.stress.reshape(-1, 9).T
+    sums = np.array([np.bincount(parent, weight * part) for part in parts]).T
+    mean = (sums / np.bincount(parent, weight)[:, None]).reshape(-1, 3, 3)
     loads = prepare(problem).forces_in(field.case) - heat_forces(problem, field.case)
     inside = field.reactions + loads
     held = field.reactions.any(axis=1)
