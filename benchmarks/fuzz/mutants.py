@@ -285,8 +285,11 @@ def medit(mesh) -> str:
     return "\n".join([*lines, "End"]) + "\n"
 
 
-def frd(mesh, stress) -> str:
-    """Results of CalculiX on a linear mesh; stress (n, 6) at the nodes: xx, yy, zz, xy, yz, zx."""
+def frd(mesh, stress, kind=3) -> str:
+    """Results of CalculiX on linear cells, by default its type 3, tetrahedra.
+
+    Stress is (n, 6) at the nodes: xx, yy, zz, xy, yz, zx.
+    """
     number = [f" -1{k:10d}" for k in range(1, len(mesh.points) + 1)]
     lines = ["    1C", f"    2C{len(mesh.points):30d}{1:38d}"]
     lines += [
@@ -295,7 +298,7 @@ def frd(mesh, stress) -> str:
     ]
     lines += [" -3", f"    3C{len(mesh.cells):30d}{1:38d}"]
     for k, nodes in enumerate(mesh.cells.tolist(), 1):
-        lines += [f" -1{k:10d}    3    0    1", " -2" + "".join(f"{n + 1:10d}" for n in nodes)]
+        lines += [f" -1{k:10d}{kind:5d}    0    1", " -2" + "".join(f"{n + 1:10d}" for n in nodes)]
     lines += [" -3", " -4  STRESS      6    1"]
     lines += [f" -5  S{name:11s} 1    4    1    1" for name in ("XX", "YY", "ZZ", "XY", "YZ", "ZX")]
     lines += [

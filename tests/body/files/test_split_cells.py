@@ -1,9 +1,12 @@
 """Hexahedra, wedges and pyramids as tetrahedra: volumes, faces that agree, exact stress."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import pyvista
 
+from benchmarks.fuzz.mutants import frd
 from ccfem.base.errors import InputError
 from ccfem.body.files import read_mesh
 from ccfem.body.files.cells import CELL_FACES, outside, tetrahedra, triangles_of
@@ -206,6 +209,12 @@ def test_stress_on_hexahedra_goes_to_their_tetrahedra(tmp_path):
     given = read_stress(tmp_path / "result.vtu", mesh, "MPa")
     np.testing.assert_allclose(given.stress[:, 0, 0], np.repeat(np.arange(len(cells)), 6))
     np.testing.assert_allclose(given.nodal[:, 0, 0], mesh.points[:, 0])
+    # The same at the nodes from a file of CalculiX, in which its first type of elements is he8.
+    table = np.column_stack([moved[:, 0], np.zeros((len(points), 5))])
+    model = SimpleNamespace(points=moved, cells=new[cells[order]])
+    (tmp_path / "result.frd").write_text(frd(model, table, kind=1))
+    given = read_stress(tmp_path / "result.frd", mesh)
+    np.testing.assert_allclose(given.nodal[:, 0, 0], mesh.points[:, 0], rtol=1e-5)
 
 
 @pytest.mark.parametrize(
