@@ -131,23 +131,27 @@ def _support(table: TomlTable, where: str) -> AnySupport:
 
 
 def loads_of(cases: TomlTable, mistakes: Mistakes) -> dict[str, tuple[Load, ...]]:
-    """Read the loads of every load case, of the tables [[loads.NAME]]; what is wrong is noted."""
+    """Read the loads of every load case, of the tables [[loads.NAME]]; what is wrong is noted.
+
+    A case without loads, ``NAME = []``, is one in which supports alone move.
+    """
     if not cases:
         mistakes.lines.append("a part needs a load: add [[loads.NAME]] with its kind")
     loads: dict[str, tuple[Load, ...]] = {}
     for name, tables in cases.items():
-        if not isinstance(tables, list) or not tables:
+        if not isinstance(tables, list):
             mistakes.lines.append(
                 f"loads.{name} must be a list of tables; got {shown(tables)}: write "
                 f"[[loads.{name}]]"
             )
             continue
+        loads[name] = ()
         for k, table in enumerate(tables):
             with mistakes.noted():
                 where = f"loads.{name}[{k}]"
                 kind, rest = named_table(table, "kind", LOADS, where)
                 load = from_table(LOADS[kind], rest, where)
-                loads[name] = (*loads.get(name, ()), load)
+                loads[name] = (*loads[name], load)
     return loads
 
 

@@ -430,6 +430,21 @@ def test_supports_of_cases_are_written_and_read_again(folder):
     assert len(support_sets(again)) == 1
 
 
+def test_a_case_in_which_supports_alone_move_is_written_and_read_again(folder):
+    """Between grips: 1000 MPa times the area, 2 mm^2, times the strain of 0.1 / 20."""
+    moving = '[[supports]]\npatch = "x_max"\ncomponents = "x"\nvalue = [0.1, 0, 0]\n'
+    (folder / "part.toml").write_text(PART + HELD + moving + "[loads]\ngrips = []\n")
+    case = read_part(folder / "part.toml")
+    (folder / "again.toml").write_text(part_text(case, "body.npz"))
+    again = read_part(folder / "again.toml").problem
+    assert again.loads == case.problem.loads == {"grips": ()}
+    field = solve(again)["grips"]
+    ends = field.mesh.points[:, 0] == 20.0
+    assert field.reactions[ends, 0].sum() == pytest.approx(10.0, rel=1e-6)
+    with pytest.raises(InputError, match="no support moves"):
+        solve(read(folder, PART + HELD + "[loads]\ngrips = []\n"))
+
+
 def test_check_says_in_which_load_case_a_patch_is_held(folder):
     text = PART + OWN_SUPPORTS
     (folder / "part.toml").write_text(text)
