@@ -15,7 +15,7 @@ from ccfem.comparison.request import STRATEGIES
 from ccfem.workbench.child_run import ChildRun, RunState
 from ccfem.workbench.guard import Served, escaped
 from ccfem.workbench.result_views import Pieces, RunResults, read_results
-from ccfem.workbench.tab import FIBRE, MOVED, PART, STRESS, Tabbed, table_html
+from ccfem.workbench.tab import FIBRE, MOVED, PART, STRESS, Field, Tabbed, table_html
 
 _NO_ONE, _FIRST, _ALL = "none", "the first", "all at once"
 _BESIDE = 1.25
@@ -34,14 +34,15 @@ class CompareTab:
         self.run: ChildRun | None = None
         self.results: RunResults | None = None
         known = strategy_modules.named()
-        self.ticks: dict[str, Any] = {}
+        self.ticks: dict[str, Field] = {}
         with gui.add_folder("Strategies"):
             self._add_ticks({name: known[name] for name in STRATEGIES})
         with gui.add_folder("More strategies", expand_by_default=False):
             self._add_ticks({k: v for k, v in known.items() if k not in STRATEGIES})
-        self.case = gui.add_dropdown("Load case", (_FIRST,), visible=False)
-        self.case.on_update(page.on(self.show))
-        self.minutes = gui.add_number("Longest run, min", 120.0, min=0.1, step=10.0)
+        case = gui.add_dropdown("Load case", (_FIRST,), visible=False)
+        self.case = Field(page, case, lambda _: self.show())
+        minutes = gui.add_number("Longest run, min", 120.0, min=0.1, step=10.0)
+        self.minutes = Field(page, minutes)
         self.start = gui.add_button("Compare", icon="player-play")
         self.start.on_click(page.on(self._compare))
         self.ending = gui.add_button("Stop", icon="player-stop", visible=False, color="red")
@@ -52,11 +53,10 @@ class CompareTab:
         self._table = gui.add_html("", visible=False)
         self._found = gui.add_folder("Layers", visible=False)
         with self._found:
-            self.left = gui.add_dropdown("Strategy", (_NO_ONE,))
-            self.right = gui.add_dropdown("Beside it", (_NO_ONE,))
-            self.layer = gui.add_slider("Layer", 0, 1, 1, 0)
-            for field in (self.left, self.right, self.layer):
-                field.on_update(page.on(self._draw))
+            left, right = (gui.add_dropdown(t, (_NO_ONE,)) for t in ("Strategy", "Beside it"))
+            self.left, self.right = (Field(page, h, lambda _: self._draw()) for h in (left, right))
+            self.layer = gui.add_slider("Layer", 0, 1, 1, 0)  # the newest place, not all between
+            self.layer.on_update(page.on(self._draw))
             self._layer_said = gui.add_html("")
             self.prints = gui.add_button("G-code of this strategy", icon="printer")
             self.prints.on_click(page.on(self._plan))
@@ -67,8 +67,7 @@ class CompareTab:
         for name, strategy in known.items():
             about = (inspect.getdoc(strategy) or "").split("\n")[0]
             tick = self.page.server.gui.add_checkbox(name, name in STRATEGIES, hint=about)
-            tick.on_update(self.page.on(self.show))
-            self.ticks[name] = tick
+            self.ticks[name] = Field(self.page, tick, lambda _: self.show())
 
     # Running.
 
@@ -80,7 +79,7 @@ class CompareTab:
         return ["compare", self.page.bench.part_argument(), *chosen, *self._load_case()]
 
     def _load_case(self) -> list[str]:
-        if not self.case.visible or self.case.value == _FIRST:
+        if not self.case.handle.visible or self.case.value == _FIRST:
             return []
         return ["--load-case", "all" if self.case.value == _ALL else self.case.value]
 
@@ -146,8 +145,10 @@ class CompareTab:
         loads, sums = (bench.content.get(key) for key in ("loads", "combinations"))
         names = [name for these in (loads, sums) if isinstance(these, dict) for name in these]
         options = (_FIRST, *names, _ALL)
-        if self.case.options != options:
-            self.case.options, self.case.visible = options, len(names) > 1
+        case = self.case.handle
+        if case.options != options:
+            case.options, case.visible = options, len(names) > 1
+            self.case.put(case.value)
         try:
             command = shlex.join(["ccfem", *self._arguments()])
         except InputError:
@@ -179,8 +180,9 @@ class CompareTab:
         )
         self._found.visible = bool(names and self.results.layers)
         if self._found.visible:
-            self.left.options, self.right.options = tuple(names), (_NO_ONE, *names)
-            self.left.value, self.right.value = names[0], (names[1] if names[1:] else _NO_ONE)
+            self.left.handle.options, self.right.handle.options = tuple(names), (_NO_ONE, *names)
+            self.left.put(names[0])
+            self.right.put(names[1] if names[1:] else _NO_ONE)
             self.layer.max = max(len(self.results.layers) - 1, 1)
             self.layer.value = self.results.first
             self.prints.visible = not any(name.endswith(".gcode") for name in files)

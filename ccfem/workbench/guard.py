@@ -202,6 +202,15 @@ def _page() -> bytes:
     )
 
 
+def send_again(handle: Any) -> None:
+    """Send the value of a field to all browsers, whatever they show."""
+    from viser._messages import GuiUpdateMessage
+
+    inner = handle._impl
+    message = GuiUpdateMessage(inner.uuid, {"value": inner.value})
+    inner.gui_api._websock_interface.queue_message(message)
+
+
 def limit_uploads(server: Any, refuse: Callable[[str], object]) -> None:
     """Refuse files above `UPLOAD_LIMIT` when they are announced and as they come; share nothing.
 

@@ -1,12 +1,13 @@
 """The tab for loads and supports: faces that are chosen, what may act on them, and what does."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
+from ccfem.base.errors import InputError
 from ccfem.workbench.guard import escaped
 from ccfem.workbench.part_edits import (
     appended,
@@ -17,7 +18,7 @@ from ccfem.workbench.part_edits import (
     removed,
     valued,
 )
-from ccfem.workbench.tab import Tabbed
+from ccfem.workbench.tab import Field, Tabbed
 
 _NO_FACE = "choose a face"
 _LISTED = 200
@@ -28,8 +29,14 @@ _KINDS = {
     "pressure": "pressure",
     "weight of the whole part": "gravity",
 }
+_BY_FACE = ("pull or push (force)", "bearing of a pin")
+"""Kind that is proposed for other faces, and for round ones."""
 _FORCE = 100.0
 """Force, N, that is proposed."""
+
+
+_SUPPORTS = {"held": "Hold", "sliding": "Roll"}
+_UNITS = {"force": ", N", "bearing": ", N", "point": ", N"}
 
 
 @dataclass(frozen=True)
@@ -57,8 +64,19 @@ class Entry:
             return f"{_SUPPORTS.get(kind, kind)}{on}"
         return f"{self.keys[1]}: {self.table.get('kind', 'load')}{on}"
 
+    @property
+    def amount(self) -> tuple[float, ...] | float | None:
+        """What of it can be typed: a vector, or a pressure."""
+        vector, size = vector_of(self.table), self.table.get("magnitude")
+        if self.keys[0] == "supports":
+            return None
+        if vector is not None:
+            return tuple(vector.tolist())
+        return float(size) if isinstance(size, int | float) else None
 
-_SUPPORTS = {"held": "Hold", "sliding": "Roll"}
+
+Name = tuple[str, type, int]
+"""What an entry is known by while others come and go: title, kind of amount, place among alike."""
 
 
 def vector_of(table: Mapping[str, Any]) -> FloatArray | None:
@@ -85,27 +103,43 @@ class LoadsTab:
         holds = gui.add_button_group("Support", ["Hold", "Roll"])
         holds.on_click(page.on_value(self._support))
         with gui.add_folder("Load"):
-            self.kind = gui.add_dropdown("Kind", list(_KINDS))
-            self.kind.on_update(page.on(self._show_kind))
-            self.vector = gui.add_vector3("Force, N", (0.0, 0.0, _FORCE), step=1.0)
-            self.pressure = gui.add_number("Pressure, MPa", 0.1, step=0.1, visible=False)
-            self.case = gui.add_text("Load case", "load")
+            self.kind = Field(page, gui.add_dropdown("Kind", list(_KINDS)), self._show_kind)
+            self.vector = Field(page, gui.add_vector3("Force, N", (0.0, 0.0, _FORCE), step=1.0))
+            pressure = gui.add_number("Pressure, MPa", 0.1, step=0.1, visible=False)
+            self.pressure = Field(page, pressure)
+            self.case = Field(page, gui.add_text("Load case", "load"))
             gui.add_button("Add load").on_click(page.on(self._load))
         self._list = gui.add_folder("In the part", visible=False)
-        self._shown: list[Any] = []
-        self._fields: dict[tuple[str | int, ...], Any] = {}
-        self._titles: list[str] = []
+        self._rows: dict[Name, tuple[Any, Field | None]] = {}
 
-    def entries(self) -> list[Entry]:
+    def entries(self) -> dict[Name, Entry]:
         """Supports and loads of the part file, as far as they read."""
-        content, found = self.page.bench.content, []
+        content, those = self.page.bench.content, []
         supports, cases = content.get("supports"), content.get("loads")
         for k, table in enumerate(supports if isinstance(supports, list) else ()):
-            found.append(Entry(("supports", k), table))
+            those.append(Entry(("supports", k), table))
         for name, tables in (cases if isinstance(cases, Mapping) else {}).items():
             for k, table in enumerate(tables if isinstance(tables, list) else ()):
-                found.append(Entry(("loads", name, k), table))
-        return [entry for entry in found if isinstance(entry.table, Mapping)]
+                those.append(Entry(("loads", name, k), table))
+        named: dict[Name, Entry] = {}
+        for entry in those:
+            if isinstance(entry.table, Mapping):
+                alike = (entry.title, type(entry.amount))
+                named[*alike, sum(name[:2] == alike for name in named)] = entry
+        return named
+
+    def entry(self, name: Name) -> Entry:
+        """Support or load of a name, wherever it stands by now.
+
+        Raises
+        ------
+        InputError
+            Where it is there no more.
+        """
+        entry = self.entries().get(name)
+        if entry is None:
+            raise InputError(f"{name[0]} is not in the part any more: add it again")
+        return entry
 
     # Faces.
 
@@ -132,7 +166,7 @@ class LoadsTab:
             page.choose_all(sorted({k for n in page.chosen for k in alike(listing, n)}))
 
     def show_chosen(self) -> None:
-        """Say which faces are chosen, and propose a force along their normal."""
+        """Say which faces are chosen."""
         page = self.page
         if not page.chosen:
             self._said.content = '<p class="ccfem">Click a face; with Shift one more.</p>'
@@ -147,13 +181,16 @@ class LoadsTab:
         several = "faces" if len(faces) > 1 else "face"
         head = f"{len(faces)} {several}, {area:.4g} mm²"
         self._said.content = f'<div class="ccfem"><b>{head}</b><ul>{items}</ul></div>'
+
+    def propose(self) -> None:
+        """Propose a load for faces that were just chosen, where nothing else was typed."""
+        faces = [self.page.bench.listing.face(number) for number in self.page.chosen]
         if len(faces) == 1 and faces[0].kind == "plane":
             x, y, z = (round(_FORCE * float(c), 2) + 0.0 for c in faces[0].direction)
-            self.vector.value = (x, y, z)
-        if all(face.kind == "cylinder" for face in faces) and self.kind.value != "pressure":
-            self.kind.value = "bearing of a pin"
-        elif self.kind.value == "bearing of a pin":
-            self.kind.value = "pull or push (force)"
+            self.vector.propose((x, y, z))
+        bearing = faces and all(face.kind == "cylinder" for face in faces)
+        if self.kind.value in _BY_FACE and faces:
+            self.kind.propose(_BY_FACE[bool(bearing)])
 
     # What acts.
 
@@ -176,11 +213,12 @@ class LoadsTab:
         name = self.case.value.strip() or "load"
         page.chosen = []
         page.edit(edited(text, appended(("loads", name), table)))
+        self.kind.typed = self.vector.typed = False  # the next choice proposes again
 
-    def _show_kind(self) -> None:
-        kind = _KINDS[self.kind.value]
-        self.pressure.visible = kind == "pressure"
-        self.vector.visible = kind in ("force", "bearing")
+    def _show_kind(self, title: str) -> None:
+        kind = _KINDS[title]
+        self.pressure.handle.visible = kind == "pressure"
+        self.vector.handle.visible = kind in ("force", "bearing")
 
     # What is there.
 
@@ -191,43 +229,45 @@ class LoadsTab:
             return
         self.show_chosen()
         entries = self.entries()
-        titles = [f"{entry.keys} {entry.title}" for entry in entries]
-        if titles != self._titles:
-            self._titles = titles
-            for handle in self._shown:
-                handle.remove()
-            self._shown, self._fields = [], {}
-            with self._list:
-                for entry in entries:
-                    self._add(entry)
-            self._list.visible = bool(entries)
-        for entry in entries:
-            field = self._fields.get(entry.keys)
+        for name in self._rows.keys() - entries.keys():
+            self._drop(name)
+        for place, (name, entry) in enumerate(entries.items()):
+            if name not in self._rows:
+                with self._list:
+                    self._rows[name] = self._row(name, entry)
+            folder, field = self._rows[name]
+            folder.order = place
             if field is not None:
-                value = vector_of(entry.table)
-                field.value = entry.table["magnitude"] if value is None else tuple(value.tolist())
+                field.put(entry.amount)
+        self._list.visible = bool(entries)
 
-    def _add(self, entry: Entry) -> None:
+    def _drop(self, name: Name) -> None:
+        folder, field = self._rows.pop(name)
+        folder.remove()
+        if field is not None:
+            self.page.fields.remove(field)
+
+    def _row(self, name: Name, entry: Entry) -> tuple[Any, Field | None]:
         page, gui = self.page, self.page.server.gui
-        folder = gui.add_folder(entry.title)
-        self._shown.append(folder)
+        field, folder = None, gui.add_folder(entry.title)
         with folder:
-            magnitude, vector = entry.table.get("magnitude"), vector_of(entry.table)
-            if vector is not None and entry.keys[0] == "loads":
-                unit = {"force": ", N", "bearing": ", N", "point": ", N"}.get(
-                    str(entry.table.get("kind")), ""
-                )
-                x, y, z = vector.tolist()
-                field: Any = gui.add_vector3(f"Vector{unit}", (x, y, z), step=1.0)
-                field.on_update(page.on_value(self._change, entry.keys, "vector"))
-                self._fields[entry.keys] = field
-            elif isinstance(magnitude, int | float):
-                field = gui.add_number("Pressure, MPa", float(magnitude), step=0.1)
-                field.on_update(page.on_value(self._change, entry.keys, "magnitude"))
-                self._fields[entry.keys] = field
+            if isinstance(entry.amount, tuple):
+                unit = _UNITS.get(str(entry.table.get("kind")), "")
+                vector = gui.add_vector3(f"Vector{unit}", entry.amount, step=1.0)
+                field = Field(page, vector, lambda value: self._change(name, "vector", value))
+            elif entry.amount is not None:
+                number = gui.add_number("Pressure, MPa", entry.amount, step=0.1)
+                field = Field(page, number, lambda value: self._change(name, "magnitude", value))
             remove = gui.add_button("Remove", color="gray", hint=entry.title)
-            remove.on_click(page.on(page.edit, removed(entry.keys)))
+            remove.on_click(page.on(self._remove, name, folder))
+        return folder, field
 
-    def _change(self, keys: Sequence[str | int], key: str, value: Any) -> None:
-        plain = [float(x) for x in value] if isinstance(value, tuple) else float(value)
-        self.page.edit(valued((*keys, key), plain), f"{keys} {key}")
+    def _remove(self, name: Name, folder: Any) -> None:
+        if name in self._rows and self._rows[name][0] is folder:  # else it was clicked twice
+            keys = self.entry(name).keys
+            self._drop(name)
+            self.page.edit(removed(keys))
+
+    def _change(self, name: Name, key: str, value: Any) -> None:
+        plain = list(value) if isinstance(value, tuple) else float(value)
+        self.page.edit(valued((*self.entry(name).keys, key), plain), f"{name} {key}")

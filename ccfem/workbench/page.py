@@ -29,11 +29,11 @@ from ccfem.workbench.body_scene import (
 from ccfem.workbench.compare_tab import CompareTab
 from ccfem.workbench.file_tab import FileTab
 from ccfem.workbench.guard import Guard, Served, escaped, limit_uploads
-from ccfem.workbench.loads_tab import LoadsTab, vector_of
+from ccfem.workbench.loads_tab import LoadsTab, Name, vector_of
 from ccfem.workbench.newest import Newest
 from ccfem.workbench.part_edits import Change, valued
 from ccfem.workbench.print_tab import PrintTab
-from ccfem.workbench.tab import PART, VIEWS
+from ccfem.workbench.tab import PART, VIEWS, Field
 
 _FACE, _CHOSEN = (203, 210, 216), (245, 190, 65)
 _HELD, _LOADED, _BOTH = (120, 168, 214), (226, 142, 120), (170, 140, 190)
@@ -75,6 +75,7 @@ class Page:
 
         self.bench, self.guard = bench, Guard(self._served)
         self.chosen: list[int] = []
+        self.fields: list[Field] = []
         self.checked: Check | None = None
         self._checked_text, self._said = "", Said()
         self._faces: dict[int, Any] = {}
@@ -133,10 +134,7 @@ class Page:
         return heed
 
     def on_value(self, what: Callable[..., None], *arguments: Any) -> Callable[[Any], Any]:
-        """Return a callback as `on` does, that passes on the value as it is when that comes.
-
-        Until it is acted on, what is shown meanwhile may have set the field to something else.
-        """
+        """Return a callback as `on` does, that passes on what was clicked or uploaded."""
 
         async def heed(event: Any) -> None:
             if event.client_id is not None:
@@ -167,6 +165,8 @@ class Page:
         self.bench.open(what)
         self.say("")
         self.chosen, self.checked, self._said = [], None, ()
+        for field in self.fields:
+            field.typed = False
         self.compare.forget()
         self.show()
         self.look()
@@ -241,6 +241,8 @@ class Page:
             self.checked, self._said = came
             self._tell_lines("")
             self._draw_symbols()
+            for field in self.fields:
+                field.settle()
             self.drawn.set()
 
     def _tell_lines(self, doing: str) -> None:
@@ -313,22 +315,18 @@ class Page:
     def choose(self, number: int, more: bool) -> None:
         """Choose a face, or with `more` one more; one that is chosen is left out again."""
         if not more:
-            self.chosen = [] if self.chosen == [number] else [number]
+            self.choose_all([] if self.chosen == [number] else [number])
         elif number in self.chosen:
-            self.chosen = [k for k in self.chosen if k != number]
+            self.choose_all([k for k in self.chosen if k != number])
         else:
-            self.chosen = [*self.chosen, number]
-        self.show_chosen()
+            self.choose_all([*self.chosen, number])
 
     def choose_all(self, numbers: Sequence[int]) -> None:
         """Choose these faces."""
         self.chosen = list(numbers)
-        self.show_chosen()
-
-    def show_chosen(self) -> None:
-        """Show which faces are chosen."""
         self._paint()
         self.loads.show_chosen()
+        self.loads.propose()
 
     def places(self) -> dict[str, PatchPlace]:
         """Places of the patches, as far as they are known."""
@@ -338,7 +336,7 @@ class Page:
         """Colour the faces by what acts on them, and those that are chosen."""
         held, loaded = set[int](), set[int]()
         places = self.places()
-        for entry in self.loads.entries():
+        for entry in self.loads.entries().values():
             place = places.get(str(entry.table.get("patch")))
             if place is not None:
                 (held if entry.keys[0] == "supports" else loaded).update(place.numbers)
@@ -358,7 +356,7 @@ class Page:
             handle.remove()
         self._drawn = []
         places, size = self.places(), listing.size
-        for k, entry in enumerate(self.loads.entries()):
+        for k, (called, entry) in enumerate(self.loads.entries().items()):
             place = places.get(str(entry.table.get("patch")))
             if place is None:
                 continue
@@ -379,13 +377,13 @@ class Page:
                     )
                 )
             elif np.any(force):
-                self._drawn += self._arrow(name, entry.keys, place, force, 0.22 * size)
+                self._drawn += self._arrow(name, called, place, force, 0.22 * size)
         self._paint()
 
     def _arrow(
         self,
         name: str,
-        keys: Sequence[str | int],
+        entry: Name,
         place: PatchPlace,
         force: FloatArray,
         long: float,
@@ -417,16 +415,18 @@ class Page:
             position=tuple(free + 0.12 * (ends[1] - ends[0]) * (-1.0 if presses else 1.0)),
             anchor="bottom-center",
         )
-        amount, sign = float(np.linalg.norm(force)), -1.0 if presses else 1.0
+        sign = -1.0 if presses else 1.0
 
         async def drag(event: Any) -> None:
             self.act(dragged, np.array(event.end_position), event.phase)
 
         def dragged(end: FloatArray, phase: str) -> None:
             along = snapped(end - place.centre)
-            if phase == "end":
-                vector = [round(float(x), 3) + 0.0 for x in sign * amount * along]
-                self.edit(valued((*keys, "vector"), vector))
+            if phase == "end":  # its size as it is now: somebody may have typed another
+                now = self.loads.entry(entry)
+                size = np.linalg.norm(now.amount or 0.0)
+                vector = [round(float(x), 3) + 0.0 for x in sign * size * along]
+                self.edit(valued((*now.keys, "vector"), vector))
                 return
             tip = place.centre + long * along
             new = [tip, place.centre] if presses else [place.centre, tip]

@@ -1,6 +1,6 @@
 """The tab for how a part is printed: machine, material, cells, layers, build direction, fibre."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from ccfem.base.errors import InputError
@@ -8,7 +8,7 @@ from ccfem.fem.materials import material_names
 from ccfem.machine.named_machines import machine_about, machine_names
 from ccfem.workbench.guard import escaped
 from ccfem.workbench.part_edits import Change, appended, edited, patch_of, valued
-from ccfem.workbench.tab import Tabbed
+from ccfem.workbench.tab import Field, Tabbed
 
 _COUNT = 12
 """Layers that a part has which says nothing of them."""
@@ -21,30 +21,27 @@ class PrintTab:
 
     def __init__(self, page: Tabbed) -> None:
         self.page, gui = page, page.server.gui
-        self.machine = gui.add_dropdown("Machine", (_STANDARD, *machine_names()))
+        machines, materials = (_STANDARD, *machine_names()), (*material_names(), _WRITTEN)
+        self.machine = self._field(gui.add_dropdown("Machine", machines), self._machine)
         self._about = gui.add_html("")
-        self.material = gui.add_dropdown("Material", (*material_names(), _WRITTEN))
-        self.build = gui.add_dropdown("Build direction", (*_DIRECTIONS, _WRITTEN))
-        self.layers = gui.add_number("Layers of fibre", _COUNT, min=1, step=1)
-        self.cells = gui.add_number("Edge of cells, mm", 2.0, min=0.01, step=0.1)
-        for field, change in (
-            (self.machine, self._machine),
-            (self.material, self._choice("material")),
-            (self.build, self._choice("build")),
-            (self.layers, self._layers),
-            (self.cells, self._cells),
-        ):
-            field.on_update(page.on_value(self._edit, change))
+        material = gui.add_dropdown("Material", materials)
+        self.material = self._field(material, lambda name: self._choice("material", name))
+        build = gui.add_dropdown("Build direction", (*_DIRECTIONS, _WRITTEN))
+        self.build = self._field(build, lambda name: self._choice("build", name))
+        layers = gui.add_number("Layers of fibre", _COUNT, min=1, step=1)
+        self.layers = self._field(layers, self._layers)
+        cells = gui.add_number("Edge of cells, mm", 2.0, min=0.01, step=0.1)
+        self.cells = self._field(cells, self._cells)
         with gui.add_folder("Fibre only near chosen faces", expand_by_default=False):
-            self.within = gui.add_number("Within, mm", 6.0, min=0.1, step=0.5)
+            self.within = Field(page, gui.add_number("Within, mm", 6.0, min=0.1, step=0.5))
             near = gui.add_button_group("Fibre", ["Near the chosen faces", "Everywhere"])
             near.on_click(page.on_value(self._near))
         self._said = gui.add_html("")
 
-    def _edit(self, change: Any, value: Any) -> None:
-        made = change(value)
-        if made is not None:
-            self.page.edit(made, f"print {change}")
+    def _field(self, handle: Any, change: Callable[[Any], Change]) -> Field:
+        """Field whose value makes a change of the part file."""
+        edit = self.page.edit
+        return Field(self.page, handle, lambda value: edit(change(value), handle.label))
 
     def _machine(self, name: str) -> Change:
         if name != _STANDARD:
@@ -54,8 +51,10 @@ class PrintTab:
             return valued(("machine",), None)
         return valued(("machine", "profile"), None)
 
-    def _choice(self, key: str) -> Any:
-        return lambda value: None if value == _WRITTEN else valued((key,), value)
+    def _choice(self, key: str, value: str) -> Change:
+        if value == _WRITTEN:
+            raise InputError(f"the part file has a {key} of the list: choose another")
+        return valued((key,), value)
 
     def _layers(self, count: int) -> Change:
         other = [key for key in ("heights", "slicing") if key in self.page.bench.content]
@@ -88,7 +87,7 @@ class PrintTab:
         machine = content.get("machine")
         profile = machine.get("profile", _STANDARD) if isinstance(machine, Mapping) else _STANDARD
         known = profile in (_STANDARD, *machine_names())
-        self.machine.value = profile if known else _STANDARD
+        self.machine.put(profile if known else _STANDARD)
         about = machine_about(profile) if known and profile != _STANDARD else ""
         self._about.content = f'<p class="ccfem small">{escaped(about)}</p>'
         for field, key, default in (
@@ -96,14 +95,14 @@ class PrintTab:
             (self.build, "build", "z"),
         ):
             value = content.get(key, default)
-            field.value = value if value in field.options else _WRITTEN
-        if isinstance(content.get("layers"), int):
-            self.layers.value = content["layers"]
+            field.put(value if value in field.handle.options else _WRITTEN)
+        count = content.get("layers")
+        self.layers.put(count if isinstance(count, int) else _COUNT)
         planform = content.get("planform")
         edge = (planform if isinstance(planform, Mapping) else content).get("edge_length")
-        self.cells.visible = isinstance(edge, int | float)
+        self.cells.handle.visible = isinstance(edge, int | float)
         if isinstance(edge, int | float):
-            self.cells.value = float(edge)
+            self.cells.put(float(edge))
         fibre = content.get("fibre")
         regions = fibre.get("regions", []) if isinstance(fibre, Mapping) else []
         near = [r.get("patch") for r in regions if isinstance(r, Mapping) and "patch" in r]

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 from ccfem.workbench.bench import Bench
-from ccfem.workbench.guard import escaped
+from ccfem.workbench.guard import escaped, send_again
 from ccfem.workbench.part_edits import Change
 
 PART, STRESS, MOVED, FIBRE = VIEWS = ("Part", "Stress", "Deformed", "Fibre")
@@ -18,6 +18,7 @@ class Tabbed(Protocol):
     server: Any
     view: Any
     chosen: list[int]
+    fields: list["Field"]
 
     def act(self, what: Callable[..., None], *arguments: Any) -> Any:
         """Do something when all before it is done."""
@@ -26,7 +27,7 @@ class Tabbed(Protocol):
         """Return a callback of viser that does something."""
 
     def on_value(self, what: Callable[..., None], *arguments: Any) -> Callable[[Any], Any]:
-        """Return a callback of viser that does something with the value of its field."""
+        """Return a callback of viser that does something with what was clicked or uploaded."""
 
     def say(self, text: str) -> None:
         """Show a line at the top."""
@@ -45,6 +46,107 @@ class Tabbed(Protocol):
 
     def show_view(self, view: str) -> None:
         """Show one of `VIEWS`."""
+
+
+_DIGITS = 6
+"""Decimal places of numbers: as few as their step has would make 70.5 that is typed 705."""
+
+_CROSSING = 5.0
+"""Seconds after which a browser shows what was sent to it, however busy it is."""
+
+
+class Field:
+    """A field of the panel, whose value keeps the order of what is done.
+
+    What is typed is acted on later, one thing after the other. What is shown here meanwhile never
+    takes its place.
+
+    Parameters
+    ----------
+    page : Tabbed
+    handle : handle of viser
+    changed : callable, optional
+        Takes each value that is typed. Where it raises, the field shows what it showed before.
+
+    Attributes
+    ----------
+    value
+        What the field held when what is being done now was asked for.
+    typed : bool
+        Whether somebody typed that value.
+    """
+
+    def __init__(
+        self, page: Tabbed, handle: Any, changed: Callable[[Any], object] | None = None
+    ) -> None:
+        self.page, self.handle, self._changed = page, handle, changed
+        self.value = self._shown = self._before = handle.value
+        self.typed = self._doubtful = False
+        self._came = self._taken = 0
+        self._sent = handle.update_timestamp
+        if isinstance(self.value, float | tuple):
+            handle.precision = _DIGITS
+        handle.on_update(self._heed)
+        page.fields.append(self)
+
+    async def _heed(self, event: Any) -> None:
+        if event.client_id is not None:
+            self._came += 1
+            self._doubtful |= event.target.update_timestamp - self._sent < _CROSSING
+            self.page.act(self._take, event.target.value, self.page.bench.opened)
+
+    def _take(self, value: Any, opened: object) -> None:
+        self._taken += 1
+        if opened is not self.page.bench.opened:  # it was typed for the part before
+            self.put(self._shown)
+            return
+        self.value, self.typed = self._joined(value), True
+        try:
+            if self._changed is not None:
+                self._changed(self.value)
+        except Exception:
+            self.put(self._shown)
+            raise
+        self._show()
+
+    def _joined(self, value: Any) -> Any:
+        """Join a component that was typed with the others as they were put here meanwhile.
+
+        Somebody types one component at a time. Where more of them differ he did not see yet what
+        was put here last.
+        """
+        if not isinstance(value, tuple):
+            return value
+        if sum(new != now for new, now in zip(value, self.value, strict=True)) < 2:
+            return value
+        three = zip(value, self._before, self.value, strict=True)
+        return tuple(now if new == old else new for new, old, now in three)
+
+    def _show(self) -> None:
+        if self._came == self._taken and self.handle.value != self.value:
+            self.handle.value = self.value
+            self._sent = self.handle.update_timestamp
+
+    def put(self, value: Any) -> None:
+        """Show a value, unless a newer one was typed that is still to be acted on."""
+        if value != self.value:
+            self._before, self.value = self.value, value
+        self._shown = value
+        self._show()
+
+    def propose(self, value: Any) -> None:
+        """Show a value where nobody has typed one."""
+        if not self.typed:
+            self.put(value)
+
+    def settle(self) -> None:
+        """Send the value again, when all is quiet, where it may have crossed with what was typed.
+
+        Then the browser shows what was put here, and the part file has what was typed.
+        """
+        if self._doubtful and self._came == self._taken:
+            self._doubtful, self._sent = False, self.handle.update_timestamp
+            send_again(self.handle)
 
 
 def table_html(heads: Sequence[str], rows: Sequence[Sequence[str]], marked: str = "") -> str:

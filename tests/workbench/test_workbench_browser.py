@@ -132,6 +132,25 @@ def test_from_a_body_to_a_part_file_by_clicks_alone(work):
     assert tab.evaluate(NAMELESS) == 0
 
 
+TYPE = """(fields) => { for (const [label, text] of fields) {
+    const input = document.querySelector(`[aria-label="${label}"]`)
+      || [...document.querySelectorAll("label")].find((each) => each.textContent === label).control;
+    const put = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
+    put.call(input, text);
+    input.dispatchEvent(new Event("input", { bubbles: true }));
+} }"""
+"""Types in fields, one after the other without a moment between."""
+
+
+def test_what_is_typed_in_one_moment_all_arrives(work):
+    view, loads = work.first, work.page.loads
+    view.choose_tab("Loads")
+    view.tab.evaluate(TYPE, [["Load case", "a"], ["Force, N", "70.5"], ["Load case", "pull"]])
+    view.settle()
+    assert loads.vector.value[0] == 70.5
+    assert loads.case.value == "pull"
+
+
 def test_an_arrow_is_dragged_and_undone(work):
     view, bench = work.first, work.bench
     before = bench.text

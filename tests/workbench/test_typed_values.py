@@ -1,0 +1,228 @@
+"""What is typed reaches the part file, whatever is drawn, checked or undone meanwhile."""
+
+import asyncio
+import threading
+from contextlib import contextmanager
+
+import pytest
+
+from ccfem.body.files import write_mesh
+from ccfem.body.mesh.box import box_mesh
+from ccfem.workbench.bench import Bench
+
+HELD = """\
+mesh = "bar.vtu"
+material = "pla"
+
+[patches.end]
+rule = "face"
+at = [40.0, 5.0, 2.0]
+normal = "x"
+
+[[loads.pull]]
+kind = "force"
+patch = "end"
+vector = [100.0, 0.0, 0.0]
+
+[[loads.press]]
+kind = "pressure"
+patch = "end"
+magnitude = 0.1
+"""
+
+
+class Visit:
+    """What a browser does to a page: it shows what is sent, and sends what is typed on top of it.
+
+    `late` holds back what is sent to it, `busy` what is done of what it asks for.
+    """
+
+    def __init__(self, page, monkeypatch):
+        self.page, self.gui = page, page.server.gui
+        self.screen, self.seen, self._way, self._late = {}, [], [], False
+        queue = self.gui._websock_interface.queue_message
+
+        def sent(message):
+            queue(message)
+            if "value" in getattr(message, "updates", {}) and message.excluded_self_client != 1:
+                self._way.append((message.uuid, message.updates["value"]))
+                if not self._late:
+                    self.receive()
+
+        monkeypatch.setattr(self.gui._websock_interface, "queue_message", sent)
+        monkeypatch.setattr(self.gui, "_resolve_client", lambda client: object())
+
+    def receive(self):
+        while self._way:
+            uuid, value = self._way.pop(0)
+            self.seen.append(uuid)
+            self.screen[uuid] = value
+
+    def shown(self, field):
+        return self.screen.get(field.handle._impl.uuid, field.handle._impl.value)
+
+    def send(self, handle, value):
+        from viser._messages import GuiUpdateMessage
+
+        message = GuiUpdateMessage(handle._impl.uuid, {"value": value})
+        update = self.gui._handle_gui_updates(1, message)
+        asyncio.run_coroutine_threadsafe(update, self.gui._event_loop).result(10)
+
+    def type(self, field, value, component=None):
+        if component is not None:
+            value = [value if k == component else x for k, x in enumerate(self.shown(field))]
+        value = tuple(value) if isinstance(value, list) else value
+        self.screen[field.handle._impl.uuid] = value
+        self.send(field.handle, value)
+
+    def click(self, name, place=0):
+        handles = self.gui._gui_input_handle_from_uuid.values()
+        named = [h for h in handles if getattr(h, "label", "") == name]
+        self.send(named[place], True)
+
+    @contextmanager
+    def busy(self):
+        going = threading.Event()
+        self.page.act(going.wait)
+        yield
+        going.set()
+        self.settle()
+
+    @contextmanager
+    def late(self):
+        self._late = True
+        yield
+        self._late = False
+        self.receive()
+
+    def settle(self):
+        self.page.act(lambda: None).result(10)
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory):
+    pytest.importorskip("viser", reason="viser is not installed: pip install ccfem[ui]")
+    from ccfem.workbench.page import Page
+
+    folder = tmp_path_factory.mktemp("typed")
+    write_mesh(box_mesh((40.0, 10.0, 4.0), (2, 1, 1)), folder / "bar.vtu")
+    (folder / "bar.toml").write_text(HELD)
+    page = Page(Bench(folder))
+    yield page
+    page.close()
+
+
+@pytest.fixture
+def page(served):
+    served._newest.ask = lambda text: None  # the check is drawn where a test says so
+    served.act(served.open, "bar.toml").result()
+    return served
+
+
+@pytest.fixture
+def visit(page, monkeypatch):
+    return Visit(page, monkeypatch)
+
+
+def face(page, along):
+    pairs = zip(page.bench.listing.numbers, page.bench.listing.faces, strict=True)
+    return next(number for number, face in pairs if face.along == along)
+
+
+def vectors(page, case):
+    return [load["vector"] for load in page.bench.content["loads"][case]]
+
+
+def row(page, title):
+    return next(field for name, (_, field) in page.loads._rows.items() if name[0] == title)
+
+
+def test_a_typed_force_survives_what_is_shown_before_it_is_added(page, visit):
+    loads = page.loads
+    page.act(page.choose, face(page, "x"), False).result()
+    assert loads.vector.value == (100.0, 0.0, 0.0)
+    visit.type(loads.vector, 200.0, 0)
+    visit.type(page.prints.layers, 3)
+    page.act(page.choose, face(page, "y"), True)
+    page.act(page.choose, face(page, "y"), True)
+    visit.settle()
+    visit.type(loads.case, "more")
+    visit.click("Add load")
+    visit.settle()
+    assert vectors(page, "more") == [[200.0, 0.0, 0.0]]
+    page.act(page.choose, face(page, "z"), False).result()
+    assert loads.vector.value == (0.0, 0.0, 100.0)  # of the next load, proposed again
+
+
+def test_a_force_typed_before_the_choice_was_seen_is_joined_with_its_direction(page, visit):
+    visit.type(page.loads.vector, 0.0, 0)
+    page.act(page.choose, face(page, "z"), False).result()
+    page.loads.vector.typed = False
+    with visit.busy():
+        page.act(page.choose, face(page, "x"), False)
+        for size in (2.0, 20.0, 200.0):
+            visit.type(page.loads.vector, size, 0)
+        visit.type(page.loads.case, "early")
+        visit.click("Add load")
+        visit.type(page.loads.vector, 300.0, 0)  # for the next
+        visit.type(page.loads.case, "next")
+    assert vectors(page, "early") == [[200.0, 0.0, 0.0]]
+    assert visit.shown(page.loads.vector) == page.loads.vector.value == (300.0, 0.0, 0.0)
+
+
+def test_digits_that_come_fast_are_never_overwritten_by_older_ones(page, visit):
+    field = row(page, "pull: force on end")
+    with visit.busy():
+        for size in (7.0, 70.0, 70.5):
+            visit.type(field, size, 0)
+        page.act(page.show)
+    assert vectors(page, "pull") == [[70.5, 0.0, 0.0]]
+    assert visit.shown(field) == (70.5, 0.0, 0.0)
+    assert field.handle._impl.uuid not in visit.seen
+    assert field.handle.precision == 6  # or the point is not taken, and 70.5 is 705
+    page.act(page.step, -1).result()
+    assert vectors(page, "pull") == [[100.0, 0.0, 0.0]]
+
+
+def test_what_crosses_on_the_way_ends_as_it_was_typed(page, visit):
+    field = row(page, "press: pressure on end")
+    visit.type(field, 0.7)
+    visit.settle()
+    with visit.late():
+        page.act(page.step, -1).result()
+        visit.type(field, 0.75)
+        visit.settle()
+    assert visit.shown(field) == 0.1  # the undone one came last ...
+    page.act(page._heed, page.bench.text, (None, ())).result()
+    assert visit.shown(field) == 0.75  # ... until all is quiet
+    assert page.bench.content["loads"]["press"][0]["magnitude"] == 0.75
+
+
+def test_rows_are_known_whatever_comes_and_goes(page, visit):
+    field = row(page, "press: pressure on end")
+    with visit.busy():
+        visit.click("Remove")
+        visit.click("Remove")
+        visit.type(field, 0.5)
+    assert page.bench.content["loads"] == {
+        "press": [{"kind": "pressure", "patch": "end", "magnitude": 0.5}]
+    }
+    assert row(page, "press: pressure on end") is field
+    with visit.busy():
+        page.act(page.open, "bar.toml")
+        visit.type(field, 0.9)  # in the part before
+    assert page.bench.text == HELD
+
+
+def test_a_value_that_is_refused_or_undone_is_shown_no_more(page, visit):
+    layers = page.prints.layers
+    visit.type(layers, 5)
+    visit.settle()
+    page.act(page.step, -1).result()
+    assert visit.shown(layers) == 12
+    page.act(page.bench.edit, HELD.replace("material", "heights = [1.0]\nmaterial")).result()
+    visit.type(layers, 5)
+    visit.settle()
+    assert "gives its layers by heights" in page.message.content
+    assert visit.shown(layers) == 12
+    assert page.bench.content["heights"] == [1.0]
