@@ -109,7 +109,7 @@ def turned(build: Sequence[float], turns: Sequence[str], spin: float = 0.0) -> t
         return (x, y, z), spin
     frame = BedLayout(spin).frame(plane_frame(build))
     for text in turns:
-        frame = (_about(*_axis_and_angle(text)) @ frame).round(_DIGITS) + 0.0
+        frame = (_about(*axis_and_angle(text)) @ frame).round(_DIGITS) + 0.0
     upright = plane_frame(frame[2].tolist())
     cosine, sine = upright[0] @ frame[0], upright[0] @ frame[1]
     angle = round(float(np.degrees(np.arctan2(sine, cosine))), 9) + 0.0
@@ -122,8 +122,14 @@ def _about(axis: str, angle: float) -> FloatArray:
     return np.asarray(Rotation.from_euler(axis, angle, degrees=True).as_matrix())
 
 
-def _axis_and_angle(text: str) -> tuple[str, float]:
-    """Axis and angle of ``x=90``."""
+def axis_and_angle(text: str) -> tuple[str, float]:
+    """Read a turn, ``x=90``, as an axis and its angle in degrees.
+
+    Raises
+    ------
+    InputError
+        For anything else.
+    """
     axis, equals, angle = text.replace(" ", "").lower().partition("=")
     try:
         degrees = float(angle)

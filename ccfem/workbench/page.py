@@ -241,6 +241,7 @@ class Page:
             self.checked, self._said = came
             self._tell_lines("")
             self._draw_symbols()
+            self.prints.show()
             for field in self.fields:
                 field.settle()
             self.drawn.set()

@@ -71,7 +71,7 @@ def edited(text: str, change: Change) -> str:
 
 
 def valued(keys: Keys, value: Any) -> Change:
-    """Set a value, and the tables in which it stands; None removes it."""
+    """Set a value, and the tables in which it stands; None removes it, and a table left empty."""
 
     def change(content: Any) -> None:
         at = content
@@ -87,6 +87,8 @@ def valued(keys: Keys, value: Any) -> Change:
                 at[keys[-1]].add(tomlkit.nl())
         elif keys[-1] in at:
             del at[keys[-1]]
+            if len(keys) > 1 and not len(at):
+                valued(keys[:-1], None)(content)
 
     return change
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
+from ccfem.cases.inspection import Check
 from ccfem.workbench.bench import Bench
 from ccfem.workbench.guard import escaped, send_again
 from ccfem.workbench.part_edits import Change
@@ -18,6 +19,7 @@ class Tabbed(Protocol):
     server: Any
     view: Any
     chosen: list[int]
+    checked: Check | None
     fields: list["Field"]
 
     def act(self, what: Callable[..., None], *arguments: Any) -> Any:

@@ -142,7 +142,7 @@ def test_a_typed_force_survives_what_is_shown_before_it_is_added(page, visit):
     page.act(page.choose, face(page, "x"), False).result()
     assert loads.vector.value == (100.0, 0.0, 0.0)
     visit.type(loads.vector, 200.0, 0)
-    visit.type(page.prints.layers, 3)
+    visit.type(page.prints.settings["layers"].field, 3)
     page.act(page.choose, face(page, "y"), True)
     page.act(page.choose, face(page, "y"), True)
     visit.settle()
@@ -215,7 +215,7 @@ def test_rows_are_known_whatever_comes_and_goes(page, visit):
 
 
 def test_a_value_that_is_refused_or_undone_is_shown_no_more(page, visit):
-    layers = page.prints.layers
+    layers = page.prints.settings["layers"].field
     visit.type(layers, 5)
     visit.settle()
     page.act(page.step, -1).result()
@@ -226,3 +226,57 @@ def test_a_value_that_is_refused_or_undone_is_shown_no_more(page, visit):
     assert "gives its layers by heights" in page.message.content
     assert visit.shown(layers) == 12
     assert page.bench.content["heights"] == [1.0]
+
+
+def test_plastic_and_bed_are_set_beside_what_the_page_cannot_show(page, visit):
+    by_hand = """
+[plastic]
+walls = 2.5      # a slip
+seam = "corner"  # by hand
+
+[bed]
+turn = ["x=90", "z=30"]
+copies = "2x3"
+"""
+    page.act(page.bench.edit, HELD + by_hand).result()
+    page.act(page.show).result()
+    fields = {name: setting.field for name, setting in page.prints.settings.items()}
+    assert not fields["walls"].handle.visible
+    assert not fields["turn"].handle.visible
+    assert "plastic.walls = 2.5; bed.turn = " in page.prints._said.content
+    assert (fields["seam"].value, fields["copies"].value) == ("corner", "2x3")
+    assert not fields["density"].handle.visible  # of a solid part
+    steps = [
+        ("infill", "gyroid", {"infill": "gyroid"}, {}),
+        ("density", 0.35, {"density": 0.35}, {}),
+        ("seam", "any", {"seam": None}, {}),
+        ("copies", "4", {}, {"copies": 4}),
+        ("centre", (120.0, 150.0), {}, {"centre": [120.0, 150.0]}),
+        ("centre", (150.0, 150.0), {}, {"centre": None}),
+    ]
+    plastic = {"walls": 2.5, "seam": "corner"}
+    bed = {"turn": ["x=90", "z=30"], "copies": "2x3"}
+    for name, value, of_plastic, of_bed in steps:
+        visit.type(fields[name], value)
+        visit.settle()
+        plastic = {k: v for k, v in (plastic | of_plastic).items() if v is not None}
+        bed = {k: v for k, v in (bed | of_bed).items() if v is not None}
+        assert page.bench.content["plastic"] == plastic
+        assert page.bench.content["bed"] == bed
+    assert fields["density"].handle.visible
+    assert "# a slip" in page.bench.text
+    for _ in steps[1:]:  # a field that is typed in twice is one step
+        page.act(page.step, -1).result()
+    assert page.bench.text == HELD + by_hand
+    assert (fields["seam"].value, visit.shown(fields["copies"])) == ("corner", "2x3")
+
+
+def test_a_turn_leaves_no_empty_table(page, visit):
+    turn = page.prints.settings["turn"].field
+    visit.type(turn, 37.5)
+    visit.settle()
+    assert page.bench.content["bed"] == {"turn": "z=37.5"}
+    visit.type(turn, 0.0)
+    visit.settle()
+    assert "bed" not in page.bench.content
+    assert page.bench.content.keys() == {"mesh", "material", "patches", "loads"}
