@@ -3,19 +3,21 @@
 import inspect
 import mimetypes
 import shlex
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ccfem import strategies as strategy_modules
-from ccfem.base.arrays import FloatArray
+from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.errors import InputError
 from ccfem.comparison.plot.colours import LINK, OUTLINE, scale
+from ccfem.comparison.report.print_view import BESIDE, COLOURS, FILLS, KINDS, MOVES
 from ccfem.comparison.request import STRATEGIES
 from ccfem.workbench.child_run import ChildRun, RunState
 from ccfem.workbench.guard import Served, escaped
-from ccfem.workbench.result_views import Pieces, RunResults, read_results
-from ccfem.workbench.tab import FIBRE, MOVED, PART, STRESS, Field, Tabbed, table_html
+from ccfem.workbench.result_views import Pieces, PrintLayer, RunResults, read_results
+from ccfem.workbench.tab import FIBRE, MOVED, PART, PRINT, STRESS, Field, Tabbed, table_html
 
 _NO_ONE, _FIRST, _ALL = "none", "the first", "all at once"
 _BESIDE = 1.25
@@ -54,14 +56,22 @@ class CompareTab:
         self._found = gui.add_folder("Layers", visible=False)
         with self._found:
             left, right = (gui.add_dropdown(t, (_NO_ONE,)) for t in ("Strategy", "Beside it"))
-            self.left, self.right = (Field(page, h, lambda _: self._draw()) for h in (left, right))
+            self.left, self.right = (
+                Field(page, h, lambda _: self._redraw()) for h in (left, right)
+            )
             self.layer = gui.add_slider("Layer", 0, 1, 1, 0)  # the newest place, not all between
             self.layer.on_update(page.on(self._draw))
+            self.top = gui.add_slider("Printed up to", 0, 1, 1, 0, visible=False)
+            self.alone = gui.add_checkbox("This layer alone", False, visible=False)
+            self.travel = gui.add_checkbox("Moves and lifts", False, visible=False)
+            for field in (self.top, self.alone, self.travel):
+                field.on_update(page.on(self._show_print))
             self._layer_said = gui.add_html("")
             self.prints = gui.add_button("G-code of this strategy", icon="printer")
             self.prints.on_click(page.on(self._plan))
         self._links = gui.add_html("")
         self._handles: list[Any] = []
+        self._printed: list[PrintLayer] = []
 
     def _add_ticks(self, known: dict[str, Any]) -> None:
         for name, strategy in known.items():
@@ -99,20 +109,21 @@ class CompareTab:
         page.bench.part_file()
         suffix = f"-{self.left.value}" if arguments[0] == "plan" else ""
         folder = page.bench.results / f"{page.bench.name}{suffix}"
+        view = PRINT if "--gcode" in arguments else FIBRE
         self.run = ChildRun(
             arguments,
             page.bench.folder,
-            lambda state: page.act(self._heed, state, folder),
+            lambda state: page.act(self._heed, state, folder, view),
             float(self.minutes.value),
         )
         self._tell(self.run.state)
 
-    def _heed(self, state: RunState, folder: Any) -> None:
+    def _heed(self, state: RunState, folder: Path, view: str) -> None:
         self._tell(state)
         if state.written:
             self.results = read_results(folder)
             self._show_results()
-            self.page.show_view(FIBRE)
+            self.page.show_view(view)
         elif not state.running:
             self.page.say("" if state.stopped == "stopped" else state.complaint)
 
@@ -209,10 +220,15 @@ class CompareTab:
         for handle in self._handles:
             handle.remove()
         self._handles = []
+        self.layer.visible = self.right.handle.visible = view != PRINT
+        for field in (self.top, self.alone, self.travel):
+            field.visible = view == PRINT
         if view == PART or self.results is None:
             return None
         if view in (STRESS, MOVED):
             return self._draw_surface(view)
+        if view == PRINT:
+            return self._draw_print()
         self._draw()
         points = self.results.rims(self._place).reshape(-1, 3)
         if not len(points):
@@ -257,6 +273,62 @@ class CompareTab:
             scene.add_label("/surface_said", surface.said, position=above, anchor="bottom-center"),
         ]
         return low, high
+
+    def _redraw(self) -> None:
+        """Draw another strategy, from where one looks now."""
+        self.shown(self.page.view.value)
+
+    def _draw_print(self) -> tuple[FloatArray, FloatArray]:
+        """Draw the whole print of a strategy, a line segment for each piece."""
+        assert self.results is not None
+        name = self.left.value
+        self._printed = self.results.print_layers(name)
+        if not self._printed:
+            why = self.results.why_not(name) or "press “G-code of this strategy”"
+            raise InputError(f"there is no print of {name} to show: {why}")
+        # Of a layer that others lie on only what is seen is drawn.
+        for k, layer in enumerate(self._printed):
+            seen = (layer.kind != FILLS) & (layer.kind != MOVES)
+            self._handles.append(self._lines(f"/print_{k}", layer, seen))
+        self.top.max = max(len(self._printed) - 1, 1)
+        self.top.value = len(self._printed) - 1
+        self._show_print()
+        parts = [layer.ends[layer.kind < BESIDE].reshape(-1, 3) for layer in self._printed]
+        corners = np.concatenate(parts)
+        return corners.min(axis=0), corners.max(axis=0)
+
+    def _show_print(self) -> None:
+        """Show the print up to a layer, or that alone, with what fills it and how one travels."""
+        if self.page.view.value != PRINT or not self._printed:
+            return
+        count = len(self._printed)
+        top = min(int(self.top.value), count - 1)
+        for k, handle in enumerate(self._handles[:count]):
+            visible = k == top or (k < top and not self.alone.value)
+            if handle.visible != visible:
+                handle.visible = visible
+        for handle in self._handles[count:]:
+            handle.remove()
+        layer = self._printed[top]
+        upper = (layer.kind == FILLS) | ((layer.kind == MOVES) & self.travel.value)
+        self._handles[count:] = [self._lines("/print_top", layer, upper)]
+        items = "".join(
+            f'<li style="border-left: 0.8rem solid {colour}; padding-left: 0.4rem">{kind}</li>'
+            for kind, colour in zip(KINDS, COLOURS, strict=True)
+        )
+        self._layer_said.content = (
+            f'<div class="ccfem"><p>{escaped(layer.said)}. Below it only contours, fibre and '
+            f'supports are drawn.</p><ul class="kinds">{items}</ul></div>'
+        )
+
+    def _lines(self, name: str, layer: PrintLayer, chosen: BoolArray) -> Any:
+        """Pieces of a layer of the print, coloured by what they are."""
+        colours = _linear(np.array([_rgb(colour) for colour in COLOURS]) / 255.0)
+        shades = np.repeat(colours[layer.kind[chosen]][:, None], 2, axis=1)
+        ends = layer.ends[chosen].astype(np.float32)
+        return self.page.server.scene.add_line_segments(
+            name, ends, shades, thickness=1.5, thickness_units="screen"
+        )
 
     def _draw(self) -> None:
         """Draw a layer of one or two strategies, coloured by force."""

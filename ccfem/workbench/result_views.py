@@ -59,6 +59,24 @@ class Surface:
 
 
 @dataclass(frozen=True)
+class PrintLayer:
+    """Lines of a layer of the whole print, in straight pieces.
+
+    Attributes
+    ----------
+    said : str
+        Which layer it is, and up to where.
+    ends : (s, 2, 3) array, mm
+    kind : (s,) int array
+        Place in `ccfem.comparison.report.print_view.KINDS`.
+    """
+
+    said: str
+    ends: FloatArray
+    kind: IntArray
+
+
+@dataclass(frozen=True)
 class RunResults:
     """Results in a folder: what ``results.json`` records, and what ``report.html`` draws.
 
@@ -71,12 +89,15 @@ class RunResults:
     part : dict
         The part with displacement and stress: see
         `ccfem.comparison.report.html_report.part_view`; empty where the report has no such view.
+    prints : dict
+        Lines of the whole print: see `ccfem.comparison.report.print_view.print_views`.
     """
 
     folder: Path
     record: dict[str, Any]
     views: dict[str, Any]
     part: dict[str, Any]
+    prints: dict[str, Any]
 
     @property
     def names(self) -> list[str]:
@@ -166,6 +187,11 @@ class RunResults:
         """Words of the report below a layer of a strategy."""
         return str(self._laid(name, layer)["caption"])
 
+    def print_layers(self, name: str) -> list[PrintLayer]:
+        """Layers of the whole print of a strategy; empty where it has none."""
+        runs = [run for run in self.prints.get("runs", ()) if run["name"] == name]
+        return [_print_layer(view, run["count"]) for run in runs for view in run["layers"]]
+
     def _laid(self, name: str, layer: int) -> dict[str, Any]:
         return dict(self._stack["runs"][self.names.index(name)]["layers"][layer])
 
@@ -177,6 +203,14 @@ class RunResults:
         offsets = np.asarray(view["rim_offsets"], dtype=int)
         inner = np.setdiff1d(np.arange(len(points)), offsets[1:] - 1)
         return np.stack([points[inner], points[inner + 1]], axis=1).reshape(-1, 2, 3)
+
+
+def _print_layer(view: dict[str, Any], count: int) -> PrintLayer:
+    points, offsets = np.asarray(view["points"]), np.asarray(view["offsets"], dtype=int)
+    start = np.setdiff1d(np.arange(len(points)), offsets[1:] - 1)
+    kind = np.repeat(np.asarray(view["kind"], dtype=int), np.diff(offsets))[start]
+    said = f"Layer {view['index'] + 1} of {count}, up to {view['top']:.4g} mm"
+    return PrintLayer(said, np.stack([points[start], points[start + 1]], axis=1), kind)
 
 
 def _in_space(points: FloatArray, space: Any) -> FloatArray:
@@ -206,4 +240,4 @@ def read_results(folder: Path) -> RunResults:
     data = _DATA.search(page)
     views = unpack(data[1]) if data else {}
     layers = views.get("layers") or {"stacks": []}
-    return RunResults(folder, record, layers, views.get("part") or {})
+    return RunResults(folder, record, layers, views.get("part") or {}, views.get("print") or {})

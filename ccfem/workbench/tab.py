@@ -8,7 +8,7 @@ from ccfem.workbench.bench import Bench
 from ccfem.workbench.guard import escaped, send_again
 from ccfem.workbench.part_edits import Change
 
-PART, STRESS, MOVED, FIBRE = VIEWS = ("Part", "Stress", "Deformed", "Fibre")
+PART, STRESS, MOVED, FIBRE, PRINT = VIEWS = ("Part", "Stress", "Deformed", "Fibre", "Print")
 """What the page shows in space: the part to be set up, or what the last run says of it."""
 
 

@@ -232,6 +232,18 @@ def test_a_run_is_stopped_found_again_and_shown(work):
         scene = again.page.server.scene
         assert scene.get_handle_by_name("/surface_said").text.startswith(said)
         assert scene.get_handle_by_name("/fibre_0_fibre") is None
+    # The whole print, layer by layer, as the report draws it.
+    again.button("Print")
+    again.settle()
+    scene, count = again.page.server.scene, len(compare._printed)
+    shown = [scene.get_handle_by_name(f"/print_{k}").visible for k in range(count)]
+    assert shown == [True] * count
+    again.tab.get_by_role("slider", name="Printed up to").press("ArrowLeft")
+    again.tab.get_by_label("This layer alone").click()
+    again.settle()
+    shown = [scene.get_handle_by_name(f"/print_{k}").visible for k in range(count)]
+    assert shown == [k == count - 2 for k in range(count)]
+    assert not again.tab.get_by_role("slider", name="Layer", exact=True).count()
     again.button("Fibre")
     again.settle()
     assert again.page.server.scene.get_handle_by_name("/surface") is None

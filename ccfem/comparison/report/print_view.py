@@ -14,6 +14,10 @@ from ccfem.printing.moves import LAY, ROLES, TRAVEL, Moves
 
 KINDS = ("contour", "matrix", "fibre", "support and pads", "beside the part", "travel")
 """What the lines of a print are drawn as."""
+COLOURS = ("#6b7686", "#a9b4c2", "#0d2f5c", "#b08968", "#cfd8c8", "#b3261e")
+"""Colour of each of them."""
+FILLS, BESIDE, MOVES = 1, 4, 5
+"""Kinds whose lines are not always drawn: what fills a layer, what is beside the part, travel."""
 
 _KIND_OF = {
     "travel": 5,
@@ -45,12 +49,13 @@ def print_views(runs: Sequence[Run]) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``kinds``, names, and ``runs``, each with its ``name``, the ``count`` of its layers, and the
-        ``layers`` that are drawn: ``index``, ``top`` in mm, ``points``, ``offsets`` of lines in
-        these and ``kind`` of each line.
+        ``kinds``, names, their ``colours``, and ``runs``, each with its ``name``, the ``count`` of
+        its layers, and the ``layers`` that are drawn: ``index``, ``top`` in mm, ``points``,
+        ``offsets`` of lines in these and ``kind`` of each line.
     """
     return {
         "kinds": list(KINDS),
+        "colours": list(COLOURS),
         "runs": [
             {"name": run.name, **_drawn(run.moves, run.print_plan.top)}
             for run in runs

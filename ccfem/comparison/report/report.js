@@ -638,7 +638,7 @@ function spaceScene(part, layers) {
 // ---- the print --------------------------------------------------------------------------------
 
 // The layer on top is drawn whole; of those below it what is seen: contours, fibre, supports.
-const LINES = ["#6b7686", "#a9b4c2", "#0d2f5c", "#b08968", "#cfd8c8", "#b3261e"], FILLS = 1, TRAVEL = 5;
+const FILLS = 1, TRAVEL = 5;
 function printScene(given) {
   const view = byId("print-view"), choice = byId("print-run"), top = byId("print-top");
   const alone = byId("print-alone"), travel = byId("print-travel");
@@ -658,7 +658,7 @@ function printScene(given) {
       });
     });
     const traces = lists.map(([x, y, z], kind) => ({ type: "scatter3d", mode: "lines", x, y, z, name: given.kinds[kind],
-      hoverinfo: "skip", line: { color: LINES[kind], width: kind === 2 ? 3 : 1.5 } })).filter((trace) => trace.x.length);
+      hoverinfo: "skip", line: { color: given.colours[kind], width: kind === 2 ? 3 : 1.5 } })).filter((trace) => trace.x.length);
     const run = given.runs[+choice.value], layer = layers()[at];
     byId("print-top-said").textContent = `${layer.index + 1} of ${run.count}, ${short(layer.top)} mm`;
     byId("print-said").textContent = (layers().length < run.count ? `${layers().length} of ${run.count} layers are drawn. ` : "") +
@@ -666,7 +666,7 @@ function printScene(given) {
     return Plotly.react(view, traces, scene(view, [], traces), CONFIG);
   }
   byId("print-legend").innerHTML = given.kinds.map((kind, k) =>
-    `<span class="legend"><i class="short" style="background:${LINES[k]}"></i>${kind}</span>`).join(" ");
+    `<span class="legend"><i class="short" style="background:${given.colours[k]}"></i>${kind}</span>`).join(" ");
   begin();
   choice.onchange = () => { begin(); draw(); };
   top.oninput = alone.onchange = travel.onchange = draw;

@@ -1,11 +1,13 @@
 """The print as the report draws it: what is laid, where, and with how many points."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from ccfem.comparison.report import print_view
+from ccfem.comparison.report.packing import pack, unpack
 from ccfem.comparison.report.print_view import KINDS, print_views
 from ccfem.comparison.runs import Run
 from ccfem.machine import Machine
@@ -14,6 +16,7 @@ from ccfem.printing.moves import LAY, TRAVEL
 from ccfem.printing.part_moves import part_moves
 from ccfem.printing.print_plan import PrintPlan
 from ccfem.strategies import Zigzag
+from ccfem.workbench.result_views import RunResults
 
 
 @pytest.fixture(scope="module")
@@ -61,6 +64,20 @@ def test_all_that_is_laid_and_travelled_is_drawn(run):
         0.99 * 2.0 * np.pi * 20.0
     )
     assert sum(len(layer["points"].values) for layer in view["layers"]) < 0.4 * len(moves)
+
+
+def test_the_workbench_reads_the_same_lines_from_the_report(run):
+    views = print_views([run])
+    results = RunResults(Path(), {}, {}, {}, unpack(pack(views)))
+    layers = results.print_layers("circles")
+    assert layers[7].said == "Layer 8 of 8, up to 1.6 mm"
+    for kind in range(len(KINDS)):
+        drawn = [
+            np.linalg.norm(layer.ends[:, 1] - layer.ends[:, 0], axis=1)[layer.kind == kind].sum()
+            for layer in layers
+        ]
+        assert drawn == pytest.approx(lengths(views["runs"][0], kind), rel=2e-3)  # of 0.01 mm
+    assert results.print_layers("another") == []
 
 
 def test_a_large_print_is_drawn_on_some_layers(run, monkeypatch):
