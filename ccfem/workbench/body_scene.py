@@ -11,9 +11,12 @@ from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError, Mistakes
 from ccfem.body.mesh.face_places import BodyFaces
 from ccfem.body.mesh.face_rules import Faces, Holes
+from ccfem.body.mesh.patches import unit_vector
 from ccfem.body.mesh.smooth_faces import Face
 from ccfem.cases.inspection import Check
 from ccfem.cases.part_tables import rules_of
+from ccfem.printing.bed_layout import bed_of
+from ccfem.slicing.layers.layer import plane_frame
 
 _MANY = 64
 """Triangles from which on a plane is drawn by its outline."""
@@ -235,3 +238,23 @@ def snapped(direction: FloatArray) -> FloatArray:
     if abs(unit[axis]) > _SNAP:
         return np.asarray(np.sign(unit[axis]) * np.eye(3)[axis])
     return np.asarray(unit)
+
+
+def upward(content: Mapping[str, Any]) -> FloatArray | None:
+    """Build direction (3,) of a part file, turned as it says; None where it says nothing right."""
+    try:
+        build = unit_vector(content.get("build", "z"), "build").tolist()
+        return np.array(bed_of(build, content.get("bed", {}))[0])
+    except InputError:  # the check says so
+        return None
+
+
+def bed_under(points: FloatArray, up: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Rim (4, 2, 3) of a piece of the bed that a part stands on, and a corner (3,) of it, mm."""
+    frame = plane_frame(up.tolist())
+    low, high = (points @ frame.T).min(axis=0), (points @ frame.T).max(axis=0)
+    margin = 0.2 * float(np.max(high - low))
+    x, y = np.stack([low - margin, high + margin], axis=1)[:2]
+    plane = np.array([[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]])
+    corners = np.insert(plane, 2, low[2], axis=1) @ frame
+    return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1), corners[0]

@@ -9,6 +9,7 @@ import io
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,11 +21,13 @@ from ccfem.workbench.bench import Bench, Said
 from ccfem.workbench.body_scene import (
     PatchPlace,
     arrow,
+    bed_under,
     borders,
     cones,
     face_meshes,
     patch_places,
     snapped,
+    upward,
 )
 from ccfem.workbench.compare_tab import CompareTab
 from ccfem.workbench.file_tab import FileTab
@@ -37,7 +40,7 @@ from ccfem.workbench.tab import PART, VIEWS, Field
 
 _FACE, _CHOSEN = (203, 210, 216), (245, 190, 65)
 _HELD, _LOADED, _BOTH = (120, 168, 214), (226, 142, 120), (170, 140, 190)
-_EDGE, _LOAD, _SUPPORT = (70, 80, 92), (179, 38, 30), (0, 98, 155)
+_EDGE, _LOAD, _SUPPORT, _BED = (70, 80, 92), (179, 38, 30), (0, 98, 155), (110, 120, 130)
 _MARKS = 10
 """Symbols on a patch."""
 _TITLES = {
@@ -82,6 +85,7 @@ class Page:
         self.body: Any = None
         self._listing: Any = None
         self._drawn: list[Any] = []
+        self._dragging: int | None = None
         self._acts = ThreadPoolExecutor(1, "page")
         self.drawn = threading.Event()
         """Set whenever a check has been drawn."""
@@ -351,12 +355,18 @@ class Page:
                 handle.color = colour
 
     def _draw_symbols(self) -> None:
-        """Draw cones on what is held and pressed, and arrows, to be dragged, for forces."""
+        """Draw the bed, cones on what is held and pressed, and arrows, to be dragged, for forces.
+
+        Nothing is drawn anew while one is dragged: that would end the drag where it is.
+        """
+        if self._dragging in self.server.get_clients():
+            return
         scene, listing = self.server.scene, self.bench.listing
         for handle in self._drawn:
             handle.remove()
         self._drawn = []
         places, size = self.places(), listing.size
+        corners = listing.points[listing.triangles]
         for k, (called, entry) in enumerate(self.loads.entries().items()):
             place = places.get(str(entry.table.get("patch")))
             if place is None:
@@ -378,25 +388,40 @@ class Page:
                     )
                 )
             elif np.any(force):
-                self._drawn += self._arrow(name, called, place, force, 0.22 * size)
+                ends, presses = arrow(place, force, 0.22 * size, corners)
+                turned = partial(self._turn_force, called, presses)
+                said = f"{np.linalg.norm(force):.4g} N"
+                self._drawn += self._arrow(name, ends, presses, place.centre, said, turned)
+        up = upward(self.bench.content)
+        if up is not None:
+            rim, foot = bed_under(corners.reshape(-1, 3), up)
+            bed = rim.astype(np.float32)
+            self._drawn.append(
+                scene.add_line_segments(
+                    "/body/bed", bed, _BED, thickness=1.5, thickness_units="screen"
+                )
+            )
+            ends = np.array([foot, foot + 0.22 * size * up])
+            lay, name = self.prints.lay, "/body/build"
+            self._drawn += self._arrow(name, ends, False, foot, "build direction", lay, _BED)
         self._paint()
 
     def _arrow(
         self,
         name: str,
-        entry: Name,
-        place: PatchPlace,
-        force: FloatArray,
-        long: float,
+        ends: FloatArray,
+        presses: bool,
+        start: FloatArray,
+        said: str,
+        turned: Callable[[FloatArray], None],
+        colour: tuple[int, int, int] = _LOAD,
     ) -> list[Any]:
-        """Arrow of a force with its size, and a ball at its free end to drag it by."""
-        scene = self.server.scene
-        listing = self.bench.listing
-        ends, presses = arrow(place, force, long, listing.points[listing.triangles])
+        """Arrow with its words, and a ball at its free end to drag it by, about a place."""
+        scene, long = self.server.scene, float(np.linalg.norm(ends[1] - ends[0]))
         drawn = scene.add_arrows(
             name,
             ends[None].astype(np.float32),
-            _LOAD,
+            colour,
             shaft_radius=0.03 * long,
             head_radius=0.09 * long,
             head_length=0.22 * long,
@@ -405,34 +430,38 @@ class Page:
         ball = scene.add_icosphere(
             f"{name}_ball",
             0.08 * long,
-            _LOAD,
+            colour,
             position=tuple(free),
             cast_shadow=False,
             receive_shadow=False,
         )
         label = scene.add_label(
-            f"{name}_size",
-            f"{np.linalg.norm(force):.4g} N",
+            f"{name}_said",
+            said,
             position=tuple(free + 0.12 * (ends[1] - ends[0]) * (-1.0 if presses else 1.0)),
             anchor="bottom-center",
         )
-        sign = -1.0 if presses else 1.0
 
         async def drag(event: Any) -> None:
-            self.act(dragged, np.array(event.end_position), event.phase)
+            self.act(dragged, np.array(event.end_position), event.phase, event.client_id)
 
-        def dragged(end: FloatArray, phase: str) -> None:
-            along = snapped(end - place.centre)
-            if phase == "end":  # its size as it is now: somebody may have typed another
-                now = self.loads.entry(entry)
-                size = np.linalg.norm(now.amount or 0.0)
-                vector = [round(float(x), 3) + 0.0 for x in sign * size * along]
-                self.edit(valued((*now.keys, "vector"), vector))
+        def dragged(end: FloatArray, phase: str, client: int) -> None:
+            along = snapped(end - start)
+            self._dragging = None if phase == "end" else client
+            if phase == "end":
+                self._draw_symbols()
+                turned(along)
                 return
-            tip = place.centre + long * along
-            new = [tip, place.centre] if presses else [place.centre, tip]
+            tip = start + long * along
             ball.position = tuple(tip)
-            drawn.points = np.array(new, dtype=np.float32)[None]
+            drawn.points = np.array([tip, start] if presses else [start, tip], np.float32)[None]
 
         ball.on_drag(drag)
         return [drawn, ball, label]
+
+    def _turn_force(self, name: Name, presses: bool, along: FloatArray) -> None:
+        """Turn a force, with its size as it is by now: somebody may have typed another."""
+        now = self.loads.entry(name)
+        size = np.linalg.norm(now.amount or 0.0) * (-1.0 if presses else 1.0)
+        vector = [round(float(x), 3) + 0.0 for x in size * along]
+        self.edit(valued((*now.keys, "vector"), vector))

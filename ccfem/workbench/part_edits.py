@@ -273,7 +273,7 @@ def rule_of(listing: BodyFaces, numbers: Collection[int]) -> dict[str, Any]:
     points = [list(place["at"]) for place in places]
     place: dict[str, Any] = {"at": points[0] if len(points) == 1 else points}
     for keys in (("normal",), ("axis", "radius")):
-        those = [[_written(place.get(key)) for key in keys] for place in places]
+        those = [[written(place.get(key)) for key in keys] for place in places]
         if None not in those[0] and all(entry == those[0] for entry in those):
             place |= dict(zip(keys, those[0], strict=True))
     try:
@@ -283,7 +283,7 @@ def rule_of(listing: BodyFaces, numbers: Collection[int]) -> dict[str, Any]:
     return {"rule": "face", **(place if right else {"number": wanted})}
 
 
-def _written(value: Any) -> Any:
+def written(value: Any) -> Any:
     """Radius or direction of a face as a part file has it."""
     if value is None or isinstance(value, float):
         return value

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, get_args, get_type_hints
 
+from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
 from ccfem.fem.materials import material_names
 from ccfem.machine import Machine
@@ -11,7 +12,7 @@ from ccfem.machine.named_machines import machine_about, machine_names
 from ccfem.paths.plastic import Plastic
 from ccfem.printing.bed_layout import axis_and_angle
 from ccfem.workbench.guard import escaped
-from ccfem.workbench.part_edits import appended, edited, patch_of, valued
+from ccfem.workbench.part_edits import appended, edited, patch_of, valued, written
 from ccfem.workbench.tab import Field, Tabbed
 
 _COUNT = 12
@@ -54,6 +55,8 @@ class PrintTab:
         self._about = gui.add_html("")
         self._choice("Material", (*materials, _WRITTEN), ("material",), _WRITTEN)
         self._choice("Build direction", (*_DIRECTIONS, _WRITTEN), ("build",))
+        down = gui.add_button("Chosen face on the bed", hint="Or drag the arrow at the bed.")
+        down.on_click(page.on(self._lay_on_face))
         layers = gui.add_number("Layers of fibre", _COUNT, min=1, step=1)
         self._setting(layers, ("layers",), write=self._layers)
         cells = gui.add_number("Edge of cells, mm", 2.0, min=0.01, step=0.1)
@@ -123,6 +126,18 @@ class PrintTab:
 
         field = Field(self.page, handle, change)
         self.settings[name] = Setting(keys, field, default, read or _like(default))
+
+    def _lay_on_face(self) -> None:
+        faces = [self.page.bench.listing.face(number) for number in self.page.chosen]
+        if len(faces) != 1 or faces[0].kind != "plane":
+            raise InputError("choose one plane face that the part is to stand on")
+        self.lay(-faces[0].direction)
+
+    def lay(self, up: FloatArray) -> None:
+        """Have the part built along a direction."""
+        if not self.settings["turn"].field.handle.visible:
+            raise InputError("the part file turns the part about x or y: take bed.turn out there")
+        self.page.edit(valued(("build",), written(up)))
 
     def _layers(self, count: int) -> int:
         other = [key for key in ("heights", "slicing") if key in self.page.bench.content]

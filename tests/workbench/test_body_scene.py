@@ -6,7 +6,16 @@ import shapely
 
 from ccfem.body.mesh.face_rules import numbered_faces
 from ccfem.body.meshing import extrude
-from ccfem.workbench.body_scene import PatchPlace, arrow, borders, cones, face_meshes, snapped
+from ccfem.workbench.body_scene import (
+    PatchPlace,
+    arrow,
+    bed_under,
+    borders,
+    cones,
+    face_meshes,
+    snapped,
+    upward,
+)
 
 
 @pytest.fixture(scope="module")
@@ -82,3 +91,16 @@ def test_a_direction_near_an_axis_takes_it(angle):
     given = 3.0 * np.array([-np.cos(np.radians(angle)), np.sin(np.radians(angle)), 0.0])
     wanted = [-1.0, 0.0, 0.0] if angle < 6.0 else given / 3.0
     np.testing.assert_allclose(snapped(given), wanted, atol=1e-12)
+
+
+def test_the_bed_lies_under_the_part_as_it_is_built():
+    corners = np.array([[x, y, z] for x in (0.0, 10.0) for y in (0.0, 20.0) for z in (5.0, 6.0)])
+    for build, height in (("z", 5.0), ("-z", -6.0), ("x", 0.0), ("-y", -20.0)):
+        up = upward({"build": build})
+        rim, foot = bed_under(corners, up)
+        assert rim @ up == pytest.approx(height)
+        assert any((foot == end).all() for end in rim.reshape(-1, 3))
+        assert ((corners - rim.min(axis=(0, 1))) @ (1.0 - abs(up)) > 0.0).all()
+    # A turn by 90 degrees about x lays y, which pointed back, upwards.
+    np.testing.assert_allclose(upward({"bed": {"turn": "x=90"}}), [0, 1, 0], atol=1e-12)
+    assert upward({"build": "w"}) is None

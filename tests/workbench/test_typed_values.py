@@ -4,6 +4,7 @@ import asyncio
 import threading
 from contextlib import contextmanager
 
+import numpy as np
 import pytest
 
 from ccfem.body.files import write_mesh
@@ -280,3 +281,30 @@ def test_a_turn_leaves_no_empty_table(page, visit):
     visit.settle()
     assert "bed" not in page.bench.content
     assert page.bench.content.keys() == {"mesh", "material", "patches", "loads"}
+
+
+def test_a_face_that_is_clicked_lies_on_the_bed(page, visit):
+    visit.click("Chosen face on the bed")
+    visit.settle()
+    assert "choose one plane face" in page.message.content
+    page.act(page.choose, face(page, "y"), False).result()
+    visit.click("Chosen face on the bed")
+    visit.settle()
+    assert page.bench.content["build"] == "-y"
+    assert page.prints.settings["build"].field.value == "-y"
+    page.act(page.prints.lay, np.array([0.6, 0.0, 0.8])).result()
+    assert page.bench.content["build"] == [0.6, 0.0, 0.8]
+    page.act(page.bench.edit, HELD + '[bed]\nturn = "x=90"').result()
+    page.act(page.show).result()
+    page.act(page.prints.lay, np.array([0.0, 0.0, 1.0])).result()
+    assert "take bed.turn out" in page.message.content
+
+
+def test_a_check_that_ends_leaves_what_is_dragged_alone(page, monkeypatch):
+    monkeypatch.setattr(page.server, "get_clients", lambda: {7: None})
+    page._dragging, drawn = 7, page._drawn
+    page.act(page._heed, page.bench.text, (None, ())).result()
+    assert page._drawn is drawn
+    page._dragging = 8  # one who has left
+    page.act(page._heed, page.bench.text, (None, ())).result()
+    assert page._drawn is not drawn
