@@ -240,6 +240,16 @@ def snapped(direction: FloatArray) -> FloatArray:
     return np.asarray(unit)
 
 
+def across(axis: FloatArray, away: FloatArray) -> FloatArray:
+    """Return the unit vector (3,) across an axis along x, y or z that goes most along another."""
+    square = np.eye(3)[np.abs(axis) < 1e-6]
+    if not len(square):
+        square = plane_frame(axis.tolist())[:2]
+    along = square @ away
+    k = int(np.argmax(np.abs(along)))
+    return np.asarray(np.copysign(1.0, along[k]) * square[k])
+
+
 def upward(content: Mapping[str, Any]) -> FloatArray | None:
     """Build direction (3,) of a part file, turned as it says; None where it says nothing right."""
     try:

@@ -47,6 +47,8 @@ class CompareTab:
         self.minutes = Field(page, minutes)
         self.start = gui.add_button("Compare", icon="player-play")
         self.start.on_click(page.on(self._compare))
+        self.direct = gui.add_button("G-code of the ticked strategy", icon="printer", visible=False)
+        self.direct.on_click(page.on(lambda: self._plan(*self._ticked())))
         self.ending = gui.add_button("Stop", icon="player-stop", visible=False, color="red")
         self.ending.on_click(page.on(self.stop))
         self.bar = gui.add_progress_bar(0.0, visible=False)
@@ -68,7 +70,7 @@ class CompareTab:
                 field.on_update(page.on(self._show_print))
             self._layer_said = gui.add_html("")
             self.prints = gui.add_button("G-code of this strategy", icon="printer")
-            self.prints.on_click(page.on(self._plan))
+            self.prints.on_click(page.on(lambda: self._plan(self.left.value)))
         self._links = gui.add_html("")
         self._handles: list[Any] = []
         self._printed: list[PrintLayer] = []
@@ -81,8 +83,11 @@ class CompareTab:
 
     # Running.
 
+    def _ticked(self) -> list[str]:
+        return [name for name, tick in self.ticks.items() if tick.value]
+
     def _arguments(self) -> list[str]:
-        names = [name for name, tick in self.ticks.items() if tick.value]
+        names = self._ticked()
         if not names:
             raise InputError("no strategy is ticked: tick one or more")
         chosen = [] if set(names) == set(STRATEGIES) else ["--strategies", ",".join(names)]
@@ -96,18 +101,16 @@ class CompareTab:
     def _compare(self) -> None:
         self._begin(self._arguments())
 
-    def _plan(self) -> None:
-        name = self.left.value
+    def _plan(self, name: str) -> None:
         part = self.page.bench.part_argument()
-        self._begin(["plan", part, "--strategy", name, "--gcode", *self._load_case()])
+        self._begin(["plan", part, "--strategy", name, "--gcode", *self._load_case()], f"-{name}")
 
-    def _begin(self, arguments: list[str]) -> None:
+    def _begin(self, arguments: list[str], suffix: str = "") -> None:
         page = self.page
         if self.run is not None and self.run.state.running:
             raise InputError("a run is going on: stop it first")
         page.say("")
         page.bench.part_file()
-        suffix = f"-{self.left.value}" if arguments[0] == "plan" else ""
         folder = page.bench.results / f"{page.bench.name}{suffix}"
         view = PRINT if "--gcode" in arguments else FIBRE
         self.run = ChildRun(
@@ -129,6 +132,7 @@ class CompareTab:
 
     def _tell(self, state: RunState) -> None:
         self.start.visible, self.ending.visible = not state.running, state.running
+        self.direct.visible = not state.running and len(self._ticked()) == 1
         self.bar.visible, self.bar.value = state.running, 100.0 * state.share
         said = f"{100.0 * state.share:.0f} %: {state.step}" if state.running else state.complaint
         self._said.content = f'<p class="ccfem" role="status">{escaped(said)}</p>' if said else ""
@@ -160,6 +164,8 @@ class CompareTab:
         if case.options != options:
             case.options, case.visible = options, len(names) > 1
             self.case.put(case.value)
+        running = self.run is not None and self.run.state.running
+        self.direct.visible = not running and len(self._ticked()) == 1
         try:
             command = shlex.join(["ccfem", *self._arguments()])
         except InputError:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
+from ccfem.workbench.body_scene import across
 from ccfem.workbench.guard import escaped
 from ccfem.workbench.part_edits import (
     appended,
@@ -184,13 +185,20 @@ class LoadsTab:
 
     def propose(self) -> None:
         """Propose a load for faces that were just chosen, where nothing else was typed."""
-        faces = [self.page.bench.listing.face(number) for number in self.page.chosen]
-        if len(faces) == 1 and faces[0].kind == "plane":
-            x, y, z = (round(_FORCE * float(c), 2) + 0.0 for c in faces[0].direction)
+        listing = self.page.bench.listing
+        faces = [listing.face(number) for number in self.page.chosen]
+        if not faces:
+            return
+        along = faces[0].direction
+        bearing = all(face.kind == "cylinder" for face in faces)
+        if bearing:  # across its axis, away from the middle of the body
+            away = faces[0].centre - listing.points[np.unique(listing.triangles)].mean(axis=0)
+            along = across(along, away)
+        if bearing or [face.kind for face in faces] == ["plane"]:
+            x, y, z = (round(_FORCE * float(c), 2) + 0.0 for c in along)
             self.vector.propose((x, y, z))
-        bearing = faces and all(face.kind == "cylinder" for face in faces)
-        if self.kind.value in _BY_FACE and faces:
-            self.kind.propose(_BY_FACE[bool(bearing)])
+        if self.kind.value in _BY_FACE:
+            self.kind.propose(_BY_FACE[bearing])
 
     # What acts.
 

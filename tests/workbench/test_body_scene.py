@@ -8,6 +8,7 @@ from ccfem.body.mesh.face_rules import numbered_faces
 from ccfem.body.meshing import extrude
 from ccfem.workbench.body_scene import (
     PatchPlace,
+    across,
     arrow,
     bed_under,
     borders,
@@ -104,3 +105,12 @@ def test_the_bed_lies_under_the_part_as_it_is_built():
     # A turn by 90 degrees about x lays y, which pointed back, upwards.
     np.testing.assert_allclose(upward({"bed": {"turn": "x=90"}}), [0, 1, 0], atol=1e-12)
     assert upward({"build": "w"}) is None
+
+
+def test_a_pin_is_pulled_across_its_axis_and_away_from_the_part():
+    np.testing.assert_array_equal(across(np.array([0, 0, 1.0]), np.array([2, -3, 9.0])), [0, -1, 0])
+    np.testing.assert_array_equal(across(np.array([1.0, 0, 0]), np.zeros(3)), [0, 1, 0])
+    oblique = np.array([2.0, 1.0, 2.0]) / 3.0
+    along = across(oblique, np.array([0, 5.0, 0]))
+    assert along @ oblique == pytest.approx(0.0, abs=1e-12)
+    assert along[1] > 0.5
