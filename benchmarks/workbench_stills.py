@@ -54,11 +54,15 @@ def main(folder: Path = FOLDER) -> None:
         tab.get_by_role("button", name="Hold").first.click()
         page.act(lambda: None).result()
         page.act(page.choose, eye, False).result()
-        tab.get_by_label("Force, N", exact=True).first.fill("0")
+        tab.get_by_label("Force, N z").first.fill("200")
         tab.get_by_role("button", name="Add load").click()
         page.act(lambda: None).result()
         page.drawn.wait(60)
         still("loads")
+        tab.get_by_role("tab", name="Print", exact=True).click()
+        for folder_name in ("Plastic", "On the bed"):
+            tab.get_by_text(folder_name, exact=True).click()
+        still("settings")
         tab.get_by_role("tab", name="Compare").click()
         tab.get_by_label("isocurve", exact=True).click()
         tab.get_by_label("contour_zigzag", exact=True).click()
@@ -71,6 +75,13 @@ def main(folder: Path = FOLDER) -> None:
         still("deformed")
         page.act(page.show_view, "Stress")
         still("stress")
+        tab.get_by_role("button", name="G-code of this strategy").click()
+        tab.wait_for_timeout(500)
+        page.compare.run.wait()
+        page.act(lambda: None).result()
+        for _ in range(len(page.compare.printed) // 2):
+            tab.get_by_role("slider", name="Printed up to").press("ArrowLeft")
+        still("print")
         tab.get_by_role("tab", name="Part file").click()
         page.act(page.show_view, "Part")
         still("part_file")
@@ -79,11 +90,11 @@ def main(folder: Path = FOLDER) -> None:
 
 
 def _write(data: bytes, file: Path) -> None:
-    """Write a screenshot with few colours, which makes it a third as large."""
+    """Write a screenshot with few colours, small areas' too, which makes it a third as large."""
     from PIL import Image
 
     picture: Any = Image.open(io.BytesIO(data)).convert("RGB")
-    picture.quantize(128).save(file, optimize=True)
+    picture.quantize(256, Image.Quantize.FASTOCTREE).save(file, optimize=True)
 
 
 if __name__ == "__main__":

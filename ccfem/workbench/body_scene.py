@@ -268,3 +268,49 @@ def bed_under(points: FloatArray, up: FloatArray) -> tuple[FloatArray, FloatArra
     plane = np.array([[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]])
     corners = np.insert(plane, 2, low[2], axis=1) @ frame
     return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1), corners[0]
+
+
+# Boxes that hold fibre, or none.
+
+
+def boxes(content: Mapping[str, Any]) -> dict[int, FloatArray]:
+    """Opposite corners (2, 3), mm, of the fibre regions of a part file that are boxes."""
+    fibre = content.get("fibre")
+    regions = fibre.get("regions") if isinstance(fibre, Mapping) else None
+    those = {}
+    for k, region in enumerate(regions if isinstance(regions, list) else ()):
+        if isinstance(region, Mapping) and region.get("rule") == "box":
+            try:
+                corners = np.array([region.get("lower"), region.get("upper")], dtype=float)
+            except (TypeError, ValueError):  # the check says so
+                continue
+            if corners.shape == (2, 3) and np.isfinite(corners).all():
+                those[k] = corners
+    return those
+
+
+def box_edges(corners: FloatArray) -> FloatArray:
+    """Edges (12, 2, 3) of a box."""
+    places = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+    pairs = [(a, b) for a in range(8) for b in range(a) if abs(places[a] - places[b]).sum() == 1]
+    return np.asarray(corners[places[np.array(pairs)], np.arange(3)])
+
+
+def stretched(corners: FloatArray, end: int, place: FloatArray, body: FloatArray) -> FloatArray:
+    """Corners of a box of which one is dragged to a place, or onto the bounds of the part near it.
+
+    Parameters
+    ----------
+    corners : (2, 3) array, mm
+    end : {0, 1}
+        The lower or the upper corner; it does not pass the other.
+    body : (2, 3) array, mm
+        Bounds of the part.
+    """
+    reach = 0.05 * (body[1] - body[0])
+    near = np.abs(body - place)
+    bound = np.where(near[0] < near[1], body[0], body[1])
+    place = np.where(near.min(axis=0) < reach, bound, np.round(place, 2))
+    if end == 0:
+        return np.stack([np.minimum(place, corners[1] - reach), corners[1]])
+    return np.stack([corners[0], np.maximum(place, corners[0] + reach)])

@@ -73,7 +73,7 @@ class CompareTab:
             self.prints.on_click(page.on(lambda: self._plan(self.left.value)))
         self._links = gui.add_html("")
         self._handles: list[Any] = []
-        self._printed: list[PrintLayer] = []
+        self.printed: list[PrintLayer] = []
 
     def _add_ticks(self, known: dict[str, Any]) -> None:
         for name, strategy in known.items():
@@ -288,26 +288,26 @@ class CompareTab:
         """Draw the whole print of a strategy, a line segment for each piece."""
         assert self.results is not None
         name = self.left.value
-        self._printed = self.results.print_layers(name)
-        if not self._printed:
+        self.printed = self.results.print_layers(name)
+        if not self.printed:
             why = self.results.why_not(name) or "press “G-code of this strategy”"
             raise InputError(f"there is no print of {name} to show: {why}")
         # Of a layer that others lie on only what is seen is drawn.
-        for k, layer in enumerate(self._printed):
+        for k, layer in enumerate(self.printed):
             seen = (layer.kind != FILLS) & (layer.kind != MOVES)
             self._handles.append(self._lines(f"/print_{k}", layer, seen))
-        self.top.max = max(len(self._printed) - 1, 1)
-        self.top.value = len(self._printed) - 1
+        self.top.max = max(len(self.printed) - 1, 1)
+        self.top.value = len(self.printed) - 1
         self._show_print()
-        parts = [layer.ends[layer.kind < BESIDE].reshape(-1, 3) for layer in self._printed]
+        parts = [layer.ends[layer.kind < BESIDE].reshape(-1, 3) for layer in self.printed]
         corners = np.concatenate(parts)
         return corners.min(axis=0), corners.max(axis=0)
 
     def _show_print(self) -> None:
         """Show the print up to a layer, or that alone, with what fills it and how one travels."""
-        if self.page.view.value != PRINT or not self._printed:
+        if self.page.view.value != PRINT or not self.printed:
             return
-        count = len(self._printed)
+        count = len(self.printed)
         top = min(int(self.top.value), count - 1)
         for k, handle in enumerate(self._handles[:count]):
             visible = k == top or (k < top and not self.alone.value)
@@ -315,7 +315,7 @@ class CompareTab:
                 handle.visible = visible
         for handle in self._handles[count:]:
             handle.remove()
-        layer = self._printed[top]
+        layer = self.printed[top]
         upper = (layer.kind == FILLS) | ((layer.kind == MOVES) & self.travel.value)
         self._handles[count:] = [self._lines("/print_top", layer, upper)]
         items = "".join(

@@ -23,10 +23,13 @@ from ccfem.workbench.body_scene import (
     arrow,
     bed_under,
     borders,
+    box_edges,
+    boxes,
     cones,
     face_meshes,
     patch_places,
     snapped,
+    stretched,
     upward,
 )
 from ccfem.workbench.compare_tab import CompareTab
@@ -43,22 +46,16 @@ _HELD, _LOADED, _BOTH = (120, 168, 214), (226, 142, 120), (170, 140, 190)
 _EDGE, _LOAD, _SUPPORT, _BED = (70, 80, 92), (179, 38, 30), (0, 98, 155), (110, 120, 130)
 _MARKS = 10
 """Symbols on a patch."""
-_TITLES = {
-    "mistake": "mistake",
-    "cannot be planned": "cannot be planned",
-    "not printable": "not printable",
-    "warning": "warning",
-}
+_MATT = {"cast_shadow": False, "receive_shadow": False}
 
 
-def lines_of(said: Said, known: bool = True) -> str:
+def lines_of(said: Said) -> str:
     """HTML of what a check says, the worst first."""
-    shown = [(kind, line) for kind, line in said if known or kind != "known"]
     items = "".join(
         f'<li class="{kind.replace(" ", "-")}">'
-        + (f"<b>{_TITLES[kind]}</b> " if kind in _TITLES else "")
+        + (f"<b>{kind}</b> " if kind != "known" else "")
         + f"{escaped(line)}</li>"
-        for kind, line in shown
+        for kind, line in said
     )
     return f"<ul>{items}</ul>" if items else ""
 
@@ -305,8 +302,7 @@ class Page:
                 mesh.triangles.astype(np.uint32),
                 color=_FACE,
                 side="double",
-                cast_shadow=False,
-                receive_shadow=False,
+                **_MATT,
             )
             handle.on_click(self.on(self.choose, mesh.number, False))
             handle.on_click(modifier="shift")(self.on(self.choose, mesh.number, True))
@@ -383,8 +379,7 @@ class Page:
                         triangles.astype(np.uint32),
                         color=_SUPPORT if support else _LOAD,
                         flat_shading=True,
-                        cast_shadow=False,
-                        receive_shadow=False,
+                        **_MATT,
                     )
                 )
             elif np.any(force):
@@ -392,6 +387,9 @@ class Page:
                 turned = partial(self._turn_force, called, presses)
                 said = f"{np.linalg.norm(force):.4g} N"
                 self._drawn += self._arrow(name, ends, presses, place.centre, said, turned)
+        bounds = np.array([corners.min(axis=(0, 1)), corners.max(axis=(0, 1))])
+        for k, box in boxes(self.bench.content).items():
+            self._drawn += self._box(k, box, bounds)
         up = upward(self.bench.content)
         if up is not None:
             rim, foot = bed_under(corners.reshape(-1, 3), up)
@@ -427,14 +425,6 @@ class Page:
             head_length=0.22 * long,
         )
         free = ends[0 if presses else 1]
-        ball = scene.add_icosphere(
-            f"{name}_ball",
-            0.08 * long,
-            colour,
-            position=tuple(free),
-            cast_shadow=False,
-            receive_shadow=False,
-        )
         label = scene.add_label(
             f"{name}_said",
             said,
@@ -442,22 +432,76 @@ class Page:
             anchor="bottom-center",
         )
 
+        def moved(end: FloatArray) -> FloatArray:
+            tip = np.asarray(start + long * snapped(end - start))
+            drawn.points = np.array([tip, start] if presses else [start, tip], np.float32)[None]
+            return tip
+
+        def dropped(end: FloatArray) -> None:
+            turned(snapped(end - start))
+
+        return [drawn, self._ball(name, free, 0.08 * long, colour, moved, dropped), label]
+
+    def _ball(
+        self,
+        name: str,
+        place: FloatArray,
+        radius: float,
+        colour: tuple[int, int, int],
+        moved: Callable[[FloatArray], FloatArray],
+        dropped: Callable[[FloatArray], None],
+    ) -> Any:
+        """Ball to drag something by; `moved` says where the ball is then."""
+        name = f"{name}_ball"
+        ball = self.server.scene.add_icosphere(name, radius, colour, position=tuple(place), **_MATT)
+
         async def drag(event: Any) -> None:
             self.act(dragged, np.array(event.end_position), event.phase, event.client_id)
 
         def dragged(end: FloatArray, phase: str, client: int) -> None:
-            along = snapped(end - start)
             self._dragging = None if phase == "end" else client
             if phase == "end":
                 self._draw_symbols()
-                turned(along)
-                return
-            tip = start + long * along
-            ball.position = tuple(tip)
-            drawn.points = np.array([tip, start] if presses else [start, tip], np.float32)[None]
+                dropped(end)
+            else:
+                ball.position = tuple(moved(end))
 
         ball.on_drag(drag)
-        return [drawn, ball, label]
+        return ball
+
+    def _box(self, place: int, corners: FloatArray, body: FloatArray) -> list[Any]:
+        """Box of a fibre region, with a ball at its lower and its upper corner."""
+        name, size = f"/body/box_{place}", float(np.linalg.norm(body[1] - body[0]))
+
+        ends = box_edges(corners).astype(np.float32)
+        drawn = self.server.scene.add_line_segments(
+            name, ends, _SUPPORT, thickness=2.0, thickness_units="screen"
+        )
+
+        def moved(end: int, to: FloatArray) -> FloatArray:
+            new = stretched(corners, end, to, body)
+            drawn.points = box_edges(new).astype(np.float32)
+            return np.asarray(new[end])
+
+        def dropped(end: int, to: FloatArray) -> None:
+            if place not in boxes(self.bench.content):
+                raise InputError("this box is not in the part any more")
+            new = stretched(corners, end, to, body)[end].round(3).tolist()
+            key = "lower" if end == 0 else "upper"
+            self.edit(valued(("fibre", "regions", place, key), new))
+
+        balls = [
+            self._ball(
+                f"{name}_{end}",
+                at,
+                0.015 * size,
+                _SUPPORT,
+                partial(moved, end),
+                partial(dropped, end),
+            )
+            for end, at in enumerate(corners)
+        ]
+        return [drawn, *balls]
 
     def _turn_force(self, name: Name, presses: bool, along: FloatArray) -> None:
         """Turn a force, with its size as it is by now: somebody may have typed another."""

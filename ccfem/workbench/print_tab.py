@@ -61,10 +61,10 @@ class PrintTab:
         self._setting(layers, ("layers",), write=self._layers)
         cells = gui.add_number("Edge of cells, mm", 2.0, min=0.01, step=0.1)
         self.cells = Field(page, cells, self._cells)
-        with gui.add_folder("Fibre only near chosen faces", expand_by_default=False):
+        with gui.add_folder("Fibre in regions alone", expand_by_default=False):
             self.within = Field(page, gui.add_number("Within, mm", 6.0, min=0.1, step=0.5))
-            near = gui.add_button_group("Fibre", ["Near the chosen faces", "Everywhere"])
-            near.on_click(page.on_value(self._near))
+            near = gui.add_button_group("Fibre", ["Near faces", "In a box", "Everywhere"])
+            near.on_click(page.on_value(self._regions))
         self._fibre_said = gui.add_html("")
         with gui.add_folder("Plastic", expand_by_default=False):
             self._add_plastic()
@@ -154,13 +154,19 @@ class PrintTab:
             raise InputError("the part has the cells of its mesh file: only a body can be meshed")
         self.page.edit(valued((*outer, "edge_length"), length), "cells")
 
-    def _near(self, where: str) -> None:
-        page = self.page
+    def _regions(self, where: str) -> None:
+        page, text = self.page, self.page.bench.text
         if where == "Everywhere":
             page.edit(valued(("fibre",), None))
             return
-        text, patch = patch_of(page.bench.text, page.bench.listing, page.chosen)
-        region = {"rule": "patch", "patch": patch, "within": self.within.value}
+        if where == "Near faces":
+            text, patch = patch_of(text, page.bench.listing, page.chosen)
+            region = {"rule": "patch", "patch": patch, "within": self.within.value}
+        else:  # the lower half, to be dragged
+            low, high = page.bench.listing.points.min(axis=0), page.bench.listing.points.max(axis=0)
+            high[2] = 0.5 * (low[2] + high[2])
+            lower, upper = low.round(3).tolist(), high.round(3).tolist()
+            region = {"rule": "box", "lower": lower, "upper": upper}
         page.edit(edited(text, appended(("fibre", "regions"), region)))
 
     def show(self) -> None:
@@ -181,12 +187,7 @@ class PrintTab:
         self.cells.handle.visible = isinstance(edge, int | float)
         if isinstance(edge, int | float):
             self.cells.put(float(edge))
-        fibre = content.get("fibre")
-        regions = fibre.get("regions", []) if isinstance(fibre, Mapping) else []
-        near = [r.get("patch") for r in regions if isinstance(r, Mapping) and "patch" in r]
-        said = "Fibre lies everywhere." if not fibre else "Fibre lies where the part file says."
-        if near:
-            said = f"Fibre lies near {', '.join(map(str, near))}."
+        said = _fibre_lies(content.get("fibre"))
         self._fibre_said.content = f'<p class="ccfem">{escaped(said)}</p>'
         kept = "As the part file has it: " + "; ".join(hidden) if hidden else ""
         self._said.content = f'<p class="ccfem">{escaped(kept)}</p>'
@@ -203,6 +204,20 @@ class PrintTab:
             return f"{'.'.join(setting.keys)} = {value}"
         setting.field.put(shown)
         return ""
+
+
+def _fibre_lies(fibre: object) -> str:
+    if not fibre:
+        return "Fibre lies everywhere."
+    regions = fibre.get("regions") if isinstance(fibre, Mapping) and len(fibre) == 1 else None
+    words = []
+    for region in regions if isinstance(regions, list) else ():
+        near = isinstance(region, Mapping) and region.keys() == {"rule", "patch", "within"}
+        box = isinstance(region, Mapping) and region.keys() == {"rule", "lower", "upper"}
+        words.append(f"near {region['patch']}" if near else "in a box" if box else "")
+    if not all(words) or not words:
+        return "Fibre lies where the part file says."
+    return f"Fibre lies {' and '.join(words)}."
 
 
 def _like(default: float) -> Callable[[object], float | None]:

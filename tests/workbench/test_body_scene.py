@@ -12,9 +12,12 @@ from ccfem.workbench.body_scene import (
     arrow,
     bed_under,
     borders,
+    box_edges,
+    boxes,
     cones,
     face_meshes,
     snapped,
+    stretched,
     upward,
 )
 
@@ -114,3 +117,18 @@ def test_a_pin_is_pulled_across_its_axis_and_away_from_the_part():
     along = across(oblique, np.array([0, 5.0, 0]))
     assert along @ oblique == pytest.approx(0.0, abs=1e-12)
     assert along[1] > 0.5
+
+
+def test_a_box_is_stretched_by_a_corner_and_takes_the_bounds_of_the_part():
+    body, box = np.array([[0, 0, 0], [100.0, 50, 20]]), np.array([[10, 10, 10], [90.0, 40, 18]])
+    ends = box_edges(box)
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    assert sorted(lengths) == [8.0] * 4 + [30.0] * 4 + [80.0] * 4
+    moved = stretched(box, 0, np.array([20.004, 1.0, -0.5]), body)
+    np.testing.assert_allclose(moved, [[20.0, 0, 0], box[1]])
+    moved = stretched(box, 1, np.array([5.0, 30.0, 500.0]), body)
+    np.testing.assert_allclose(moved, [box[0], [15.0, 30.0, 500.0]])  # not past the other
+    regions = [{"rule": "patch"}, {"rule": "box", "lower": [0, 0, 0], "upper": [1, 2, 3]}]
+    regions += [{"rule": "box", "lower": [0, 0, 0], "upper": ["inf", 2, 3]}, {"rule": "box"}]
+    assert boxes({"fibre": {"regions": regions}}).keys() == {1}
+    assert boxes({"fibre": 3}) == {}

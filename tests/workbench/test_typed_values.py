@@ -3,6 +3,7 @@
 import asyncio
 import threading
 from contextlib import contextmanager
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -308,3 +309,25 @@ def test_a_check_that_ends_leaves_what_is_dragged_alone(page, monkeypatch):
     page._dragging = 8  # one who has left
     page.act(page._heed, page.bench.text, (None, ())).result()
     assert page._drawn is not drawn
+
+
+def test_fibre_lies_in_a_box_that_is_dragged(page, visit):
+    page.act(page.prints._regions, "In a box").result()
+    region = {"rule": "box", "lower": [0.0, 0.0, 0.0], "upper": [40.0, 10.0, 2.0]}
+    assert page.bench.content["fibre"] == {"regions": [region]}
+
+    def drag(to, phase):
+        ball = next(h for h in page._drawn if h.name == "/body/box_0_1_ball")
+        event = SimpleNamespace(end_position=to, phase=phase, client_id=7)
+        asyncio.run(ball._impl.drag_cb[0].callback(event))
+        visit.settle()
+        return ball
+
+    assert drag((30.0, 10.2, 3.0), "update").position == pytest.approx((30.0, 10.0, 3.0))
+    assert page.bench.content["fibre"] == {"regions": [region]}
+    drag((30.0, 10.2, 3.0), "end")
+    assert page.bench.content["fibre"]["regions"][0]["upper"] == [30.0, 10.0, 3.0]
+    lines = page.server.scene.get_handle_by_name("/body/box_0").points
+    assert lines.max(axis=(0, 1)) == pytest.approx([30.0, 10.0, 3.0])
+    page.act(page.step, -1).result()
+    assert page.bench.content["fibre"] == {"regions": [region]}

@@ -235,7 +235,7 @@ def test_a_run_is_stopped_found_again_and_shown(work):
     # The whole print, layer by layer, as the report draws it.
     again.button("Print")
     again.settle()
-    scene, count = again.page.server.scene, len(compare._printed)
+    scene, count = again.page.server.scene, len(compare.printed)
     shown = [scene.get_handle_by_name(f"/print_{k}").visible for k in range(count)]
     assert shown == [True] * count
     again.tab.get_by_role("slider", name="Printed up to").press("ArrowLeft")
