@@ -17,7 +17,17 @@ from ccfem.comparison.request import STRATEGIES
 from ccfem.workbench.child_run import ChildRun, RunState
 from ccfem.workbench.guard import Served, escaped
 from ccfem.workbench.result_views import Pieces, PrintLayer, RunResults, read_results
-from ccfem.workbench.tab import FIBRE, MOVED, PART, PRINT, STRESS, Field, Tabbed, table_html
+from ccfem.workbench.tab import (
+    FIBRE,
+    MOVED,
+    PART,
+    PRINT,
+    STRESS,
+    Field,
+    Tabbed,
+    draw_lines,
+    table_html,
+)
 
 _NO_ONE, _FIRST, _ALL = "none", "the first", "all at once"
 _BESIDE = 1.25
@@ -54,6 +64,8 @@ class CompareTab:
         self.bar = gui.add_progress_bar(0.0, visible=False)
         self._said = gui.add_html("")
         self._command = gui.add_html("")
+        old = "<p class='ccfem'><b>These results are of the part before it was changed.</b></p>"
+        self._old, self._ran = gui.add_html(old, visible=False), ""
         self._table = gui.add_html("", visible=False)
         self._found = gui.add_folder("Layers", visible=False)
         with self._found:
@@ -83,6 +95,10 @@ class CompareTab:
 
     # Running.
 
+    @property
+    def _running(self) -> bool:
+        return self.run is not None and self.run.state.running
+
     def _ticked(self) -> list[str]:
         return [name for name, tick in self.ticks.items() if tick.value]
 
@@ -107,24 +123,25 @@ class CompareTab:
 
     def _begin(self, arguments: list[str], suffix: str = "") -> None:
         page = self.page
-        if self.run is not None and self.run.state.running:
+        if self._running:
             raise InputError("a run is going on: stop it first")
         page.say("")
         page.bench.part_file()
         folder = page.bench.results / f"{page.bench.name}{suffix}"
-        view = PRINT if "--gcode" in arguments else FIBRE
+        view, text = PRINT if "--gcode" in arguments else FIBRE, page.bench.text
         self.run = ChildRun(
             arguments,
             page.bench.folder,
-            lambda state: page.act(self._heed, state, folder, view),
+            lambda state: page.act(self._heed, state, folder, view, text),
             float(self.minutes.value),
         )
         self._tell(self.run.state)
 
-    def _heed(self, state: RunState, folder: Path, view: str) -> None:
+    def _heed(self, state: RunState, folder: Path, view: str, text: str) -> None:
         self._tell(state)
         if state.written:
-            self.results = read_results(folder)
+            self.results, self._ran = read_results(folder), text
+            self._old.visible = text != self.page.bench.text
             self._show_results()
             self.page.show_view(view)
         elif not state.running:
@@ -145,7 +162,7 @@ class CompareTab:
     def forget(self) -> None:
         """Show no results: they are of another part."""
         self.results = None
-        self._table.visible = self._found.visible = False
+        self._table.visible = self._found.visible = self._old.visible = False
         self._links.content = ""
         self.page.view.value = PART
         self.shown(PART)
@@ -164,8 +181,8 @@ class CompareTab:
         if case.options != options:
             case.options, case.visible = options, len(names) > 1
             self.case.put(case.value)
-        running = self.run is not None and self.run.state.running
-        self.direct.visible = not running and len(self._ticked()) == 1
+        self.direct.visible = not self._running and len(self._ticked()) == 1
+        self._old.visible = self.results is not None and self._ran != bench.text
         try:
             command = shlex.join(["ccfem", *self._arguments()])
         except InputError:
@@ -331,10 +348,7 @@ class CompareTab:
         """Pieces of a layer of the print, coloured by what they are."""
         colours = _linear(np.array([_rgb(colour) for colour in COLOURS]) / 255.0)
         shades = np.repeat(colours[layer.kind[chosen]][:, None], 2, axis=1)
-        ends = layer.ends[chosen].astype(np.float32)
-        return self.page.server.scene.add_line_segments(
-            name, ends, shades, thickness=1.5, thickness_units="screen"
-        )
+        return draw_lines(self.page.server.scene, name, layer.ends[chosen], shades)
 
     def _draw(self) -> None:
         """Draw a layer of one or two strategies, coloured by force."""
@@ -349,22 +363,13 @@ class CompareTab:
         drawn: list[Any] = []
         for k, name in enumerate(names):
             pieces = results.pieces(name, place)
-            colours = np.repeat(self._colours(pieces)[:, None], 2, axis=1)
-            lines: tuple[tuple[str, FloatArray, Any, float, Any], ...] = (
-                ("rim", rims, _rgb(OUTLINE), 1.5, "screen"),
-                ("fibre", pieces.ends, colours, _LINE * results.width, "world"),
-            )
-            for what, ends, shade, width, unit in lines:
-                if len(ends):
-                    drawn.append(
-                        scene.add_line_segments(
-                            f"/fibre_{k}_{what}",
-                            (ends + k * step).astype(np.float32),
-                            shade,
-                            thickness=width,
-                            thickness_units=unit,
-                        )
-                    )
+            shades = np.repeat(self._colours(pieces)[:, None], 2, axis=1)
+            rim, width = _rgb(OUTLINE), _LINE * results.width
+            if len(rims):
+                drawn.append(draw_lines(scene, f"/fibre_{k}_rim", rims + k * step, rim))
+            if len(pieces.ends):
+                ends = pieces.ends + k * step
+                drawn.append(draw_lines(scene, f"/fibre_{k}_fibre", ends, shades, width, "world"))
             at = np.where(step > 0.0, low, middle) + k * step
             title = scene.add_label(
                 f"/fibre_{k}_name", name, position=tuple(at), anchor="top-center"

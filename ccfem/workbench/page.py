@@ -39,14 +39,13 @@ from ccfem.workbench.loads_tab import LoadsTab, Name, vector_of
 from ccfem.workbench.newest import Newest
 from ccfem.workbench.part_edits import Change, valued
 from ccfem.workbench.print_tab import PrintTab
-from ccfem.workbench.tab import PART, VIEWS, Field
+from ccfem.workbench.tab import MATT, PART, VIEWS, Field, draw_lines, draw_mesh
 
 _FACE, _CHOSEN = (203, 210, 216), (245, 190, 65)
 _HELD, _LOADED, _BOTH = (120, 168, 214), (226, 142, 120), (170, 140, 190)
 _EDGE, _LOAD, _SUPPORT, _BED = (70, 80, 92), (179, 38, 30), (0, 98, 155), (110, 120, 130)
 _MARKS = 10
 """Symbols on a patch."""
-_MATT = {"cast_shadow": False, "receive_shadow": False}
 
 
 def lines_of(said: Said) -> str:
@@ -261,16 +260,11 @@ class Page:
 
     # The part in space.
 
-    def look(self) -> None:
-        """Look at the part from the front, above."""
-        if self._listing is None:
+    def look(self, box: tuple[FloatArray, FloatArray] | None = None) -> None:
+        """Look at a box, or the part, from the front, above."""
+        if box is None and self._listing is None:
             return
-        points = self._listing.points[self._listing.triangles].reshape(-1, 3)
-        low, high = points.min(axis=0), points.max(axis=0)
-        self.look_at(low, high)
-
-    def look_at(self, low: FloatArray, high: FloatArray) -> None:
-        """Look at a box from the front, above."""
+        low, high = box or self._bounds()
         centre, size = 0.5 * (low + high), float(np.linalg.norm(high - low))
         place = centre + 1.05 * size * np.array([-0.6, -0.7, 0.5])
         cameras = [client.camera for client in self.server.get_clients().values()]
@@ -283,11 +277,11 @@ class Page:
         self.view.value = view
         if self.body is not None:
             self.body.visible = view == PART
-        box = self.compare.shown(view)
-        if box is None:
-            self.look()
-        else:
-            self.look_at(*box)
+        self.look(self.compare.shown(view))
+
+    def _bounds(self) -> tuple[FloatArray, FloatArray]:
+        corners = self._listing.points[self._listing.triangles]
+        return corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
 
     def _draw_body(self, listing: Any) -> None:
         """Draw the faces, each to be clicked, and their borders."""
@@ -296,21 +290,12 @@ class Page:
         self.body = scene.add_frame("/body", show_axes=False)
         self._faces, self._drawn, self._listing = {}, [], listing
         for mesh in face_meshes(listing):
-            handle = scene.add_mesh_simple(
-                f"/body/face_{mesh.number}",
-                mesh.points.astype(np.float32),
-                mesh.triangles.astype(np.uint32),
-                color=_FACE,
-                side="double",
-                **_MATT,
-            )
+            name = f"/body/face_{mesh.number}"
+            handle = draw_mesh(scene, name, mesh.points, mesh.triangles, _FACE, side="double")
             handle.on_click(self.on(self.choose, mesh.number, False))
             handle.on_click(modifier="shift")(self.on(self.choose, mesh.number, True))
             self._faces[mesh.number] = handle
-        ends = borders(listing).astype(np.float32)
-        scene.add_line_segments(
-            "/body/borders", ends, _EDGE, thickness=1.5, thickness_units="screen"
-        )
+        draw_lines(scene, "/body/borders", borders(listing), _EDGE)
         self.loads.list_faces()
 
     def choose(self, number: int, more: bool) -> None:
@@ -371,34 +356,20 @@ class Page:
             force = vector_of(entry.table)
             if support or force is None:
                 tips, outward = place.spots(_MARKS)
-                points, triangles = cones(tips, outward, 0.035 * size)
-                self._drawn.append(
-                    scene.add_mesh_simple(
-                        name,
-                        points.astype(np.float32),
-                        triangles.astype(np.uint32),
-                        color=_SUPPORT if support else _LOAD,
-                        flat_shading=True,
-                        **_MATT,
-                    )
-                )
+                colour, shapes = _SUPPORT if support else _LOAD, cones(tips, outward, 0.035 * size)
+                self._drawn.append(draw_mesh(scene, name, *shapes, colour, flat_shading=True))
             elif np.any(force):
                 ends, presses = arrow(place, force, 0.22 * size, corners)
                 turned = partial(self._turn_force, called, presses)
                 said = f"{np.linalg.norm(force):.4g} N"
                 self._drawn += self._arrow(name, ends, presses, place.centre, said, turned)
-        bounds = np.array([corners.min(axis=(0, 1)), corners.max(axis=(0, 1))])
+        bounds = np.array(self._bounds())
         for k, box in boxes(self.bench.content).items():
             self._drawn += self._box(k, box, bounds)
         up = upward(self.bench.content)
         if up is not None:
             rim, foot = bed_under(corners.reshape(-1, 3), up)
-            bed = rim.astype(np.float32)
-            self._drawn.append(
-                scene.add_line_segments(
-                    "/body/bed", bed, _BED, thickness=1.5, thickness_units="screen"
-                )
-            )
+            self._drawn.append(draw_lines(scene, "/body/bed", rim, _BED))
             ends = np.array([foot, foot + 0.22 * size * up])
             lay, name = self.prints.lay, "/body/build"
             self._drawn += self._arrow(name, ends, False, foot, "build direction", lay, _BED)
@@ -453,7 +424,7 @@ class Page:
     ) -> Any:
         """Ball to drag something by; `moved` says where the ball is then."""
         name = f"{name}_ball"
-        ball = self.server.scene.add_icosphere(name, radius, colour, position=tuple(place), **_MATT)
+        ball = self.server.scene.add_icosphere(name, radius, colour, position=tuple(place), **MATT)
 
         async def drag(event: Any) -> None:
             self.act(dragged, np.array(event.end_position), event.phase, event.client_id)
@@ -472,11 +443,7 @@ class Page:
     def _box(self, place: int, corners: FloatArray, body: FloatArray) -> list[Any]:
         """Box of a fibre region, with a ball at its lower and its upper corner."""
         name, size = f"/body/box_{place}", float(np.linalg.norm(body[1] - body[0]))
-
-        ends = box_edges(corners).astype(np.float32)
-        drawn = self.server.scene.add_line_segments(
-            name, ends, _SUPPORT, thickness=2.0, thickness_units="screen"
-        )
+        drawn = draw_lines(self.server.scene, name, box_edges(corners), _SUPPORT, 2.0)
 
         def moved(end: int, to: FloatArray) -> FloatArray:
             new = stretched(corners, end, to, body)
@@ -490,18 +457,11 @@ class Page:
             key = "lower" if end == 0 else "upper"
             self.edit(valued(("fibre", "regions", place, key), new))
 
-        balls = [
-            self._ball(
-                f"{name}_{end}",
-                at,
-                0.015 * size,
-                _SUPPORT,
-                partial(moved, end),
-                partial(dropped, end),
-            )
-            for end, at in enumerate(corners)
-        ]
-        return [drawn, *balls]
+        def ball(end: int) -> Any:
+            acts = (partial(moved, end), partial(dropped, end))
+            return self._ball(f"{name}_{end}", corners[end], 0.015 * size, _SUPPORT, *acts)
+
+        return [drawn, ball(0), ball(1)]
 
     def _turn_force(self, name: Name, presses: bool, along: FloatArray) -> None:
         """Turn a force, with its size as it is by now: somebody may have typed another."""

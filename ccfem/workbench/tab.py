@@ -3,6 +3,9 @@
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
+import numpy as np
+
+from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.cases.inspection import Check
 from ccfem.workbench.bench import Bench
 from ccfem.workbench.guard import escaped, send_again
@@ -149,6 +152,26 @@ class Field:
         if self._doubtful and self._came == self._taken:
             self._doubtful, self._sent = False, self.handle.update_timestamp
             send_again(self.handle)
+
+
+MATT = {"cast_shadow": False, "receive_shadow": False}
+"""How everything is drawn: without shadows, which take most of the time."""
+
+
+def draw_mesh(
+    scene: Any, name: str, points: FloatArray, triangles: IntArray, colour: Any, **more: Any
+) -> Any:
+    """Draw triangles; points in mm. Returns the handle of viser."""
+    where, which = points.astype(np.float32), triangles.astype(np.uint32)
+    return scene.add_mesh_simple(name, where, which, color=colour, **more, **MATT)
+
+
+def draw_lines(
+    scene: Any, name: str, ends: FloatArray, colour: Any, width: float = 1.5, unit: str = "screen"
+) -> Any:
+    """Draw straight pieces (s, 2, 3), mm, some pixels wide or, by unit "world", some mm."""
+    where = ends.astype(np.float32)
+    return scene.add_line_segments(name, where, colour, thickness=width, thickness_units=unit)
 
 
 def table_html(heads: Sequence[str], rows: Sequence[Sequence[str]], marked: str = "") -> str:

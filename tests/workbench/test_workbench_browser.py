@@ -16,6 +16,7 @@ from clicking import View, pixel
 from ccfem.body.files.surface import write_stl
 from ccfem.body.mesh.box import box_mesh
 from ccfem.workbench.bench import Bench
+from ccfem.workbench.part_edits import valued
 
 EVIL = "<img src=http://127.0.0.1:9/x onerror='window.broken=1'>"
 BY_HAND = f"""\
@@ -222,6 +223,13 @@ def test_a_run_is_stopped_found_again_and_shown(work):
     again.tab.get_by_text("Layer 0, at 1.00 mm").wait_for(timeout=5000)
     drawn = np.asarray(again.page.server.scene.get_handle_by_name("/fibre_0_fibre").points)
     assert 1.0 == pytest.approx(drawn[..., 2].min()) == pytest.approx(drawn[..., 2].max())
+    # What is changed afterwards is said beside what was computed before.
+    old = again.tab.get_by_text("These results are of the part before it was changed.")
+    assert not old.is_visible()
+    work.page.act(work.page.edit, valued(("layers",), 3)).result()
+    old.wait_for(timeout=5000)
+    again.button("Undo")
+    old.wait_for(state="hidden", timeout=5000)
     # The part without fibre: its stress, and deformed.
     for name, said in (
         ("Stress", "von Mises stress, up to "),
