@@ -37,7 +37,9 @@ def main(folder: Path = FOLDER) -> None:
         tab.get_by_role("button", name="Close").click(timeout=60_000)
 
         def still(name: str) -> None:
+            tab.wait_for_timeout(500)
             page.act(lambda: None).result()
+            page.drawn.wait(60)
             tab.mouse.move(5, 5)
             tab.wait_for_timeout(2500)
             _write(tab.screenshot(), folder / f"{name}.png")
@@ -56,8 +58,6 @@ def main(folder: Path = FOLDER) -> None:
         page.act(page.choose, eye, False).result()
         tab.get_by_label("Force, N z").first.fill("200")
         tab.get_by_role("button", name="Add load").click()
-        page.act(lambda: None).result()
-        page.drawn.wait(60)
         still("loads")
         tab.get_by_role("tab", name="Print", exact=True).click()
         for folder_name in ("Plastic", "On the bed"):
