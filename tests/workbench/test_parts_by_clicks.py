@@ -113,18 +113,10 @@ def visit(tmp_path_factory):
         browser.close()
 
 
-SLOW = pytest.mark.skipif(
-    not os.environ.get("CCFEM_SLOW"), reason="takes a quarter of a minute more: set CCFEM_SLOW=1"
+@pytest.mark.skipif(
+    not os.environ.get("CCFEM_SLOW"), reason="takes a minute: set CCFEM_SLOW=1 to run it"
 )
-
-
-@pytest.mark.parametrize(
-    "file",
-    [
-        "l_bracket.step",
-        *(pytest.param(f, marks=SLOW) for f in ("crane_hook.stl", "brake_lever.stl")),
-    ],
-)
+@pytest.mark.parametrize("file", WANTED)
 def test_from_a_file_to_its_gcode(visit, file):
     set_up, load = WANTED[file]
     bench, page = visit.page.bench, visit.page

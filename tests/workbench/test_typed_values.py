@@ -13,7 +13,7 @@ from ccfem.body.mesh.box import box_mesh
 from ccfem.workbench.bench import Bench
 
 HELD = """\
-mesh = "bar.vtu"
+mesh = "bar.npz"
 material = "pla"
 
 [patches.end]
@@ -107,7 +107,7 @@ def served(tmp_path_factory):
     from ccfem.workbench.page import Page
 
     folder = tmp_path_factory.mktemp("typed")
-    write_mesh(box_mesh((40.0, 10.0, 4.0), (2, 1, 1)), folder / "bar.vtu")
+    write_mesh(box_mesh((40.0, 10.0, 4.0), (2, 1, 1)), folder / "bar.npz")
     (folder / "bar.toml").write_text(HELD)
     page = Page(Bench(folder))
     yield page
