@@ -7,12 +7,12 @@ text is `ALL_KEYS`.
 """
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -38,7 +38,7 @@ from ccfem.body.mesh.tet_mesh import CellMesh, TetMesh
 from ccfem.body.meshing.cad import is_cad
 from ccfem.body.meshing.volume import check_edge_length
 from ccfem.cases.case import Case, check_name
-from ccfem.cases.deck_analysis import read_analysis
+from ccfem.cases.deck_analysis import DeckAnalysis, read_analysis
 from ccfem.cases.part_fibre import fibre_of, patches_of_fibre
 from ccfem.cases.part_keys import Part
 from ccfem.cases.part_loads import (
@@ -141,44 +141,16 @@ def part_case(content: TomlTable, path: Path, mesh: TetMesh | None = None) -> Ca
     """
     mistakes = Mistakes()
     part, unread = _readable(content, mistakes)
-    name, given = part.name or path.stem, _Values()
+    name = part.name or path.stem
     with mistakes.noted():
         check_name(name, part.title or name)
-    with mistakes.noted():
-        given.build, given.bed = bed_of(unit_vector(part.build, "build").tolist(), part.bed)
-    with mistakes.noted():
-        given.slicing = slicing_of(part)
-    with mistakes.noted():
-        given.machine = machine_from(part.machine)
-    if "material" not in unread and part.analysis is None:
-        with mistakes.noted():
-            given.material = material_of(part.material)
-    if part.fibre is not None:
-        with mistakes.noted():
-            given.fibre = fibre_of(part.fibre, path.parent)
-    with mistakes.noted():
-        given.plastic = plastic_of(part.plastic)
-    with mistakes.noted():
-        given.scatter = from_table(Scatter, part.scatter, "scatter")
+    given = _values(part, unread, path.parent, mistakes)
     check_strategies(part.strategies, mistakes)
     rules = rules_of(part.patches, mistakes)
     with mistakes.noted():
         part.check(path.parent)
-    deck, names = None, part.loads
-    if part.analysis is None:
-        readable = "supports" not in unread
-        supports, case_supports = (
-            supports_of(part.supports, part.loads, mistakes) if readable else ((), {})
-        )
-        loads = loads_of(part.loads, mistakes) if "loads" not in unread else {}
-    else:
-        mistakes.complain()
-        assert part.mesh is not None
-        deck = read_analysis(path.parent / part.mesh, part.scale, part.step)
-        supports, case_supports = deck.supports, dict(deck.case_supports)
-        loads = names = dict(deck.loads)
-        if part.order == 1 and deck.mesh.order == 2:
-            mistakes.lines.append("order = 1 goes with a deck of linear cells: leave it out")
+    deck, supports, case_supports, loads = _acting(part, unread, path.parent, mistakes)
+    names: TomlTable = part.loads if deck is None else dict(loads)
     others = alternative_supports_of(part.alternative_supports, mistakes)
     combinations = combinations_of(part.combinations, names, mistakes)
     weights = weights_of(part.weights, {**names, **part.combinations}, mistakes)
@@ -285,6 +257,53 @@ class _Values:
     plastic: Plastic
     scatter: Scatter
     fibre: FibrePlaces | None = None
+
+
+def _values(part: Part, unread: Container[str], folder: Path, mistakes: Mistakes) -> _Values:
+    """Take what stands in sections of its own."""
+    given = _Values()
+    with mistakes.noted():
+        given.build, given.bed = bed_of(unit_vector(part.build, "build").tolist(), part.bed)
+    with mistakes.noted():
+        given.slicing = slicing_of(part)
+    with mistakes.noted():
+        given.machine = machine_from(part.machine)
+    if "material" not in unread and part.analysis is None:
+        with mistakes.noted():
+            given.material = material_of(part.material)
+    if part.fibre is not None:
+        with mistakes.noted():
+            given.fibre = fibre_of(part.fibre, folder)
+    with mistakes.noted():
+        given.plastic = plastic_of(part.plastic)
+    with mistakes.noted():
+        given.scatter = from_table(Scatter, part.scatter, "scatter")
+    return given
+
+
+class _Acting(NamedTuple):
+    """What holds and loads a part, and the analysis of a deck that says so, if one does."""
+
+    deck: DeckAnalysis | None
+    supports: tuple[AnySupport, ...]
+    case_supports: dict[str, tuple[AnySupport, ...]]
+    loads: dict[str, tuple[Load, ...]]
+
+
+def _acting(part: Part, unread: Container[str], folder: Path, mistakes: Mistakes) -> _Acting:
+    """Take supports and loads, from the part file or from the deck that it names."""
+    if part.analysis is None:
+        supports, case_supports = (
+            ((), {}) if "supports" in unread else supports_of(part.supports, part.loads, mistakes)
+        )
+        loads = {} if "loads" in unread else loads_of(part.loads, mistakes)
+        return _Acting(None, supports, case_supports, loads)
+    mistakes.complain()
+    assert part.mesh is not None
+    deck = read_analysis(folder / part.mesh, part.scale, part.step)
+    if part.order == 1 and deck.mesh.order == 2:
+        mistakes.lines.append("order = 1 goes with a deck of linear cells: leave it out")
+    return _Acting(deck, deck.supports, dict(deck.case_supports), dict(deck.loads))
 
 
 def _readable(content: TomlTable, mistakes: Mistakes) -> tuple[Part, set[str]]:
