@@ -10,6 +10,7 @@ from ccfem.base.arrays import freeze
 from ccfem.base.checks import check_known, check_number, member_name
 from ccfem.base.display import Shown
 from ccfem.base.errors import InputError, Mistakes, shown
+from ccfem.base.plain import plain
 from ccfem.body.mesh.face_places import BodyFaces
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.stress_field import PartStress
@@ -90,6 +91,7 @@ class Case(Shown):
 
     def __post_init__(self) -> None:
         freeze(self, parameters=dict, alternative_supports=tuple, weights=dict)
+        object.__setattr__(self, "build", plain(self.build))
         for name, weight in self.weights.items():
             check_known("load case", name, self.problem.cases)
             check_number(f"weight of load case '{name}'", weight, above=0.0)

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from ccfem.base.arrays import FloatArray
 from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError, shown
+from ccfem.base.plain import plain_dataclass
 from ccfem.base.toml import from_table
 from ccfem.slicing.layers.layer import plane_frame
 from ccfem.slicing.layers.slicer import Vector
@@ -20,7 +21,7 @@ _DIGITS = 12
 """Decimals of directions: a quarter of a turn leads exactly to another axis."""
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class BedLayout:
     """How a part is placed on the bed, in a part file the table ``[bed]``.
 

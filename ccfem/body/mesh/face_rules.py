@@ -9,6 +9,7 @@ import numpy as np
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.checks import check_fields
 from ccfem.base.errors import InputError
+from ccfem.base.plain import plain_dataclass
 from ccfem.body.mesh.face_places import BodyFaces
 from ccfem.body.mesh.patches import Bounded, Vector, number_of_face, unit_vector
 from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE, Face, given_faces, smooth_faces
@@ -21,7 +22,7 @@ _PARALLEL = 0.02
 """Sine of the largest angle between the axis of a hole and the one that is wanted."""
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class Faces:
     """Smooth faces by their places, or by their numbers, as ``ccfem faces`` lists both.
 
@@ -149,7 +150,7 @@ class OnBody:
         return _facets(mesh, [meshed.face(number) for number in numbers])
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class Holes:
     """The walls of all holes of a radius.
 
@@ -252,7 +253,7 @@ class CellRule(Protocol):
         ...
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class CellBox:
     """Cells with their centres in a box.
 
@@ -275,7 +276,7 @@ class CellBox:
         return _chosen(inside, f"box {self.lower} to {self.upper}", mesh)
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class CellCylinder:
     """Cells with their centres in a cylinder, which goes through the whole part.
 

@@ -6,7 +6,6 @@ chooses nothing is an error that names the nearest candidate.
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Protocol, Self, TypeVar
 
 import numpy as np
@@ -15,6 +14,7 @@ from numpy.typing import ArrayLike
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.checks import FARTHEST, check_fields, check_number
 from ccfem.base.errors import InputError
+from ccfem.base.plain import plain_dataclass
 from ccfem.geometry.facets import are_among
 
 Vector = tuple[float, float, float]
@@ -71,7 +71,7 @@ class PatchRule(Protocol):
         ...
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class Plane:
     """Boundary facets on a plane.
 
@@ -125,7 +125,7 @@ class Plane:
         return _choose(mesh, missed, tolerance, facing, f"plane {self.normal} at {offset:g} mm")
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class Box:
     """Boundary facets with all their nodes in a box.
 
@@ -164,7 +164,7 @@ class Box:
         return _choose(mesh, missed, tolerance, wanted, f"box {self.lower} to {self.upper}")
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class Cylinder:
     """The wall of a hole or a pin: not its flat ends.
 
@@ -214,7 +214,7 @@ class Cylinder:
         return _choose(mesh, missed, _default(self.tolerance, mesh), wall, label)
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class Nearest:
     """The boundary facets whose centres are nearest to a point.
 
@@ -250,7 +250,7 @@ class Nearest:
         return _choose(mesh, missed, 0.0, everywhere, label)
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class Group:
     """A patch that came with the file: a physical group, node set or surface of that name."""
 

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,11 +9,12 @@ import numpy as np
 from ccfem.base.checks import ACCELERATION, FORCE, MASS_DENSITY, MOMENT, TRACTION, WARMTH, Range
 from ccfem.base.errors import InputError
 from ccfem.base.formula import check_formula
+from ccfem.base.plain import plain_dataclass
 
 Vector = tuple[float, float, float]
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class Force:
     """A total force, N, spread evenly over the area of a patch."""
 
@@ -22,7 +22,7 @@ class Force:
     vector: Vector
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class Traction:
     """A traction, MPa, on a patch."""
 
@@ -30,7 +30,7 @@ class Traction:
     vector: Vector
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class Pressure:
     """A pressure, MPa, on a patch; positive pushes inward."""
 
@@ -38,7 +38,7 @@ class Pressure:
     magnitude: float
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class Bearing:
     """A total force, N, on a cylindrical patch, as a pin presses it.
 
@@ -50,7 +50,7 @@ class Bearing:
     vector: Vector
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class Moment:
     """A total moment, N mm, spread over a patch by tractions without a resultant force.
 
@@ -62,7 +62,7 @@ class Moment:
     vector: Vector
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class PointForce:
     """A force, N, at the mesh node nearest to a point, mm, of the part."""
 
@@ -70,7 +70,7 @@ class PointForce:
     vector: Vector
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class NodeForces:
     """Forces, N, at the mesh nodes nearest to points, mm, of the part.
 
@@ -91,14 +91,14 @@ class NodeForces:
             )
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class BodyForce:
     """A force on every volume of the part, N/mm^3."""
 
     vector: Vector
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class Gravity:
     """The weight of the part, or the inertia force of an acceleration.
 
@@ -114,7 +114,7 @@ class Gravity:
     mass_density: float | None = None
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class Centrifugal:
     """The inertia forces of a part that turns steadily about an axis.
 
@@ -142,7 +142,7 @@ class Centrifugal:
             )
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class Temperature:
     """A change of temperature, K, of the part; its materials need an expansion.
 
@@ -170,7 +170,7 @@ class Temperature:
             )
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class Displacement:
     """A displacement, mm, of the supports on a patch in this load case.
 

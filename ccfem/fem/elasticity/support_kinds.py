@@ -1,6 +1,5 @@
 """Kinds of supports: patches, edges, points, rigid patches, pins, springs and elastic beds."""
 
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -8,6 +7,7 @@ import numpy as np
 from ccfem.base.arrays import FloatArray
 from ccfem.base.checks import BED, SPRING, Range
 from ccfem.base.errors import InputError
+from ccfem.base.plain import plain_dataclass
 from ccfem.body.mesh.patches import unit_vector
 from ccfem.fem.elasticity.load_kinds import Vector
 
@@ -19,7 +19,7 @@ _LARGEST_ANGLE = 25.0
 ``sqrt(1 + angle^2)``."""
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class Support:
     """Components of the displacement held on a patch.
 
@@ -39,7 +39,7 @@ class Support:
         _check_components(self, self.components, f"patch '{self.patch}'")
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class EdgeSupport:
     """Components held at the edge where two patches meet, that is at their common nodes.
 
@@ -64,7 +64,7 @@ class EdgeSupport:
         _check_components(self, self.components, f"patches {self.patches}")
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class PointSupport:
     """Components held at the mesh node nearest to a point, mm, of the part.
 
@@ -84,7 +84,7 @@ class PointSupport:
         _check_finite(self, "point")
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class NodeSupport:
     """Components held at the mesh nodes nearest to points, mm, of the part.
 
@@ -121,7 +121,7 @@ class NodeSupport:
                 )
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class LocalSupport:
     """Components along axes of its own held on a patch: of a turned or a cylindrical system.
 
@@ -188,7 +188,7 @@ def local_axes(system: str, points: Any, places: FloatArray) -> FloatArray:
     return np.stack([along, np.cross(third, along), third], axis=2)
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class SlidingSupport:
     """A patch that slides without friction: only motion normal to its surface is held.
 
@@ -214,7 +214,7 @@ class SlidingSupport:
             unit_vector(self.normal, f"normal of the sliding support on patch '{self.patch}'")
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class PressingSupport:
     """A patch on something rigid, without friction: it may lift off, but not sink in.
 
@@ -238,7 +238,7 @@ class PressingSupport:
             unit_vector(self.normal, f"normal of the pressing support on patch '{self.patch}'")
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class RigidPatch:
     """A patch that moves as a rigid body, as if a stiff plate were glued to it.
 
@@ -279,7 +279,7 @@ class RigidPatch:
             )
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class Pin:
     """A rigid pin glued into a hole, which turns freely about its own axis.
 
@@ -308,7 +308,7 @@ class Pin:
         unit_vector(self.axis, f"axis of the pin in patch '{self.patch}'")
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class Spring:
     """Springs to the ground, spread evenly over a patch.
 
@@ -325,7 +325,7 @@ class Spring:
         _check_stiffness(self.stiffness, f"the spring on patch '{self.patch}'", SPRING)
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class PointSpring:
     """A spring to the ground at the mesh node nearest to a point, mm, of the part.
 
@@ -344,7 +344,7 @@ class PointSpring:
         _check_stiffness(self.stiffness, f"the spring at {self.point}", SPRING)
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class Foundation:
     """An elastic bed under a patch (Winkler): traction proportional to displacement.
 

@@ -10,6 +10,7 @@ import shapely
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.checks import check_choices, check_fields
 from ccfem.base.errors import InputError
+from ccfem.base.plain import plain_dataclass
 from ccfem.body.files.surface import Surface
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.face_rules import check_box
@@ -41,7 +42,7 @@ class Shape(Protocol):
         ...
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class InBox:
     """A box along the axes of the mesh.
 
@@ -68,7 +69,7 @@ class InBox:
         return shape
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class InCylinder:
     """A cylinder without ends.
 

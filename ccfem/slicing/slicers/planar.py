@@ -1,7 +1,6 @@
 """Flat layers across the build direction."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -9,6 +8,7 @@ import numpy as np
 from ccfem.base.arrays import FloatArray
 from ccfem.base.checks import check_choices, check_number
 from ccfem.base.errors import InputError
+from ccfem.base.plain import plain_dataclass
 from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.facets import counter_clockwise
@@ -32,7 +32,7 @@ _MOST = 100_000
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
-@dataclass(frozen=True)
+@plain_dataclass
 class Planar:
     """Flat layers across the build direction, at the middle of slabs or at given heights.
 
