@@ -36,8 +36,9 @@ from ccfem.strategies.fibre_aware.prune import prune
 from ccfem.strategies.fibre_aware.smeared import SmearedPart
 from ccfem.strategies.fibre_aware.stream_design import SLACK, StreamProblem, design
 from ccfem.strategies.fibre_aware.stream_paths import CLEARANCE, SHORTEST
+from ccfem.strategies.fibre_aware.stream_start import field_along, start_fields
 from ccfem.strategies.fibre_aware.upper_bound import UpperBound, upper_bound
-from ccfem.strategies.stream_function import StreamFunction, field_along, start_fields
+from ccfem.strategies.stream_function import StreamFunction
 
 __all__ = ["along_one_direction", "losses", "posed", "share_inside", "tension_of"]
 
@@ -119,7 +120,7 @@ def losses(
     one = len(layers) // 2
     shifts = np.arange(strategy.phases) / strategy.phases
     tried = [extraction.layer_paths(layers[one], extraction.fields[group[one]], x) for x in shifts]
-    values = [extraction.profiles(paths) for paths in tried]
+    values = [extraction.profiles(paths, layers[one]) for paths in tried]
     ((best,), *_) = extraction.best_phases([values], [len(layers)], length)
     shift = float(shifts[best])
 

@@ -179,9 +179,7 @@ _FOLDED = {
     "strategies.isocurve": "paths.linking.spiral",
     "strategies.mat": "geometry.medial_fill",
     "strategies.mps": "geometry.abutting geometry.guide_fit paths.raster.guides",
-    "strategies.stream_function": (
-        "strategies.fibre_aware.design_lengths strategies.fibre_aware.stream_start"
-    ),
+    "strategies.stream_function": "strategies.fibre_aware.design_lengths",
     "strategies.streamline": "paths.fields.evenly_spaced",
     "strategies.stress_tracing.stress_lines": "strategies.stress_tracing.criterion",
     "strategies.stress_tracing.tracks": "strategies.stress_tracing.turning",

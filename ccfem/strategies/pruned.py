@@ -24,6 +24,7 @@ from ccfem.strategies.fibre_aware.judges import Goal
 from ccfem.strategies.fibre_aware.plain_plans import plain_plans
 from ccfem.strategies.fibre_aware.plan_cases import plan_by_layers
 from ccfem.strategies.fibre_aware.shortening import TIGHT_SHARES
+from ccfem.strategies.fibre_aware.strand_moves import check_moves
 from ccfem.strategies.fibre_aware.upper_bound import measures
 
 _BASES: Mapping[str, Mapping[str, Any]] = {"isocurve": {"link_limit": 10.0}}
@@ -38,8 +39,8 @@ class Pruned:
     """The most useful fibre of another strategy.
 
     The load is that of the stress given to the strategy. Fibre is taken to carry tension only. With
-    the default base, straight rows along the mean tension and contours are pruned and tested too,
-    and the best is taken.
+    the default base, straight rows along the mean tension and contours, on curved layers `stripes`,
+    are pruned and tested too, and the best is taken.
 
     Attributes
     ----------
@@ -64,7 +65,7 @@ class Pruned:
     moves : int, default 0
         Number of steps in which the remaining strands are moved sideways, each step tested
         (`ccfem.strategies.fibre_aware.strand_moves`). 6 steps make a part 1 to 2 % stiffer, and
-        planning takes two to three times as long.
+        planning takes two to three times as long. On flat layers only.
     turns : {"tight", "cut"}
         Whether more than 1 % of the fibre may turn more tightly than the machine's minimum radius.
     objective : {"worst", "sum", "least"}
@@ -83,7 +84,6 @@ class Pruned:
     objective: Literal["worst", "sum", "least"] = "worst"
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.9, least=0.1)
-    flat_layers_only: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "concentric": {"of": "concentric"},
         "moves": {"moves": 2},
@@ -165,6 +165,7 @@ class Pruned:
         InputError
             Whatever the base strategy raises.
         """
+        check_moves(self.moves, layers)
         full, strand = full_length(layers, machine), Strand(self.rho)
         most = max(self.amount.most, self.coverage) * full
         lengths = [min(length, most) for length in lengths]

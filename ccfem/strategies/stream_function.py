@@ -10,20 +10,17 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, Protocol, TypeVar
 
 import numpy as np
-import scipy.sparse as sp
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.checks import check_choices, check_fields
 from ccfem.base.errors import InputError
 from ccfem.base.parallel import in_processes
-from ccfem.base.tensor import largest_in_plane
 from ccfem.fem.elasticity import PartStress, StressField
 from ccfem.fem.elasticity.stress_field import WeightedCases, solved
 from ccfem.judging.virtual_testing import RHO, Strand, specimens
 from ccfem.machine.machine import Machine
-from ccfem.paths.fields.directed import fill_screened
-from ccfem.paths.fields.layer_elements import Surface, positive_definite
-from ccfem.paths.fields.tensile import Tension, layer_tension, orient
+from ccfem.paths.fields.chart import chart_of, flat_view
+from ccfem.paths.fields.tensile import layer_tension
 from ccfem.paths.planning.strategy import Amount, LayerPlanner, WholePart, full_length
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer, stress_on
@@ -38,11 +35,12 @@ from ccfem.strategies.fibre_aware.heights import (
     nearest_layer,
 )
 from ccfem.strategies.fibre_aware.judges import Goal
+from ccfem.strategies.fibre_aware.layer_axes import frames_in_cells
 from ccfem.strategies.fibre_aware.plain_plans import plain_plans
 from ccfem.strategies.fibre_aware.shortening import TIGHT_SHARES
 from ccfem.strategies.fibre_aware.smeared import SmearedPart, smeared_cases
 from ccfem.strategies.fibre_aware.spline_grid import SplineGrid
-from ccfem.strategies.fibre_aware.strand_moves import kept_radius
+from ccfem.strategies.fibre_aware.strand_moves import check_moves, kept_radius
 from ccfem.strategies.fibre_aware.stream_design import (
     DENSEST,
     DESIGN_POWERS,
@@ -52,6 +50,7 @@ from ccfem.strategies.fibre_aware.stream_design import (
     designed_in_steps,
 )
 from ccfem.strategies.fibre_aware.stream_paths import Extraction, refined
+from ccfem.strategies.fibre_aware.stream_start import plane_axes, start_fields
 from ccfem.strategies.fibre_aware.strength_design import design_for_strength
 from ccfem.strategies.fibre_aware.upper_bound import measures
 
@@ -79,6 +78,10 @@ class StreamFunction:
     best is taken. The load is that of the stress given to the strategy. Fibre is taken to carry
     tension only.
 
+    On curved layers the field is one of space, of which each layer has the values along its
+    surface: neighbouring layers get about the same strands. `stripes` takes the place of rows and
+    contours there.
+
     Attributes
     ----------
     coverage : float, default 0.45
@@ -93,7 +96,7 @@ class StreamFunction:
         follow for one load case (`ccfem.strategies.fibre_aware.stream_design.designed_in_steps`).
     groups : int, default 0
         Number of fields over the height of the part; 0 for one field, or for at most six where the
-        stress differs over the height.
+        stress differs over the height. Curved layers have one, which changes over the height.
     grid : float, default 2
         Side of the squares of the field, in strand widths; never finer than the cells of the mesh.
     cap : float, default 90
@@ -119,10 +122,12 @@ class StreamFunction:
         ``stiffness^(1 - strength) * load^strength``. Of several load cases, the load is that of the
         case that fails first, at the least multiple of its load.
     moves : int, default 0
-        Number of steps in which strands are moved sideways (`moved`), each step tested.
+        Number of steps in which strands are moved sideways (`moved`), each step tested; on flat
+        layers only.
     turns : {"tight", "cut"}
         Whether more than 1 % of the fibre may turn more tightly than the machine's minimum radius.
-        With "cut", fibre that needs such turns is left out, so less may be laid than asked for.
+        With "cut", fibre that needs such turns is left out, so less may be laid than asked for; on
+        flat layers the design then avoids them too.
     """
 
     coverage: float = 0.45
@@ -142,7 +147,6 @@ class StreamFunction:
     turns: Literal["tight", "cut"] = "tight"
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.85, least=0.1)
-    flat_layers_only: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "border": {"inset": 0.0, "evaluations": 5},
         "groups": {"groups": 2, "evaluations": 5},
@@ -246,6 +250,7 @@ class StreamFunction:
 
         With `whole`, plans that lay the length go before stiffer ones that do not.
         """
+        check_moves(self.moves, layers)
         _check_tension(cases.fields, layers)
         in_all, strand = [length * len(layers) for length in lengths], Strand(self.rho)
         bounds = measures(self.objective, cases, layers, max(in_all), machine, strand)
@@ -260,7 +265,7 @@ class StreamFunction:
                 (float(share) / one.work, one.displacement)
                 for share, one in zip(counts, solutions, strict=True)
             ]
-            drawn = self.extraction(problem.model, tuple(design.fields), strained, machine)
+            drawn = self.extraction(problem.model, tuple(design.fields), strained, machine, layers)
             return drawn.candidates(layers, fields_of, in_all)
 
         tried = candidates(designed)
@@ -289,13 +294,24 @@ class StreamFunction:
         fields: Sequence[FloatArray],
         strains_of: Sequence[tuple[float, FloatArray]],
         machine: Machine,
+        layers: Sequence[Layer] = (),
     ) -> Extraction:
         """Paths along the fields; each field has a block of coefficients for every group."""
         blocks = [model.signed(field, group) for field in fields for group in range(model.groups)]
         mesh, widths = model.part.mesh, (self.inset, self.link_limit)
         radius = kept_radius(machine, TIGHT_SHARES[self.turns])
+        curved = layers if model.part.axes.curved else ()
+        charts = {layer.index: chart_of(layer) for layer in curved}
         return Extraction(
-            tuple(blocks), model.grid, mesh, strains_of, machine, self.phases, *widths, radius
+            tuple(blocks),
+            model.grid,
+            mesh,
+            strains_of,
+            machine,
+            self.phases,
+            *widths,
+            radius,
+            charts,
         )
 
     def designed(
@@ -311,7 +327,7 @@ class StreamFunction:
         (`ccfem.strategies.fibre_aware.upper_bound.measures`), by default 1.
         """
         cases = WeightedCases.of(stress)
-        parts = smeared_cases(cases.fields, layers[0].plane.frame)
+        parts = smeared_cases(cases.fields, frames_in_cells(cases.mesh.centres, layers))
         model, group = self._model(parts, layers, machine)
         shares = layer_counts(cases.weights, len(layers)) / len(layers)
         measured = np.ones(len(cases)) if bounds is None else bounds
@@ -329,18 +345,20 @@ class StreamFunction:
         self, parts: Sequence[SmearedPart], layers: Sequence[Layer], machine: Machine
     ) -> tuple[StreamModel, IntArray]:
         """Return the fibre of one field, and each layer's group."""
-        part, mesh = parts[0], parts[0].mesh
-        centres = part.centroids @ part.frame[:2].T
+        part, mesh, axes = parts[0], parts[0].mesh, parts[0].axes
+        centres = axes.places(part.centroids)
         size = max(self.grid * machine.fibre_width, float(np.cbrt(6.0 * mesh.volumes.mean())))
         stresses = [specimen_part.specimen.unreinforced.stress for specimen_part in parts]
-        if self.groups:
+        if axes.curved:  # a field in space may change from layer to layer
+            group = np.zeros(len(layers), dtype=np.int64)
+        elif self.groups:
             group = group_layers(layers, self.groups)
         else:
             group = grouped_by_stress(mesh, stresses, layers, size)
-        corners = mesh.points[np.unique(mesh.corners)] @ part.frame[:2].T
-        points = [corners, centres]
+        points = [axes.places(mesh.points[np.unique(mesh.corners)]), centres]
         for layer in layers:
-            points += [refined(layer)[0], layer.plane.points[layer.triangles].mean(axis=1)]
+            fine = refined(layer, in_space=axes.curved)[0]
+            points += [fine, fine[layer.triangles].mean(axis=1)]
         energies = [
             mesh.volumes * np.einsum("cij,cij->c", specimen_part, specimen_part)
             for specimen_part in stresses
@@ -356,7 +374,7 @@ class StreamFunction:
             width=machine.fibre_width,
             axial_stiffness=self.rho * part.modulus,
             budget=self.overfill * self.coverage * float(mesh.volumes @ capacity),
-            radius=_WIDE[self.turns] * machine.minimum_radius,
+            radius=0.0 if axes.curved else _WIDE[self.turns] * machine.minimum_radius,
         )
         return model, group
 
@@ -374,7 +392,8 @@ def _with_first(
 def _check_tension(stresses: Sequence[StressField], layers: Sequence[Layer]) -> None:
     """Refuse a part that is under tension nowhere, in no load case."""
     for stress in stresses:
-        if any(layer_tension(stress_on(layer, stress)).defined.any() for layer in layers):
+        views = map(flat_view, layers)
+        if any(layer_tension(stress_on(view, stress)).defined.any() for view in views):
             return
     largest = max(float(np.linalg.eigvalsh(stress.stress).max()) for stress in stresses)
     raise InputError(
@@ -481,161 +500,3 @@ def designed_to_lengths(
 def _designed_for(strategy: Designed, coverage: float, designed: float) -> Designed:
     """Strategy that lays a coverage from a design for `designed`, overfill included."""
     return replace(strategy, coverage=coverage, overfill=max(designed / coverage, 1.0))
-
-
-# Start of the design of stream functions: their grid, and fields that follow the tension.
-
-
-_SPACING_WEIGHT = 0.1
-"""Weight of the wanted density against the direction, as in `fields.scalar.fit_weighted`."""
-
-_FILL_LENGTH = 3.0
-"""Length, mm, over which the screened fill carries the field on."""
-
-_FULLEST = 0.85
-"""Largest share of the fibre at the density limit to which the first field is scaled up."""
-
-_LEAST_WEIGHT = 1e-3
-_SMOOTH = 1e-5
-_REGULARISATION = 1e-9
-
-
-def plane_axes(part: SmearedPart, energies: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Centre (2,) and in-plane axes (2, 2) that rotate with the part and its loads.
-
-    They are the in-plane principal axes of inertia, of volume and strain energy in equal parts: a
-    symmetric part rarely has a load that is symmetric too.
-
-    Parameters
-    ----------
-    energies : sequence of (m,) arrays
-        Strain energy of each cell under each load case, in any unit.
-    """
-    mesh = part.mesh
-    place = part.centroids @ part.frame[:2].T
-    shares = np.mean([energy / energy.sum() for energy in energies], axis=0)
-    weight = mesh.volumes / mesh.volumes.sum() + shares
-    centre = weight @ place / weight.sum()
-    away = place - centre
-    _, vectors = np.linalg.eigh((away * weight[:, None]).T @ away)
-    first = vectors[:, 1] * (1.0 if vectors[np.abs(vectors[:, 1]).argmax(), 1] > 0.0 else -1.0)
-    return centre, np.stack([first, [-first[1], first[0]]])
-
-
-def start_fields(
-    problem: StreamProblem,
-    stresses: Sequence[StressField],
-    layers: Sequence[Layer],
-    cap: float,
-    tilt: float = 1.0,
-) -> FloatArray:
-    """Make fields (n * c,) to start with: each mainly follows the tension of its own case.
-
-    Field k follows ``sum over i of v_i s_i t_i t_i^T / sqrt(C_i)``, s_i the tension along t_i and
-    C_i the compliance without fibre, v_i the tilt for its own case and equal for the others. It is
-    as dense as the budget allows.
-
-    Parameters
-    ----------
-    stresses : sequence of StressField
-        Of the part without fibre, one for each case.
-    layers : sequence of Layer
-        One for each group, whose tension its field follows.
-    cap : float
-        Percentile of the stress above which the density no longer increases.
-    tilt : float in (0, 1], default 1
-        Weight of a field's own case. At 1 the initial fields are independent of each other; at
-        1 / n they start alike, and stay so.
-
-    Returns
-    -------
-    (n * c,) array
-        Coefficients, field after field; zero for a group without tension.
-    """
-    count = len(stresses)
-    tensions = [
-        [layer_tension(stress_on(layer, stress_field)) for stress_field in stresses]
-        for layer in layers
-    ]
-    size = np.sqrt([part.unreinforced.work for part in problem.parts])
-    fields = []
-    for k in range(count):
-        factors = np.full(count, (1.0 - tilt) / max(count - 1, 1))
-        factors[k] = tilt
-        mixed = [mixed_tension(of_layer, factors / size) for of_layer in tensions]
-        fields.append(field_along(problem.model, layers, mixed, cap))
-    return np.concatenate(fields)
-
-
-def field_along(
-    model: StreamModel, layers: Sequence[Layer], tensions: Sequence[Tension], cap: float
-) -> FloatArray:
-    """Fields (c,) that follow given tensions of one layer for each group; cap as `start_fields`."""
-    values = np.concatenate([np.where(t.defined, t.stress, 0.0) for t in tensions])
-    weight = np.concatenate([layer.areas for layer in layers])
-    order = np.argsort(values, kind="stable")
-    below = np.cumsum(weight[order])
-    at = int(np.searchsorted(below, cap / 100.0 * below[-1] * (1.0 - 1e-12)))
-    top = max(float(values[order[min(at, len(order) - 1)]]), 1e-300)
-    field = np.concatenate(
-        [_fit(model, layer, tension, top) for layer, tension in zip(layers, tensions, strict=True)]
-    )
-    return _to_budget(model, field)
-
-
-def mixed_tension(tensions: Sequence[Tension], factors: FloatArray) -> Tension:
-    """Tension of ``sum of factor s t t^T`` over the tensions s along t of several load cases.
-
-    Parameters
-    ----------
-    tensions : sequence of Tension
-        In the plane of one layer.
-    factors : (n,) array
-        Not negative.
-    """
-    if len(tensions) == 1:  # only its size would change, which no field depends on
-        return tensions[0]
-    total = np.zeros((len(tensions[0].stress), 3))
-    for factor, one in zip(factors, tensions, strict=True):
-        x, y = one.direction.T
-        size = factor * np.where(one.defined, one.stress, 0.0)
-        total += size[:, None] * np.stack([x * x, y * y, x * y], axis=1)
-    largest, _, angle = largest_in_plane(total)
-    return Tension(np.stack([np.cos(angle), np.sin(angle)], axis=1), largest, largest > 0.0)
-
-
-def _fit(model: StreamModel, layer: Layer, tension: Tension, top: float) -> FloatArray:
-    """Coefficients (k,) of the field along the tension of one layer."""
-    grid = model.grid
-    if not tension.defined.any():
-        return np.zeros(len(grid))
-    surface = Surface.of(layer)
-    confidence = np.where(tension.defined, np.minimum(tension.stress / top, 1.0), 0.0)
-    direction, size = fill_screened(
-        surface, tension.direction, tension.stress, confidence, _FILL_LENGTH
-    )
-    direction = orient(direction, surface.neighbours, confidence)
-    density = DENSEST * np.clip(size / top, 0.0, 1.0)
-    weight = np.maximum(confidence, _LEAST_WEIGHT) * surface.areas
-    weight = weight / weight.sum()
-    x, y = grid.slopes(surface.points[surface.triangles].mean(axis=1))
-    a, b = direction.T
-    along = model.width * (sp.diags_array(a) @ x + sp.diags_array(b) @ y)
-    across = model.width * (sp.diags_array(a) @ y - sp.diags_array(b) @ x)
-    weighted = (_SPACING_WEIGHT * across).T * weight
-    bend = grid.laplacian.T @ grid.laplacian / len(grid)
-    matrix = (along.T * weight) @ along + weighted @ across + _SMOOTH * bend
-    matrix = matrix + _REGULARISATION * sp.eye_array(len(grid))
-    return np.asarray(positive_definite(matrix).solve(weighted @ density))
-
-
-def _to_budget(model: StreamModel, field: FloatArray) -> FloatArray:
-    """Scale a field so that it uses the budget as far as the density stays below its limit."""
-    size = np.hypot(*(slope @ field for slope in model.slopes))
-    most = _FULLEST * DENSEST * float(model.room.sum())
-    low, high = 1e-2, 1e2
-    for _ in range(60):
-        middle = float(np.sqrt(low * high))
-        length = model.room @ np.minimum(middle * size, DENSEST)
-        low, high = (middle, high) if length < min(model.budget, most) else (low, middle)
-    return low * field

@@ -26,6 +26,14 @@ from ccfem.strategies import create, named
 MACHINE = Machine()
 RADIUS = 40.0
 CURVED = [name for name in sorted(named()) if not getattr(named()[name], "flat_layers_only", False)]
+QUICK = {
+    "pruned": {"of": "concentric"},
+    "stream_function": {"evaluations": 5, "phases": 1, "inset": 0.6},  # no plain plans instead
+}
+OFF = {"pruned": 0.006, "stream_function": 0.006}
+"""Distance from the layer, mm, of strategies that plan the whole part: they step once more, in
+space, within 0.005 fibre widths of chords of half a millimetre, which lie R - sqrt(R^2 - 0.25^2) =
+0.001 mm inside. Others step in the chart."""
 FREE = ["concentric", "offset", "streamline", "winding"]
 """Strategies that have no direction of their own: a chart may lie in its plane in any way. Ends of
 `isocurve` move by up to 0.8 mm where the same chart lies turned by so much, and one of `stripes` by
@@ -69,7 +77,7 @@ def part(load=1.0, turned=False):
 @cache
 def paths_of(name):
     stress, layers = part()
-    return plan(create(name), layers, stress, MACHINE)
+    return plan(create(name, QUICK.get(name)), layers, stress, MACHINE)
 
 
 @pytest.mark.parametrize("name", CURVED)
@@ -77,7 +85,7 @@ def test_fibre_lies_on_the_layer_and_is_long_enough(name):
     (layer,), paths = part()[1], paths_of(name)
     assert len(paths) > 0
     found = nearest_on_triangles(layer.points, layer.triangles, paths.points)
-    assert found.distance.max() < 5e-3
+    assert found.distance.max() < OFF.get(name, 5e-3)
     np.testing.assert_allclose(np.linalg.norm(paths.normals, axis=1), 1.0)
     assert paths.lengths.min() >= 0.97 * MACHINE.minimum_length
     # From the axis of the bend, as far as the layer is: chords of edges 5 mm long, as the diagonals
@@ -100,10 +108,10 @@ def test_evaluator_accepts_the_paths(name):
 @pytest.mark.parametrize("name", CURVED)
 def test_neither_the_load_nor_another_run_changes_the_paths(name):
     stress, layers = part()
-    again = plan(create(name), layers, stress, MACHINE)
+    again = plan(create(name, QUICK.get(name)), layers, stress, MACHINE)
     np.testing.assert_array_equal(again.points, paths_of(name).points)
     stress, layers = part(load=1e-3)
-    scaled = plan(create(name), layers, stress, MACHINE)
+    scaled = plan(create(name, QUICK.get(name)), layers, stress, MACHINE)
     np.testing.assert_array_equal(scaled.offsets, paths_of(name).offsets)
     np.testing.assert_allclose(scaled.points, paths_of(name).points, atol=1e-3)
 

@@ -81,15 +81,17 @@ class BorderLevels:
         """Weights for a field (c,) and its solution."""
         part, grid, mesh = problem.part, problem.grid, problem.part.mesh
         area, normal = mesh.facet_areas(mesh.boundary)
-        upright = np.flatnonzero(np.abs(normal @ part.frame[2]) < _UPRIGHT)
-        inward = -normal[upright] @ part.frame[:2].T
+        axes, cell = part.axes, mesh.boundary_cells
+        upright = np.flatnonzero(np.abs(axes.across(normal, cell)) < _UPRIGHT)
+        cell = cell[upright]
+        inward = axes.along(-normal[upright], cell)
         inward = inward / np.linalg.norm(inward, axis=1)[:, None]
-        at = mesh.points[mesh.boundary[upright]].mean(axis=1) @ part.frame[:2].T
-        at = at + _DEPTH * problem.width * inward
+        at = axes.places(mesh.points[mesh.boundary[upright]].mean(axis=1))
+        at = axes.moved(at, _DEPTH * problem.width * inward, cell)
         kept = grid.covers(at)
-        at, inward, upright = at[kept], inward[kept], upright[kept]
-        cell = mesh.boundary_cells[upright]
-        gx, gy = (problem.of_group(matrix, problem.group[cell]) for matrix in grid.slopes(at))
+        at, inward, upright, cell = at[kept], inward[kept], upright[kept], cell[kept]
+        slopes = axes.slopes(grid, at, cell)
+        gx, gy = (problem.of_group(matrix, problem.group[cell]) for matrix in slopes)
         (a, b), (x, y) = inward.T, (gx @ field, gy @ field)
         across, along = np.abs(a * x + b * y), np.abs(a * y - b * x)
         e1, e2, e12 = solution.strain[cell].T

@@ -11,7 +11,8 @@ from ccfem.base.tensor import in_plane
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer import Layer, curved_layers
+from ccfem.strategies.fibre_aware.layer_axes import NearestLayers
 from ccfem.strategies.fibre_aware.smeared import SmearedPart
 
 _ALIKE = 0.8
@@ -24,7 +25,9 @@ _EQUAL = 1e-6
 
 
 def nearest_layer(part: SmearedPart, layers: Sequence[Layer]) -> IntArray:
-    """Position in `layers` of the one nearest in height to each cell, (m,)."""
+    """Position in `layers` of the one nearest to each cell, (m,); of flat ones in height."""
+    if curved_layers(layers):
+        return NearestLayers.of(part.centroids, layers).number
     heights = np.array([layer.plane.height for layer in layers])
     order = np.argsort(heights, kind="stable")
     bounds = 0.5 * (heights[order][1:] + heights[order][:-1])
@@ -34,8 +37,17 @@ def nearest_layer(part: SmearedPart, layers: Sequence[Layer]) -> IntArray:
 
 def fibre_capacity(part: SmearedPart, layers: Sequence[Layer], machine: Machine) -> FloatArray:
     """Density of fibre (m,), mm/mm^3, at one strand a width in the layer nearest to each cell."""
+    if curved_layers(layers):
+        return 1.0 / (machine.fibre_width * NearestLayers.of(part.centroids, layers).thickness)
     thickness = np.array([layer.thickness for layer in layers])
     return 1.0 / (machine.fibre_width * thickness[nearest_layer(part, layers)])
+
+
+def _upwards(layers: Sequence[Layer]) -> IntArray:
+    """Positions of layers from the bottom to the top; a stack of curved ones is sorted."""
+    if curved_layers(layers):
+        return np.arange(len(layers))
+    return np.argsort([layer.plane.height for layer in layers], kind="stable")
 
 
 def group_layers(layers: Sequence[Layer], groups: int) -> IntArray:
@@ -46,7 +58,7 @@ def group_layers(layers: Sequence[Layer], groups: int) -> IntArray:
     (n,) int array
         Group of each layer; every group has a layer.
     """
-    order = np.argsort([layer.plane.height for layer in layers], kind="stable")
+    order = _upwards(layers)
     group = np.empty(len(layers), dtype=np.int64)
     group[order] = np.arange(len(layers)) * min(groups, len(layers)) // len(layers)
     return group
@@ -84,15 +96,18 @@ def grouped_by_stress(
 ) -> IntArray:
     """Group of each layer, (layers,): one group where the stress is alike at all heights.
 
+    Curved layers form as many groups as flat ones whose stress differs.
+
     Parameters
     ----------
     stresses : sequence of (m, 3, 3) arrays, MPa
         Of the load cases.
     layers : sequence of Layer
-        Flat ones.
     size : float, mm, default 0
         As of `alike_share`, where it is more than the mean edge of the cells.
     """
+    if curved_layers(layers):
+        return group_layers(layers, _MOST_GROUPS)
     size = max(size, float(np.cbrt(6.0 * mesh.volumes.mean())))
     frame = layers[0].plane.frame
     alike = min(alike_share(mesh, frame, stress, size) for stress in stresses)
@@ -104,10 +119,17 @@ def layers_of_one_kind(
 ) -> list[IntArray]:
     """Numbers of the layers of each kind: they share a group, and a section up to a distance, mm.
 
+    No two curved layers are equal; up to a larger distance neighbours of a group count as alike.
+
     Parameters
     ----------
     group : (layers,) int array
     """
+    if curved_layers(layers):
+        kind_of = np.arange(len(layers))
+        if distance > _EQUAL:
+            kind_of = group * len(layers) + group_layers(layers, _MOST_GROUPS)
+        return [np.flatnonzero(kind_of == k) for k in np.unique(kind_of)]
     kinds: list[list[int]] = []
     borders = [shapely.boundary(layer.plane.polygon) for layer in layers]
     for k, border in enumerate(borders):
@@ -122,7 +144,9 @@ def layers_of_one_kind(
 
 
 def on_layer(paths: Toolpaths, layer: Layer) -> Toolpaths:
-    """Paths of a layer with the same section, drawn on another."""
+    """Paths of a layer with the same section, drawn on another; those of a curved layer itself."""
+    if layer.flat is None:
+        return paths
     points = layer.plane.to_space(layer.plane.project(paths.points))
     return replace(paths, points=points, layer=np.full(len(paths), layer.index))
 
@@ -163,7 +187,7 @@ def layers_by_case(weights: FloatArray, layers: Sequence[Layer]) -> IntArray:
     """
     count = len(layers)
     counts = layer_counts(weights, count)
-    order = np.argsort([layer.plane.height for layer in layers], kind="stable")
+    order = _upwards(layers)
     given = np.zeros(len(counts), dtype=np.int64)
     case_of = np.empty(count, dtype=np.int64)
     for place, number in enumerate(order):

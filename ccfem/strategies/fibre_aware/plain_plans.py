@@ -16,7 +16,7 @@ from ccfem.paths.planning.infill import long_enough
 from ccfem.paths.planning.plan import plan, plan_layers
 from ccfem.paths.planning.strategy import LayerPlanner
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer, LayerStress
+from ccfem.slicing.layers.layer import Layer, LayerStress, curved_layers
 from ccfem.strategies import create
 from ccfem.strategies.concentric import Concentric
 from ccfem.strategies.fibre_aware.heights import (
@@ -106,12 +106,13 @@ def plain_plans(
 ) -> list[Toolpaths]:
     """Plan straight rows, contours and isocurves, each with more fibre than is usually kept.
 
-    Layers of one section under alike stress are planned once.
+    Layers of one section under alike stress are planned once. On curved layers rows and contours
+    follow the tension nowhere: there strands side by side along it (`stripes`) take their place.
 
     Parameters
     ----------
     layers : sequence of Layer
-        Flat ones. Each is planned for one load case, as many for each as its weight says.
+        Each is planned for one load case, as many for each as its weight says.
     curves : bool, default True
         Whether to plan isocurves too.
 
@@ -142,8 +143,12 @@ def plain_plans(
     def by(planner: LayerPlanner) -> Toolpaths:
         return in_all(lambda some, field: plan_layers(planner, some, some, field, machine))
 
-    rings = Concentric().for_part(field, layers, machine)
-    plans = [by(StraightRows("tension")), by(StraightRows("section")), by(rings)]
+    if curved_layers(layers):
+        stripes = create("stripes")
+        plans = [in_all(lambda some, field: plan(stripes, some, field, machine))]
+    else:
+        rings = Concentric().for_part(field, layers, machine)
+        plans = [by(StraightRows("tension")), by(StraightRows("section")), by(rings)]
     if curves:
         isocurve = create("isocurve", {"cap": _CAP})
         plans.append(in_all(lambda some, field: plan(isocurve, some, field, machine)))

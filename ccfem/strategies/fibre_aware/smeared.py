@@ -2,7 +2,8 @@
 
 Fibre of density m (mm of strand per mm^3) along the unit vector t in a cell of volume V adds the
 energy ``EA V m eps^2 / 2``, with the strain eps along t. Fibre lies in the planes of the layers, so
-its stiffness acts on the three in-plane strains only.
+its stiffness acts on the three in-plane strains only: on curved layers those in the tangent plane
+of the layer nearest to each cell.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,6 +12,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray, freeze, in_brief, read_only
@@ -18,6 +20,7 @@ from ccfem.base.errors import SolveError
 from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity import StressField, cell_gradients, preconditioned_cg, solve
 from ccfem.judging.virtual_testing import Specimen
+from ccfem.strategies.fibre_aware.layer_axes import LayerAxes
 
 _UPDATES = 40
 """Updates of the displacement after which to give up."""
@@ -72,14 +75,20 @@ class SmearedPart:
     ----------
     specimen : Specimen
         On linear cells.
-    frame : (3, 3) array
-        Of the layers: two unit vectors in their plane, and their normal.
+    frame : (3, 3) or (m, 3, 3) array
+        Of the layers: two unit vectors in their plane, and their normal; of curved ones in each
+        cell.
     """
 
     specimen: Specimen
     frame: FloatArray
 
     __repr__ = in_brief
+
+    @cached_property
+    def axes(self) -> LayerAxes:
+        """Axes of the layers."""
+        return LayerAxes(self.frame)
 
     @classmethod
     def of(
@@ -91,7 +100,7 @@ class SmearedPart:
 
         Parameters
         ----------
-        frame : (3, 3) array
+        frame : (3, 3) or (m, 3, 3) array
         backend : str, optional
             Preconditioner; default "superlu" for small systems, else "amg". Both are always
             installed, so that paths do not depend on optional packages.
@@ -101,8 +110,10 @@ class SmearedPart:
         known = stress.__dict__.setdefault("smeared", {})
         key = _key(backend, frame)
         if key not in known:
-            linear = on_linear_cells(stress, backend)
-            known[key] = cls(Specimen.of(linear, backend), read_only(frame))
+            # What other layers of the part have factorised serves these too.
+            same = [part.specimen for (name, _), part in known.items() if name == backend]
+            specimen = same[0] if same else Specimen.of(on_linear_cells(stress, backend), backend)
+            known[key] = cls(specimen, read_only(frame))
         part: SmearedPart = known[key]
         return part
 
@@ -164,11 +175,32 @@ class SmearedPart:
     @cached_property
     def _slopes(self) -> FloatArray:
         """Gradients (m, 4, 2) of the barycentric coordinates in the plane, 1/mm."""
-        return np.ascontiguousarray(cell_gradients(self.mesh) @ self.frame[:2].T)
+        return np.ascontiguousarray(self.axes.along(cell_gradients(self.mesh)))
 
     @cached_property
     def _cells(self) -> IntArray:
-        return np.ascontiguousarray(self.mesh.corners)
+        """Rows (m, 4) of `_in_plane` for the corners of each cell."""
+        corners = np.ascontiguousarray(self.mesh.corners)
+        return np.arange(corners.size).reshape(-1, 4) if self.axes.curved else corners
+
+    @cached_property
+    def _gathered(self) -> Any:
+        """Matrix (n, 4 m) that adds up what the corners of all cells have at the nodes."""
+        corners = self.mesh.corners.ravel()
+        entries = (np.ones(len(corners)), (corners, np.arange(len(corners))))
+        return sp.csr_array(entries, shape=(len(self.mesh.points), len(corners)))
+
+    def _in_plane(self, displacement: FloatArray) -> FloatArray:
+        """Displacements along the layers: (n, 2), on curved ones (4 m, 2) of corners of cells."""
+        if not self.axes.curved:
+            return np.ascontiguousarray(displacement @ self.frame[:2].T)
+        corners = displacement[self.mesh.corners]
+        return np.matmul(corners, self._turned).reshape(-1, 2)
+
+    @cached_property
+    def _turned(self) -> FloatArray:
+        """Axes (m, 3, 2) along curved layers, as columns."""
+        return np.ascontiguousarray(np.swapaxes(self.frame[:, :2], 1, 2))
 
     @cached_property
     def _reduced(self) -> Any:
@@ -176,17 +208,20 @@ class SmearedPart:
 
     def strain(self, displacement: FloatArray) -> FloatArray:
         """Strains (m, 3) in the plane: 11, 22 and 12 (engineering shear)."""
-        plane = np.ascontiguousarray(displacement @ self.frame[:2].T)
+        plane = self._in_plane(displacement)
         result = np.empty((len(self._cells), 3))
         _strains(self._cells, self._slopes, plane, result)
         return result
 
     def _force(self, packed: FloatArray, displacement: FloatArray) -> FloatArray:
         """Nodal forces (n, 3) of fibre with packed stiffness (m, 6) times volume."""
-        plane = np.ascontiguousarray(displacement @ self.frame[:2].T)
+        plane = self._in_plane(displacement)
         result = np.zeros_like(plane)
         _forces(self._cells, self._slopes, packed, plane, result)
-        return result @ self.frame[:2]
+        if not self.axes.curved:
+            return result @ self.frame[:2]
+        of_cells = np.matmul(result.reshape(-1, 4, 2), self.frame[:, :2])
+        return np.asarray(self._gathered @ of_cells.reshape(-1, 3))
 
     def pack(self, stiffness: FloatArray) -> FloatArray:
         """Upper triangles (m, 6) of stiffnesses (m, 3, 3), times the volumes of the cells."""
@@ -283,7 +318,7 @@ def smeared_cases(fields: Sequence[StressField], frame: FloatArray) -> tuple[Sme
     ----------
     fields : sequence of StressField
         Of one mesh.
-    frame : (3, 3) array
+    frame : (3, 3) or (m, 3, 3) array
         Of the layers.
     """
     leaders: dict[int, SmearedPart] = {}

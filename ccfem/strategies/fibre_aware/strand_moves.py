@@ -96,8 +96,7 @@ def moved(
     """
     check_number("moves", moves, at_least=0)
     check_number("inset", inset, at_least=0.0, unit="fibre widths")
-    if curved_layers(layers):
-        raise InputError("strands move on flat layers only; got a curved one: set moves to 0")
+    check_moves(moves, layers)
     fibre = toolpaths.of_kind(FIBRE)
     if not moves or not len(fibre):
         return toolpaths
@@ -122,6 +121,18 @@ def moved(
         return toolpaths
     others = toolpaths.select(toolpaths.kind != FIBRE)
     return Toolpaths.concatenate([lines.slid(slide), others])
+
+
+def check_moves(moves: int, layers: Sequence[Layer]) -> None:
+    """Refuse to move strands on curved layers.
+
+    Raises
+    ------
+    InputError
+        When strands are to move and a layer is curved.
+    """
+    if moves and curved_layers(layers):
+        raise InputError("strands move on flat layers only; got a curved one: set moves to 0")
 
 
 def kept_radius(machine: Machine, tight: float) -> float:

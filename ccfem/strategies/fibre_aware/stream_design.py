@@ -178,7 +178,8 @@ class StreamModel:
     group : (m,) int array
         Which field each cell follows; field k has the k-th block of ``len(grid)`` coefficients.
     centres : (m, 2) array, mm
-        Where each cell samples its field: its centroid in the plane of the layers.
+        Where each cell samples its field: its centroid in the plane of the layers; (m, 3) in space
+        for curved ones.
     capacity : (m,) array, 1/mm^2
         Fibre density at one strand a width, ``1 / (width * thickness)`` of the layers there.
     width : float, mm
@@ -209,7 +210,8 @@ class StreamModel:
     @cached_property
     def slopes(self) -> tuple[Any, Any]:
         """Matrices (m, c) from coefficients to the components of g, strands a width."""
-        x, y = (self.of_group(matrix, self.group) for matrix in self.grid.slopes(self.centres))
+        slopes = self.part.axes.slopes(self.grid, self.centres)
+        x, y = (self.of_group(matrix, self.group) for matrix in slopes)
         return self.width * x, self.width * y
 
     def of_group(self, matrix: Any, group: IntArray) -> Any:

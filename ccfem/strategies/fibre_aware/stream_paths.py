@@ -1,7 +1,7 @@
 """Paths along the levels of designed fields, of which the stretches worth most are kept."""
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise, product
 from typing import Any, cast
@@ -18,6 +18,7 @@ from ccfem.geometry.shapes import Region
 from ccfem.judging.virtual_testing import cut_strands
 from ccfem.judging.virtual_testing.equilibrium import bars
 from ccfem.machine.machine import Machine
+from ccfem.paths.fields.chart import Chart, flat_view
 from ccfem.paths.linking.finishing import (
     keep_off_border,
     linked_paths,
@@ -81,6 +82,8 @@ class Extraction:
         Least distance from the boundary, and largest distance of linked ends, in strand widths.
     radius : float, mm, default 0
         Least radius that bends are corrected to; 0 for none.
+    charts : mapping of int to Chart, default {}
+        Where layers are curved, of all by `Layer.index`: paths are drawn in the plane of the chart.
     """
 
     fields: tuple[FloatArray, ...]
@@ -92,6 +95,7 @@ class Extraction:
     inset: float
     link_limit: float
     radius: float = 0.0
+    charts: Mapping[int, Chart] = field(default_factory=dict)
 
     def candidates(
         self, layers: Sequence[Layer], group: IntArray, lengths: Sequence[float]
@@ -265,19 +269,27 @@ class Extraction:
     def levels(self, layer: Layer, field: FloatArray, shift: float) -> list[FloatArray]:
         """Trace the levels `shift` above whole numbers on a layer, (n, 2), mm."""
         points, triangles = refined(layer)
-        values = self.grid.values(points) @ field
+        chart = self.charts.get(layer.index)
+        places = points if chart is None else refined(chart.layer, in_space=True)[0]
+        values = self.grid.values(places) @ field
         first = float(np.ceil(values.min() - shift)) + shift
         return isocontours(points, triangles, values, first, 1.0).lines()
 
     def _worth(self, layer: Layer, lines: Sequence[FloatArray]) -> list[Profile]:
         """Profiles of lines on a layer, each starting at its first point."""
         closed = len(lines) * [False]
-        return self.profiles(Toolpaths.from_plane(lines, layer, closed))
+        return self.profiles(Toolpaths.from_plane(lines, layer, closed), layer)
 
-    def profiles(self, toolpaths: Toolpaths) -> list[Profile]:
-        """Value of the paths at the strains of the designed part."""
-        if not len(toolpaths):
+    def on_part(self, paths: Toolpaths, layer: Layer) -> Toolpaths:
+        """Paths of a layer where they lie on the part."""
+        chart = self.charts.get(layer.index)
+        return paths if chart is None else chart.lifted(paths)
+
+    def profiles(self, paths: Toolpaths, layer: Layer) -> list[Profile]:
+        """Value of the paths of a layer at the strains of the designed part."""
+        if not len(paths):
             return []
+        toolpaths = self.on_part(paths, layer)
         strands = cut_strands(toolpaths, self.mesh)
         pieces = bars(strands, self.mesh)
         value = np.zeros(len(strands.length))
@@ -295,7 +307,8 @@ class _Drawings:
 
     def __init__(self, extraction: Extraction, layers: Sequence[Layer], group: IntArray) -> None:
         self.alike = layers_of_one_kind(layers, group, _SAME * extraction.machine.fibre_width)
-        self._extraction, self._layers, self._group = extraction, layers, group
+        self._extraction, self._group = extraction, group
+        self._layers = list(map(flat_view, layers))
         self._kind = {int(k): middle(numbers) for numbers in self.alike for k in numbers}
         equal = layers_of_one_kind(layers, group)
         self._source = {int(k): middle(numbers) for numbers in equal for k in numbers}
@@ -332,7 +345,7 @@ class _Drawings:
         """Worth of the paths of a layer, not led round holes."""
         if (number, phase) not in self._rough:
             paths = self._extraction.linked(self._layers[number], self.strands(number, phase))
-            self._rough[number, phase] = self._extraction.profiles(paths)
+            self._rough[number, phase] = self._extraction.profiles(paths, self._layers[number])
         return self._rough[number, phase]
 
     def led(self, number: int, phase: int) -> tuple[list[FloatArray], int]:
@@ -363,7 +376,7 @@ class _Drawings:
         """Worth of the paths of a layer."""
         key = number, phase, reach
         if key not in self._worth:
-            self._worth[key] = self._extraction.profiles(self.paths(*key))
+            self._worth[key] = self._extraction.profiles(self.paths(*key), self._layers[number])
         return self._worth[key]
 
     def with_links(self, number: int, phase: int) -> None:
@@ -389,14 +402,20 @@ class _Drawings:
         alone = {(k if reach else self._source[k], phase, reach) for k, phase, reach in keys}
         self.draw("paths", sorted(alone - self._paths.keys()))
         return {
-            way: Toolpaths.concatenate([self.paths(*key) for key in sorted(some)])
+            way: Toolpaths.concatenate(
+                self._extraction.on_part(self.paths(*key), self._layers[key[0]])
+                for key in sorted(some)
+            )
             for way, some in positions.items()
         }
 
 
-def refined(layer: Layer) -> tuple[FloatArray, IntArray]:
-    """Points (n, 2) and triangles (t, 3) of a layer, each triangle cut in four."""
-    points, corners = layer.plane.points, layer.triangles
+def refined(layer: Layer, in_space: bool = False) -> tuple[FloatArray, IntArray]:
+    """Points and triangles (t, 3) of a layer, each triangle cut in four.
+
+    Points are (n, 2) in the plane of a flat layer, or (n, 3) in space, in the same order.
+    """
+    points, corners = layer.points if in_space else layer.plane.points, layer.triangles
     edges, opposite = triangle_edges(corners)
     a, b, c = corners.T
     x, y, z = opposite.T + len(points)

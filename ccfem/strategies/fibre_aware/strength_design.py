@@ -161,7 +161,7 @@ class StrengthProblem:
                 along = np.stack([one.along for one in smeared])
                 forces = self._forces(np.einsum("fc,fci->ci", by_stretch, along))
                 fibre = Peak(index, norm, forces)
-            normal = part.frame[2]
+            normal = part.axes.normal
             peaks = judge.peaks(solution.displacement, fibre, self.limits, normal)
             # For the same load, which falls with the stiffness where supports move.
             load = 1.0 if part.forced else part.ratio(solution.work)
@@ -172,9 +172,10 @@ class StrengthProblem:
     def _forces(self, by_strain: FloatArray) -> FloatArray:
         """Turn a derivative by the strains (m, 3) in the plane into one by the displacement."""
         part = self.problem.model.part
-        a, b, _ = part.frame
-        pairs = np.stack([np.outer(a, a), np.outer(b, b), np.outer(a, b) + np.outer(b, a)])
-        tensor = np.einsum("ci,ijk->cjk", by_strain / part.mesh.volumes[:, None], pairs)
+        a, b = part.frame[..., 0, :, None], part.frame[..., 1, :, None]
+        pairs = np.stack([a * a.mT, b * b.mT, a * b.mT + b * a.mT], axis=-3)
+        density = by_strain / part.mesh.volumes[:, None]
+        tensor = np.einsum("ci,cijk->cjk" if part.axes.curved else "ci,ijk->cjk", density, pairs)
         return strain_forces(part.mesh, to_voigt(tensor))
 
     def _near(

@@ -15,6 +15,9 @@ principal directions. Several have none in common, so 360 angles are tried, with
 in between. A case in which supports move instead of forces has a compliance too: see
 `SmearedPart.pull`.
 
+On curved layers a cell holds fibre along the layer nearest to its middle. The bound then is as
+exact as layers are flat within a cell.
+
 Each of several cases counts by C_i over the least compliance that any paths can reach in it alone,
 or over the compliance of the part without fibre. The sharpest bound on the largest of these ratios
 is found by increasing the factors of the worst cases. The bound holds for any factors.
@@ -44,6 +47,7 @@ from ccfem.judging.virtual_testing.equilibrium import BONDED, TENSION
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.heights import fibre_capacity
+from ccfem.strategies.fibre_aware.layer_axes import frames_in_cells
 from ccfem.strategies.fibre_aware.smeared import SmearedPart, SmearedSolution, smeared_cases
 
 WORST, SUM, LEAST = OBJECTIVES = ("worst", "sum", "least")
@@ -189,7 +193,7 @@ def upper_bound(
     stress : StressField or WeightedCases
         The part without fibre, under the load that counts, or under several.
     layers : sequence of Layer
-        All flat layers of the part; each carries at most one strand a width.
+        All layers of the part; each carries at most one strand a width.
     length : float, mm
         Total length of fibre.
     machine : Machine
@@ -224,7 +228,7 @@ def upper_bound(
     check_number("gap", gap, at_least=0.0)
     check_known("mode", mode, (TENSION, BONDED))
     check_known("objective", objective, OBJECTIVES)
-    parts = smeared_cases(cases.fields, layers[0].plane.frame)
+    parts = smeared_cases(cases.fields, frames_in_cells(cases.mesh.centres, layers))
     alone = (layers, length, machine, strand, _SINGLE_ITERATIONS, mode)
     singles = measures(objective, cases, *alone)
     volume, most = parts[0].mesh.volumes, fibre_capacity(parts[0], layers, machine)
@@ -363,7 +367,8 @@ def measures(
     """
     if objective == LEAST or len(cases) == 1:
         return np.ones(len(cases))
-    smeared_cases(cases.fields, layers[0].plane.frame)  # one factorisation for all
+    # One factorisation for all.
+    smeared_cases(cases.fields, frames_in_cells(cases.mesh.centres, layers))
     return np.array(
         [
             upper_bound(case, layers, length, machine, strand, mode, iterations).ratio

@@ -18,11 +18,12 @@ from ccfem.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.strategies.fibre_aware.judges import Goal, strength_judge
 from ccfem.strategies.fibre_aware.plan_cases import plan_cases
+from ccfem.strategies.fibre_aware.stream_start import start_fields
 from ccfem.strategies.fibre_aware.strength_design import StrengthProblem, design_for_strength
 from ccfem.strategies.fibre_aware.strength_value import Worth
 from ccfem.strategies.fibre_aware.upper_bound import WORST, measures
 from ccfem.strategies.pruned import Pruned
-from ccfem.strategies.stream_function import StreamFunction, start_fields
+from ccfem.strategies.stream_function import StreamFunction
 
 from .test_stream_design import problem_of
 from .test_strength import near_of, work_of

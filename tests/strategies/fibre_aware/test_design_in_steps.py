@@ -11,7 +11,8 @@ from ccfem.machine import Machine
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies.fibre_aware.heights import middle_layers
 from ccfem.strategies.fibre_aware.stream_design import design, designed_in_steps
-from ccfem.strategies.stream_function import StreamFunction, start_fields
+from ccfem.strategies.fibre_aware.stream_start import start_fields
+from ccfem.strategies.stream_function import StreamFunction
 
 MACHINE = Machine()
 

@@ -22,7 +22,7 @@ from ccfem.strategies.fibre_aware.heights import (
 from ccfem.strategies.fibre_aware.smeared import SmearedPart, smeared_cases
 from ccfem.strategies.fibre_aware.spline_grid import SplineGrid
 from ccfem.strategies.fibre_aware.stream_design import StreamModel, StreamProblem, design
-from ccfem.strategies.stream_function import mixed_tension, plane_axes, start_fields
+from ccfem.strategies.fibre_aware.stream_start import mixed_tension, plane_axes, start_fields
 
 MACHINE = Machine()
 

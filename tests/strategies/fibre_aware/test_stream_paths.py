@@ -54,7 +54,7 @@ def test_links_by_worth_are_tried_at_whole_numbers_too(two_pulls, monkeypatch):
         line = [[lines[0], reach], [lines[0] + 50.0, reach]]
         return Toolpaths.from_plane([np.array(line)], layer, [False])
 
-    def placed(self, paths):
+    def placed(self, paths, layer):
         return tuple(np.round(paths.points[0] @ layers[0].plane.frame[:2].T, 6).tolist())
 
     def gain(self, along, price):
@@ -67,7 +67,7 @@ def test_links_by_worth_are_tried_at_whole_numbers_too(two_pulls, monkeypatch):
     monkeypatch.setattr(Extraction, "_price", lambda self, *_: 0.0)
     monkeypatch.setattr(Extraction, "_gain", gain)
     ((_, *_, best),) = extraction.candidates(layers, np.zeros(1, dtype=int), [100.0])
-    assert placed(extraction, best) == (0.0, 1.0)
+    assert placed(extraction, best, layers[0]) == (0.0, 1.0)
 
 
 def test_layers_of_one_section_are_drawn_once_for_each_field(two_pulls, monkeypatch):

@@ -24,10 +24,11 @@ from ccfem.strategies.fibre_aware.cut_and_move import best_cut, prune_and_move
 from ccfem.strategies.fibre_aware.judges import Goal
 from ccfem.strategies.fibre_aware.prune import prune
 from ccfem.strategies.fibre_aware.stream_design import design
+from ccfem.strategies.fibre_aware.stream_start import start_fields
 from ccfem.strategies.fibre_aware.strength_design import StrengthProblem, design_for_strength
 from ccfem.strategies.fibre_aware.strength_value import Worth, raised
 from ccfem.strategies.pruned import Pruned
-from ccfem.strategies.stream_function import StreamFunction, start_fields
+from ccfem.strategies.stream_function import StreamFunction
 
 from .test_stream_design import problem_of
 
