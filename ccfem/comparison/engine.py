@@ -491,8 +491,8 @@ def _bounds(
 ) -> dict[float, UpperBound]:
     """Bound what any paths can reach, by the length of fibre in all, mm.
 
-    None if no run of the wanted length was tested, for curved layers, for supports that hold in
-    one sense only, and where slicings are compared. Slicings that differ in the number of flat
+    None if no run of the wanted length was tested, for supports that hold in one sense only, and
+    where slicings are compared. Slicings that differ in the number of flat
     layers alone, as those of several lengths do, are bounded on the most layers.
     """
     equal = [run for run in runs if run.tested is not None and not off_length(run, wanted)]
@@ -500,8 +500,7 @@ def _bounds(
     if request.named and not several_lengths:
         return {}
     part = max(parts.values(), key=lambda part: len(part.layers))
-    curved = curved_layers(part.layers)
-    if not request.bound or basis.tests is None or not equal or curved or presses(basis.cases):
+    if not request.bound or basis.tests is None or not equal or presses(basis.cases):
         return {}
     several, strand = len(basis.cases) > 1, basis.tests.strand
     laid = [float(run.toolpaths.lengths.sum()) for run in equal]

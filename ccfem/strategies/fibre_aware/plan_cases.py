@@ -8,7 +8,6 @@ stress is planned as it is.
 
 from collections.abc import Sequence
 
-from ccfem.base.errors import InputError
 from ccfem.fem.elasticity import StressField
 from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.judging.virtual_testing import Strand, specimens
@@ -20,7 +19,7 @@ from ccfem.paths.planning.plan import check_layers, plan_layers
 from ccfem.paths.planning.strategy import CasesStrategy, LengthStrategy
 from ccfem.paths.planning.unfolding import may_fold
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer, curved_layers
+from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.heights import layers_by_case
 from ccfem.strategies.fibre_aware.judges import Goal
 from ccfem.strategies.fibre_aware.prune import prune
@@ -50,7 +49,7 @@ def plan_cases(
     Parameters
     ----------
     layers : sequence of Layer
-        All layers of the part; flat ones for several load cases.
+        All layers of the part.
     stress : StressField or WeightedCases
     wanted : float, mm, optional
         Fibre per layer, mean over the stack; default what the strategy lays by itself, of which
@@ -63,7 +62,7 @@ def plan_cases(
     Raises
     ------
     InputError
-        Whatever the strategy raises; for curved layers.
+        Whatever the strategy raises.
     """
     check_layers(strategy, layers, machine)
     if wanted is None and isinstance(strategy, LengthStrategy):
@@ -77,12 +76,6 @@ def plan_cases(
         return Planned(strategy, paths, length_per_layer(paths, layers))
     if isinstance(strategy, CasesStrategy) and wanted is not None:
         return _by_itself(strategy, layers, cases, machine, (wanted,))[0]
-    curved = [layer.index for layer in curved_layers(layers)]
-    if curved:
-        raise InputError(
-            f"several load cases are planned for on flat layers only; layer {curved[0]} is curved: "
-            "choose a planar slicing, or one load case"
-        )
     if wanted is None:
         return _planned(strategy, plan_by_layers(strategy, layers, cases, machine), layers, machine)
     too_much = plan_by_layers(strategy, layers, cases, machine, _TOO_MUCH * wanted)

@@ -147,11 +147,17 @@ def test_strategies_that_ignore_the_stress_stay_as_they_are(planned, two_bends):
     np.testing.assert_array_equal(planned["zigzag"].toolpaths.points, alone.toolpaths.points)
 
 
-def test_curved_layers_are_refused(two_bends):
+def test_flat_layers_as_surfaces_are_planned_for_all_cases(two_bends):
     cases, layers = two_bends
-    curved = [*layers[:2], replace(layers[2], flat=None)]
-    with pytest.raises(InputError, match="on flat layers only; layer 2 is curved"):
-        plan_cases(Isocurve(), curved, cases, MACHINE, 500.0)
+    surfaces = [replace(layer, flat=None) for layer in layers]
+    strategy, goal = Pruned(of="concentric"), specimens(cases)
+    laid = [plan_cases(strategy, some, cases, MACHINE, 300.0) for some in (layers, surfaces)]
+    ratios = [virtual_tests(one.toolpaths, goal).ratios for one in laid]
+    assert laid[1].length_per_layer == pytest.approx(300.0, rel=0.01)
+    # Of rings in the chart and in the plane, which begin at other places, the same goes.
+    np.testing.assert_allclose(ratios[1], ratios[0], rtol=0.02)
+    with pytest.raises(InputError, match="on flat layers only; got a curved one: set moves to 0"):
+        plan_cases(replace(strategy, moves=1), surfaces, cases, MACHINE, 300.0)
 
 
 def test_no_tension_in_any_case_is_refused(two_pulls):
