@@ -1,7 +1,8 @@
 """Array types, and read-only arrays and mappings for frozen dataclasses."""
 
 import dataclasses
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
@@ -37,6 +38,122 @@ def seen_only(values: NDArray[Any]) -> NDArray[Any]:
     view = np.ascontiguousarray(values).view()
     view.flags.writeable = False
     return view
+
+
+def sealed(values: NDArray[Any]) -> NDArray[Any]:
+    """Make an array that nobody else holds read-only in place, so that `read_only` keeps it."""
+    values.flags.writeable = False
+    return values
+
+
+def is_shared(rows: NDArray[Any]) -> bool:
+    """Whether all rows of an array are one row in memory."""
+    return rows.ndim > 0 and len(rows) > 1 and rows.strides[0] == 0
+
+
+def shared_rows(values: ArrayLike, dtype: DTypeLike = float) -> NDArray[Any]:
+    """Return `values` as a read-only array whose rows are one row in memory where all are equal."""
+    array = np.asarray(values)
+    if len(array) < 2 or array.dtype != dtype:
+        array = read_only(array, dtype)
+    if len(array) < 2 or is_shared(array):
+        return array
+    return (
+        np.broadcast_to(array[0].copy(), array.shape) if _alike(array) else read_only(array, dtype)
+    )
+
+
+def _alike(rows: NDArray[Any]) -> bool:
+    """Whether all rows are equal to the last bit, with the signs of zeros."""
+    same = bool((rows[-1] == rows[0]).all() and (rows == rows[0]).all())
+    signs = rows.dtype.kind == "f" and not rows[0].all()
+    return same and not (signs and (np.signbit(rows) != np.signbit(rows[0])).any())
+
+
+_SMALL, _ALONE = 1_000_000, 2**25 + 4096
+"""Bytes from which a buffer gets so many, of which it uses what it needs: pages of its own, which
+grow where they are and leave no holes."""
+
+
+class RowBuffer:
+    """Rows that come block by block, in one array that grows where it is.
+
+    Blocks that are joined at the end are there twice. Rows that are all equal share one in memory,
+    if that is wanted.
+    """
+
+    def __init__(self, dtype: DTypeLike, *shape: int, share: bool = True) -> None:
+        self._rows, self._share = np.empty((0, *shape), dtype), share
+        self._one: NDArray[Any] | None = None
+        self._count = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    def append(self, block: NDArray[Any]) -> None:
+        """Add rows at the end."""
+        if not len(block):
+            return
+        begin, self._count = self._count, self._count + len(block)
+        if not begin and self._share:
+            self._one = np.array(block[0], dtype=self._rows.dtype)
+        if self._one is not None:
+            ends = np.stack([self._one, block[0].astype(self._one.dtype)])
+            if _alike(ends) and (is_shared(block) or _alike(block)):
+                return
+            first, self._one = self._one, None
+            self._reserve(self._count)
+            self._rows[:begin] = first
+        self._reserve(self._count)
+        self._rows[begin : self._count] = block
+
+    def insert(self, places: Sequence[int], rows: NDArray[Any]) -> None:
+        """Insert rows before those at some places, which do not fall."""
+        count = self._count
+        if not len(places):
+            return
+        if self._one is not None and _alike(np.stack([self._one, *rows.astype(self._one.dtype)])):
+            self._count += len(places)
+            return
+        if self._one is not None:
+            self._rows = np.empty((count, *self._rows.shape[1:]), self._rows.dtype)
+            self._rows[:] = self._one
+            self._one = None
+        self._count = count + len(places)
+        self._reserve(self._count)
+        for number in range(len(places))[::-1]:
+            at = places[number]
+            self._rows[at + number + 1 : count + number + 1] = self._rows[at:count]
+            self._rows[at + number] = rows[number]
+            count = at
+
+    def seen(self) -> NDArray[Any]:
+        """All rows so far, read-only: to be forgotten before the buffer changes."""
+        if self._one is not None:
+            return np.broadcast_to(self._one, (self._count, *self._one.shape))
+        return sealed(self._rows[: self._count])
+
+    def _reserve(self, count: int) -> None:
+        if count <= len(self._rows):
+            return
+        shape = self._rows.shape[1:]
+        size = self._rows.itemsize * max(math.prod(shape), 1)
+        more = count + count // 16
+        if count * size > _SMALL and self._rows.nbytes < _ALONE:
+            rows = np.empty((max(more, _ALONE // size + 1), *shape), self._rows.dtype)
+            rows[: len(self._rows)] = self._rows
+            self._rows = rows
+        else:
+            self._rows.resize((more, *shape), refcheck=False)
+
+    def rows(self) -> NDArray[Any]:
+        """All rows, read-only; afterwards the buffer is empty."""
+        count, self._count = self._count, 0
+        if self._one is not None:
+            return np.broadcast_to(self._one, (count, *self._one.shape))
+        rows, self._rows = self._rows, np.empty((0, *self._rows.shape[1:]), self._rows.dtype)
+        rows.resize((count, *rows.shape[1:]), refcheck=False)
+        return sealed(rows)
 
 
 def repeated(counts: IntArray) -> tuple[IntArray, IntArray]:

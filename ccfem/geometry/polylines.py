@@ -52,6 +52,21 @@ def _steps(points: FloatArray, offsets: IntArray) -> FloatArray:
     return steps
 
 
+_TOGETHER = 200_000
+"""Points whose differences are taken at a time: those of a large print fill memory."""
+
+
+def step_lengths(points: FloatArray, out: FloatArray | None = None) -> FloatArray:
+    """Distance from each point (P, d) to the next one, (P - 1,), in an array that may be given."""
+    count = max(len(points) - 1, 0)
+    steps = np.empty(count) if out is None else out
+    for first in range(0, count, _TOGETHER):
+        some = slice(first, min(first + _TOGETHER, count))
+        step = points[some.start + 1 : some.stop + 1] - points[some]
+        steps[some] = np.linalg.norm(step, axis=1)
+    return steps
+
+
 def arc_lengths(points: FloatArray, offsets: IntArray) -> FloatArray:
     """Arc length from the start of its polyline to each point, (P,)."""
     along = np.cumsum(_steps(points, offsets))

@@ -2,15 +2,27 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, RowBuffer, freeze, shared_rows
 from ccfem.base.display import Shown
+from ccfem.geometry.polylines import step_lengths
 from ccfem.slicing.layers.layer import Layer
 
 KINDS = ("fibre", "matrix", "support", "travel")
 FIBRE, MATRIX, SUPPORT, TRAVEL = range(4)
+
+_COLUMNS: dict[str, tuple[Any, ...]] = {
+    "points": (float, 3),
+    "normals": (float, 3),
+    "layer": (np.int64,),
+    "kind": (np.int64,),
+    "closed": (bool,),
+    "link": (bool,),
+}
+"""Arrays of paths that are joined as they are: their kind and the shape of a row."""
 
 
 @dataclass(frozen=True)
@@ -57,9 +69,11 @@ class Toolpaths(Shown):
 
     def __post_init__(self) -> None:
         if self.link is None:
-            object.__setattr__(self, "link", np.zeros(len(self.points), dtype=np.bool_))
-        freeze(self, points=float, normals=float, offsets=int)
-        freeze(self, layer=int, kind=int, closed=bool, link=bool)
+            object.__setattr__(self, "link", np.broadcast_to(np.False_, len(self.points)))
+        freeze(self, points=float, offsets=int, layer=int, kind=int, closed=bool)
+        # Flat layers have one normal, and most paths no link.
+        object.__setattr__(self, "normals", shared_rows(self.normals))
+        object.__setattr__(self, "link", shared_rows(self.link, bool))
         count = len(self.layer)
         if self.points.shape != self.normals.shape or self.points.ndim != 2:
             raise ValueError(
@@ -149,16 +163,17 @@ class Toolpaths(Shown):
 
     @classmethod
     def concatenate(cls, parts: Iterable["Toolpaths"]) -> "Toolpaths":
-        """All paths of `parts`, in their order."""
-        filled = [part for part in parts if len(part)]
-        if not filled:
+        """All paths of `parts`, in their order; none is kept while the next one is made."""
+        columns = {name: RowBuffer(kind, *shape) for name, (kind, *shape) in _COLUMNS.items()}
+        sizes = [np.zeros(1, dtype=np.int64)]
+        for part in parts:
+            sizes.append(np.diff(part.offsets))
+            for name, column in columns.items():
+                column.append(getattr(part, name))
+        if not len(columns["layer"]):
             return cls.empty()
-        sizes = np.concatenate([np.diff(part.offsets) for part in filled])
-        joined = {
-            name: np.concatenate([getattr(part, name) for part in filled])
-            for name in ("points", "normals", "layer", "kind", "closed", "link")
-        }
-        return cls(offsets=np.concatenate([[0], np.cumsum(sizes)]), **joined)
+        joined = {name: column.rows() for name, column in columns.items()}
+        return cls(offsets=np.cumsum(np.concatenate(sizes)), **joined)
 
     def __len__(self) -> int:
         return len(self.layer)
@@ -218,6 +233,6 @@ class Toolpaths(Shown):
         if not len(self):
             return np.zeros(0)
         steps = np.zeros(len(self.points))
-        steps[1:] = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
+        step_lengths(self.points, steps[1:])
         steps[self.offsets[:-1]] = 0.0
         return np.add.reduceat(steps, self.offsets[:-1])

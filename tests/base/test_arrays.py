@@ -7,7 +7,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ccfem.base.arrays import FloatArray, IntArray, freeze, read_only, repeated
+from ccfem.base import arrays
+from ccfem.base.arrays import (
+    FloatArray,
+    IntArray,
+    RowBuffer,
+    freeze,
+    is_shared,
+    read_only,
+    repeated,
+    shared_rows,
+)
 
 
 @dataclass(frozen=True)
@@ -59,3 +69,46 @@ def test_repeated_counts_up_for_each_owner():
     wanted = [(k, i) for k, count in enumerate(counts) for i in range(count)]
     assert list(zip(owner.tolist(), number.tolist(), strict=True)) == wanted
     assert repeated(np.zeros(3, dtype=np.int64))[0].shape == (0,)
+
+
+def test_equal_rows_share_one_in_memory_unless_a_zero_has_another_sign():
+    up = shared_rows(np.tile([0.0, 0.0, 1.0], (5, 1)))
+    assert is_shared(up)
+    assert up.tolist() == 5 * [[0.0, 0.0, 1.0]]
+    assert not up.flags.writeable
+    for other in ([0.0, 0.0, 0.9], [-0.0, 0.0, 1.0], [np.nan, 0.0, 1.0]):
+        assert not is_shared(shared_rows(np.array([*up, other])))
+    assert shared_rows(np.zeros((0, 3))).shape == (0, 3)
+
+
+@pytest.mark.parametrize("last", [1.0, 2.0])
+def test_rows_that_come_block_by_block_are_as_joined_and_inserted_at_once(last):
+    blocks = [np.ones((3, 2)), np.zeros((0, 2)), np.ones((4, 2)), np.full((2, 2), last)]
+    buffer = RowBuffer(float, 2)
+    for block in blocks:
+        buffer.append(block)
+    joined = np.concatenate(blocks)
+    np.testing.assert_array_equal(buffer.seen(), joined)
+    places, rows = [0, 4, 4, 9], np.array([[5.0, 6.0], [1.0, 1.0], [7.0, 8.0], [2.0, 2.0]])
+    buffer.insert(places, rows)
+    assert len(buffer) == 13
+    np.testing.assert_array_equal(buffer.rows(), np.insert(joined, places, rows, axis=0))
+    assert len(buffer) == 0
+
+
+def test_a_buffer_of_megabytes_holds_what_came(monkeypatch):
+    monkeypatch.setattr(arrays, "_SMALL", 100)
+    monkeypatch.setattr(arrays, "_ALONE", 1000)
+    buffer, block = RowBuffer(np.int32), np.arange(40)
+    for _ in range(12):
+        buffer.append(block)
+    np.testing.assert_array_equal(buffer.rows(), np.tile(block, 12))
+
+
+def test_rows_inserted_like_all_others_stay_shared():
+    buffer = RowBuffer(np.int8)
+    buffer.append(np.full(5, 3))
+    buffer.insert([2], np.array([3]))
+    rows = buffer.rows()
+    assert is_shared(rows)
+    assert rows.tolist() == 6 * [3]
