@@ -3,6 +3,7 @@
 Results are the same, to the last bit, for any number of them.
 """
 
+import ctypes
 import gc
 import io
 import multiprocessing
@@ -22,6 +23,7 @@ from typing import IO, Any, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from ccfem.base.arrays import is_shared
 from ccfem.base.errors import InputError
 
 _MOST = 4
@@ -139,6 +141,14 @@ def in_processes(
                 process.join()
 
 
+def give_back() -> None:
+    """Give memory that is free back to the system, where its C library can: arrays leave holes."""
+    if sys.platform == "linux":
+        trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+        if trim is not None:
+            trim(0)
+
+
 _Known = dict[int, Any]
 """Objects by their identity, which is the same in a copy of this process."""
 
@@ -159,6 +169,10 @@ def _read_only_mapping(content: dict[Any, Any]) -> MappingProxyType[Any, Any]:
     return MappingProxyType(content)
 
 
+def _shared_rows(row: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+    return np.broadcast_to(row, shape)
+
+
 def _read_only_array(content: bytes, dtype: Any, shape: tuple[int, ...]) -> NDArray[Any]:
     return np.frombuffer(content, dtype).reshape(shape)
 
@@ -175,6 +189,8 @@ class _Pickler(pickle.Pickler):
         """Keep what is read-only so; arrays would come back without that."""
         if isinstance(thing, MappingProxyType):
             return _read_only_mapping, (dict(thing),)
+        if type(thing) is np.ndarray and is_shared(thing):
+            return _shared_rows, (thing[0].copy(), thing.shape)
         if type(thing) is np.ndarray and not (thing.flags.writeable or thing.dtype.hasobject):
             return _read_only_array, (thing.tobytes(), thing.dtype, thing.shape)
         return NotImplemented

@@ -9,7 +9,7 @@ from itertools import count
 from typing import Any
 
 from ccfem.base.errors import InputError, SolveError
-from ccfem.base.parallel import in_processes
+from ccfem.base.parallel import give_back, in_processes
 from ccfem.base.progress import Progress
 from ccfem.comparison.runs import Run, Tested
 from ccfem.comparison.tested_cases import in_all_cases
@@ -169,6 +169,7 @@ def side_by_side(
     for run in runs:
         tell(what.format(run.name))
         done.append(next(results))
+    give_back()
     return done
 
 
@@ -198,7 +199,9 @@ def planned(
         return with_plan(run, outcome, part)
 
     bare = replace(run, toolpaths=Toolpaths.empty(), length_per_layer=0.0)
-    return _stage(bare, "plan", work)
+    done = _stage(bare, "plan", work)
+    give_back()
+    return done
 
 
 def with_plan(run: Run, plan: Planned, part: Part) -> Run:

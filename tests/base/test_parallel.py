@@ -6,7 +6,7 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 
-from ccfem.base.arrays import read_only
+from ccfem.base.arrays import is_shared, read_only, shared_rows
 from ccfem.base.errors import InputError
 from ccfem.base.parallel import in_processes, in_threads, processors
 
@@ -51,6 +51,13 @@ def test_processes_give_results_in_order_and_change_nothing_here(two):
     assert os.getpid() not in pids
     assert seen == []
     assert list(in_processes(work, [], [])) == []
+
+
+def test_rows_that_are_one_in_memory_come_back_as_one(two):
+    for up in in_processes(lambda count: shared_rows(np.tile([0.0, 1.0], (count, 1))), [4, 5]):
+        assert is_shared(up)
+        assert up.tolist() == len(up) * [[0.0, 1.0]]
+        assert not up.flags.writeable
 
 
 @dataclass(frozen=True)
