@@ -11,6 +11,7 @@ from ccfem.geometry.polylines import is_closed, merge_repeated, pack
 from ccfem.geometry.shapes import Region, strings
 from ccfem.machine.machine import Machine
 from ccfem.paths.linking.print_order import nearest_end_order
+from ccfem.paths.splitting.printed_strands import border_crossings
 from ccfem.paths.toolpaths import FIBRE, MATRIX, SUPPORT, Toolpaths
 from ccfem.printing.matrix_flow import pad_flow, with_flow
 from ccfem.printing.matrix_lines import MatrixFill
@@ -36,6 +37,23 @@ class Below:
     sections: list[float] = field(default_factory=list)
     height: float = 0.0
 
+    def under(
+        self,
+        lines: Sequence[FloatArray],
+        by_matrix: Sequence[FloatArray],
+        thickness: float,
+        machine: Machine,
+    ) -> "Below":
+        """Fibre layers with a further one on top: its strands, and matrix in place of short ones.
+
+        Lines are (n, 2) arrays, mm.
+        """
+        sections = [machine.matrix_width * thickness] * len(by_matrix)
+        sections += [machine.strand_area] * len(lines)
+        return Below(
+            [*self.strands, *by_matrix, *lines], self.sections + sections, self.height + thickness
+        )
+
 
 @dataclass(frozen=True)
 class LaidLayer:
@@ -53,6 +71,8 @@ class LaidLayer:
         Lines of sparse infill.
     outside : float, mm
         Length of fibre outside the part.
+    trims : (t, 3) array, mm
+        As of `ccfem.printing.print_plan.PrintPlan`.
     """
 
     paths: Toolpaths
@@ -62,6 +82,7 @@ class LaidLayer:
     sparse: BoolArray
     warning: str = ""
     outside: float = 0.0
+    trims: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
 
 
 def matrix_layer(
@@ -103,13 +124,12 @@ def fibre_layer(
     lines: Sequence[FloatArray],
     by_matrix: Sequence[FloatArray],
     border: Region,
-    below: Below,
     number: int,
     height: float,
     thickness: float,
     machine: Machine,
-) -> tuple[LaidLayer, Below]:
-    """Lay strands (n, 2), and matrix in place of those too short; also return the new `Below`.
+) -> LaidLayer:
+    """Lay strands (n, 2), and matrix in place of those too short.
 
     Parameters are those of `matrix_layer`, and the border of the part on the layer.
     """
@@ -118,13 +138,10 @@ def fibre_layer(
     fibre = Toolpaths.concatenate([few, _printed(lines, height, number, FIBRE)[0]])
     heights = np.full(len(fibre.points), thickness)
     short = fibre.kind == MATRIX
-    sections = [machine.matrix_width * thickness] * len(by_matrix)
-    sections += [machine.strand_area] * len(lines)
-    after = Below(
-        [*below.strands, *by_matrix, *lines], below.sections + sections, below.height + thickness
-    )
+    places = border_crossings([*lines, *by_matrix], border)
+    trims = np.column_stack([np.full(len(places), number), places])
     none = np.zeros(len(fibre), dtype=bool)
-    return LaidLayer(fibre, heights, np.ones(len(fibre)), short, none, "", outside), after
+    return LaidLayer(fibre, heights, np.ones(len(fibre)), short, none, "", outside, trims)
 
 
 def _printed(

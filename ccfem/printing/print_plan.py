@@ -1,24 +1,32 @@
 """A whole part as it is printed: layers of matrix below, between and above the layers of fibre."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import shapely
 
-from ccfem.base.arrays import BoolArray, FloatArray, freeze, in_brief
+from ccfem.base.arrays import (
+    BoolArray,
+    FloatArray,
+    RowBuffer,
+    freeze,
+    in_brief,
+    shared_rows,
+)
 from ccfem.base.errors import InputError
+from ccfem.base.parallel import in_processes
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.offsets import offset_rings
-from ccfem.geometry.polylines import line_length, starts_segment
+from ccfem.geometry.polylines import line_length, starts_segment, step_lengths
 from ccfem.geometry.shapes import Region, open_lines, strings
 from ccfem.machine.machine import Machine
 from ccfem.paths.plastic.plastic import SOLID, Plastic
 from ccfem.paths.splitting.printed_strands import (
     SHORT,
     PrintedStrands,
-    border_crossings,
     height_over,
     printed_strands,
     sections_of,
@@ -104,15 +112,15 @@ class PrintPlan:
                 object.__setattr__(self, name, np.zeros(len(self.paths), dtype=bool))
         if self.trims is None:
             object.__setattr__(self, "trims", np.zeros((0, 3)))
-        freeze(self, trims=float, top=float, thickness=float, laid=float, room=float)
-        freeze(self, short=bool, sparse=bool)
+        freeze(self, trims=float, top=float, thickness=float, laid=float)
+        for name, kind in (("room", float), ("short", bool), ("sparse", bool)):
+            object.__setattr__(self, name, shared_rows(getattr(self, name), kind))
 
     def volume(self, machine: Machine) -> float:
         """Volume of matrix and of fibre inside the part, mm^3."""
-        points, start = self.paths.points, np.flatnonzero(starts_segment(self.paths.offsets))
-        steps = np.linalg.norm(points[start + 1] - points[start], axis=1)
-        matrix = np.repeat(self.paths.kind == MATRIX, np.diff(self.paths.offsets))[start]
-        volume = float((steps * self.laid[start])[matrix].sum())
+        begins = starts_segment(self.paths.offsets)[:-1]
+        matrix = np.repeat(self.paths.kind == MATRIX, np.diff(self.paths.offsets))[:-1] & begins
+        volume = float((step_lengths(self.paths.points)[matrix] * self.laid[:-1][matrix]).sum())
         fibre = float(self.paths.of_kind(FIBRE).lengths.sum())
         return machine.matrix_width * volume + machine.strand_area * (fibre - self.outside)
 
@@ -192,45 +200,20 @@ def plan_print(
         )
 
     borders = {index: seen(section) for index, section in sections_of(used, mesh).items()}
-    fibre = _on_bed(strands.fibre, used, frame, origin)
-    short = _on_bed(strands.short, used, frame, origin)
-    over = {
-        index: height_over(fibre[index] + short[index], borders[index], machine)
-        for index in borders
-    }
+    placed = _Strands(strands, frame[:2], origin, borders)
+    above = in_processes(
+        lambda index: height_over(placed.lines(index), borders[index], machine), list(borders)
+    )
+    over = dict(zip(borders, above, strict=True))
     slabs = slabs_of(used, float(lowest[2]), float(highest[2]), machine, over)
     turned = spun(machine, spin)
     fills = matrix_fills(slabs, layers, mesh, frame, origin, turned, plastic)
-    placed = _Strands(fibre, short, borders)
     hanging = overhang(mesh, frame[2], machine) if support else None
     in_air = _NONE
     if hanging is not None:
         in_air = seen(hanging.region)
-    done = _layers(slabs, fills, placed, in_air, float(lowest[2]), machine)
-    trims = [
-        np.column_stack([np.full(len(places), number), places])
-        for number, slab in enumerate(slabs)
-        if slab.fibre is not None
-        for places in [border_crossings(fibre[slab.fibre] + short[slab.fibre], borders[slab.fibre])]
-    ]
-    plan = PrintPlan(
-        Toolpaths.concatenate(layer.paths for layer in done),
-        np.array([slab.upper - lowest[2] for slab in slabs]).round(COORDINATE_DIGITS),
-        np.array([slab.upper - slab.lower for slab in slabs]),
-        np.concatenate([layer.laid for layer in done]),
-        np.concatenate([layer.room for layer in done]),
-        np.concatenate([layer.short for layer in done]),
-        strands.dropped,
-        np.concatenate([np.zeros((0, 3)), *trims]),
-        sum(layer.outside for layer in done),
-        (
-            *strands.warnings,
-            *(layer.warning for layer in done if layer.warning),
-            *check_cover(slabs, machine),
-        ),
-        strands.ended,
-        sparse=np.concatenate([layer.sparse for layer in done]),
-    )
+    layers_laid = _layers(slabs, fills, placed, in_air, float(lowest[2]), machine)
+    plan = _joined(layers_laid, slabs, float(lowest[2]), strands, machine)
     check_bed(plan, machine)
     return plan
 
@@ -243,27 +226,41 @@ def spun(machine: Machine, spin: float) -> Machine:
     return replace(machine, gcode=replace(machine.gcode, matrix_angle=angle))
 
 
-def _on_bed(
-    paths: Toolpaths, layers: Sequence[Layer], frame: FloatArray, origin: FloatArray
-) -> dict[int, list[FloatArray]]:
-    """Paths on the bed (n, 2), by the index of their layer."""
-    return {
-        layer.index: [path @ frame[:2].T - origin for path in paths.on_layer(layer.index)]
-        for layer in layers
-    }
-
-
 @dataclass(frozen=True)
 class _Strands:
-    """Strands on the bed, lines of matrix in place of short ones, and borders, by layer."""
+    """Strands as they are printed, the axes of the bed (2, 3), its origin, and borders by layer."""
 
-    fibre: Mapping[int, list[FloatArray]]
-    short: Mapping[int, list[FloatArray]]
+    printed: PrintedStrands
+    axes: FloatArray
+    origin: FloatArray
     borders: Mapping[int, Region]
 
-    def on(self, slab: Slab) -> list[FloatArray]:
+    def fibre(self, index: int) -> list[FloatArray]:
+        """Strands (n, 2) of a layer on the bed."""
+        return self._on_bed(self.printed.fibre, index)
+
+    def short(self, index: int) -> list[FloatArray]:
+        """Lines of matrix (n, 2) in place of short strands of a layer, on the bed."""
+        return self._on_bed(self.printed.short, index)
+
+    def lines(self, index: int | None) -> list[FloatArray]:
         """All lines on a layer of fibre; nothing on one of matrix."""
-        return [] if slab.fibre is None else self.fibre[slab.fibre] + self.short[slab.fibre]
+        return [] if index is None else self.fibre(index) + self.short(index)
+
+    def _on_bed(self, paths: Toolpaths, index: int) -> list[FloatArray]:
+        return [path @ self.axes.T - self.origin for path in paths.on_layer(index)]
+
+    def below(self, slabs: Sequence[Slab], number: int, machine: Machine) -> Below:
+        """Fibre layers between a layer of matrix and the one below it."""
+        first = number
+        while first and slabs[first - 1].fibre is not None:
+            first -= 1
+        below = Below()
+        for slab in slabs[first:number]:
+            assert slab.fibre is not None
+            about = (self.fibre(slab.fibre), self.short(slab.fibre))
+            below = below.under(*about, slab.upper - slab.lower, machine)
+        return below
 
 
 def _layers(
@@ -273,23 +270,65 @@ def _layers(
     in_air: Region,
     bottom: float,
     machine: Machine,
-) -> list[LaidLayer]:
-    """All layers, from the bed to the top."""
+) -> Iterator[LaidLayer]:
+    """All layers, from the bed to the top, several at a time."""
     sections = [fill and fill.section for fill in fills]
-    pads = pad_regions(sections, [strands.on(slab) for slab in slabs], machine, in_air)
-    layers, below = [], Below()
-    for number, (slab, fill) in enumerate(zip(slabs, fills, strict=True)):
+    lines = [strands.lines(slab.fibre) for slab in slabs]
+    pads = pad_regions(sections, lines, machine, in_air)
+    del lines  # as large as all strands
+
+    def laid(number: int) -> LaidLayer:
+        slab, fill = slabs[number], fills[number]
         size = (number, slab.upper - bottom, slab.upper - slab.lower, machine)
-        if slab.fibre is None:
-            assert fill is not None
-            layers.append(matrix_layer(fill, pad_lines(*pads[number], machine), below, *size))
-            below = Below()
-        else:
+        if slab.fibre is not None:
             k = slab.fibre
-            fibre, short, border = strands.fibre[k], strands.short[k], strands.borders[k]
-            layer, below = fibre_layer(fibre, short, border, below, *size)
-            layers.append(layer)
-    return layers
+            return fibre_layer(strands.fibre(k), strands.short(k), strands.borders[k], *size)
+        assert fill is not None
+        below = strands.below(slabs, number, machine)
+        return matrix_layer(fill, pad_lines(*pads[number], machine), below, *size)
+
+    return in_processes(laid, range(len(slabs)))
+
+
+def _joined(
+    layers: Iterable[LaidLayer],
+    slabs: Sequence[Slab],
+    bottom: float,
+    strands: PrintedStrands,
+    machine: Machine,
+) -> PrintPlan:
+    """Plan of layers that are made one after the other: none is kept beside the plan."""
+    columns = {
+        "laid": RowBuffer(float),
+        "room": RowBuffer(float),
+        "short": RowBuffer(bool),
+        "sparse": RowBuffer(bool),
+        "trims": RowBuffer(float, 3),
+    }
+    warnings = list(strands.warnings)
+    outside = 0.0
+
+    def paths() -> Iterator[Toolpaths]:
+        nonlocal outside
+        for layer in layers:
+            for name, column in columns.items():
+                column.append(getattr(layer, name))
+            warnings.extend(filter(None, [layer.warning]))
+            outside += layer.outside
+            yield layer.paths
+
+    joined = Toolpaths.concatenate(paths())
+    of_layers: dict[str, Any] = {name: column.rows() for name, column in columns.items()}
+    return PrintPlan(
+        joined,
+        np.array([slab.upper - bottom for slab in slabs]).round(COORDINATE_DIGITS),
+        np.array([slab.upper - slab.lower for slab in slabs]),
+        dropped=strands.dropped,
+        outside=outside,
+        warnings=(*warnings, *check_cover(slabs, machine)),
+        ended=strands.ended,
+        **of_layers,
+    )
 
 
 def check_bed(plan: PrintPlan, machine: Machine) -> None:
