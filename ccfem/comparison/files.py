@@ -236,29 +236,29 @@ def _write_matrix(comparison: Comparison, folder: Path) -> None:
     write_robot_waypoints(folder / "matrix_waypoints.csv", matrix, layers, machine, MATRIX)
 
 
-def _files_of_print(
-    folder: Path, name: str, run: Run, comparison: Comparison, cell: bool
-) -> list[_Write]:
-    """Files of what a printer and a cell of robots do to print a part: one chain of moves."""
+def _write_gcode(folder: Path, name: str, run: Run, comparison: Comparison) -> None:
+    """Write what a printer does to print a part, several layers at a time."""
     from ccfem.printing.export.gcode import gcode_pieces
-    from ccfem.printing.export.robot_cell import write_robot_cell
-    from ccfem.printing.export.trim_table import write_trims
 
     case, plan, moves = comparison.case, run.print_plan, run.moves
     assert plan is not None
     assert moves is not None
     doubts = [run.why_not] if run.why_not else []
+    about = (f"{case.name}, {name}", doubts, run.print_totals)
+    with (folder / f"{name}.gcode").open("w", encoding="utf-8", newline="\n") as file:
+        file.writelines(gcode_pieces(moves, plan, case.machine, *about))
 
-    def write_gcode() -> None:
-        pieces = gcode_pieces(moves, plan, case.machine, f"{case.name}, {name}", doubts)
-        with (folder / f"{name}.gcode").open("w", encoding="utf-8", newline="\n") as file:
-            file.writelines(pieces)
 
-    files: list[_Write] = [write_gcode]
-    if cell:
-        files.append(partial(write_robot_cell, folder / f"{name}_cell.csv", moves))
-    if len(plan.trims):
-        files.append(partial(write_trims, folder / f"{name}_trim.csv", plan))
+def _files_of_print(folder: Path, name: str, run: Run, cell: bool) -> list[_Write]:
+    """Files of the same chain of moves for a cell of robots, and of where strands are trimmed."""
+    from ccfem.printing.export.robot_cell import write_robot_cell
+    from ccfem.printing.export.trim_table import write_trims
+
+    files: list[_Write] = []
+    if cell and run.moves is not None:
+        files.append(partial(write_robot_cell, folder / f"{name}_cell.csv", run.moves))
+    if run.print_plan is not None and len(run.print_plan.trims):
+        files.append(partial(write_trims, folder / f"{name}_trim.csv", run.print_plan))
     return files
 
 
@@ -269,15 +269,20 @@ def _write_paths(comparison: Comparison, folder: Path, cell: bool) -> None:
     from ccfem.printing.export.waypoints import write_waypoints
 
     runs, machine = comparison.succeeded, comparison.case.machine
-    every = Toolpaths.concatenate(run.toolpaths for run in runs)
     number = np.repeat(np.arange(float(len(runs))), [len(run.toolpaths) for run in runs])
+
+    def write_all_paths() -> None:
+        every = Toolpaths.concatenate(run.toolpaths for run in runs)
+        write_paths(every, folder / "paths.vtp", path_data={"strategy": number})
+
     files: list[_Write] = []
     for run in runs:
         if run.print_plan is not None and run.moves is not None:
-            files += _files_of_print(folder, _stem(run.slicing, run), run, comparison, cell)
+            _write_gcode(folder, _stem(run.slicing, run), run, comparison)
+            files += _files_of_print(folder, _stem(run.slicing, run), run, cell)
     if not comparison.over_slicings and runs and curved_layers(comparison.layers):
         files.append(partial(_write_matrix, comparison, folder))
-    files.append(partial(write_paths, every, folder / "paths.vtp", path_data={"strategy": number}))
+    files.append(write_all_paths)
     for run in runs:
         layers, stem = comparison.stacks[run.slicing], _stem(run.slicing, run)
         if comparison.over_slicings or curved_layers(layers):

@@ -4,9 +4,24 @@ from itertools import pairwise
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.machine.machine import Machine
-from ccfem.printing.moves import CUT, FEED, LAY, PAUSE, PREHEAT, STANDBY, TRAVEL, WAIT, WORK, Moves
+from ccfem.printing.moves import (
+    CUT,
+    FEED,
+    LAY,
+    PAUSE,
+    PREHEAT,
+    STANDBY,
+    TRAVEL,
+    WAIT,
+    WORK,
+    Moves,
+    is_any,
+)
+
+_TOGETHER = 100_000
+"""Rows that are timed at a time: a large print has millions."""
 
 
 def durations(moves: Moves, machine: Machine, heating: bool = True) -> FloatArray:
@@ -30,30 +45,50 @@ def durations(moves: Moves, machine: Machine, heating: bool = True) -> FloatArra
     fed = moves.event == FEED
     length = np.maximum(np.abs(moves.feed[fed]), np.abs(moves.beside[fed]))
     seconds[fed] = length / moves.speed[fed]
-    still = np.isin(moves.event, [CUT, WAIT])
+    still = is_any(moves.event, CUT, WAIT)
     seconds[still] = moves.amount[still]
-    moving = np.flatnonzero(np.isin(moves.event, [TRAVEL, LAY]) & (moves.length > 0.0))
-    # The way to the first place starts at an unknown one.
-    moving = moving[1:]
-    halt = np.cumsum(np.isin(moves.event, [FEED, CUT, WAIT, WORK, PAUSE]).astype(np.int64))
-    seconds[moving] = _motion(moves, moving, halt[moving], machine)
+    halts = is_any(moves.event, FEED, CUT, WAIT, WORK, PAUSE)
+    first = True
+    for begin, end in pairwise(_edges(halts)):
+        before = max(begin - 1, 0)
+        place = moves.place[before:end]
+        way = np.diff(place, axis=0, prepend=place[:1])[begin - before :]
+        length = np.linalg.norm(way, axis=1)
+        moves_on = is_any(moves.event[begin:end], TRAVEL, LAY)
+        rows = np.flatnonzero(moves_on & (length > 0.0))
+        # The way to the first place of all starts at an unknown one.
+        if first and len(rows):
+            rows, first = rows[1:], False
+        at = begin + rows
+        stops = np.cumsum(halts[begin:end], dtype=np.int64)[rows]
+        seconds[at] = _motion(way[rows], length[rows], moves.speed[at], stops, machine)
     return seconds + waits(seconds, moves, machine) if heating else seconds
+
+
+def _edges(halts: BoolArray) -> list[int]:
+    """Rows that cut all (n,) into pieces in which moves can be timed alone, between halts."""
+    halting, count = np.flatnonzero(halts), len(halts)
+    after = np.searchsorted(halting, np.arange(_TOGETHER, count, _TOGETHER))
+    cuts = np.unique(halting[after[after < len(halting)]])
+    return [0, *cuts.tolist(), count]
 
 
 def waits(seconds: FloatArray, moves: Moves, machine: Machine) -> FloatArray:
     """Seconds that each row waits for its tool, where all rows take some seconds without."""
     pauses = np.array(seconds)
     _add_heating(pauses, moves, machine)
-    return pauses - seconds
+    pauses -= seconds
+    return pauses
 
 
-def _motion(moves: Moves, moving: IntArray, stops: IntArray, machine: Machine) -> FloatArray:
-    """Seconds of moves (k,), which stop where the number of halts before them changes."""
-    if not len(moving):
+def _motion(
+    way: FloatArray, length: FloatArray, speed: FloatArray, stops: IntArray, machine: Machine
+) -> FloatArray:
+    """Seconds of moves along ways (k, 3), which stop where the number of halts before changes."""
+    if not len(way):
         return np.zeros(0)
     most, process = machine.process.acceleration, machine.process
-    length, speed = moves.length[moving], moves.speed[moving]
-    way = (moves.place - moves.start)[moving] / length[:, None]
+    way = way / length[:, None]
     cosine = -np.einsum("ij,ij->i", way[1:], way[:-1])
     half = np.sqrt(np.clip(0.5 * (1.0 - cosine), 0.0, 1.0 - 1e-12))
     corner = most * process.junction * half / (1.0 - half)
@@ -87,7 +122,7 @@ def _motion(moves: Moves, moving: IntArray, stops: IntArray, machine: Machine) -
 def _add_heating(seconds: FloatArray, moves: Moves, machine: Machine) -> None:
     """Add the waits for tools that are not hot yet to rows WORK, in place."""
     rate = (machine.matrix_heating, machine.fibre_heating)
-    work = np.flatnonzero(np.isin(moves.event, [STANDBY, PREHEAT, WORK]))
+    work = np.flatnonzero(is_any(moves.event, STANDBY, PREHEAT, WORK))
     heat = [machine.matrix_temperature + machine.process.warm_matrix, machine.fibre_standby]
     wanted, since = list(heat), [0.0, 0.0]
     now = 0.0

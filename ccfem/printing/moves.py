@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import DTypeLike
 
-from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, in_brief
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, in_brief, shared_rows
 
 EVENTS = (
     *("travel", "lay", "feed", "cut", "tool", "standby", "preheat", "heat", "work"),
@@ -24,6 +24,14 @@ ROLES = ("travel", "contour", "infill", "fibre", "tail", "block", "skirt", "pad"
 def role(name: str) -> int:
     """Find the index of a role by its name."""
     return ROLES.index(name)
+
+
+def is_any(event: IntArray, *kinds: int) -> BoolArray:
+    """Mask (n,) of rows that are of some kinds, without scratch of eight bytes a row."""
+    mask = np.zeros(len(event), dtype=bool)
+    for kind in kinds:
+        mask |= event == kind
+    return mask
 
 
 @dataclass(frozen=True)
@@ -47,6 +55,15 @@ class Arcs:
 
     def __post_init__(self) -> None:
         freeze(self, first=int, last=int, centre=float, sweep=float)
+
+
+KINDS: dict[str, DTypeLike] = {
+    **dict.fromkeys(("event", "tool", "role"), np.int8),
+    **dict.fromkeys(("layer", "strand"), np.int32),
+    **dict.fromkeys(("place", "normal", "feed", "beside", "speed"), float),
+    **dict.fromkeys(("width", "height", "amount"), float),
+}
+"""Kind of each column of `Moves`."""
 
 
 @dataclass(frozen=True)
@@ -97,14 +114,8 @@ class Moves:
     __repr__ = in_brief
 
     def __post_init__(self) -> None:
-        whole: dict[str, DTypeLike] = dict.fromkeys(("event", "tool", "role"), np.int8)
-        whole |= dict.fromkeys(("layer", "strand"), np.int32)
-        rest = dict.fromkeys(
-            ("place", "feed", "beside", "speed", "width", "height", "amount"), float
-        )
-        freeze(self, **whole, **rest)
-        if not self.normal.strides or self.normal.strides[0]:  # else it is one for all rows
-            freeze(self, normal=float)
+        for name, kind in KINDS.items():
+            object.__setattr__(self, name, shared_rows(getattr(self, name), kind))
 
     def __len__(self) -> int:
         return len(self.event)

@@ -1,12 +1,12 @@
 """From a plan to all actions of the machine: one sequence for every file that is written."""
 
-from dataclasses import fields, replace
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.errors import InputError
+from ccfem.base.parallel import in_processes
 from ccfem.geometry.polylines import along_line, line_length, points_along, turning_angles
 from ccfem.machine.machine import Machine
 from ccfem.machine.speeds import step_curvatures, table_speeds
@@ -33,9 +33,10 @@ from ccfem.printing.moves import (
     WAIT,
     WORK,
     Moves,
+    is_any,
 )
 from ccfem.printing.print_plan import PrintPlan
-from ccfem.printing.recorder import Recorder
+from ccfem.printing.recorder import Recorder, Steps, steps_along
 
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -60,42 +61,57 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
     flat = bool((plan.paths.normals[:, 2] > 1.0 - 1e-9).all())
     recorder = Recorder(machine)
     paths, site = plan.paths, _Site(beside(plan, machine), None if flat else plan.thickness.max())
-    below = 0.0
-    for number in np.unique(paths.layer).tolist():
+    numbers = np.unique(paths.layer).tolist()
+    below = dict(zip(numbers, [0.0, *(float(plan.top[k]) for k in numbers[:-1])], strict=True))
+    for number in [k for k in numbers if k < plan.first]:
+        site.printed(float(plan.top[number]), paths.kind[paths.layer == number] == FIBRE)
+    numbers = [k for k in numbers if k >= plan.first]
+    prepared = in_processes(
+        lambda number: _prepared(plan, number, _speed(below[number], machine), machine), numbers
+    )
+    for number, lines in zip(numbers, prepared, strict=True):
         top, thickness = float(plan.top[number]), float(plan.thickness[number])
-        if number < plan.first:
-            site.printed(top, paths.kind[paths.layer == number] == FIBRE)
-            below = top
-            continue
-        begin_layer(recorder, number, top, below, machine)
+        begin_layer(recorder, number, top, below[number], machine)
         if number in plan.pauses:
             _pause(recorder, number, machine)
-        for k in np.flatnonzero(paths.layer == number).tolist():
-            start, end = int(paths.offsets[k]), int(paths.offsets[k + 1])
-            line, normals = paths.points[start:end], paths.normals[start:end]
-            tool = int(paths.kind[k] == FIBRE)
+        for line in lines:
+            tool = int(isinstance(line, StrandSteps))
             changed = change_tool(recorder, tool, top, machine)
-            if tool == 0 and (changed or site.height < top):
-                site.prime(recorder, top, below == 0.0, changed, machine)
-            if tool:
+            if isinstance(line, StrandSteps):
                 site.first_strand(recorder, top, thickness, machine)
-            if tool:
                 recorder.strand += 1
-                lay_strand(recorder, line, normals, thickness, machine)
-            else:
-                what = "short" if plan.short[k] else "contour" if paths.closed[k] else "infill"
-                what = "pad" if paths.kind[k] == SUPPORT else "sparse" if plan.sparse[k] else what
-                speed = _speed(below, machine)
-                heights, room = plan.laid[start : end - 1], float(plan.room[k])
-                lay_matrix(recorder, line, normals, heights, what, machine, speed, room)
-        below = top
+                lay_strand(recorder, line, machine)
+                continue
+            if changed or site.height < top:
+                site.prime(recorder, top, below[number] == 0.0, changed, machine)
+            lay_line(recorder, line, machine)
     # Away from the part, before the end of the file moves the carriage home.
     recorder.rise(recorder.top + machine.process.tool_lift)
-    moves = preheated(_numbered(recorder.moves()), machine)
+    recorder.insert(PREHEAT, *_preheats(recorder.seen(), machine))
+    moves = recorder.moves()
     if machine.gcode.arcs and not machine.kinematics.letters:
         moves = with_arcs(moves, machine)
     _check_bed(moves, machine)
     return moves
+
+
+def _prepared(
+    plan: PrintPlan, number: int, speed: float, machine: Machine
+) -> "list[Steps | StrandSteps]":
+    """Find the moves along the paths of a layer, in their order; the speed is that of matrix."""
+    paths, lines = plan.paths, list[Steps | StrandSteps]()
+    thickness = float(plan.thickness[number])
+    for k in np.flatnonzero(paths.layer == number).tolist():
+        start, end = int(paths.offsets[k]), int(paths.offsets[k + 1])
+        line, normals = paths.points[start:end], paths.normals[start:end]
+        if paths.kind[k] == FIBRE:
+            lines.append(strand_steps(line, normals, thickness, machine))
+            continue
+        what = "short" if plan.short[k] else "contour" if paths.closed[k] else "infill"
+        what = "pad" if paths.kind[k] == SUPPORT else "sparse" if plan.sparse[k] else what
+        heights, room = plan.laid[start : end - 1], float(plan.room[k])
+        lines.append(matrix_steps(line, normals, heights, what, machine, speed, room))
+    return lines
 
 
 def _pause(recorder: Recorder, number: int, machine: Machine) -> None:
@@ -113,11 +129,6 @@ def _speed(below: float, machine: Machine) -> float:
     """Speed of matrix on a layer that lies on this height."""
     slower = machine.process.first_layer_speed if below == 0.0 else 1.0
     return machine.matrix_speed * slower
-
-
-def _numbered(moves: Moves) -> Moves:
-    """Give numbers to strands only, not to the matrix between them."""
-    return replace(moves, strand=np.where(moves.tool == 1, moves.strand, -1))
 
 
 class _Site:
@@ -165,7 +176,8 @@ class _Site:
             points = np.column_stack([line, np.full(len(line), top)])
             normals = np.tile(_UP, (len(line), 1))
             heights = np.full(len(line) - 1, high)
-            lay_matrix(recorder, points, normals, heights, what, machine, speed)
+            steps = matrix_steps(points, normals, heights, what, machine, speed)
+            lay_line(recorder, steps, machine)
 
         volume = 0.0
         for k, line in enumerate(self.around.block):
@@ -191,22 +203,31 @@ class _Site:
         level = top if self.highest is None else self.bar + machine.strand_height
         points = np.column_stack([self.strand, np.full(2, level)])
         self.strand = None
-        lay_strand(recorder, points, np.tile(_UP, (2, 1)), thickness, machine)
+        steps = strand_steps(points, np.tile(_UP, (2, 1)), thickness, machine)
+        lay_strand(recorder, steps, machine)
 
 
 def _check_bed(moves: Moves, machine: Machine) -> None:
     """Check that both nozzles stay over the bed, and below its height."""
     profile = machine.gcode
-    moving = np.isin(moves.event, [TRAVEL, LAY, FEED])
-    place = moves.place - np.where(moves.tool[:, None] == 1, profile.offset, 0.0)
-    # Z of an offset is set by the firmware or the file; the carriage itself stays in X and Y.
-    place = np.column_stack([place[moving, :2], moves.place[moving, 2]])
+    moving = is_any(moves.event, TRAVEL, LAY, FEED)
+    least, most = np.full(3, np.inf), np.full(3, -np.inf)
+    for fibre in (False, True):
+        rows = moving & ((moves.tool == 1) == fibre)
+        if not rows.any():
+            continue
+        # Z of an offset is set by firmware or file; the carriage itself stays in X and Y.
+        shift = np.append(profile.offset[:2], 0.0) * fibre
+        low, high = (
+            np.array([end(column[rows]) for column in moves.place.T]) for end in (np.min, np.max)
+        )
+        least, most = np.minimum(least, low - shift), np.maximum(most, high - shift)
     bed = np.array(profile.bed)
-    if (place.min(axis=0) < 0.0).any() or (place.max(axis=0) > bed).any():
-        size = np.ptp(place, axis=0)
+    if (least < 0.0).any() or (most > bed).any():
+        size = most - least
         raise InputError(
             f"with skirt, block, lifts and the offset of the nozzles the print needs {size[0]:.4g} "
-            f"x {size[1]:.4g} x {place[:, 2].max():.4g} mm, but the printer has {bed[0]:g} x "
+            f"x {size[1]:.4g} x {most[2]:.4g} mm, but the printer has {bed[0]:g} x "
             f"{bed[1]:g} x {bed[2]:g} mm: turn the part, or set process.prime = 'none' and "
             "process.skirt_loops = 0"
         )
@@ -215,11 +236,12 @@ def _check_bed(moves: Moves, machine: Machine) -> None:
 # Preheating of a waiting tool, so that the print does not wait for it.
 
 
-def preheated(moves: Moves, machine: Machine) -> Moves:
-    """Insert a row PREHEAT before each change back to a tool that was set to standby.
+def _preheats(moves: Moves, machine: Machine) -> tuple[list[int], list[float], list[int]]:
+    """Rows before which a tool is preheated, its temperature, and the tool.
 
-    It is inserted before the last row that starts at least the heating time, (work - standby) over
-    the rate, ahead of the change; or right after the change away if that is later.
+    There is one for each change back to a tool that was set to standby: the last row that starts at
+    least the heating time, (work - standby) over the rate, ahead of the change; or right after the
+    change away if that is later.
     """
     begin = np.concatenate([[0.0], np.cumsum(durations(moves, machine, heating=False))])[:-1]
     rate = (machine.matrix_heating, machine.fibre_heating)
@@ -242,39 +264,12 @@ def preheated(moves: Moves, machine: Machine) -> Moves:
                 places.append(at)
                 values.append(float(moves.amount[k]))
                 tools.append(tool)
-    return _with_rows(moves, places, values, tools)
+    return places, values, tools
 
 
 def _waiting(tool: int, machine: Machine) -> float:
     """Temperature of a tool before its first use; the start of the file waits for that of T0."""
     return machine.fibre_standby if tool else machine.matrix_temperature + 1e3
-
-
-def _with_rows(moves: Moves, places: list[int], values: list[float], tools: list[int]) -> Moves:
-    """Insert rows PREHEAT before the rows at the given places."""
-    if not places:
-        return moves
-    by_row: dict[str, Any] = {}
-    for field in fields(moves):
-        old = getattr(moves, field.name)
-        if old is None:
-            continue
-        new = np.zeros((len(places), *old.shape[1:]), dtype=old.dtype)
-        at = np.array(places)
-        if field.name in ("place", "normal", "layer", "strand"):
-            new = old[np.maximum(at - 1, 0)]
-        elif field.name == "event":
-            new[:] = PREHEAT
-        elif field.name == "amount":
-            new[:] = values
-        elif field.name == "tool":
-            new[:] = tools
-        if field.name == "normal" and old.strides[0] == 0:  # one for all rows
-            by_row["normal"] = np.broadcast_to(old[:1], (len(old) + len(at), 3))
-            continue
-        by_row[field.name] = np.insert(old, at, new, axis=0)
-        by_row[field.name].flags.writeable = False
-    return Moves(**by_row)
 
 
 # What each tool needs before and after it lays something: heat, fan, its first filament, a cut.
@@ -371,8 +366,7 @@ def line_sizes(heights: FloatArray, room: float, machine: Machine) -> tuple[Floa
     return width, section / width
 
 
-def lay_matrix(
-    recorder: Recorder,
+def matrix_steps(
     line: FloatArray,
     normals: FloatArray,
     heights: FloatArray,
@@ -380,92 +374,121 @@ def lay_matrix(
     machine: Machine,
     speed: float,
     room: float = 1.0,
-) -> None:
-    """Lay a line (n, 3) of matrix, so high (n - 1,) on each of its steps, and leave it.
+) -> Steps:
+    """Find the moves along a line (n, 3) of matrix, so high (n - 1,) on each of its steps.
 
     Heights and `room` are those of `line_sizes`.
     """
-    profile = machine.gcode
-    recorder.travel(line[0], normals[0])
-    if recorder.drawn_back:
-        recorder.feed(recorder.drawn_back, profile.retract_speed)
-        recorder.drawn_back = 0.0
     width, heights = line_sizes(heights, room, machine)
     feed = width * heights / matrix_area(machine)
     speeds = np.full(len(heights), speed)
-    recorder.lay(line, normals, speeds, feed, width, heights, what)
+    return steps_along(line, normals, speeds, feed, width, heights, what, machine)
+
+
+def lay_line(recorder: Recorder, steps: Steps, machine: Machine) -> None:
+    """Go to a line of matrix, lay it, and leave it."""
+    profile = machine.gcode
+    recorder.travel(steps.start, steps.normal)
+    if recorder.drawn_back:
+        recorder.feed(recorder.drawn_back, profile.retract_speed)
+        recorder.drawn_back = 0.0
+    recorder.lay(steps)
     if profile.retract:
         recorder.feed(-profile.retract, profile.retract_speed)
         recorder.drawn_back = profile.retract
     recorder.retreat()
 
 
-def lay_strand(
-    recorder: Recorder, line: FloatArray, normals: FloatArray, height: float, machine: Machine
-) -> None:
-    """Feed, lay, cut and lay to its end a strand (n, 3), and leave it."""
-    process, profile = machine.process, machine.gcode
+class StrandSteps(NamedTuple):
+    """Moves along a strand: `laid` before its cut, `dragged` behind it, and `ironed`.
+
+    `total` and `tail`, mm, are its length and what lies between its cut and its end.
+    """
+
+    start: FloatArray
+    normal: FloatArray
+    total: float
+    tail: float
+    laid: Steps | None
+    dragged: Steps | None
+    ironed: Steps | None
+
+
+def strand_steps(
+    line: FloatArray, normals: FloatArray, height: float, machine: Machine
+) -> StrandSteps:
+    """Find the moves along a strand (n, 3)."""
+    process = machine.process
     positions, speeds, cut_at = strand_speeds(line, machine)
     along = along_line(line)
     points = points_along(line, along, positions).round(COORDINATE_DIGITS)
-    across = points_along(normals, along, positions)
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    across = _unit_normals(normals, along, positions)
     cut = int(np.abs(positions - cut_at).argmin())
     room = max(machine.fibre_width * height - machine.filament_area, 0.0)
     round_it = machine.coextrusion * room / matrix_area(machine)
-    total = float(positions[-1])
-    recorder.travel(points[0], across[0])
+
+    def along_part(first: int, last: int, name: str, feed: float) -> Steps | None:
+        count = last - first
+        if not count:
+            return None
+        where, ends = speeds[first:last], slice(first, last + 1)
+        full = np.ones(count)
+        sizes = (machine.fibre_width * full, height * full)
+        about = (feed * full, *sizes, name, machine, round_it * full)
+        return steps_along(points[ends], across[ends], where, *about)
+
+    return StrandSteps(
+        points[0],
+        across[0],
+        float(positions[-1]),
+        line_length(points[cut:]),
+        along_part(0, cut, "fibre", process.feed_ratio),
+        along_part(cut, len(speeds), "tail", 0.0),
+        _ironed(points, across, positions, machine) if process.ironing_length > 0.0 else None,
+    )
+
+
+def _unit_normals(normals: FloatArray, along: FloatArray, positions: FloatArray) -> FloatArray:
+    """Return unit normals at positions on a strand whose points have these normals."""
+    across = points_along(normals, along, positions)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    return across
+
+
+def lay_strand(recorder: Recorder, strand: StrandSteps, machine: Machine) -> None:
+    """Feed, lay, cut and lay to its end a strand, and leave it."""
+    process, profile = machine.process, machine.gcode
+    recorder.travel(strand.start, strand.normal)
     recorder.draw_back_beside(0.0, profile.retract_speed)
-    recorder.note(PATH_START, total)
-    tail = line_length(points[cut:])
+    recorder.note(PATH_START, strand.total)
     if machine.tail > 0.0:
-        recorder.feed(tail + process.restart_extra, profile.feed_speed)
+        recorder.feed(strand.tail + process.restart_extra, profile.feed_speed)
     if process.start_wait:
         recorder.note(WAIT, process.start_wait)
-    steps = np.ones(len(speeds))
-    for part, name, feed in (
-        (slice(0, cut), "fibre", process.feed_ratio),
-        (slice(cut, None), "tail", 0.0),
-    ):
-        if name == "tail":
-            recorder.note(CUT, machine.cut_wait)
-        ends = slice(part.start, len(points) if part.stop is None else part.stop + 1)
-        count = len(speeds[part])
-        if count:
-            recorder.lay(
-                points[ends],
-                across[ends],
-                speeds[part],
-                feed * steps[part],
-                np.full(count, machine.fibre_width),
-                np.full(count, height),
-                name,
-                np.full(count, round_it),
-            )
-    recorder.note(PATH_END, total)
-    if process.ironing_length > 0.0:
-        _iron(recorder, points, across, positions, machine)
+    if strand.laid is not None:
+        recorder.lay(strand.laid)
+    recorder.note(CUT, machine.cut_wait)
+    if strand.dragged is not None:
+        recorder.lay(strand.dragged)
+    recorder.note(PATH_END, strand.total)
+    if strand.ironed is not None:
+        recorder.lay(strand.ironed)
     if machine.coextrusion:
         recorder.draw_back_beside(profile.fibre_retract, profile.retract_speed)
     recorder.retreat(process.strand_lift)
 
 
-def _iron(
-    recorder: Recorder,
-    points: FloatArray,
-    normals: FloatArray,
-    positions: FloatArray,
-    machine: Machine,
-) -> None:
-    """Go back over the end of a strand without feeding."""
+def _ironed(
+    points: FloatArray, normals: FloatArray, positions: FloatArray, machine: Machine
+) -> Steps:
+    """Find the moves back over the end of a strand, without feeding."""
     start = max(float(positions[-1]) - machine.process.ironing_length, 0.0)
     back = np.append(positions[positions > start + 1e-3][::-1], start)
     line = points_along(points, positions, back).round(COORDINATE_DIGITS)
-    across = points_along(normals, positions, back)
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    across = _unit_normals(normals, positions, back)
     speeds = np.full(len(back) - 1, machine.process.finish_speed)
     nothing = 0.0 * speeds
-    recorder.lay(line, across, speeds, nothing, nothing, nothing, "travel")
+    return steps_along(line, across, speeds, nothing, nothing, nothing, "travel", machine)
 
 
 # Speed along a strand: slow at its start, in tight turns and corners, and behind its cut.

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -131,7 +132,7 @@ def print_totals(moves: Moves, machine: Machine) -> PrintTotals:
         fibre_fed,
         mass,
         fibre_fed * machine.fibre_mass_per_length,
-        layer_seconds(moving + waiting, moves),
+        layer_seconds(np.add(moving, waiting, out=waiting), moves),
         spool_uses(moves, machine),
         {what: price * much for what, (price, much) in cost.items() if price is not None},
         prices.currency,
@@ -140,14 +141,21 @@ def print_totals(moves: Moves, machine: Machine) -> PrintTotals:
 
 def layer_seconds(seconds: FloatArray, moves: Moves) -> dict[int, float]:
     """Seconds of each layer, in the order of printing, of those of every row (n,)."""
-    numbers, first, which = np.unique(moves.layer, return_index=True, return_inverse=True)
-    total = np.bincount(which.ravel(), seconds, minlength=len(numbers))
-    return {int(numbers[k]): float(total[k]) for k in np.argsort(first, kind="stable").tolist()}
+    changes = np.flatnonzero(moves.layer[1:] != moves.layer[:-1]) + 1
+    total: dict[int, float] = {}
+    for begin, end in pairwise([0, *changes.tolist(), len(moves)] if len(moves) else []):
+        number = int(moves.layer[begin])
+        # One after the other, as over all rows at once, where a layer goes on after others.
+        of_layer = np.append(total.get(number, 0.0), seconds[begin:end])
+        total[number] = float(np.bincount(np.zeros(len(of_layer), dtype=np.int64), of_layer)[0])
+    return total
 
 
 def spool_uses(moves: Moves, machine: Machine) -> tuple[SpoolUse, ...]:
     """Find what is taken of every kind of spool whose length is known."""
     spools = machine.spools
+    if not (spools.fibre or spools.matrix or spools.coextruded):
+        return ()
     fed = {
         "fibre": (np.where(moves.tool == 1, moves.feed, 0.0), spools.fibre, spools.fibre_left),
         "matrix": (np.where(moves.tool == 0, moves.feed, 0.0), spools.matrix, spools.matrix_left),

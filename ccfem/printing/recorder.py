@@ -1,16 +1,16 @@
 """Notes down what a machine does, knowing where its nozzle stands."""
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
 
-from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.arrays import FloatArray, IntArray, RowBuffer
 from ccfem.geometry.polylines import subdivide
 from ccfem.geometry.shapes import bends
 from ccfem.machine.machine import Machine
 from ccfem.printing.laid_layer import COORDINATE_DIGITS
-from ccfem.printing.moves import FEED, LAY, TRAVEL, Moves, role
+from ccfem.printing.moves import FEED, KINDS, LAY, TRAVEL, Moves, role
 
 _FEED_DIGITS = 5
 """Decimals of what is fed, mm."""
@@ -19,20 +19,77 @@ _STRAIGHT = 1.5 * 10.0**-COORDINATE_DIGITS
 """Distance from a straight line, mm, within which rounded points lie on it."""
 _BLOCKS = 500
 """Blocks of rows that are kept as such: many small ones leave holes in memory."""
-_COLUMNS: dict[str, tuple[int | slice, DTypeLike]] = {
-    "event": (0, np.int8),
-    "place": (slice(1, 4), float),
-    "normal": (slice(4, 7), float),
-    "tool": (7, np.int8),
-    **{name: (8 + k, float) for k, name in enumerate(("feed", "beside", "speed", "width"))},
-    **{name: (12 + k, float) for k, name in enumerate(("height", "amount"))},
-    "role": (14, np.int8),
-    "layer": (15, np.int32),
-    "strand": (16, np.int32),
+_COLUMNS: dict[str, int | slice] = {
+    "event": 0,
+    "place": slice(1, 4),
+    "normal": slice(4, 7),
+    **{name: 7 + k for k, name in enumerate(("tool", "feed", "beside", "speed", "width"))},
+    **{name: 12 + k for k, name in enumerate(("height", "amount", "role", "layer", "strand"))},
 }
-"""Columns of `Moves`: where they stand in a row, and their kind."""
+"""Columns of `Moves`: where they stand in a row."""
+_POSE = ("place", "normal")
 _LEVEL = 0.1
 """Cosine of the tilt below which a head's own axis leads too far aside to leave along it."""
+
+
+class Steps(NamedTuple):
+    """Moves along a line, whatever the machine did before.
+
+    `rows` (n, 17) are those of `Moves` but for tool, layer and strand; `start` and `normal` (3,)
+    where the line begins, and `top`, mm, its highest point.
+    """
+
+    rows: FloatArray
+    start: FloatArray
+    normal: FloatArray
+    top: float
+
+
+def steps_along(
+    line: FloatArray,
+    normals: FloatArray,
+    speeds: FloatArray,
+    feed: FloatArray,
+    widths: FloatArray,
+    heights: FloatArray,
+    what: str,
+    machine: Machine,
+    beside: FloatArray | None = None,
+) -> Steps:
+    """Find the moves along a line (n, 3), feeding so much per mm of each of its steps (n - 1,).
+
+    Steps on one straight line that are laid alike are one move, as far as firmware can feed.
+    """
+    begin, up = line[0], normals[0]
+    alike = [speeds, feed, widths, heights, *([] if beside is None else [beside])]
+    kept = _ends_of_moves(line, normals, np.column_stack(alike))
+    line, normals, index = line[kept], normals[kept], kept[:-1]
+    if len(index) and feed.max() > 0.0:
+        ends, longest = np.array([0, len(line)]), machine.gcode.longest_feed
+        line, _, step = subdivide(line, ends, longest / float(feed.max()))
+        line = line.round(COORDINATE_DIGITS)
+        normals, index = normals[step], index[step[:-1]]
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    # Rounded in sum, so that no feed is lost however short the steps are.
+    fed = np.diff(np.append(0.0, np.cumsum(feed[index] * steps)).round(_FEED_DIGITS))
+    with_it = np.zeros(len(fed)) if beside is None else beside[index] * steps
+    with_it = np.diff(np.append(0.0, np.cumsum(with_it)).round(_FEED_DIGITS))
+    moved = np.flatnonzero(steps > 0.0)
+    at = index[moved]
+    columns = {
+        "place": line[moved + 1],
+        "normal": normals[moved + 1],
+        "feed": fed[moved],
+        "beside": with_it[moved],
+        "speed": speeds[at],
+        "width": widths[at],
+        "height": heights[at],
+    }
+    rows = np.zeros((len(moved), 17))
+    rows[:, _COLUMNS["event"]], rows[:, _COLUMNS["role"]] = LAY, role(what)
+    for name, values in columns.items():
+        rows[:, _COLUMNS[name]] = values
+    return Steps(rows, begin, up, float(line[:, 2].max()))
 
 
 class Recorder:
@@ -42,7 +99,8 @@ class Recorder:
         self.machine = machine
         self.rows: list[tuple[float, ...]] = []
         self.blocks: list[FloatArray] = []
-        self.columns: dict[str, list[NDArray[Any]]] = {}
+        shapes = {name: (3,) if isinstance(at, slice) else () for name, at in _COLUMNS.items()}
+        self.columns = {name: RowBuffer(KINDS[name], *shape) for name, shape in shapes.items()}
         self.place: FloatArray | None = None
         self.normal = np.array([0.0, 0.0, 1.0])
         self.tool = -1
@@ -127,48 +185,17 @@ class Recorder:
         if self.place is not None and self.place[2] < height:
             self._leave(height)
 
-    def lay(
-        self,
-        line: FloatArray,
-        normals: FloatArray,
-        speeds: FloatArray,
-        feed: FloatArray,
-        widths: FloatArray,
-        heights: FloatArray,
-        what: str,
-        beside: FloatArray | None = None,
-    ) -> None:
-        """Move along a line (n, 3) from its start, feeding so much per mm of each step (n - 1,).
-
-        Steps on one straight line that are laid alike are one move, as far as firmware can feed.
-        """
-        alike = [speeds, feed, widths, heights, *([] if beside is None else [beside])]
-        kept = _ends_of_moves(line, normals, np.column_stack(alike))
-        line, normals, index = line[kept], normals[kept], kept[:-1]
-        if len(index) and feed.max() > 0.0:
-            ends, longest = np.array([0, len(line)]), self.machine.gcode.longest_feed
-            line, _, step = subdivide(line, ends, longest / float(feed.max()))
-            line = line.round(COORDINATE_DIGITS)
-            normals, index = normals[step], index[step[:-1]]
-        steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
-        # Rounded in sum, so that no feed is lost however short the steps are.
-        fed = np.diff(np.append(0.0, np.cumsum(feed[index] * steps)).round(_FEED_DIGITS))
-        with_it = np.zeros(len(fed)) if beside is None else beside[index] * steps
-        with_it = np.diff(np.append(0.0, np.cumsum(with_it)).round(_FEED_DIGITS))
-        number = role(what)
-        moved = np.flatnonzero(steps > 0.0)
-        if len(moved):
-            ends, at = moved + 1, index[moved]
-            same = np.broadcast_to([self.layer, self.strand], (len(moved), 2))
-            full = np.ones(len(moved))
-            values = (self.tool * full, fed[moved], with_it[moved], speeds[at])
-            rest = (widths[at], heights[at], 0.0 * full, number * full)
+    def lay(self, steps: Steps) -> None:
+        """Move along a line from its start."""
+        rows = steps.rows
+        if len(rows):
+            rows[:, _COLUMNS["tool"]] = self.tool
+            rows[:, _COLUMNS["layer"]] = self.layer
+            rows[:, _COLUMNS["strand"]] = self.strand
             self._flush()
-            self.blocks.append(
-                np.column_stack([LAY * full, line[ends], normals[ends], *values, *rest, same])
-            )
-            self.place, self.normal = line[ends[-1]], normals[ends[-1]]
-        self.top = max(self.top, float(line[:, 2].max()))
+            self.blocks.append(rows)
+            self.place, self.normal = (rows[-1, _COLUMNS[name]].copy() for name in _POSE)
+        self.top = max(self.top, steps.top)
 
     def _to(self, place: FloatArray, normal: FloatArray, across: bool = False) -> None:
         """Travel straight to a place."""
@@ -209,22 +236,40 @@ class Recorder:
         """Keep the columns of the blocks so far, each as small as `Moves` has it."""
         table = np.concatenate([np.zeros((0, 17)), *self.blocks])
         self.blocks = []
-        for name, (place, kind) in _COLUMNS.items():
-            self.columns.setdefault(name, []).append(table[:, place].astype(kind))
+        # Only strands have numbers, not the matrix between them.
+        strand = _COLUMNS["strand"]
+        table[:, strand] = np.where(table[:, _COLUMNS["tool"]] == 1.0, table[:, strand], -1.0)
+        for name, place in _COLUMNS.items():
+            self.columns[name].append(table[:, place].astype(KINDS[name]))
+
+    def seen(self) -> Moves:
+        """All that was noted so far: to be forgotten before more is."""
+        self._flush()
+        self._split()
+        columns: dict[str, Any] = {name: column.seen() for name, column in self.columns.items()}
+        return Moves(**columns)
+
+    def insert(
+        self, event: int, places: Sequence[int], values: Sequence[float], tools: Sequence[int]
+    ) -> None:
+        """Insert events before rows: they happen where the row before ends."""
+        order = np.argsort(places, kind="stable")
+        at = np.array(places, dtype=np.int64)[order]
+        given = {"event": [event] * len(at), "amount": values, "tool": tools}
+        for name, column in self.columns.items():
+            rows = column.seen()[np.maximum(at - 1, 0)]
+            if name not in ("place", "normal", "layer", "strand"):
+                rows = np.zeros_like(rows)
+            if name in given:
+                rows = np.array(given[name])[order]
+            column.insert(at.tolist(), rows)
 
     def moves(self) -> Moves:
         """All that was noted; afterwards the recorder is empty."""
         self._flush()
         self._split()
-        joined: dict[str, Any] = {}
-        for name in _COLUMNS:  # column by column, so that few are there twice
-            column = np.concatenate(self.columns.pop(name))
-            column.flags.writeable = False
-            joined[name] = column
-        normal = joined["normal"]
-        if (normal == normal[:1]).all():  # a head that never turns needs no memory
-            joined["normal"] = np.broadcast_to(normal[:1].copy(), normal.shape)
-        return Moves(**joined)
+        columns: dict[str, Any] = {name: column.rows() for name, column in self.columns.items()}
+        return Moves(**columns)
 
 
 def _ends_of_moves(line: FloatArray, normals: FloatArray, alike: FloatArray) -> IntArray:

@@ -8,8 +8,8 @@ import shapely
 
 from ccfem.machine import Machine
 from ccfem.printing.moves import FEED, LAY
-from ccfem.printing.part_moves import change_tool, lay_matrix
-from ccfem.printing.recorder import Recorder
+from ccfem.printing.part_moves import change_tool, lay_line, matrix_steps
+from ccfem.printing.recorder import Recorder, steps_along
 
 UP = np.array([[0.0, 0.0, 1.0]] * 2)
 
@@ -34,7 +34,8 @@ def test_the_melt_stands_at_the_nozzle_where_a_line_begins(retract, tool_retract
         if changes:
             change_tool(recorder, 1, 0.4, machine)
             change_tool(recorder, 0, 0.4, machine)
-        lay_matrix(recorder, line(x), UP, np.full(1, 0.4), "infill", machine, 30.0)
+        steps = matrix_steps(line(x), UP, np.full(1, 0.4), "infill", machine, 30.0)
+        lay_line(recorder, steps, machine)
     moves = recorder.moves()
     drawn, begins, before = 0.0, 0, None
     for event, fed in zip(moves.event, moves.feed, strict=True):
@@ -65,7 +66,7 @@ def test_steps_on_a_straight_line_are_one_move():
     up, full = np.broadcast_to([0.0, 0.0, 1.0], path.shape), np.ones(len(speeds))
     recorder = Recorder(machine)
     recorder.travel(path[0], up[0])
-    recorder.lay(path, up, speeds, 0.05 * full, full, 0.4 * full, "fibre")
+    recorder.lay(steps_along(path, up, speeds, 0.05 * full, full, 0.4 * full, "fibre", machine))
     moves = recorder.moves()
     laid = moves.event == LAY
     # The arc needs its points; the lines around it are three moves, one of them slower.
@@ -83,6 +84,6 @@ def test_a_line_of_one_point_is_no_move():
     place, nothing = np.array([[3.0, 4.0, 0.4]]), np.zeros(0)
     recorder.travel(place[0], UP[0])
     before = len(recorder.rows)
-    recorder.lay(place, UP[:1], nothing, nothing, nothing, nothing, "travel")
+    recorder.lay(steps_along(place, UP[:1], *4 * [nothing], "travel", Machine()))
     assert len(recorder.rows) == before
     assert not (recorder.moves().event == LAY).any()

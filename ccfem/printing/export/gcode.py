@@ -11,17 +11,18 @@ All that happens is decided before, in `ccfem.printing`; here it is only written
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.parallel import in_processes
 from ccfem.base.whole import whole_file
 from ccfem.machine.kinematics import axis_values
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import FIBRE
-from ccfem.printing.duration import durations
 from ccfem.printing.laid_layer import COORDINATE_DIGITS
 from ccfem.printing.moves import (
     CUT,
@@ -39,13 +40,12 @@ from ccfem.printing.moves import (
     WAIT,
     Arcs,
     Moves,
+    is_any,
 )
 from ccfem.printing.part_moves import part_moves
 from ccfem.printing.print_plan import PrintPlan
-from ccfem.printing.print_totals import layer_seconds, print_totals
+from ccfem.printing.print_totals import PrintTotals, print_totals
 
-_TOGETHER = 100_000
-"""Rows that are written at a time: a large print has millions."""
 _FEED_DIGITS = 5
 """Decimals of E, mm."""
 
@@ -92,9 +92,9 @@ def write_gcode(path: str | Path, plan: PrintPlan, machine: Machine, title: str 
     InputError
         When the file cannot be written, or a nozzle would leave the bed.
     """
-    text = gcode(plan, machine, title)
-    with whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
+    pieces = gcode_pieces(part_moves(plan, machine), plan, machine, title)
+    with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
+        file.writelines(pieces)
 
 
 def gcode(plan: PrintPlan, machine: Machine, title: str = "") -> str:
@@ -110,58 +110,109 @@ def gcode_of_moves(
 
 
 def gcode_pieces(
-    moves: Moves, plan: PrintPlan, machine: Machine, title: str = "", doubts: Sequence[str] = ()
+    moves: Moves,
+    plan: PrintPlan,
+    machine: Machine,
+    title: str = "",
+    doubts: Sequence[str] = (),
+    totals: PrintTotals | None = None,
 ) -> Iterator[str]:
-    """Yield the text of `gcode_of_moves` piece by piece: that of a large print fills memory."""
-    lines = _Lines(machine, plan, _progress(moves, machine))
-    axes, values = _axes(moves, machine), {**lines.values}
-    start = np.concatenate([axes[:1], axes[:-1]])
-    speeds = _speeds(moves, axes, start)
+    """Yield the text of `gcode_of_moves` layer by layer: that of a large print fills memory.
+
+    Parameters
+    ----------
+    totals : PrintTotals, optional
+        Of the moves, if they are counted already.
+    """
+    totals = print_totals(moves, machine) if totals is None else totals
+    progress = _progress(totals, machine)
+    rows = _Rows.of(moves, machine)
+    yield "\n".join(gcode_head(moves, plan, machine, totals, title, doubts)) + "\n"
+    lines = _Lines(machine, plan, progress)
     below = float(plan.top[plan.first - 1]) if plan.first else 0.0
     warm = machine.process if machine.process.warm_height > below else None
+    values = {**lines.values}
     values["bed_temperature"] += warm.warm_bed if warm else 0.0
     values["matrix_temperature"] += warm.warm_matrix if warm else 0.0
-    yield "\n".join(gcode_head(moves, plan, machine, title, doubts)) + "\n"
     values |= {"layers": len(plan.top), "layer": plan.first, "height": below}
     lines.fill("resume" if plan.first else "start", **values)
-    moved, first = axes != start, True
-    begins = np.isin(moves.event, (TRAVEL, LAY)).argmax() if len(moves) else 0
-    moved[begins : begins + 1] = True  # the first move names all axes
-    arc_of = _arcs_of(moves)
-    centres: list[str] = []
-    if moves.arcs is not None:
-        moved[moves.arcs.last, :2] = True
-        centres = _centres(moves.arcs, moves)
-        feeds = [_summed(column, moves.arcs) for column in (moves.feed, moves.beside)]
-    else:
-        feeds = [moves.feed, moves.beside]
-    of_moves = (moves.event, moves.tool, *feeds, speeds, moves.amount)
-    of_lines = (moves.role, moves.width, moves.height, moves.strand, arc_of)
-    for begin in range(0, len(moves), _TOGETHER):
-        some = slice(begin, begin + _TOGETHER)
-        places = lines.places(axes[some], moved[some], moves.tool[some])
-        columns = (column[some].tolist() for column in (*of_moves, *of_lines))
-        for event, tool, feed, beside, speed, value, role, width, height, strand, arc, place in zip(
-            *columns, places, strict=True
-        ):
+    yield "\n".join([*lines.lines, ""])
+    # All that is said once is said anew on each layer, so that layers can be written side by side.
+    begins = np.flatnonzero(moves.event == LAYER).tolist()
+    edges = [0, *(row for row in begins if row), len(moves)]
+
+    def of_layer(*piece: int) -> str:
+        return rows.text(_Lines(machine, plan, progress), slice(*piece))
+
+    yield from in_processes(of_layer, edges[:-1], edges[1:])
+    lines.lines.clear()
+    lines.fill("end", layers=len(plan.top))
+    yield "\n".join(lines.lines) + "\n"
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """Moves with what their lines say: the axes after each row, speeds, and arcs that end there.
+
+    Columns are those of `Moves`; those of `feeds` are, at the end of an arc, of all its rows.
+    """
+
+    moves: Moves
+    axes: FloatArray
+    speeds: FloatArray
+    feeds: tuple[FloatArray, FloatArray]
+    first: int
+    arc_of: IntArray | None = None
+    centres: Sequence[str] = ()
+
+    @classmethod
+    def of(cls, moves: Moves, machine: Machine) -> "_Rows":
+        """Rows of the moves of a machine."""
+        axes = _axes(moves, machine)
+        first = int(is_any(moves.event, TRAVEL, LAY).argmax()) if len(moves) else 0
+        feeds = (moves.feed, moves.beside)
+        if moves.arcs is None:
+            return cls(moves, axes, _speeds(moves, axes), feeds, first)
+        summed = (_summed(feeds[0], moves.arcs), _summed(feeds[1], moves.arcs))
+        about = (axes, _speeds(moves, axes), summed, first)
+        return cls(moves, *about, _arcs_of(moves), _centres(moves.arcs, moves))
+
+    def text(self, lines: "_Lines", some: slice) -> str:
+        """Text of some rows."""
+        moves, axes = self.moves, self.axes[some]
+        before = max(some.start - 1, 0)
+        moved = np.diff(
+            self.axes[before : some.stop], axis=0, prepend=self.axes[before : before + 1]
+        )
+        moved = (moved != 0.0)[some.start - before :]
+        if some.start <= self.first < some.stop:
+            moved[self.first - some.start] = True  # the first move names all axes
+        arc_of = np.full(len(axes), _NO_ARC) if self.arc_of is None else self.arc_of[some]
+        moved[arc_of >= 0, :2] = True
+        places = lines.places(axes, moved, moves.tool[some])
+        numbers = (moves.event, moves.tool, *self.feeds, self.speeds, moves.amount)
+        of_lines = (moves.role, moves.width, moves.height, moves.strand)
+        columns = (column[some].tolist() for column in (*numbers, *of_lines))
+        first = self.first - some.start
+        for row, (
+            (event, tool, feed, beside, speed, value, role, width, height, strand),
+            arc,
+            place,
+        ) in enumerate(zip(zip(*columns, strict=True), arc_of.tolist(), places, strict=True)):
             if arc == _IN_ARC:
                 continue
             if event in (TRAVEL, LAY):
                 if event == LAY:
                     lines.say(role, width, height)
                 if arc >= 0:
-                    lines.arc(centres[arc], tool, place, feed, beside, speed)
-                    continue
-                lines.move(event, tool, place, feed, beside, speed, first)
-                first = False
+                    lines.arc(self.centres[arc], tool, place, feed, beside, speed)
+                else:
+                    lines.move(event, tool, place, feed, beside, speed, row == first)
             elif event == FEED:
                 lines.feed(tool, feed, beside, speed)
             else:
                 lines.happen(event, tool, value, strand)
-        yield "\n".join([*lines.lines, ""])
-        lines.lines.clear()
-    lines.fill("end", layers=len(plan.top))
-    yield "\n".join(lines.lines) + "\n"
+        return "\n".join([*lines.lines, ""])
 
 
 _IN_ARC, _NO_ARC = -2, -1
@@ -200,20 +251,20 @@ def _centres(arcs: Arcs, moves: Moves) -> list[str]:
 
 def _axes(moves: Moves, machine: Machine) -> FloatArray:
     """Values of X, Y and Z, and of axes that turn, after each row (n, 3) or (n, 5)."""
-    linear, turning = axis_values(machine.kinematics, moves.place, moves.normal)
     if not machine.kinematics.letters:
         return moves.place
+    linear, turning = axis_values(machine.kinematics, moves.place, moves.normal)
     return np.column_stack([linear, turning]).round(COORDINATE_DIGITS)
 
 
-def _speeds(moves: Moves, axes: FloatArray, start: FloatArray) -> FloatArray:
+def _speeds(moves: Moves, axes: FloatArray) -> FloatArray:
     """Speed that F tells: along X, Y and Z, while the nozzle goes along the part as it should.
 
     Firmware takes F for the way of X, Y and Z alone where these move, else for degrees.
     """
     if axes.shape[1] == 3:
         return moves.speed
-    step = np.abs(axes - start)
+    step = np.abs(np.diff(axes, axis=0, prepend=axes[:1]))
     way = np.linalg.norm(step[:, :3], axis=1)
     way = np.where(way > 0.0, way, step[:, 3:].max(axis=1))
     length = np.where(moves.length > 0.0, moves.length, way)
@@ -221,12 +272,12 @@ def _speeds(moves: Moves, axes: FloatArray, start: FloatArray) -> FloatArray:
     return np.asarray((moves.speed * share).round(4))
 
 
-def _progress(moves: Moves, machine: Machine) -> dict[int, dict[str, float]]:
+def _progress(totals: PrintTotals, machine: Machine) -> dict[int, dict[str, float]]:
     """Time and share of the print until each layer begins; nothing where no line shows them."""
     shown = ("{elapsed}", "{percent}", "{minutes}")
     if not any(field in line for line in machine.gcode.layer for field in shown):
         return {}
-    seconds = layer_seconds(durations(moves, machine), moves)
+    seconds = totals.by_layer
     total, elapsed, progress = sum(seconds.values()), 0.0, {}
     for number, taken in seconds.items():
         left = total - elapsed
@@ -257,8 +308,9 @@ class _Lines:
             "tool": 0,
         }
         self.lines: list[str] = []
-        self._said = ("", "", "")
-        self._line: tuple[int, float, float] | None = None
+        types = TYPES[self.profile.comments]
+        self._types = [f";TYPE:{types[name]}" if name in types else "" for name in ROLES]
+        self._forget()
         self._letters = "".join(("X", "Y", "Z", *machine.kinematics.letters))
         self._rate, self._speed = "", -1.0
         by_file = self.profile.offset_by == "gcode"
@@ -269,17 +321,29 @@ class _Lines:
         self.lines += self.profile.fill(getattr(self.profile, kind), {**self.values, **values})
         self._rate = ""
 
+    def _forget(self) -> None:
+        """Say all anew that is said where it changes."""
+        self._type = self._wide = self._high = ""
+        self._width = self._height = float("nan")
+
     def say(self, role: int, width: float, height: float) -> None:
         """Comments for viewers, where they change."""
-        if (role, width, height) == self._line:
+        kind = self._types[role]
+        if not kind:
             return
-        self._line = (role, width, height)
-        kind = TYPES[self.profile.comments].get(ROLES[role])
-        if kind is None:
-            return
-        said = (f";TYPE:{kind}", f";WIDTH:{width:.4f}", f";HEIGHT:{height:.4f}")
-        self.lines += [new for new, old in zip(said, self._said, strict=True) if new != old]
-        self._said = said
+        if kind != self._type:
+            self._type = kind
+            self.lines.append(kind)
+        if width != self._width:
+            self._width, said = width, f";WIDTH:{width:.4f}"
+            if said != self._wide:
+                self._wide = said
+                self.lines.append(said)
+        if height != self._height:
+            self._height, said = height, f";HEIGHT:{height:.4f}"
+            if said != self._high:
+                self._high = said
+                self.lines.append(said)
 
     def places(self, axes: FloatArray, moved: BoolArray, tool: IntArray) -> list[str]:
         """Words of the axes that each row moves (n, k), by their values (n, k)."""
@@ -372,7 +436,7 @@ class _Lines:
             f";HEIGHT:{thickness:.4f}",
             f";LAYER:{number}",
         ]
-        self._said, self._line = ("", "", ""), None
+        self._forget()
         self.fill("layer", layer=number, number=number + 1, **self.progress.get(number, {}))
 
 
@@ -380,21 +444,27 @@ class _Lines:
 
 
 def gcode_head(
-    moves: Moves, plan: PrintPlan, machine: Machine, title: str, doubts: Sequence[str] = ()
+    moves: Moves,
+    plan: PrintPlan,
+    machine: Machine,
+    total: PrintTotals,
+    title: str,
+    doubts: Sequence[str] = (),
 ) -> list[str]:
     """Lines at the head of a file, as slicers write and printers read them.
 
     Parameters
     ----------
+    total : PrintTotals
+        Of the moves.
     title : str
         Case, strategy and machine; left out where empty.
     doubts : sequence of str
         What keeps the plan from being printed as it is, one line each; they come first.
     """
-    total = print_totals(moves, machine)
-    strands = plan.paths.select((plan.paths.kind == FIBRE) & (plan.paths.layer >= plan.first))
-    places = moves.place[moves.event == LAY]
-    low, high = places.min(axis=0), places.max(axis=0)
+    lengths = plan.paths.lengths[(plan.paths.kind == FIBRE) & (plan.paths.layer >= plan.first)]
+    laid = moves.event == LAY
+    low, high = ([float(end(axis[laid])) for axis in moves.place.T] for end in (np.min, np.max))
     lines = [
         f"; generated by ccfem {version('ccfem')}",
         *([f"; {title}"] if title else []),
@@ -410,12 +480,12 @@ def gcode_head(
     lines += [
         f";{end}{axis}:{at:.3f}"
         for end, values in (("MIN", low), ("MAX", high))
-        for axis, at in zip("XYZ", values.tolist(), strict=True)
+        for axis, at in zip("XYZ", values, strict=True)
     ]
-    if len(strands):
+    if len(lengths):
         lines.append(
-            f"; {strands.lengths.sum():.1f} mm of fibre in {len(strands)} strands, the shortest "
-            f"{strands.lengths.min():.1f} mm, each cut {machine.tail:g} mm before its end"
+            f"; {lengths.sum():.1f} mm of fibre in {len(lengths)} strands, the shortest "
+            f"{lengths.min():.1f} mm, each cut {machine.tail:g} mm before its end"
         )
     lines += [f"; {line}" for line in plan.warnings]
     return lines
