@@ -81,6 +81,7 @@ def beads(
     layer: IntArray,
     width: float,
     height: float,
+    shared: bool = True,
 ) -> Beads:
     """Cut strands into parts and find the room of each.
 
@@ -95,6 +96,8 @@ def beads(
     width, height : float, mm
         Of a strand. Strands on different layers share room where the layers are nearer than
         `height`.
+    shared : bool, default True
+        Whether the room is found, which takes most of the time; else it is NaN.
     """
     nodes, ends = resample(points, offsets, width / _PARTS)
     count = np.diff(ends) - 1
@@ -112,6 +115,9 @@ def beads(
     direction, straight, often = _chords(chord, length, line, first, closed)
     direction = direction - np.einsum("ij,ij->i", direction, normal)[:, None] * normal
     direction /= np.maximum(np.linalg.norm(direction, axis=1), 1e-300)[:, None]
+    if not shared:
+        unknown = np.full((4, len(line)), np.nan)
+        return Beads(line, first, length, middle, direction, normal, *unknown)
     steps = np.ceil(width * (1.0 - 1e-9) / np.maximum(length, 1e-300)).clip(1, 1e9)
     bands = _Bands(
         middle,

@@ -211,9 +211,9 @@ def test_parts_of_strands_are_found_once_a_run(monkeypatch):
     """By the rules for strands; the virtual test takes them from there."""
     counted = []
 
-    def parts(toolpaths, *about):
+    def parts(toolpaths, *about, **how):
         counted.append(len(toolpaths))
-        return strand_parts(toolpaths, *about)
+        return strand_parts(toolpaths, *about, **how)
 
     monkeypatch.setattr("ccfem.judging.evaluation.strand_rules.strand_parts", parts)
     monkeypatch.setattr("ccfem.judging.virtual_testing.strands.strand_parts", None)

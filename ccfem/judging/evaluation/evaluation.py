@@ -26,9 +26,9 @@ from ccfem.judging.evaluation.layer_paths import (
     Column,
     LayerPaths,
     PlanePaths,
+    Pool,
     Printed,
     plane_paths,
-    pool,
     printed,
 )
 from ccfem.judging.evaluation.sensitivity import strand_lamina
@@ -186,27 +186,41 @@ def evaluate(
     basis = Basis(machine, material, filled=filled)
     sampled = 1.0 if whole.all() else float(area[whole].sum() / area.sum())
 
-    def measured(layer: Layer, every: bool) -> tuple[dict[str, Any], dict[str, float]]:
-        behind = int(np.count_nonzero(late == layer.index))
-        on_layer = toolpaths.on_layer(layer.index)
-        below = _below(layer, layers, stress.mesh, machine)
-        view = _view(on_layer, layer, stress, machine, below, behind, stack, upright)
-        samples = {name: kind.sample(view) for name, kind in _sampled(every).items()}
-        return samples, _indices(samples, basis)
-
     shared = [toolpaths, stress, machine, stack]
-    results = in_processes(measured, layers, whole.tolist(), shared=shared)
-    samples, rows = zip(*results, strict=True)
-    rows = (*rows, _in_total(samples, replace(basis, sampled=sampled)))
+    rows: list[dict[str, float]] = [{} for _ in layers]
+    total: dict[str, float] = {}
+    along_fibre: list[FibreSamples] = []
+    for kinds in _passes(len(layers)):
+
+        def measured(
+            layer: Layer, every: bool, kinds: Mapping[str, ModuleType] = kinds
+        ) -> tuple[dict[str, Any], dict[str, float]]:
+            taken = {name: kind for name, kind in kinds.items() if every or not _on_some(kind)}
+            if not taken:
+                return {}, {}
+            behind = int(np.count_nonzero(late == layer.index))
+            on_layer = toolpaths.on_layer(layer.index)
+            below = _below(layer, layers, stress.mesh, machine)
+            view = _view(on_layer, layer, stress, machine, below, behind, stack, upright)
+            samples = {name: kind.sample(view) for name, kind in taken.items()}
+            return samples, _indices(samples, basis)
+
+        pools = {name: Pool() for name in kinds}
+        results = in_processes(measured, layers, whole.tolist(), shared=shared)
+        for row, every, (samples, values) in zip(rows, whole.tolist(), results, strict=True):
+            row |= values
+            for name, of_layer in samples.items():
+                pools[name].add(of_layer)
+            if every and "alignment" in samples:
+                along_fibre.append(FibreSamples(samples["curvature"], samples["alignment"]))
+        for name, pooled in pools.items():  # one kind at a time: each fills memory
+            total |= _indices({name: pooled.samples()}, replace(basis, sampled=sampled))
+    rows.append(total)
     nan = float("nan")
     return Evaluation(
         np.array([layer.index for layer in layers]),
         {column.name: np.array([row.get(column.name, nan) for row in rows]) for column in COLUMNS},
-        tuple(
-            FibreSamples(of_layer["curvature"], of_layer["alignment"])
-            for of_layer, every in zip(samples, whole, strict=True)
-            if every
-        ),
+        tuple(along_fibre),
     )
 
 
@@ -218,13 +232,26 @@ def _spread_over(count: int, most: int | None) -> BoolArray:
     return chosen
 
 
-def _sampled(every: bool) -> dict[str, ModuleType]:
-    """Return the indices that take samples of a layer: all, or those that need every layer."""
-    return {
-        name: kind
-        for name, kind in indices.named().items()
-        if hasattr(kind, "sample") and (every or not getattr(kind, "ON_SOME_LAYERS", False))
-    }
+_TOGETHER = 60
+"""Layers up to which all samples are taken at once."""
+
+
+def _passes(layers: int) -> list[dict[str, ModuleType]]:
+    """Return the indices that take samples, in passes over the layers.
+
+    Of many layers those with large samples (`LARGE`) have passes of their own.
+    """
+    kinds = {name: kind for name, kind in indices.named().items() if hasattr(kind, "sample")}
+    if layers <= _TOGETHER:
+        return [kinds]
+    large = [{name: kind} for name, kind in kinds.items() if getattr(kind, "LARGE", False)]
+    rest = {name: kind for name, kind in kinds.items() if not getattr(kind, "LARGE", False)}
+    return [*large, rest]
+
+
+def _on_some(kind: ModuleType) -> bool:
+    """Whether some of many layers are enough for an index."""
+    return bool(getattr(kind, "ON_SOME_LAYERS", False))
 
 
 def _check_layers(toolpaths: Toolpaths, layers: Sequence[Layer]) -> None:
@@ -308,15 +335,6 @@ def _in_space(paths: PlanePaths) -> Toolpaths:
     """Paths of a flat layer as toolpaths."""
     lines = np.split(paths.points, paths.offsets[1:-1]) if len(paths) else []
     return Toolpaths.from_plane(lines, paths.layer, paths.closed.tolist())
-
-
-def _in_total(samples: Sequence[Mapping[str, Any]], basis: Basis) -> dict[str, float]:
-    """Value of each of `COLUMNS` over all layers, joining one kind of samples at a time."""
-    values: dict[str, float] = {}
-    for name in samples[0]:
-        of_layers = [sample[name] for sample in samples if name in sample]
-        values |= _indices({name: pool(of_layers)}, basis)
-    return values
 
 
 def _material(

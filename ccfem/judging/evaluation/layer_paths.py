@@ -1,13 +1,13 @@
 """What an index is, and what it may need: the paths of one layer, seen in every way."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
 
-from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, RowBuffer
 from ccfem.fem.elasticity import PartStress
 from ccfem.fem.materials import Material
 from ccfem.geometry.polylines import lengths, merge_repeated, starts_segment
@@ -146,11 +146,34 @@ def _from_gaps(paths: PlanePaths, dropped: BoolArray) -> IntArray:
     return order
 
 
-def pool(parts: Sequence[Samples]) -> Samples:
+def pool(parts: Iterable[Samples]) -> Samples:
     """Join samples (dataclasses of arrays) of several layers into those of the whole part."""
-    kind: Any = type(parts[0])
-    joined = {f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(kind)}
-    return kind(**joined)
+    pooled = Pool()
+    for part in parts:
+        pooled.add(part)
+    return pooled.samples()
+
+
+class Pool:
+    """Samples of one kind, layer after layer: none is kept beside those of all."""
+
+    def __init__(self) -> None:
+        self._kind: Any = None
+        self._columns: dict[str, RowBuffer] = {}
+
+    def add(self, samples: Any) -> None:
+        """Add those of a layer."""
+        self._kind = type(samples)
+        for field in fields(samples):
+            values = getattr(samples, field.name)
+            if field.name not in self._columns:
+                empty = RowBuffer(values.dtype, *values.shape[1:], share=False)
+                self._columns[field.name] = empty
+            self._columns[field.name].append(values)
+
+    def samples(self) -> Any:
+        """Those of all layers; afterwards there are none."""
+        return self._kind(**{name: column.rows() for name, column in self._columns.items()})
 
 
 # A stack of curved layers as points, in the order in which they are printed.

@@ -140,7 +140,7 @@ def _looked_at(
     """Look at all strands: layer by layer where strands of one cannot touch those of another."""
 
     def one(some: Toolpaths, on: Sequence[Layer]) -> _Strands:
-        parts = strand_parts(some, machine, on)
+        parts = strand_parts(some, machine, on, shared=with_parts)
         line, length, first = parts.beads.line, parts.beads.length, parts.beads.first
         away = np.where(parts.link, 0.0, 1.0 - parts.inside)
         area = np.bincount(line, length, len(some))

@@ -30,8 +30,11 @@ _ACROSS = tuple(((np.arange(10) + 0.5) / 10 - 0.5).tolist())
 outside by its tenths, and by the first from a twentieth on."""
 
 
-def fibre_beads(toolpaths: Toolpaths, machine: Machine) -> Beads:
-    """Parts of the fibre paths, in the order of ``toolpaths.of_kind(FIBRE)``, with their room."""
+def fibre_beads(toolpaths: Toolpaths, machine: Machine, shared: bool = True) -> Beads:
+    """Parts of the fibre paths, in the order of ``toolpaths.of_kind(FIBRE)``, with their room.
+
+    `shared` is that of `ccfem.geometry.beads.beads`.
+    """
     fibre = toolpaths.of_kind(FIBRE)
     return beads(
         fibre.points,
@@ -41,6 +44,7 @@ def fibre_beads(toolpaths: Toolpaths, machine: Machine) -> Beads:
         fibre.layer,
         machine.fibre_width,
         machine.strand_height,
+        shared,
     )
 
 
@@ -108,7 +112,7 @@ class StrandParts(NamedTuple):
 
 
 def strand_parts(
-    toolpaths: Toolpaths, machine: Machine, layers: Sequence[Layer] = ()
+    toolpaths: Toolpaths, machine: Machine, layers: Sequence[Layer] = (), shared: bool = True
 ) -> StrandParts:
     """Cut the fibre paths into parts and find what of each carries.
 
@@ -116,9 +120,11 @@ def strand_parts(
     ----------
     layers : sequence of Layer
         That the paths lie on; without them all width counts as inside.
+    shared : bool, default True
+        Whether the room of the parts is found; without it nobody knows what carries.
     """
     fibre = toolpaths.of_kind(FIBRE)
-    parts = fibre_beads(toolpaths, machine)
+    parts = fibre_beads(toolpaths, machine, shared)
     count = np.diff(parts.first)
     arc = (np.arange(len(parts.line)) - parts.first[parts.line] + 0.5) * parts.length
     # Step of each part: arc lengths of all paths on one axis.

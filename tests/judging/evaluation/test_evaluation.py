@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.box import box_mesh
-from ccfem.judging.evaluation import COLUMNS, evaluate
+from ccfem.judging.evaluation import COLUMNS, evaluate, evaluation
 from ccfem.judging.virtual_testing import Strand
 from ccfem.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
@@ -86,6 +86,18 @@ def test_samples_of_each_layer_stay(make_part, uniform):
     assert above.alignment.length.sum() == pytest.approx(30.0)
     for samples in (below.curvature, below.alignment):
         assert not any(values.flags.writeable for values in vars(samples).values())
+
+
+def test_indices_in_passes_over_many_layers_are_those_taken_at_once(part, monkeypatch):
+    both = Toolpaths.concatenate([paths_of(part, 0), paths_of(part, 1)])
+    about = (both, part.layers, part.stress, MACHINE, None, None, 1)
+    at_once = evaluate(*about)
+    monkeypatch.setattr(evaluation, "_TOGETHER", 1)
+    assert len(evaluation._passes(2)) > 1
+    in_passes = evaluate(*about)
+    for name in NAMES:
+        np.testing.assert_array_equal(in_passes.values[name], at_once.values[name])
+    assert len(in_passes.samples) == 1
 
 
 def test_table_has_a_row_a_layer_and_the_total(part):

@@ -8,6 +8,8 @@ A module has
 * ``indices(samples, basis)``, the value of each index by name, of one layer or of all together;
 * ``ON_SOME_LAYERS``, true where they are means and quantiles that some layers of many tell, and no
   limit of a machine bounds them; default false;
+* ``LARGE``, true where the samples of a layer take megabytes: those of many layers are then taken
+  alone; default false;
 * ``PLACE``, a number that says where its columns stand in tables; default behind all others.
 
 Modules of other packages are found by entry points of the group ``ccfem.indices``. Nothing is

@@ -15,6 +15,9 @@ from ccfem.slicing.layers.layer import LayerStress
 PLACE = 90
 """Of these columns in tables: the smaller, the farther to the left."""
 
+LARGE = True
+"""Its samples take megabytes a layer."""
+
 ON_SOME_LAYERS = True
 """Of a stack of many layers some are enough."""
 

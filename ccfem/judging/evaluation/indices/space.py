@@ -22,6 +22,9 @@ from ccfem.slicing.principal_lines.critical import strongest_stress
 PLACE = 140
 """Of these columns in tables: the smaller, the farther to the left."""
 
+LARGE = True
+"""Its samples take megabytes a layer."""
+
 
 _ANGLES = (10, 20, 30)
 _REACH = 10.0
