@@ -363,6 +363,8 @@ class Isocurve:
 _Known = dict[tuple[Any, ...], Directed]
 """Directions already computed for the layers of a part, by layer and the parameters they depend on.
 They are reused when the part is planned again with more or less fibre."""
+_KNOWN = 60
+"""Layers whose directions are kept: those of one take megabytes."""
 
 
 @dataclass(frozen=True)
@@ -384,12 +386,14 @@ class _Planner:
         # The stored value refers to its layer, so no other layer can get the same id.
         key: tuple[Any, ...] = (id(layer), s.cap, s.fill, s.fill_length, s.stress, s.field)
         key = (*key, s.sense, s.compression_limit, s.incompatible)
-        if key not in self.known:
+        potential = self.known.get(key)
+        if potential is None:
             tension = self.tension(layer, stress)
             if not tension.defined.any():
                 return Toolpaths.empty()
-            self.known[key] = directed(layer, tension, s.cap, s.fill, s.fill_length)
-        potential = self.known[key]
+            potential = directed(layer, tension, s.cap, s.fill, s.fill_length)
+            if len(self.known) < _KNOWN:
+                self.known[key] = potential
         lines = self.isocurves(potential, machine.fibre_width)
         paths = self.connected(lines, layer, potential.tension, stress.held_or_loaded, machine)
         return Toolpaths.from_plane(paths.lines, layer, link=paths.link)

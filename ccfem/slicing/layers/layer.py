@@ -153,7 +153,7 @@ class Layer(Shown):
         w = self.weights.reshape((-1,) + (1,) * (nodal.ndim - 1))
         return (1.0 - w) * nodal[self.nodes[:, 0]] + w * nodal[self.nodes[:, 1]]
 
-    @cached_property
+    @property
     def _across(self) -> FloatArray:
         """Cross product of two sides of each triangle, (t, 3): twice its area, along its normal."""
         a, b, c = np.moveaxis(self.points[self.triangles], 1, 0)
