@@ -59,8 +59,9 @@ def test_strands_that_break_a_rule_are_drawn_as_such():
     none = (np.zeros((len(LAYER.triangles), 3, 3)), np.zeros((len(LAYER.points), 3, 3)))
     stress = LayerStress(LAYER, *none)
     scales = {"force": 1.0, "angle": 90.0, "curvature": 1.0}
-    assert _paths(drawn, np.array([1, 2]), LAYER, stress, scales)["broken"].tolist() == [0, 1]
-    assert _paths(drawn, np.array([1]), LAYER, stress, scales)["broken"] is None
+    assert _paths(drawn, LAYER, stress, scales)["broken"].tolist() == [1, 0, 1]
+    whole = replace(drawn, broken=np.zeros(3, dtype=bool))
+    assert _paths(whole, LAYER, stress, scales)["broken"] is None
 
 
 def test_angles_are_to_the_larger_stress():

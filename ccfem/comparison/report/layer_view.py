@@ -59,7 +59,7 @@ class DrawnPaths:
     curvature: FloatArray
 
 
-def drawn_paths(run: Run, step: float, width: float) -> DrawnPaths:
+def drawn_paths(run: Run, step: float, width: float, layer: int | None = None) -> DrawnPaths:
     """Thin out the fibre of a run.
 
     Parameters
@@ -68,9 +68,12 @@ def drawn_paths(run: Run, step: float, width: float) -> DrawnPaths:
         Points stay about so far apart; where a path turns sharply all stay.
     width : float, mm
         Of the fibre: the step that curvature is taken over.
+    layer : int, optional
+        Index of the one that is drawn. Default: all.
     """
-    number = np.flatnonzero(run.toolpaths.kind == FIBRE)
-    paths = run.toolpaths.of_kind(FIBRE)
+    fibre = run.toolpaths.kind == FIBRE
+    chosen = fibre if layer is None else fibre & (run.toolpaths.layer == layer)
+    number, paths = np.flatnonzero(chosen), run.toolpaths.select(chosen)
     points, offsets, arcs, link = _thinned(paths, step)
     ahead = np.minimum(np.arange(len(points)) + 1, len(points) - 1)
     middle = 0.5 * (arcs + arcs[ahead])
@@ -81,7 +84,7 @@ def drawn_paths(run: Run, step: float, width: float) -> DrawnPaths:
         s = test.strands
         force = _nearest(s.path, s.arc, test.axial_force, number[line], middle)
     curvature = _curvature(paths, width, line, middle)
-    broken = run.strand_verdict.strands(len(paths))
+    broken = run.strand_verdict.strands(int(fibre.sum()))[chosen[fibre]]
     return DrawnPaths(points, offsets, paths.layer, link, force, broken, curvature)
 
 
@@ -200,8 +203,16 @@ def layer_views(stacks: Mapping[str, Comparison], colours: Mapping[str, str]) ->
         A tree for `ccfem.comparison.report.packing.pack`: ``stacks``, each with layers and runs,
         and the ends of the scales, which are the same everywhere.
     """
-    lines, step = _lines(stacks)
-    shown = _shown(stacks, lines)
+    step, total = _step(stacks)
+    shown = _shown(stacks, total)
+    lines = {
+        (name, run.name): [
+            drawn_paths(run, step, stack.case.machine.fibre_width, layer.index)
+            for layer in shown[name]
+        ]
+        for name, stack in stacks.items()
+        for run in stack.succeeded
+    }
     stresses = {
         name: [stress_on(flat_view(k), stack.planned_on) for k in shown[name]]
         for name, stack in stacks.items()
@@ -209,7 +220,7 @@ def layer_views(stacks: Mapping[str, Comparison], colours: Mapping[str, str]) ->
     tension = max((tension_limit(s) for those in stresses.values() for s in those), default=1e-12)
     machine = next(iter(stacks.values())).case.machine
     most = 1.0 if machine.minimum_radius <= 0.0 else 2.0 / machine.minimum_radius
-    forces = [_most_force(drawn) for drawn in lines.values()]
+    forces = [_most_force(drawn) for drawn in lines.values() if drawn]
     scales = {
         "tension": tension,
         "force": max(forces, default=0.0) or 1e-12,
@@ -240,26 +251,24 @@ def layer_views(stacks: Mapping[str, Comparison], colours: Mapping[str, str]) ->
     return {"stacks": layer_list, "scales": scales, "step": step, "width": machine.fibre_width}
 
 
-def _lines(stacks: Mapping[str, Comparison]) -> tuple[dict[tuple[str, str], DrawnPaths], float]:
-    """Paths of every run with points as far apart as their number asks for; that distance, mm."""
-    drawn: dict[tuple[str, str], DrawnPaths] = {}
-    step = 0.0
+def _step(stacks: Mapping[str, Comparison]) -> tuple[float, int]:
+    """Distance of points, mm, that the number of all paths asks for, and their number."""
+    step, total = 0.0, 0
     for times in _STEPS:
-        for name, stack in stacks.items():
-            width = stack.case.machine.fibre_width
-            step = times * width
+        total = 0
+        for stack in stacks.values():
+            step = times * stack.case.machine.fibre_width
             for run in stack.succeeded:
-                drawn[name, run.name] = drawn_paths(run, step, width)
-        if sum(len(paths.points) for paths in drawn.values()) <= _POINTS:
+                fibre = run.toolpaths.of_kind(FIBRE)
+                of_layers = (fibre.on_layer(k) for k in np.unique(fibre.layer).tolist())
+                total += sum(len(_thinned(paths, step)[0]) for paths in of_layers)
+        if total <= _POINTS:
             break
-    return drawn, step
+    return step, total
 
 
-def _shown(
-    stacks: Mapping[str, Comparison], lines: Mapping[tuple[str, str], DrawnPaths]
-) -> dict[str, list[Layer]]:
-    """Layers of each stack that are drawn: all, or every second, third ... where they are many."""
-    total = sum(len(paths.points) for paths in lines.values())
+def _shown(stacks: Mapping[str, Comparison], total: int) -> dict[str, list[Layer]]:
+    """Layers of each stack that are drawn: all, or every second, third ... of too many points."""
     every = max(1, int(np.ceil(total / _POINTS)))
     shown = {}
     for name, stack in stacks.items():
@@ -269,9 +278,10 @@ def _shown(
     return shown
 
 
-def _most_force(paths: DrawnPaths) -> float:
-    """Force, N, that 99 % of the pieces stay below."""
-    known = paths.force[~np.isnan(paths.force)]
+def _most_force(layers: Sequence[DrawnPaths]) -> float:
+    """Force, N, that 99 % of the pieces that are drawn stay below."""
+    force = np.concatenate([paths.force for paths in layers])
+    known = force[~np.isnan(force)]
     return float(np.quantile(known, 0.99)) if len(known) else 0.0
 
 
@@ -351,7 +361,7 @@ def _raster(box: Sequence[float], cells: int) -> tuple[FloatArray, tuple[int, in
 
 def _run(
     run: Run,
-    paths: DrawnPaths,
+    drawn: Sequence[DrawnPaths],
     layers: Sequence[Layer],
     stresses: Sequence[LayerStress],
     scales: Mapping[str, float],
@@ -359,9 +369,8 @@ def _run(
 ) -> dict[str, Any]:
     """Paths of a run on each of the layers that are shown."""
     views = []
-    for layer, stress in zip(layers, stresses, strict=True):
-        mine = np.flatnonzero(paths.layer == layer.index)
-        views.append({"caption": caption(run, layer), **_paths(paths, mine, layer, stress, scales)})
+    for paths, layer, stress in zip(drawn, layers, stresses, strict=True):
+        views.append({"caption": caption(run, layer), **_paths(paths, layer, stress, scales)})
     return {
         "name": run.name,
         "colour": colours[run.name],
@@ -372,27 +381,19 @@ def _run(
 
 
 def _paths(
-    paths: DrawnPaths,
-    mine: IntArray,
-    layer: Layer,
-    stress: LayerStress,
-    scales: Mapping[str, float],
+    paths: DrawnPaths, layer: Layer, stress: LayerStress, scales: Mapping[str, float]
 ) -> dict[str, Any]:
-    """Return some paths of a run, all on one layer."""
-    sizes = np.diff(paths.offsets)[mine]
-    spans = [np.arange(paths.offsets[k], paths.offsets[k + 1]) for k in mine]
-    rows = np.concatenate([np.zeros(0, dtype=np.int64), *spans])
-    points = paths.points[rows]
-    plane = in_layer(points, layer)
-    curved = {} if layer.flat is not None else {"space": Rounded(points, _STEP)}
+    """Return the paths of a run on one layer."""
+    plane = in_layer(paths.points, layer)
+    curved = {} if layer.flat is not None else {"space": Rounded(paths.points, _STEP)}
     return {
         "points": Rounded(plane, _STEP),
-        "offsets": np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
-        "force": as_bytes(np.maximum(paths.force[rows], 0.0), scales["force"]),
+        "offsets": paths.offsets,
+        "force": as_bytes(np.maximum(paths.force, 0.0), scales["force"]),
         "angle": as_bytes(angle_on_layer(plane, stress), scales["angle"]),
-        "curvature": as_bytes(paths.curvature[rows], scales["curvature"]),
-        "link": paths.link[rows].astype(np.uint8) if paths.link[rows].any() else None,
-        "broken": paths.broken[mine].astype(np.uint8) if paths.broken[mine].any() else None,
+        "curvature": as_bytes(paths.curvature, scales["curvature"]),
+        "link": paths.link.astype(np.uint8) if paths.link.any() else None,
+        "broken": paths.broken.astype(np.uint8) if paths.broken.any() else None,
         **curved,
     }
 
