@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits
 
 from ccfem.base.checks import refuse_keywords
 from ccfem.base.errors import InputError
-from ccfem.base.parallel import processors
+from ccfem.base.parallel import in_processes, processors
 from ccfem.base.progress import Progress, silent
 from ccfem.cases.case import Case
 from ccfem.cases.load_cases import weighted_cases
@@ -507,13 +507,16 @@ def _bounds(
     lengths = [max(laid)]
     if several_lengths:
         lengths = _lengths_to_bound(laid, _SAME_CASES_BOUND if several else _SAME_BOUND)
+    of = " in all load cases" if several else ""
     bounds: dict[float, UpperBound] = {}
     with timed(seconds, "bound"):
+        about = (part.machine, strand)
+        bounded = in_processes(
+            lambda length: upper_bound(basis.cases, part.layers, length, *about), lengths
+        )
         for length in lengths:
-            of = " in all load cases" if several else ""
             tell(f"bounding what any paths of {1e-3 * length:.3g} m could reach{of}")
-            about = (part.layers, length, part.machine, strand)
-            bounds[length] = upper_bound(basis.cases, *about)
+            bounds[length] = next(bounded)
     return bounds
 
 
