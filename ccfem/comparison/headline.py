@@ -180,8 +180,8 @@ _TESTED = (
         "first_failure_load",
         "N",
         "Load at which the matrix (von Mises stress averaged over a 2 mm ball, away from loads and "
-        "supports), the fibre (99th percentile of the axial force by length) or the bond between "
-        "layers (interlayer_load) first reaches its strength, fibres carrying tension only.",
+        "supports), the fibre (highest axial force, averaged over 5 mm) or the bond between layers "
+        "(interlayer_load) first reaches its strength, fibres carrying tension only.",
         "> 0, higher is better; missing where a strength is unknown",
         _of_failure(lambda failure, tested: failure.load),
     ),

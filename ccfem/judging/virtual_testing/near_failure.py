@@ -24,7 +24,6 @@ from ccfem.fem.elasticity.recovery import cell_strain, times
 from ccfem.fem.elasticity.zone import BALL, ZONE, ball_averages, ball_shares, distance_from_patches
 from ccfem.judging.virtual_testing import failure_laws
 from ccfem.judging.virtual_testing.strand import Limits
-from ccfem.judging.virtual_testing.strength import FIBRE_SHARE
 
 Key = TypeVar("Key", bound=Hashable)
 
@@ -112,7 +111,7 @@ def check_stretched(strains: Sequence[FloatArray]) -> None:
 
 
 def stretched_index(
-    strain: FloatArray, length: FloatArray, limit: float
+    strain: FloatArray, length: FloatArray, peak: float, limit: float
 ) -> tuple[float, float, FloatArray]:
     """Index of the fibre, its norm, and how much each piece counts in that; the sum is 1.
 
@@ -122,17 +121,16 @@ def stretched_index(
         Along pieces of fibre, of which at least one is stretched; the others do not count.
     length : (s,) array, mm
         Length of fibre that each piece stands for.
+    peak : float
+        Highest strain, averaged over a length of strand.
     limit : float
         Strain at which a strand breaks.
     """
     most = float(strain.max())
-    order = np.argsort(strain, kind="stable")
-    reached = np.cumsum(length[order])
-    at = order[min(np.searchsorted(reached, FIBRE_SHARE * reached[-1]), len(order) - 1)]
     power = length * (np.maximum(strain, 0.0) / most) ** POWER
     whole = float(power.sum())
     norm = most * whole ** (1.0 / POWER) / limit
-    return max(float(strain[at]), 0.0) / limit, norm, power / whole
+    return max(peak, 0.0) / limit, norm, power / whole
 
 
 def _of_law(

@@ -14,10 +14,7 @@ import numpy as np
 from ccfem.base.arrays import FloatArray, freeze, in_brief
 from ccfem.fem.elasticity.zone import BALL, ZONE, ball_averages, distance_from_patches
 from ccfem.judging.virtual_testing import failure_laws
-from ccfem.judging.virtual_testing.failure_laws.fibre import (
-    FIBRE_SHARE as FIBRE_SHARE,
-    fibre_peak as fibre_peak,
-)
+from ccfem.judging.virtual_testing.failure_laws.fibre import fibre_peak as fibre_peak
 from ccfem.judging.virtual_testing.failure_laws.interlayer import layer_normals
 from ccfem.judging.virtual_testing.failure_laws.matrix import matrix_peak as matrix_peak
 from ccfem.judging.virtual_testing.strand import Failure, Limits, Strand
@@ -43,7 +40,7 @@ class FirstFailure:
     matrix_index : float, MPa
         Peak of the averaged von Mises stress under the load of the test.
     fibre_index : float, N
-        Axial force that 99 % of the fibre length stays below under the load of the test.
+        Highest axial force in a strand, averaged over 5 mm, under the load of the test.
     interlayer_load : float, N
         Load at which layers would come apart; infinite where nothing opens or slides, and where
         that was not judged.
@@ -96,7 +93,7 @@ def first_failure(
     Parameters
     ----------
     strand : Strand, optional
-        Its strength is the fibre's; default 86 N.
+        Its strength is the fibre's; default 105 N.
     matrix_strength : float, MPa, optional
         Von Mises stress at failure, calibrated (`ccfem.judging.virtual_testing.calibration`);
         default the tensile strength of the material of the part.

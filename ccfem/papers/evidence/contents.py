@@ -10,6 +10,8 @@ import numpy as np
 
 from ccfem.base.csv_table import write_csv
 from ccfem.base.progress import Progress, silent
+from ccfem.judging.virtual_testing.strand import STRENGTH
+from ccfem.judging.virtual_testing.strands import AVERAGING_LENGTH
 from ccfem.papers.contents import (
     Contents,
     claim_table,
@@ -215,7 +217,7 @@ def calibrated_table(study: Study) -> str:
 
 
 def force_table(study: Study) -> str:
-    """Highest force in a strand at the load at which each print of Chen et al. broke."""
+    """Averaged force in a strand at the load at which each print of Chen et al. broke."""
     lines = []
     for part in FITTED:
         if PARTS[part].missing:
@@ -224,7 +226,12 @@ def force_table(study: Study) -> str:
             load = 1000.0 * measured_of(part, name, LOAD)
             lines.append((part, name, f"{1e-3 * load:.3f}", f"{force * load:.0f}"))
     shown = table(("part", "print", "broke at, kN", "highest strand force then, N"), lines)
-    return f"{shown}\nOf pieces of strand of half a millimetre and more; it depends on the mesh.\n"
+    return f"""{shown}
+Averaged over {AVERAGING_LENGTH:g} mm of strand. On cells with midside nodes these figures change by
+3 % at most, those of single pieces by 23 %. The strength of a strand in the virtual test,
+{STRENGTH:g} N, is the highest of them. Parts in which something else fails first stay below it:
+layers of the Loop's zigzag came apart, and the pushed Shell hardly stretches fibre.
+"""
 
 
 def quantities(study: Study) -> dict[str, float]:

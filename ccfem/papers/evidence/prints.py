@@ -31,8 +31,8 @@ from ccfem.fem.materials import isotropic
 from ccfem.judging.virtual_testing.equilibrium import IN_COMPRESSION, PARTIAL
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strands import cut_strands
-from ccfem.judging.virtual_testing.strength import matrix_peak
-from ccfem.judging.virtual_testing.virtual_test import VirtualTest, virtual_test
+from ccfem.judging.virtual_testing.strength import fibre_peak, matrix_peak
+from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine
 from ccfem.papers.chen_2021.authors import PATHS
 from ccfem.papers.chen_2021.loop import FOLDER as CHEN, LAYERS_TABLE_2, authors_folder, authors_loop
@@ -54,10 +54,6 @@ FAR_END = PARTIAL
 RHOS = (2.5, 6.0)
 """EA/E, mm^2, at which ratios are known beside the default, to fit it."""
 
-_PIECE = 0.5
-"""Length of a piece of strand, mm, from which on its force counts: shorter ones cut off corners of
-cells."""
-
 _BUILD = (0.0, 1.0, 0.0)
 
 
@@ -77,15 +73,9 @@ def _tested(
         first[NONE] = far[NONE] = test.unreinforced_stiffness
         first[name], far[name] = test.stiffness, other.stiffness
         by_rho[name] = {test.rho: test.ratio, **dict(test.span)}
-        force[name] = _highest_force(test)
+        force[name] = fibre_peak(test)[0] / test.force
     index = matrix_peak(field)[0] / specimen.force(np.zeros_like(field.mesh.points))
     return PartResult((first, far), by_rho if rhos else None, index, force)
-
-
-def _highest_force(test: VirtualTest) -> float:
-    """Highest force in a strand a N of load."""
-    long = test.strands.length >= _PIECE
-    return float(test.axial_force[long].max(initial=0.0)) / test.force
 
 
 # Chen et al. 2021.

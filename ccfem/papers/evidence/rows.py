@@ -185,7 +185,7 @@ class PartResult:
     matrix_index : float
         Peak of the averaged von Mises stress without fibre, MPa a N of load.
     strand_force : mapping of print to float
-        Highest force in a strand, N a N of load.
+        Highest force in a strand, averaged over 5 mm, N a N of load.
     """
 
     readings: tuple[Mapping[str, float], ...]

@@ -14,6 +14,7 @@ import numpy as np
 from ccfem.base.arrays import FloatArray, in_brief
 from ccfem.base.tensor import to_voigt
 from ccfem.fem.elasticity.loads import strain_forces
+from ccfem.fem.elasticity.zone import ball_averages
 from ccfem.judging.virtual_testing import Strand
 from ccfem.judging.virtual_testing.near_failure import (
     POWER,
@@ -24,6 +25,7 @@ from ccfem.judging.virtual_testing.near_failure import (
     stretched_index,
 )
 from ccfem.judging.virtual_testing.strand import Limits
+from ccfem.judging.virtual_testing.strands import AVERAGING_LENGTH
 from ccfem.strategies.fibre_aware.border_levels import BorderLevels
 from ccfem.strategies.fibre_aware.field_descent import drawn_to_borders
 from ccfem.strategies.fibre_aware.smeared import SmearedSolution
@@ -40,7 +42,7 @@ _TOLERANCE = 1e-3
 """Relative residual of the adjoint solve."""
 
 _NONE = 1e-300
-"""Share used in place of zero: a field without layers is divided by it."""
+"""Share or length used in place of zero: a field without layers is divided by it."""
 
 
 @dataclass(frozen=True)
@@ -155,7 +157,8 @@ class StrengthProblem:
             fibre, counted = None, np.zeros_like(stretch)
             if stretch.max() > 0.0:
                 strain = (stretch / size**2).ravel()
-                index, norm, share = stretched_index(strain, length, limit)
+                peak = self._highest(stretch / size**2, length.reshape(size.shape))
+                index, norm, share = stretched_index(strain, length, peak, limit)
                 counted = share.reshape(stretch.shape)
                 by_stretch = counted / np.where(stretch > 0.0, stretch, 1.0)
                 along = np.stack([one.along for one in smeared])
@@ -168,6 +171,15 @@ class StrengthProblem:
             scaled = {name: peak.over(load) for name, peak in peaks.items()}
             case_peaks.append(_CasePeaks(scaled, stretch, counted))
         return case_peaks
+
+    def _highest(self, strain: FloatArray, length: FloatArray) -> float:
+        """Highest strain of all fields (f, m), averaged over as much fibre as that of strands."""
+        mesh, radius = self.problem.parts[0].specimen.unreinforced.mesh, 0.5 * AVERAGING_LENGTH
+        cells = np.arange(len(mesh.cells))
+        return max(
+            float(ball_averages(mesh.centres, of_field[:, None], weight, cells, radius).max())
+            for of_field, weight in zip(strain, np.maximum(length, _NONE), strict=True)
+        )
 
     def _forces(self, by_strain: FloatArray) -> FloatArray:
         """Turn a derivative by the strains (m, 3) in the plane into one by the displacement."""

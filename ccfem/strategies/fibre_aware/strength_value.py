@@ -25,6 +25,7 @@ from ccfem.judging.virtual_testing.near_failure import (
     stretched_index,
 )
 from ccfem.judging.virtual_testing.strand import Limits
+from ccfem.judging.virtual_testing.strands import Windows
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.strategies.fibre_aware.strain_worth import StrainWorth
 
@@ -140,7 +141,7 @@ class Worth:
         share = np.full(len(equilibria), 1.0 / len(equilibria)) if counts is None else counts
         axial, w = self.strand.stiffness(self.parts[0].modulus), self.strength
         pieces = bars(strands, self.parts[0].system.problem.mesh)
-        length = strands.length * strands.share
+        length, windows = strands.length * strands.share, Windows(strands)
         strains = [pieces.strain(equilibrium.displacement) for equilibrium in equilibria]
         check_stretched(strains)
         works = [equilibrium.work for equilibrium in equilibria]
@@ -149,7 +150,7 @@ class Worth:
             zip(self.judges, equilibria, strains, strict=True)
         ):
             fibre = _fibre(
-                pieces, length, strain, equilibrium.displacement, self.limits.fibre / axial
+                pieces, windows, strain, equilibrium.displacement, self.limits.fibre / axial
             )
             of_case = judge.peaks(equilibrium.displacement, fibre, self.limits, normal)
             load = _load_share(self.parts[k], works[k])
@@ -193,11 +194,13 @@ def _respond(part: Specimen, equilibrium: Equilibrium, load: FloatArray) -> Floa
 
 
 def _fibre(
-    pieces: Bars, length: FloatArray, strain: FloatArray, displacement: FloatArray, limit: float
+    pieces: Bars, windows: Windows, strain: FloatArray, displacement: FloatArray, limit: float
 ) -> Peak | None:
     """Index of the fibre; none where no fibre is stretched."""
     if not strain.max(initial=0.0) > 0.0:
         return None
-    index, norm, counted = stretched_index(strain, length, limit)
+    length = windows.strands.length * windows.strands.share
+    peak, _ = windows.highest(np.maximum(strain, 0.0))
+    index, norm, counted = stretched_index(strain, length, peak, limit)
     squared = np.where(strain > 0.0, strain, 1.0) ** 2 * pieces.length
     return Peak(index, norm, pieces.forces(counted / squared, displacement))

@@ -69,7 +69,7 @@ def test_part_fails_in_the_case_of_the_least_multiple(plate, strength, case):
     found = cases_failure(tested, strand)
     ratio = tested.ratios[0]
     first = min(strength / (4.0 * 5.0 / ratio), 35.0 / (5.0 / ratio))
-    # The strain is not quite uniform on these cells: the index is a 99th percentile.
+    # The strain is not quite uniform on these cells: the highest mean over 5 mm counts.
     assert found.factors[0] == pytest.approx(first, rel=0.06)
     assert found.factors[1] == pytest.approx(17.5, rel=0.01)
     assert (found.case, found.factor) == (case, min(found.factors))

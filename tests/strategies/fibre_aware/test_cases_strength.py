@@ -153,7 +153,7 @@ def test_the_judge_weighs_what_each_test_alone_says(strong_plate):
     # Force without fibre: that of the load along x, and along y of the reactions.
     bare = [goal.parts[k].force(field.reactions) for k, field in enumerate(cases.fields)]
     for strength in (0.0, 0.3, 1.0):
-        judge = strength_judge(goal, layers, SHORT, strand, strength)
+        judge = strength_judge(goal, layers, SHORT, strand, strength, tolerance=1e-8)
         expected = goal.merit(ratios) ** (1.0 - strength) * (loads / bare).min() ** strength
         assert judge(paths).value == pytest.approx(expected, rel=1e-5)
 

@@ -1,4 +1,4 @@
-"""Failure of the fibre: the force that 99 % of its length stays below reaches its strength."""
+"""Failure of the fibre: the highest force in a strand, averaged over a length, is its strength."""
 
 from collections.abc import Sequence
 
@@ -6,11 +6,9 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray
 from ccfem.judging.virtual_testing.strand import Failure, Limits
+from ccfem.judging.virtual_testing.strands import AVERAGING_LENGTH, Windows
 from ccfem.judging.virtual_testing.virtual_test import VirtualTest
 from ccfem.slicing.layers import Layer
-
-FIBRE_SHARE = 0.99
-"""Share of the fibre length whose axial force stays below the fibre's index."""
 
 
 def fails(test: VirtualTest, limits: Limits, _: Sequence[Layer] | None) -> Failure:
@@ -20,9 +18,6 @@ def fails(test: VirtualTest, limits: Limits, _: Sequence[Layer] | None) -> Failu
     return Failure(load, where, values={"fibre_load": load, "fibre_index": index})
 
 
-def fibre_peak(test: VirtualTest, share: float = FIBRE_SHARE) -> tuple[float, FloatArray]:
-    """Axial force, N, that `share` of the fibre length stays below, and a place (3,) of it."""
-    order = np.argsort(test.axial_force, kind="stable")
-    reached = np.cumsum((test.strands.length * test.strands.share)[order])
-    at = order[min(np.searchsorted(reached, share * reached[-1]), len(order) - 1)]
-    return float(test.axial_force[at]), test.strands.middle[at]
+def fibre_peak(test: VirtualTest, length: float = AVERAGING_LENGTH) -> tuple[float, FloatArray]:
+    """Highest mean of the axial force over a length of strand, mm, in N, and its place (3,)."""
+    return Windows(test.strands, length).highest(test.axial_force)
