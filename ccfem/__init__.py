@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from ccfem.judging.evaluation import evaluate
     from ccfem.judging.virtual_testing import virtual_test
     from ccfem.judging.virtual_testing.calibration import calibrate
+    from ccfem.judging.virtual_testing.progressive_failure import breaking_load
     from ccfem.machine import Machine
     from ccfem.papers.reproduce import reproduce
     from ccfem.paths.planning import plan
@@ -51,6 +52,7 @@ __all__ = [
     "Machine",
     "Problem",
     "Study",
+    "breaking_load",
     "calibrate",
     "check",
     "compare",
@@ -78,6 +80,7 @@ _HOMES = {
     "Machine": "machine",
     "Problem": "fem.elasticity",
     "Study": "comparison.studies",
+    "breaking_load": "judging.virtual_testing.progressive_failure",
     "calibrate": "judging.virtual_testing.calibration",
     "check": "cases.inspection",
     "compare": "comparison",

@@ -1,6 +1,6 @@
 """The specimen of a virtual test: the part without fibres, clamped, loaded and factorised."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -88,6 +88,22 @@ class Specimen:
             known[self.backend] = made
         specimen: Specimen = known[self.backend]
         return specimen
+
+    def weakened(self, matrix: sp.bsr_array, solver: Solver) -> "Specimen":
+        """Return the part with another stiffness, and a solver of a similar one.
+
+        Parameters
+        ----------
+        matrix : bsr_array (3n, 3n), N/mm
+            Of the pattern of `matrix`.
+        solver : Solver
+            Of a similar matrix under the same supports: the preconditioner.
+        """
+        made = replace(self, matrix=matrix)
+        reduced = self.held.reduce(matrix)
+        made.__dict__["held"] = self.held
+        made.__dict__["solver"] = replace(solver, matrix=reduced, exact=False)
+        return made
 
     @cached_property
     def solver(self) -> Solver:

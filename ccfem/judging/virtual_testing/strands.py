@@ -64,6 +64,12 @@ class Strands:
     def __len__(self) -> int:
         return len(self.cell)
 
+    @classmethod
+    def none(cls) -> "Strands":
+        """Return no fibre at all."""
+        none, points = np.zeros(0), np.zeros((0, 3))
+        return cls(none, none, points, none, none, points, 0.0, none)
+
     @property
     def total(self) -> float:
         """Length of fibre inside the mesh, mm."""
@@ -252,12 +258,26 @@ class Windows:
         size = last - first
         return np.asarray(np.divide(sums, size, out=np.zeros_like(sums), where=size > 0.0))
 
+    def overlap(self, window: int) -> tuple[IntArray, FloatArray]:
+        """Pieces that a window covers, and the share of each that it covers."""
+        first, last = self.bounds[window]
+        low = int(np.searchsorted(self._reached, first, side="right")) - 1
+        high = int(np.searchsorted(self._reached, last, side="left"))
+        ends = np.clip(self._reached[low : high + 1], first, last)
+        size = np.diff(self._reached[low : high + 1])
+        share = np.divide(np.diff(ends), size, out=np.zeros_like(size), where=size > 0.0)
+        return np.arange(low, high), share
+
     def highest(self, values: FloatArray) -> tuple[float, FloatArray]:
         """Largest mean of a value (s,) of the pieces, and the middle (3,) of its window."""
         means = self.means(values)
         window = int(means.argmax())
+        return float(means[window]), self.middle(window)
+
+    def middle(self, window: int) -> FloatArray:
+        """Middle (3,) of a window, to within half a piece."""
         at = np.searchsorted(self._reached, self.bounds[window].mean(), side="right") - 1
-        return float(means[window]), self.strands.middle[min(at, len(self.strands) - 1)]
+        return self.strands.middle[min(at, len(self.strands) - 1)]
 
 
 # Straight steps in the mesh, cut where they pass from one cell to the next.
