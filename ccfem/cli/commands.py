@@ -20,6 +20,7 @@ from ccfem.cli.machines import MachineName, SetMachine, machines
 from ccfem.cli.optimising import optimise
 from ccfem.cli.options import (
     Backend,
+    BreakingLoad,
     Calibration,
     CasePath,
     Centre,
@@ -420,6 +421,7 @@ def compare(
     paths_frame: PathsFrame = None,
     curve: Curve = None,
     virtual_test: VirtualTest = True,
+    breaking_load: BreakingLoad = False,
     every_layer: EveryLayer = False,
     load_case: LoadCase = None,
     refine: Refine = False,
@@ -479,6 +481,7 @@ def compare(
             backend=backend,
             curve=curve,
             every_layer=every_layer,
+            breaking_load=breaking_load,
         )
 
     run(case, ask, Output(out, force, pictures, drawings_of(drawings), "", details))
@@ -496,6 +499,7 @@ def plan(
     fibre_per_layer: Fibre = None,
     stiffness: Stiffness = None,
     virtual_test: TestOrNot = None,
+    breaking_load: BreakingLoad = False,
     every_layer: EveryLayer = False,
     load_case: LoadCase = None,
     refine: Refine = False,
@@ -569,6 +573,7 @@ def plan(
             course=course,
             every_layer=every_layer,
             longest_test=LONGEST_TEST if untold else float("inf"),
+            breaking_load=breaking_load,
         )
 
     output = Output(out, force, pictures, drawings_of(drawings), f"-{strategy}", details, cell)

@@ -152,6 +152,13 @@ VirtualTest = Annotated[
         help="Re-solve the part with the fibres of each strategy in it.",
     ),
 ]
+BreakingLoad = Annotated[
+    bool,
+    typer.Option(
+        "--breaking-load",
+        help="Also break every plan, step by step: an experiment that takes minutes a plan.",
+    ),
+]
 TestOrNot = Annotated[
     bool | None,
     typer.Option(

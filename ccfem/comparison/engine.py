@@ -17,7 +17,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from ccfem.base.checks import refuse_keywords
-from ccfem.base.errors import InputError
+from ccfem.base.errors import InputError, SolveError
 from ccfem.base.parallel import in_processes, processors
 from ccfem.base.progress import Progress, silent
 from ccfem.cases.case import Case
@@ -52,6 +52,7 @@ from ccfem.comparison.stages import (
     side_by_side,
     timed,
     to_length,
+    with_breaking_load,
     with_print,
     with_test,
 )
@@ -59,7 +60,9 @@ from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.stress_field import GivenStress, PartStress, StressField, WeightedCases
 from ccfem.fem.elasticity.support_kinds import PressingSupport
 from ccfem.fem.stress_files.stress_file import read_stress
+from ccfem.judging.virtual_testing.progressive_failure import BreakingLoad, breaking_load
 from ccfem.judging.virtual_testing.several_cases import specimens
+from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.paths.planning.given_paths import GivenPaths
 from ccfem.paths.planning.strategy import Strategy, full_length
@@ -253,7 +256,8 @@ def answer(
     if parts is None:
         with timed(seconds, "slice"):
             parts, refused = _cut(request, basis)
-    steps = (5 if request.print_plans else 4) * len(request.strategies) * len(parts) + 1
+    stages = 4 + request.print_plans + request.breaking_load
+    steps = stages * len(request.strategies) * len(parts) + 1
     tell = counted(progress, 0.1, steps)
     parts, runs, wanted = _planned(request, basis, parts, tell)
     runs = side_by_side("evaluating {}", evaluated, runs, parts, tell)
@@ -262,6 +266,9 @@ def answer(
     if basis.tests is not None:
         test = partial(with_test, tests=basis.tests)
         runs = side_by_side("testing {}", test, runs, parts, tell)
+    bare = None
+    if request.breaking_load:
+        runs, bare = _broken(request, basis, parts, runs, tell, seconds)
     curve = _curve(request, basis, parts, runs, wanted, tell, seconds)
     bounds = _bounds(request, basis, parts, runs, wanted, tell, seconds)
     runs = [_bounded(run, bounds, wanted) for run in runs]
@@ -281,7 +288,36 @@ def answer(
         bounds=bounds,
         curve=curve,
         of_slicers=said,
+        bare=bare,
     )
+
+
+def _broken(
+    request: Request,
+    basis: Solved,
+    parts: Mapping[str, Part],
+    runs: list[Run],
+    tell: Tell,
+    seconds: dict[str, float],
+) -> tuple[list[Run], BreakingLoad | None]:
+    """Break every run, and the part without fibre."""
+    assert request.strand is not None
+    try:
+        with timed(seconds, "breaking load without fibre"):
+            specimen = Specimen.of(_on_linear_cells(basis.field, basis.case, request.backend))
+            bare = breaking_load(None, specimen, request.strand)
+    except (InputError, SolveError) as error:
+        return [replace(run, unbroken=str(error)) for run in runs], None
+    test = partial(with_breaking_load, specimen=specimen, strand=request.strand)
+    return side_by_side("breaking {}", test, runs, parts, tell), bare
+
+
+def _on_linear_cells(field: StressField, case: Case, backend: str) -> StressField:
+    """Solution of the same load case on the cells of the part, where those are linear."""
+    mesh = case.problem.mesh
+    if field.mesh.order == 1 or mesh.order == 2:
+        return field
+    return solve(replace(field.problem, mesh=mesh, order=1), backend)[field.case]
 
 
 def _cut(request: Request, basis: Solved) -> tuple[dict[str, Part], dict[str, str]]:
@@ -571,6 +607,7 @@ def compare(
     fibre: float | None = None,
     stiffness: str | None = None,
     course: Course = WITHOUT_HALT,
+    breaking_load: bool = False,
     **unknown: Any,
 ) -> Comparison:
     """Solve a case once, and plan and evaluate each strategy on it.
@@ -601,7 +638,7 @@ def compare(
     stiffness : str, optional
         Lay the least fibre that reaches it, by one strategy: a ratio to the stiffness of the part
         without fibre as ``"2.5"``, or ``"1200N/mm"``.
-    strand, load_case, stress, backend, curve, print_plans, support, course
+    strand, load_case, stress, backend, curve, print_plans, support, course, breaking_load
         As in `Request`.
     progress : callable, optional
         Receives what is being done, and the share of the work that is done.
@@ -634,5 +671,6 @@ def compare(
         print_plans=print_plans,
         support=support,
         course=course,
+        breaking_load=breaking_load,
     )
     return answer(request, progress)

@@ -5,7 +5,7 @@ import json
 import os
 import platform
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
@@ -21,10 +21,12 @@ from ccfem.base.parallel import in_processes
 from ccfem.base.progress import Progress, silent
 from ccfem.base.result_folder import whole_folder
 from ccfem.comparison.headline import TEST_COLUMNS, headline_values, print_values
+from ccfem.comparison.plot.colours import palette
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.shown import file_stem
 from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.judging.virtual_testing.progressive_failure import BreakingLoad
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import curved_layers
 
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
 
 RESULT_FILES = (
     *("results.csv", "results.json", "report.html", "paths.vtp", "curve.csv", "curve.png"),
+    *("*_breaking.csv", "breaking.png"),
     *("tension.png", "overview.png", "part.png", "part.html"),
     *("*_waypoints.txt", "*_waypoints.csv", "*.gcode", "*_cell.csv", "*_trim.csv"),
     *("*_layer_[0-9]*.png", "*_layer_[0-9]*.svg", "*_layer_[0-9]*.dxf", "*_force.png"),
@@ -90,7 +93,8 @@ def write_results(
 ) -> None:
     """Write ``results.csv``, ``results.json``, ``report.html`` and paths; pictures where wanted.
 
-    With a curve, also ``curve.csv``; where layers are curved, ``matrix_waypoints.csv``, rings that
+    With a curve, also ``curve.csv``; with breaking loads ``breaking.png`` and
+    ``STRATEGY_breaking.csv``; where layers are curved, ``matrix_waypoints.csv``, rings that
     fill the layers. Runs with a print plan get ``STRATEGY.gcode`` too, ``STRATEGY_cell.csv`` with
     the same moves where they are wanted, and ``STRATEGY_trim.csv`` where strands leave the part. In
     ``paths.vtp`` the cell array "strategy" numbers the strategies that did not fail, in the order
@@ -127,12 +131,23 @@ def write_results(
     if comparison.curve is not None:
         frame = comparison.curve.frame
         write_csv(folder / "curve.csv", [*frame], frame.itertuples(index=False))
+    for name, broken in comparison.broken.items():
+        rows = breaking_rows(broken)
+        write_csv(folder / f"{file_stem(name)}_breaking.csv", _BREAKING, rows)
     _write_paths(comparison, folder, cell)
     spent["files"] = time.perf_counter() - start
     start = time.perf_counter()
     for suffix in drawings:
         with spared(f"drawings ({suffix})", left_out):
             _write_drawings(comparison, folder, suffix)
+    if comparison.broken:
+        from ccfem.comparison.plot.breaking_curves import breaking_picture
+        from ccfem.comparison.plot.canvas import png
+
+        with spared("breaking.png", left_out):
+            colours = palette(run.name for run in comparison.runs)
+            picture = png(breaking_picture(comparison.broken, colours))
+            (folder / "breaking.png").write_bytes(picture)
     if pictures:
         _draw(comparison, folder, lambda what, share: progress(what, 0.2 + 0.6 * share), left_out)
         spent["pictures"] = time.perf_counter() - start
@@ -331,6 +346,18 @@ def results_rows(comparison: Comparison) -> list[dict[str, Any]]:
     return rows
 
 
+_BREAKING = ("curve", "displacement_mm", "load_N", "cells_cracked", "fibre_broken_mm")
+
+
+def breaking_rows(broken: BreakingLoad) -> Iterator[tuple[str, float, float, int, float]]:
+    """Rows of load over displacement of an experiment: "middle", "low" and "high" of its band."""
+    for name, curve in (("middle", broken.curve), ("low", broken.low), ("high", broken.high)):
+        if curve is not None:
+            columns = (curve.displacement, curve.force, curve.cracks, curve.broken)
+            for row in zip(*(column.tolist() for column in columns), strict=True):
+                yield name, *row
+
+
 def _columns(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """Columns of rows: who, where and why not first, then in the order in which they occur."""
     names = [name for row in rows for name in row]
@@ -476,6 +503,24 @@ def _run_record(run: Run) -> dict[str, Any]:
         "first_failure": vars(run.tested.failure) if run.tested and run.tested.failure else None,
         "first_failure_alternative": _alternative_failure(run),
         "pinned_joints": [vars(joint) for joint in run.tested.joints] if run.tested else None,
+        "breaking_load_experiment": _breaking_record(run.broken),
+    }
+
+
+def _breaking_record(broken: BreakingLoad | None) -> dict[str, Any] | None:
+    """Say at which load a part breaks, its band, and how; None where that was not computed."""
+    if broken is None:
+        return None
+    low, high = broken.band
+    return {
+        "load": broken.load,
+        "low": low,
+        "high": high,
+        "first": broken.curve.first,
+        "first_load": float(broken.curve.force[1]),
+        "where": broken.curve.where,
+        "softening": broken.softening,
+        "said": broken.said,
     }
 
 

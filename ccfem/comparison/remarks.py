@@ -30,6 +30,7 @@ _IMPORTANT = (
     ("failed: ", "cannot cut the part: ", "cannot be printed as planned"),
     ("not printable as planned: ",),
     ("no virtual test: ", "undecided against", "no difference to"),
+    ("experiment: ", "no breaking load: "),
     ("linear theory", " are usual", "held nodes"),
     ("no paths of", "trust neither number", "bring the worst case above"),
     ("planned for ", "takes ", "the stress of another program"),
@@ -89,6 +90,7 @@ def _about(run: Run, wanted: Wanted, bounded: bool) -> list[str]:
         "failed": run.failure,
         "no virtual test": run.untested,
         "cannot be printed as planned": run.unprinted,
+        "no breaking load": run.unbroken,
         "no first-failure load": run.tested.note if run.tested is not None else "",
     }
     lines = [f"{what}: {reason}" for what, reason in reasons.items() if reason]
@@ -96,6 +98,8 @@ def _about(run: Run, wanted: Wanted, bounded: bool) -> list[str]:
         cases = run.cases.failure.each if run.cases and run.cases.failure else ()
         notes = [failure.note for failure in (run.tested.failure, *cases)]
         lines += dict.fromkeys(filter(None, notes))
+    if run.broken is not None:
+        lines.append(run.broken.said)
     if run.evaluation is not None:
         lines += _about_links(run.evaluation.total)
         meant = getattr(run.strategy, "crosses", False)

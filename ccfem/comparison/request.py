@@ -214,6 +214,9 @@ class Request:
         layers, evenly spread, where there are more.
     longest_test : float, mm, default infinite
         Length of fibre above which a plan is not tested virtually.
+    breaking_load : bool, default False
+        Also follow every plan to the load that breaks it (`ccfem.breaking_load`), an experiment
+        that takes minutes a plan, under the heaviest load case.
 
     Raises
     ------
@@ -236,6 +239,7 @@ class Request:
     course: Course = WITHOUT_HALT
     every_layer: bool = False
     longest_test: float = float("inf")
+    breaking_load: bool = False
 
     def __post_init__(self) -> None:
         freeze(self, strategies=dict, slicings=dict)
@@ -245,6 +249,8 @@ class Request:
             check_instance("strategy", strategy)
         if self.curve and self.strand is None:
             raise InputError("the curve is one of stiffness: leave the virtual test in, or it out")
+        if self.breaking_load and self.strand is None:
+            raise InputError("the breaking load is of a virtual test: leave that in, or it out")
         if self.curve and isinstance(self.amount, Spread):
             raise InputError("several lengths are planned for already: leave the curve out")
         if self.named:

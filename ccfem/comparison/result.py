@@ -22,6 +22,7 @@ from ccfem.comparison.table import Table, frame, headline_table
 from ccfem.comparison.verdict import verdict
 from ccfem.comparison.views import front_picture, layer_view, paragraphs, shown_layer
 from ccfem.fem.elasticity.stress_field import GivenStress, PartStress, StressField, WeightedCases
+from ccfem.judging.virtual_testing.progressive_failure import BreakingLoad
 from ccfem.slicing.layers import Layer
 from ccfem.strategies.fibre_aware.upper_bound import UpperBound
 
@@ -57,6 +58,8 @@ class Comparison:
         runs, and others where several lengths are asked for. Empty without virtual tests.
     of_slicers : tuple of str
         Remarks of the slicers, one line each.
+    bare : BreakingLoad, optional
+        The load that breaks the part without fibre, if breaking loads were asked for.
     curve : Curve, optional
         The strategies at several lengths of fibre, if that was asked for, or if a strategy cannot
         lay the length of the others.
@@ -73,6 +76,7 @@ class Comparison:
     bounds: Mapping[float, UpperBound] = field(default_factory=dict)
     curve: Curve | None = None
     of_slicers: tuple[str, ...] = ()
+    bare: BreakingLoad | None = None
 
     def __post_init__(self) -> None:
         freeze(self, stacks=dict, runs=tuple, seconds=dict, refused=dict, bounds=dict)
@@ -193,6 +197,12 @@ class Comparison:
             )
         return parts
 
+    @property
+    def broken(self) -> dict[str, BreakingLoad]:
+        """Breaking loads by name of the run, that of the part without fibre first."""
+        bare = {} if self.bare is None else {"without fibre": self.bare}
+        return bare | {run.name: run.broken for run in self.ranking if run.broken is not None}
+
     def plot(self) -> "Figure":
         """Draw the paths of all strategies on the middle one of the layers with fibre.
 
@@ -282,6 +292,8 @@ class Comparison:
             thick = (f"{name} {self._count(name)}" for name in self.stacks)
             lines.append(f"layers: {', '.join(thick)}")
         alone = None if self.several_cases else self.bound
+        if self.bare is not None:
+            lines.append(f"without fibre: {self.bare.said}")
         lines += remarks(self.runs, self.wanted, alone)
         if not self.over_slicings:
             lines += open_remarks(self.succeeded, self.layers, self.case.machine.fibre_width)

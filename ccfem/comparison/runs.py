@@ -11,6 +11,7 @@ from ccfem.comparison.tested_cases import TestedCases
 from ccfem.judging.evaluation import Evaluation
 from ccfem.judging.evaluation.strand_rules import StrandVerdict
 from ccfem.judging.virtual_testing.pinned_joints import PinnedJoint
+from ccfem.judging.virtual_testing.progressive_failure import BreakingLoad
 from ccfem.judging.virtual_testing.scatter import RatioScatter
 from ccfem.judging.virtual_testing.strength import FirstFailure
 from ccfem.judging.virtual_testing.virtual_test import Bracket
@@ -106,6 +107,10 @@ class Run:
     why_not : str
         What keeps the paths from being printed as they are: `unprinted`, and lengths, turns, room,
         fibre outside the part or on nothing; empty if they can be.
+    broken : BreakingLoad or None
+        The load that breaks the part, an experiment; None where it was not asked for or possible.
+    unbroken : str
+        Why there is no breaking load although it was asked for; else empty.
     unprinted : str
         Why the machine cannot print the part as planned, or why no file of the print can be made
         although one was asked for; else empty.
@@ -133,6 +138,8 @@ class Run:
     untested: str = ""
     why_not: str = ""
     unprinted: str = ""
+    broken: BreakingLoad | None = None
+    unbroken: str = ""
     slicing: str = ""
     seconds: Mapping[str, float] = field(default_factory=dict)
 

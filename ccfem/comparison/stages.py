@@ -17,6 +17,7 @@ from ccfem.fem.elasticity.stress_field import PartStress, StressField, WeightedC
 from ccfem.judging.evaluation import evaluate
 from ccfem.judging.evaluation.strand_rules import StrandVerdict, strand_verdict, why_not
 from ccfem.judging.virtual_testing.pinned_joints import pinned_joints
+from ccfem.judging.virtual_testing.progressive_failure import breaking_load
 from ccfem.judging.virtual_testing.scatter import DEFAULT_SCATTER, Scatter, ratio_scatter
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import Limits, Strand
@@ -500,6 +501,20 @@ def _test(
     limits = Limits.of(test.solution.problem.material, strand)
     joints = pinned_joints(test.solution, specimen.forces, test.force, limits)
     return Tested(bracket, failure, matrix_before=before, scatter=scatter, joints=joints)
+
+
+def with_breaking_load(run: Run, part: Part, specimen: Specimen, strand: Strand) -> Run:
+    """Break a run's part on linear cells, or say why it cannot be broken."""
+    if run.evaluation is None or run.untested:
+        return run
+
+    def work() -> Run:
+        mesh = specimen.unreinforced.mesh
+        about = (run.strategy, part.layers, mesh, part.machine, run.strand_verdict.parts)
+        strands = carrying_strands(run.toolpaths, *about)
+        return replace(run, broken=breaking_load(strands, specimen, strand))
+
+    return _stage(run, "breaking load", work, reason="unbroken")
 
 
 def _stage(run: Run, stage: str, work: Callable[[], Run], reason: str = "failure") -> Run:

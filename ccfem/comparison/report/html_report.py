@@ -15,8 +15,10 @@ from ccfem.base.tensor import von_mises
 from ccfem.cases.inspection import Check, check
 from ccfem.comparison.citations import bibtex, cited, methods_of, sentence
 from ccfem.comparison.headline import TEST_COLUMNS
+from ccfem.comparison.plot.breaking_curves import breaking_picture
 from ccfem.comparison.plot.colours import palette
 from ccfem.comparison.plot.part_picture import coloured, load_arrows, support_marks
+from ccfem.comparison.plot.values import image
 from ccfem.comparison.report.charts import curve_charts, fronts, spreads
 from ccfem.comparison.report.layer_view import layer_views
 from ccfem.comparison.report.packing import Rounded, as_bytes, compressed, pack
@@ -33,6 +35,7 @@ from ccfem.comparison.table import (
 )
 from ccfem.fem.elasticity.stress_field import StressField, about_cells
 from ccfem.judging.evaluation import COLUMNS
+from ccfem.judging.virtual_testing.progressive_failure import WORTH
 from ccfem.judging.virtual_testing.virtual_test import HONEST_PROMISE
 
 
@@ -115,6 +118,7 @@ def report_html(
         "has_curve": curve is not None,
         "curve_said": _about_curve(comparison),
         "curve_table": curve_table(curve),
+        "breaking": _breaking(comparison, colours, left_out),
         "against": against_each_other(comparison.ranking),
         "load_cases": load_cases_table(comparison.ranking),
         "indices": all_indices(comparison.ranking),
@@ -174,6 +178,20 @@ def _about_curve(comparison: Comparison) -> str:
         if common
         else "No length is within reach of all strategies."
     )
+
+
+def _breaking(
+    comparison: Comparison, colours: Mapping[str, str], left_out: list[str]
+) -> dict[str, Any]:
+    """Picture of the breaking loads, what is said of them and their worth; empty without any."""
+    broken = comparison.broken
+    if not broken:
+        return {}
+    picture = ""
+    with spared("picture of the breaking load", left_out):
+        picture = image(breaking_picture(broken, colours))
+    said = [f"{name}: {load.said}" for name, load in broken.items()]
+    return {"picture": picture, "said": said, "worth": WORTH}
 
 
 def _parameters(

@@ -463,7 +463,9 @@ class BreakingLoad:
     def said(self) -> str:
         """The load, its band and how it broke, in words."""
         low, high = self.band
-        load = f"breaks at {self.load:.4g} N ({low:.4g} to {high:.4g})"
+        load = f"breaks at {self.load:.4g} N"
+        if high > low:
+            load += f" ({low:.4g} to {high:.4g} with other strands and softening)"
         return f"{EXPERIMENT}: {load}, {self.curve.story}"
 
 

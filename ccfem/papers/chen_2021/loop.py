@@ -25,7 +25,7 @@ LAYERS_PUBLISHED = 20
 LAYERS_TABLE_2 = 12
 """Layers that the paper's Table 2 counts: the first ones of the files."""
 
-_HOLES = {
+HOLES = {
     "support": Cylinder((-0.2, 5.0, -50.0), "y", radius=5.0, tolerance=0.45, half="-z"),
     "load": Cylinder((-0.2, 5.0, 50.0), "y", radius=5.0, tolerance=0.45, half="z"),
 }
@@ -60,7 +60,7 @@ def authors_loop(layers: int = LAYERS_TABLE_2) -> Case:
     layers : int, default 12
         Layers spread evenly over the height of 10 mm; 20 gives the heights of the authors' files.
     """
-    mesh = patches_from_rules(read_mesh(authors_folder() / "Loop" / "Loop.tet"), _HOLES)
+    mesh = patches_from_rules(read_mesh(authors_folder() / "Loop" / "Loop.tet"), HOLES)
     problem = Problem(
         mesh=mesh,
         material=isotropic(3500.0, 0.35, name="PLA of the Loop benchmark"),
