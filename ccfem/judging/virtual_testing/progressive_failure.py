@@ -130,7 +130,7 @@ class Damage:
     def none(cls, model: "_Model") -> "Damage":
         """Return a part with no damage."""
         cells, pieces = len(model.specimen.unreinforced.mesh.cells), len(model.windows.strands)
-        return cls(np.zeros(cells), np.ones(cells), np.ones(pieces))
+        return cls(np.zeros(cells, dtype=np.int64), np.ones(cells), np.ones(pieces))
 
 
 class _Response(NamedTuple):
@@ -372,7 +372,7 @@ def _curve(model: _Model, stop: float) -> BreakingCurve:
     solver, near = specimen.solver, specimen.unreinforced.displacement
     rows = [(0.0, 0.0, 0, 0.0)]
     cracked, broken = np.full(len(damage.events), -1), np.full(len(strands), -1)
-    first: tuple[str, FloatArray] = ("", np.full(3, np.nan))
+    what, where = "", np.full(3, np.nan)
     for step in range(_MOST):
         response = model.response(damage, solver, near)
         near = response.balanced.displacement
@@ -384,9 +384,9 @@ def _curve(model: _Model, stop: float) -> BreakingCurve:
         holds = held if factor > _NEXT * max(held, _NONE) and len(rows) > 1 else max(factor, held)
         if holds * response.force < stop * max(row[0] for row in rows) or np.isinf(factor):
             rows.append((held * response.force, rows[-1][1], *model.lost(damage)))
-            return BreakingCurve(*_columns(rows), cracked, broken, *first, step)
+            return BreakingCurve(*_columns(rows), cracked, broken, what, where, step)
         if step == 0:
-            first = model.first(response)
+            what, where = model.first(response)
         most = _TOGETHER * factor
         if factor > held:
             balance = (factor * response.force, factor * response.displacement)
@@ -402,13 +402,17 @@ def _curve(model: _Model, stop: float) -> BreakingCurve:
     )
 
 
-def _columns(rows: Sequence[tuple[float, float, int, float]]) -> tuple[FloatArray, ...]:
+def _columns(
+    rows: Sequence[tuple[float, float, int, float]],
+) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
+    """Columns of the rows of a curve; an error where nothing failed."""
     if len(rows) == 2:
         raise InputError(
             "nothing breaks under this load: no cell away from loads and supports, and no strand, "
             "is stretched; turn the load round"
         )
-    return tuple(np.array(column) for column in zip(*rows, strict=True))
+    force, displacement, cracks, broken = np.array(rows).T
+    return force, displacement, cracks.astype(np.int64), broken
 
 
 # The breaking load with its band.
@@ -537,11 +541,11 @@ def breaking_load(
     limits = Limits.of(specimen.system.problem.material, strand, matrix_strength)
     _check_softening(softening * (SOFTENINGS[0] if band else 1.0), mesh)
     middle = _Model(specimen, Windows(strands), strand, limits, softening)
-    ends: list[BreakingCurve | None] = [None, None]
-    if band:
-        shares = zip((1.0 - SPREAD, 1.0 + SPREAD), SOFTENINGS, strict=True)
-        ends = [_curve(middle.at(*share), _STOP_OF_BAND) for share in shares]
-    return BreakingLoad(_curve(middle, stop), *ends, strands, limits, softening)
+    low, high = (
+        _curve(middle.at(*factors), _STOP_OF_BAND) if band else None
+        for factors in zip((1.0 - SPREAD, 1.0 + SPREAD), SOFTENINGS, strict=True)
+    )
+    return BreakingLoad(_curve(middle, stop), low, high, strands, limits, softening)
 
 
 def _check_softening(softening: float, mesh: TetMesh) -> None:

@@ -67,8 +67,8 @@ class Strands:
     @classmethod
     def none(cls) -> "Strands":
         """Return no fibre at all."""
-        none, points = np.zeros(0), np.zeros((0, 3))
-        return cls(none, none, points, none, none, points, 0.0, none)
+        none, points, numbers = np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64)
+        return cls(numbers, none, points, numbers, none, points, 0.0, none)
 
     @property
     def total(self) -> float:
