@@ -39,8 +39,8 @@ class Pruned:
     """The most useful fibre of another strategy.
 
     The load is that of the stress given to the strategy. Fibre is taken to carry tension only. With
-    the default base, straight rows along the mean tension and contours, on curved layers `stripes`,
-    are pruned and tested too, and the best is taken.
+    the default base, `stripes` and, on flat layers, straight rows along the mean tension and
+    contours are pruned and tested too, and the best is taken.
 
     Attributes
     ----------

@@ -73,14 +73,13 @@ class StreamFunction:
 
     All layers share one field where the stress is about the same at all heights; otherwise the
     layers form groups over the height with one field each. The fields are designed for slightly too
-    much fibre; of their isocurves, the stretches that are worth most are kept. Straight rows along
-    the mean tension, contours and `isocurve` are cut to the same length and tested too, and the
-    best is taken. The load is that of the stress given to the strategy. Fibre is taken to carry
-    tension only.
+    much fibre; of their isocurves, the stretches that are worth most are kept. `stripes`,
+    `isocurve`, straight rows along the mean tension and contours are cut to the same length and
+    tested too, and the best is taken. The load is that of the stress given to the strategy. Fibre
+    is taken to carry tension only.
 
     On curved layers the field is one of space, of which each layer has the values along its
-    surface: neighbouring layers get about the same strands. `stripes` takes the place of rows and
-    contours there.
+    surface: neighbouring layers get about the same strands. Rows and contours are left out there.
 
     Attributes
     ----------

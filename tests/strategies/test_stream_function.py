@@ -94,6 +94,13 @@ def test_stiffer_than_isocurves_of_the_same_length(bent_beam):
     assert 0.8 < bound.share(ratios[1]) <= 1.0
 
 
+@pytest.fixture
+def designs_alone(monkeypatch):
+    """Designed plans without the rows, contours and stripes that may be stiffer."""
+    monkeypatch.setattr(sys.modules[StreamFunction.__module__], "plain_plans", lambda *_: [])
+
+
+@pytest.mark.usefixtures("designs_alone")
 def test_strands_keep_their_width_and_the_layer(bent_beam):
     stress, layers = bent_beam
     paths = plan(StreamFunction(coverage=0.5, evaluations=20), layers, stress, MACHINE)
@@ -106,10 +113,15 @@ def test_strands_keep_their_width_and_the_layer(bent_beam):
     assert paths.lengths.min() >= MACHINE.minimum_length * (1.0 - 1e-9)
 
 
-@pytest.fixture
-def designs_alone(monkeypatch):
-    """Designed plans without the straight rows and contours that may be stiffer."""
-    monkeypatch.setattr(sys.modules[StreamFunction.__module__], "plain_plans", lambda *_: [])
+def test_plain_plans_keep_to_the_layer_and_off_each_other(bent_beam):
+    """The best plan here is one of stripes, whose strands may lie closer than a design's."""
+    stress, layers = bent_beam
+    paths = plan(StreamFunction(coverage=0.5, evaluations=1), layers, stress, MACHINE)
+    total = evaluate(paths, layers, stress, MACHINE).total
+    assert total["on_fibre"] < 0.5 * MACHINE.limits.on_fibre
+    assert total["outside_length"] == 0.0
+    assert total["crossings"] + total["self_crossings"] == 0
+    assert paths.lengths.min() >= MACHINE.minimum_length * (1.0 - 1e-9)
 
 
 @pytest.mark.usefixtures("designs_alone")

@@ -104,10 +104,10 @@ def _drawn_to_border(
 def plain_plans(
     cases: WeightedCases, layers: Sequence[Layer], machine: Machine, curves: bool = True
 ) -> list[Toolpaths]:
-    """Plan straight rows, contours and isocurves, each with more fibre than is usually kept.
+    """Plan straight rows, contours, stripes and isocurves, each with more fibre than is kept.
 
     Layers of one section under alike stress are planned once. On curved layers rows and contours
-    follow the tension nowhere: there strands side by side along it (`stripes`) take their place.
+    follow the tension nowhere, and are left out.
 
     Parameters
     ----------
@@ -143,12 +143,12 @@ def plain_plans(
     def by(planner: LayerPlanner) -> Toolpaths:
         return in_all(lambda some, field: plan_layers(planner, some, some, field, machine))
 
-    if curved_layers(layers):
-        stripes = create("stripes")
-        plans = [in_all(lambda some, field: plan(stripes, some, field, machine))]
-    else:
+    plans = []
+    if not curved_layers(layers):
         rings = Concentric().for_part(field, layers, machine)
-        plans = [by(StraightRows("tension")), by(StraightRows("section")), by(rings)]
+        plans += [by(StraightRows("tension")), by(StraightRows("section")), by(rings)]
+    stripes = create("stripes")
+    plans.append(in_all(lambda some, field: plan(stripes, some, field, machine)))
     if curves:
         isocurve = create("isocurve", {"cap": _CAP})
         plans.append(in_all(lambda some, field: plan(isocurve, some, field, machine)))
