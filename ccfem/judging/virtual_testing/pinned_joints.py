@@ -4,7 +4,8 @@ First failure leaves out what lies near loads and supports, so that it does not 
 out of its hole. The three ways in which it does are judged here as in the design of pinned joints
 and lugs: by mean stresses on the areas that would part, which are measured in the mesh.
 
-* bearing: the pin crushes the wall, ``F / (d t)`` against the compressive strength;
+* bearing: the pin crushes the wall, ``F / (d t)`` against the compressive strength; of a part of a
+  wall, as at a plane of symmetry, its own width across the force counts in place of ``d``;
 * net section: the material beside the hole breaks, ``F / ((W - d) t)`` against the tensile one;
 * shear-out: what lies ahead of the pin is pushed out between two planes that touch the hole along
   the force, ``F / (2 e t)`` against the tensile strength over the root of 3 (von Mises).
@@ -20,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ccfem.base.arrays import FloatArray, IntArray, freeze
+from ccfem.base.errors import InputError
 from ccfem.body.mesh.smooth_faces import Face, given_faces
 from ccfem.fem.elasticity import StressField
 from ccfem.fem.elasticity.load_kinds import patches_in_use
@@ -114,11 +116,13 @@ def pinned_joints(
         Its strength of the matrix is the tensile one.
     """
     problem, mesh = stress.problem, stress.mesh
-    outer = forces + stress.reactions
-    names = patches_in_use(problem.all_supports, {stress.case: problem.loads_of(stress.case)})
+    loaded = patches_in_use((), {stress.case: problem.loads_of(stress.case)})
+    held = patches_in_use(problem.all_supports, {})
     joints = []
-    for name in names:
+    for name in sorted({*loaded, *held}):
         facets = mesh.patch(name)
+        # At the rim the nodes are also those of other patches: their supports are not the pin.
+        outer = forces * (name in loaded) + stress.reactions * (name in held)
         for face in given_faces(mesh.points, facets, _pieces(facets)):
             if face.kind != "cylinder" or not face.hollow or face.turn < _HALF:
                 continue
@@ -135,7 +139,10 @@ def about_pins(stress: StressField) -> str:
     strength = stress.material.tensile_strength
     if strength is None or stress.problem.case_supports:
         return ""
-    specimen = Specimen.of(stress)
+    try:
+        specimen = Specimen.of(stress)
+    except InputError as error:
+        return f"pins in holes are not judged: {error}"
     size = specimen.force(stress.reactions)
     joints = pinned_joints(stress, specimen.forces, size, Limits.of(stress.material))
     return said_of_pins(joints)
@@ -193,7 +200,7 @@ def _joint(
     if material.compressive_strength is not None:
         bearing = material.compressive_strength
     strengths = {
-        BEARING: bearing * 2.0 * radius * thickness,
+        BEARING: bearing * radius * _width(stress, wall, facets, aside) * thickness,
         NET_SECTION: limits.matrix * net_area if stretched > 0.0 else np.inf,
         SHEAR_OUT: limits.matrix / np.sqrt(3.0) * shear_area,
     }
@@ -207,6 +214,18 @@ def _joint(
         shear_area=shear_area,
         loads={mode: size * float(most) / pull for mode, most in strengths.items() if most > 0.0},
     )
+
+
+def _width(stress: StressField, wall: Face, facets: IntArray, aside: FloatArray) -> float:
+    """Width of a wall along a direction across its axis, in radii: 2 of half a turn ahead or more.
+
+    The wall reaches as far as the point of its arc that is nearest to the direction, both ways.
+    """
+    area, normal = stress.mesh.facet_areas(facets)
+    middle = area @ normal - (area @ normal @ wall.direction) * wall.direction
+    cosine = float(middle @ aside) / max(float(np.linalg.norm(middle)), 1e-300)
+    off = np.degrees(np.arccos(np.clip([cosine, -cosine], -1.0, 1.0))) - 0.5 * wall.turn
+    return float(np.cos(np.radians(np.maximum(off, 0.0))).sum())
 
 
 class _Rays(NamedTuple):

@@ -7,7 +7,7 @@ import shapely
 from ccfem.body.mesh.patches import Cylinder, Plane, patches_from_rules
 from ccfem.body.meshing import extrude
 from ccfem.comparison.tested_cases import in_all_cases
-from ccfem.fem.elasticity import Bearing
+from ccfem.fem.elasticity import Bearing, Temperature
 from ccfem.fem.elasticity.problem import Force, Problem, Support
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.stress_field import WeightedCases
@@ -77,6 +77,37 @@ def test_a_held_hole_is_judged_by_its_reaction_and_an_idle_one_is_not():
     np.testing.assert_allclose(held.force, [100.0, 0.0, 0.0], atol=1e-4)
     assert held.loads["net section"] == pytest.approx(TENSILE * 12.0 * THICKNESS, rel=1e-3)
     assert joints(lug(), pull, "end") == ()
+
+
+def test_supports_beside_a_loaded_hole_do_not_relieve_its_pin():
+    mesh = patches_from_rules(lug(), {"below": Plane("z", "min")})  # with the lower rim of the hole
+    (joint,) = joints(mesh, (Bearing("hole", (100.0, 0.0, 0.0)),), "below")
+    np.testing.assert_allclose(joint.force, [100.0, 0.0, 0.0], atol=1e-6)
+
+
+def test_half_a_lug_at_its_plane_of_symmetry_bears_half():
+    hole = shapely.Point(0.0, 0.0).buffer(DIAMETER / 2, quad_segs=32)
+    half = shapely.box(-30.0, -WIDTH / 2, END, 0.0).difference(hole)
+    rules = {
+        "hole": Cylinder((0.0, 0.0, 0.0), "z", DIAMETER / 2),
+        "root": Plane("x", "min"),
+        "middle": Plane("y", "max"),
+    }
+    mesh = patches_from_rules(extrude(half, THICKNESS, 4.0), rules)
+    pull = {"pull": (Force("hole", (100.0, 0.0, 0.0)),)}
+    problem = Problem(mesh, MATERIAL, (Support("root"), Support("middle", "y")), pull, order=1)
+    forces = prepare(problem).forces_in("pull")
+    (joint,) = pinned_joints(solve(problem)["pull"], forces, 100.0, Limits.of(MATERIAL))
+    whole = CRUSHING * DIAMETER * THICKNESS
+    assert joint.loads["bearing"] == pytest.approx(0.5 * whole, rel=0.01)
+    assert joint.loads["net section"] == pytest.approx(TENSILE * 6.0 * THICKNESS, rel=0.01)
+
+
+def test_a_part_that_is_heated_says_why_its_pins_are_not_judged():
+    material = isotropic(3000.0, 0.35, tensile_strength=TENSILE, expansion=7e-5)
+    problem = Problem(lug(), material, (Support("hole"),), {"heat": (Temperature(40.0),)}, order=1)
+    said = about_pins(solve(problem)["heat"])
+    assert said.startswith("pins in holes are not judged: load case 'heat' heats the part")
 
 
 def test_over_several_cases_the_least_multiple_of_a_load_counts():
