@@ -16,6 +16,8 @@ from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.bisection import bisected
 from ccfem.fem.elasticity.conjugate_gradient import Solution
 from ccfem.fem.elasticity.held import Held
+from ccfem.fem.elasticity.load_kinds import kind_of, points_of
+from ccfem.fem.elasticity.nodes import nearest_nodes
 from ccfem.fem.elasticity.plausibility import (
     LARGEST_ERROR,
     MOST_CELLS,
@@ -428,6 +430,12 @@ def refine(
     -------
     Problem
         The same part, supports, loads and materials on the finer mesh.
+
+    Raises
+    ------
+    InputError
+        Where cells would be refined about single nodes that carry force: the displacement there
+        grows without end as cells get smaller.
     """
     check_number("error to refine to", error, above=0.0, below=1.0)
     if problem.mesh.order == 2:
@@ -438,6 +446,8 @@ def refine(
         worst = max(fields.values(), key=lambda field: field.record.error)
         if worst.record.error <= error:
             break
+        for field in fields.values():
+            _check_points(field)
         # The error scales with edge length to the power of the order; three halvings halve an edge.
         wanted = 3.0 * np.log2(worst.record.error / error) / worst.mesh.order
         finer, chosen = problem, _worst(fields, error)
@@ -448,6 +458,29 @@ def refine(
                 return problem
         problem = finer
     return problem
+
+
+_IDLE = 1e-3
+"""Share of all forces below which supports at points only keep the part in place."""
+
+
+def _check_points(field: StressField) -> None:
+    """Refuse to refine about nodes that carry force by themselves."""
+    problem = field.problem
+    loads = [kind_of(load) for load in problem.loads_of(field.case) if points_of(load)]
+    acting = (field.reactions, prepare(problem).forces_in(field.case))
+    size = sum(np.linalg.norm(forces, axis=1).sum() for forces in acting)
+    for support in problem.supports:
+        if points := points_of(support):
+            nodes = nearest_nodes(field.mesh, points, "a support")
+            carried = np.linalg.norm(field.reactions[nodes], axis=1).sum()
+            loads += [kind_of(support)] * bool(carried > _IDLE * size)
+    if loads:
+        raise InputError(
+            f"refinement needs loads and supports on patches; got {loads[0]} in load case "
+            f"'{field.case}', and a node that carries force moves without end as cells get "
+            "smaller: spread it over a patch, or do not refine"
+        )
 
 
 def _worst(fields: dict[str, StressField], error: float) -> BoolArray:

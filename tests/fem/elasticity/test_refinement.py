@@ -7,7 +7,17 @@ import pytest
 
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import box_mesh
-from ccfem.fem.elasticity import Force, Problem, Region, Support, refine, solve
+from ccfem.fem.elasticity import (
+    Force,
+    NodeSupport,
+    PointForce,
+    PointSupport,
+    Problem,
+    Region,
+    Support,
+    refine,
+    solve,
+)
 from ccfem.fem.materials import isotropic
 
 
@@ -47,6 +57,26 @@ def test_what_cells_have_goes_with_them(bent):
     centre = finer.mesh.points[finer.mesh.corners].mean(axis=1)
     np.testing.assert_array_equal(finer.regions[0].cells, np.flatnonzero(centre[:, 0] < 20.0))
     np.testing.assert_array_equal(finer.density, np.where(centre[:, 2] < 2.0, 1.0, 0.5))
+
+
+def test_nodes_that_carry_force_are_not_refined_about(bent):
+    """Boussinesq: under a force at a point the displacement grows as one over the distance."""
+    tip = PointForce((40.0, 5.0, 4.0), (0.0, 0.0, -10.0))
+    with pytest.raises(InputError, match="got point force in load case 'tip'"):
+        refine(replace(bent, loads={"tip": (tip,)}), 0.05)
+    corners = ((0.0, 0.0, 0.0), (0.0, 10.0, 0.0), (0.0, 0.0, 4.0))
+    with pytest.raises(InputError, match="got node support in load case 'tip'"):
+        refine(replace(bent, supports=(NodeSupport("feet", corners),)), 0.05)
+    # Supports at points that only keep a balanced part in place carry nothing.
+    points = (
+        PointSupport((0.0, 0.0, 0.0), "xyz"),
+        PointSupport((40.0, 0.0, 0.0), "yz"),
+        PointSupport((0.0, 10.0, 0.0), "z"),
+    )
+    down, up = (0.0, 0.0, -5.0), (0.0, 0.0, 10.0)
+    loads = (Force("x_min", down), Force("x_max", down), Force("z_max", up))
+    placed = replace(bent, supports=points, loads={"bent": loads}, order=1)
+    assert len(refine(placed, 0.4).mesh.cells) > len(bent.mesh.cells)
 
 
 def test_what_is_fine_enough_or_may_not_grow_stays(bent):
