@@ -343,9 +343,35 @@ def _plan_at_length(
     length = length_per_layer(toolpaths, layers)
     if _meets(length, wanted):
         return Planned(strategy, toolpaths, length)
-    note = f"lays {length:.0f} of {wanted:.0f} mm per layer: its most"
-    note += about_short_pieces(layers, machine)
+    note = about_shortfall(length, wanted, layers, machine)
     return Planned(strategy, toolpaths, length, note, reached=False)
+
+
+def about_lengths(length: float, wanted: float) -> str:
+    """Say which length is laid and which was asked for, mm per layer."""
+    asked = f"{wanted:.0f}" if wanted >= 10.0 else f"{wanted:.3g}"
+    return f"lays {length:.0f} of {asked} mm per layer"
+
+
+def _of_strands(machine: Machine) -> str:
+    return f"the nearest that strands of {machine.shortest_strand:g} mm allow"
+
+
+def about_shortfall(
+    length: float, wanted: float, layers: Sequence[Layer], machine: Machine, cases: str = ""
+) -> str:
+    """Say why less is laid than was asked for: no more fits, or a strand more would be too much.
+
+    Parameters
+    ----------
+    length, wanted : float, mm per layer
+    cases : str
+        What the plan is for, where that is several load cases.
+    """
+    if (wanted - length) * len(layers) < machine.shortest_strand:
+        return f"{about_lengths(length, wanted)}: {_of_strands(machine)}"
+    most = f"{about_lengths(length, wanted)}: its most{cases}"
+    return most + about_short_pieces(layers, machine)
 
 
 def _meets(length: float, wanted: float, tolerance: float = TOLERANCE) -> bool:
@@ -524,10 +550,7 @@ class _Search:
         if planned.cut:
             said += f", strands cut back on {planned.cut}"
         if not self.meets(length, wanted):
-            said += (
-                f"; lays {length:.0f} of {wanted:.0f} mm per layer: the nearest that strands of "
-            )
-            said += f"{self.machine.shortest_strand:g} mm allow"
+            said += f"; {about_lengths(length, wanted)}: {_of_strands(self.machine)}"
         return Planned(less.strategy, planned.toolpaths, length, said, self.meets(length, wanted))
 
     def off(self, wanted: float) -> Planned:
@@ -537,7 +560,7 @@ class _Search:
         best = min(plans, key=_length) if much else max(plans[::-1], key=_length)
         end = "least" if much else "most"
         note = (
-            f"lays {best.length_per_layer:.0f} of {wanted:.0f} mm per layer: its {end}, at "
+            f"{about_lengths(best.length_per_layer, wanted)}: its {end}, at "
             f"{self.dial.says(best.strategy)}"
         )
         return Planned(best.strategy, best.toolpaths, best.length_per_layer, note, reached=False)

@@ -13,8 +13,7 @@ from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.judging.virtual_testing import Strand, specimens
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning import Planned, Strategy, length_per_layer, plan, plan_to_length
-from ccfem.paths.planning.equal_fibre import TOLERANCE, plan_to_lengths
-from ccfem.paths.planning.infill import about_short_pieces
+from ccfem.paths.planning.equal_fibre import TOLERANCE, about_shortfall, plan_to_lengths
 from ccfem.paths.planning.plan import check_layers, plan_layers
 from ccfem.paths.planning.strategy import CasesStrategy, LengthStrategy
 from ccfem.paths.planning.unfolding import may_fold
@@ -172,6 +171,5 @@ def _planned(
     length = length_per_layer(toolpaths, layers)
     if wanted is None or length >= (1.0 - TOLERANCE) * wanted:
         return Planned(strategy, toolpaths, length)
-    note = f"lays {length:.0f} of {wanted:.0f} mm per layer: its most for all load cases"
-    note += about_short_pieces(layers, machine)
+    note = about_shortfall(length, wanted, layers, machine, " for all load cases")
     return Planned(strategy, toolpaths, length, note, reached=False)

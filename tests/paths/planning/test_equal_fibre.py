@@ -15,6 +15,7 @@ from ccfem.fem.materials import isotropic
 from ccfem.machine import Machine
 from ccfem.paths.planning import Amount, plan
 from ccfem.paths.planning.equal_fibre import (
+    about_shortfall,
     extremes,
     length_per_layer,
     plan_to_length,
@@ -316,6 +317,15 @@ def test_a_longer_plan_is_cut_where_that_to_the_length_lays_less(plate):
     assert far.length_per_layer == pytest.approx(1000.0)
     assert most.length_per_layer == pytest.approx(2400.0)
     assert most.note == "lays 2400 of 2500 mm per layer: its most"
+
+
+def test_a_length_below_a_strand_is_not_called_the_most(plate):
+    """Strands of 60 mm: of 70 mm on a layer one fits, and none of 0.5 mm."""
+    _, layers = plate
+    shortest = f"the nearest that strands of {MACHINE.shortest_strand:g} mm allow"
+    for length, wanted, asked in ((60.0, 70.0, "70"), (0.0, 0.5, "0.5")):
+        said = about_shortfall(length, wanted, layers[:1], MACHINE)
+        assert said == f"lays {length:.0f} of {asked} mm per layer: {shortest}"
 
 
 @pytest.mark.parametrize("wanted", [0.0, -5.0, float("nan"), float("inf")])
