@@ -43,7 +43,7 @@ def check_part(read: Callable[[], Case], picture: Path | None) -> int:
     page = check_writable(picture.with_suffix(".html"))
     print(checked.known)
     if not checked.mistakes:
-        for line in _of_a_solve(checked.case):
+        for line in _of_a_solve(checked.case, printed=not checked.not_planned):
             print(f"remark: {line}")
     save(part_picture(checked), picture)
     with whole_file(page) as temporary:
@@ -60,12 +60,13 @@ _QUICK = 15.0
 """Estimated seconds of a solve that a check may take."""
 
 
-def _of_a_solve(case: Case) -> list[str]:
+def _of_a_solve(case: Case, printed: bool) -> list[str]:
     """Say what the first load case shows, solved on the cells that there are, if that is quick.
 
-    That is a build direction in which fibre would take much more, and a pin that tears out.
+    That is a build direction in which fibre would take much more, and a pin that tears out; of the
+    plastic as it is printed, if its layers are known.
     """
-    slicing, problem = case.slicing, case.problem
+    slicing, problem = case.slicing, case.printed_problem() if printed else case.problem
     if solve_costs(problem)[0].seconds > _QUICK:
         return []
     name = next(iter(problem.loads))

@@ -1,5 +1,7 @@
 """``ccfem check`` and ``ccfem mesh``: what they print and write."""
 
+import re
+
 import pytest
 
 PART = """
@@ -131,3 +133,25 @@ def test_check_proposes_a_build_direction_in_which_fibre_can_carry(ccfem, tmp_pa
     assert code == 0
     assert "remark: layers along" not in out
     assert "remark: layers along" not in ccfem("check", "strip.toml")[1]
+
+
+def test_check_judges_pins_in_the_plastic_that_is_printed(ccfem, tmp_path):
+    """Solid, the sides of the hole hold 50 MPa on 12 x 12 mm^2; with a tenth as infill the wall."""
+    lug = PART.replace("height = 5", "height = 12\nholes = [{ centre = [10, 10], radius = 4 }]")
+    lug = lug.replace(
+        'material = "pla"',
+        "heights = [6.0]\nmaterial = { modulus = 3500.0, "
+        "poisson = 0.35, tensile_strength = 50.0, compressive_strength = 60.0 }",
+    )
+    lug = lug.replace('"force"', '"bearing"').replace('patch = "end"', 'patch = "bore"')
+    lug = lug.replace("[100, 0, 0]", "[-100, 0, 0]").replace('patch = "foot"', 'patch = "end"')
+    lug += '[patches.bore]\nrule = "holes"\nradius = 4.0\n'
+    (tmp_path / "lug.toml").write_text(lug)
+    sparse = '[plastic]\ninfill = "grid"\ndensity = 0.1\nwalls = 1\nskins = 1\n'
+    (tmp_path / "sparse.toml").write_text(lug + sparse)
+    holds = [
+        float(re.findall(r"net section (?:of 'bore' at )?(\d+)", ccfem("check", file)[1])[0])
+        for file in ("lug.toml", "sparse.toml")
+    ]
+    assert holds[0] == pytest.approx(50.0 * 12.0 * 12.0, rel=1e-3)
+    assert 0.2 * holds[0] < holds[1] < 0.6 * holds[0]
