@@ -73,6 +73,7 @@ from ccfem.printing.line_counts import check_strands
 from ccfem.printing.support import SupportLayers, slice_with_support
 from ccfem.slicing.layers.layer import curved_layers
 from ccfem.slicing.layers.slicer import Slicer, has_field, slicer_remarks
+from ccfem.strategies.fibre_aware.smeared import on_linear_cells
 from ccfem.strategies.fibre_aware.upper_bound import UpperBound, upper_bound
 
 _REPLACED = {
@@ -304,20 +305,12 @@ def _broken(
     assert request.strand is not None
     try:
         with timed(seconds, "breaking load without fibre"):
-            specimen = Specimen.of(_on_linear_cells(basis.field, basis.case, request.backend))
+            specimen = Specimen.of(on_linear_cells(basis.field, request.backend))
             bare = breaking_load(None, specimen, request.strand)
     except (InputError, SolveError) as error:
         return [replace(run, unbroken=str(error)) for run in runs], None
     test = partial(with_breaking_load, specimen=specimen, strand=request.strand)
     return side_by_side("breaking {}", test, runs, parts, tell), bare
-
-
-def _on_linear_cells(field: StressField, case: Case, backend: str) -> StressField:
-    """Solution of the same load case on the cells of the part, where those are linear."""
-    mesh = case.problem.mesh
-    if field.mesh.order == 1 or mesh.order == 2:
-        return field
-    return solve(replace(field.problem, mesh=mesh, order=1), backend)[field.case]
 
 
 def _cut(request: Request, basis: Solved) -> tuple[dict[str, Part], dict[str, str]]:
