@@ -16,6 +16,8 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from contextvars import ContextVar
 from multiprocessing.connection import Connection, wait
 from types import BuiltinFunctionType, FunctionType, MappingProxyType, ModuleType
 from typing import IO, Any, TypeVar, cast
@@ -78,8 +80,27 @@ def in_threads(
         return list(pool.map(work, *items))
 
 
+Elsewhere = Callable[[Callable[..., Any], Sequence[tuple[Any, ...]]], Iterator[Any] | None]
+"""Does work for the arguments of each of its calls; None where it cannot."""
+
+_ELSEWHERE: ContextVar[Elsewhere | None] = ContextVar("elsewhere", default=None)
+
+
+@contextmanager
+def done_elsewhere(results: Elsewhere) -> Iterator[None]:
+    """Let something else than processes of this machine do what `in_processes` shares out."""
+    token = _ELSEWHERE.set(results)
+    try:
+        yield
+    finally:
+        _ELSEWHERE.reset(token)
+
+
 def in_processes(
-    work: Callable[..., Result], *items: Sequence[Any], shared: Sequence[Any] = ()
+    work: Callable[..., Result],
+    *items: Sequence[Any],
+    shared: Sequence[Any] = (),
+    writes: bool = False,
 ) -> Iterator[Result]:
     """Yield results of a function for each of some items, in their order, several at a time.
 
@@ -95,6 +116,8 @@ def in_processes(
     shared : sequence, optional
         Where a result refers to these, to the items, or to what they refer to, it refers to the
         same objects here: they are not sent.
+    writes : bool, default False
+        The work writes files, so that it is not done elsewhere.
 
     Raises
     ------
@@ -104,6 +127,10 @@ def in_processes(
         When a process ends before its work, as where memory runs out.
     """
     arguments = list(zip(*items, strict=True))
+    elsewhere = None if writes or len(arguments) < 2 else _ELSEWHERE.get()
+    if elsewhere is not None and (results := elsewhere(work, arguments)) is not None:
+        yield from results
+        return
     count = min(processors(), len(arguments))
     within = multiprocessing.current_process().daemon
     # Forks of several threads at once disturb each other.
@@ -177,23 +204,28 @@ def _read_only_array(content: bytes, dtype: Any, shape: tuple[int, ...]) -> NDAr
     return np.frombuffer(content, dtype).reshape(shape)
 
 
-class _Pickler(pickle.Pickler):
-    def __init__(self, file: IO[bytes], known: _Known) -> None:
-        super().__init__(file, pickle.HIGHEST_PROTOCOL)
-        self._known = known
-
-    def persistent_id(self, thing: Any) -> int | None:
-        return id(thing) if id(thing) in self._known else None
+class ReadOnlyPickler(pickle.Pickler):
+    """Keeps what is read-only so; arrays would come back without that."""
 
     def reducer_override(self, thing: Any) -> Any:
-        """Keep what is read-only so; arrays would come back without that."""
+        """Reduce mappings and arrays that are read-only, and leave the rest as it is."""
         if isinstance(thing, MappingProxyType):
             return _read_only_mapping, (dict(thing),)
         if type(thing) is np.ndarray and is_shared(thing):
             return _shared_rows, (thing[0].copy(), thing.shape)
         if type(thing) is np.ndarray and not (thing.flags.writeable or thing.dtype.hasobject):
             return _read_only_array, (thing.tobytes(), thing.dtype, thing.shape)
-        return NotImplemented
+        override = getattr(super(), "reducer_override", None)
+        return NotImplemented if override is None else override(thing)
+
+
+class _Pickler(ReadOnlyPickler):
+    def __init__(self, file: IO[bytes], known: _Known) -> None:
+        super().__init__(file, pickle.HIGHEST_PROTOCOL)
+        self._known = known
+
+    def persistent_id(self, thing: Any) -> int | None:
+        return id(thing) if id(thing) in self._known else None
 
 
 class _Unpickler(pickle.Unpickler):

@@ -47,6 +47,7 @@ from ccfem.cli.options import (
     PrintFile,
     Refine,
     RobotCell,
+    Scheduler,
     SetCase,
     SetOfOne,
     SetOfStrategies,
@@ -165,10 +166,7 @@ def study(
         int | None,
         typer.Option(metavar="N", help="Processes; default as many as processors.", min=0),
     ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers make the runs instead."),
-    ] = None,
+    scheduler: Scheduler = None,
     out: Out = None,
     force: Force = False,
 ) -> None:
@@ -440,6 +438,7 @@ def compare(
     pictures: Pictures = False,
     drawings: Drawings = None,
     details: Details = False,
+    scheduler: Scheduler = None,
     out: Out = None,
     force: Force = False,
 ) -> None:
@@ -484,7 +483,7 @@ def compare(
             breaking_load=breaking_load,
         )
 
-    run(case, ask, Output(out, force, pictures, drawings_of(drawings), "", details))
+    run(case, ask, Output(out, force, pictures, drawings_of(drawings), "", details), scheduler)
 
 
 @app.command()
@@ -525,6 +524,7 @@ def plan(
     pictures: Pictures = False,
     drawings: Drawings = None,
     details: Details = False,
+    scheduler: Scheduler = None,
     out: Out = None,
     force: Force = False,
 ) -> None:
@@ -577,7 +577,7 @@ def plan(
         )
 
     output = Output(out, force, pictures, drawings_of(drawings), f"-{strategy}", details, cell)
-    if code := plan_code(run(case, ask, output), force):
+    if code := plan_code(run(case, ask, output, scheduler), force):
         raise typer.Exit(code)
 
 

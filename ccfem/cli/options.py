@@ -167,6 +167,14 @@ TestOrNot = Annotated[
         show_default=False,
     ),
 ]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Dask scheduler whose workers plan, evaluate and test instead, as tcp://host:8786.",
+    ),
+]
 EveryLayer = Annotated[
     bool,
     typer.Option(

@@ -194,7 +194,9 @@ NOT_PRINTABLE = 3
 """Exit code of a plan that is written, but cannot be printed as it is."""
 
 
-def run(name: str, ask: "Callable[[], Request]", output: Output) -> "Comparison":
+def run(
+    name: str, ask: "Callable[[], Request]", output: Output, scheduler: str | None = None
+) -> "Comparison":
     """Carry out what is asked of a part, write the results, print the table, and return it.
 
     A failure leaves nothing behind.
@@ -205,7 +207,10 @@ def run(name: str, ask: "Callable[[], Request]", output: Output) -> "Comparison"
         Of a case, or of a part file.
     ask : callable
         Reads the part, and returns what is asked of it.
+    scheduler : str, optional
+        Address of a Dask scheduler, as of `ccfem.base.cluster.on_cluster`.
     """
+    from ccfem.base.cluster import on_cluster
     from ccfem.base.result_folder import whole_folder
     from ccfem.cli.first_run import compiling_beside
     from ccfem.cli.screen import print_comparison
@@ -219,6 +224,7 @@ def run(name: str, ask: "Callable[[], Request]", output: Output) -> "Comparison"
     with (
         whole_folder(where, RESULT_FILES, output.force) as folder,
         compiling_beside(),
+        on_cluster(scheduler),
         progress_bar(lines=True) as progress,
     ):
         comparison = answer(request, _part(progress, 0.0, _SOLVED))

@@ -306,7 +306,7 @@ def _write_paths(comparison: Comparison, folder: Path, cell: bool) -> None:
         else:
             file = folder / f"{stem}_waypoints.txt"
             files.append(partial(write_waypoints, file, run.toolpaths, layers))
-    for _ in in_processes(lambda write: write(), files):
+    for _ in in_processes(lambda write: write(), files, writes=True):
         pass
 
 

@@ -13,7 +13,6 @@ from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, field
 from html import escape
-from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import gettempdir
@@ -21,6 +20,7 @@ from typing import Any, BinaryIO, cast
 from uuid import uuid4
 
 from ccfem.base.checks import check_number
+from ccfem.base.cluster import connected
 from ccfem.base.csv_table import write_csv
 from ccfem.base.errors import InputError, spared
 from ccfem.base.folder import Folder, private_folder, sweep
@@ -246,10 +246,6 @@ return turn*(x!==""&&y!==""&&!isNaN(x)&&!isNaN(y)?x-y:x.localeCompare(y));})
 # Runs of a study on a Dask cluster.
 
 
-_PATIENCE = 30.0
-"""Seconds to wait for a scheduler."""
-
-
 def on_cluster(
     parts: Mapping[int, bytes], jobs: Sequence[Job], address: str
 ) -> Iterator[tuple[Job, Outcome]]:
@@ -267,24 +263,11 @@ def on_cluster(
     Raises
     ------
     InputError
-        Where Dask is not installed, the scheduler does not answer, has no workers, or these have
-        another version of ccfem.
+        As of `ccfem.base.cluster.connected`.
     """
-    try:
-        from distributed import Client, as_completed
-    except ImportError:
-        raise InputError(
-            "--scheduler needs Dask, which is not installed: pip install 'ccfem[dask]'"
-        ) from None
-    try:
-        client = Client(address, timeout=_PATIENCE)
-    except (OSError, TimeoutError, ValueError) as error:
-        raise InputError(
-            f"no Dask scheduler answers at {address} ({type(error).__name__}): start it with "
-            "dask scheduler, and workers with dask worker"
-        ) from None
-    with client:
-        _check_workers(client, address)
+    with connected(address) as client:
+        from distributed import as_completed
+
         stress = {
             number: client.submit(solve_part, task, pure=False) for number, task in parts.items()
         }
@@ -298,30 +281,6 @@ def on_cluster(
                 yield job, future.result()
             else:  # a worker that was killed, again and again
                 yield job, crashed(" ".join(f"{type(failed).__name__}: {failed}".split()))
-
-
-def _check_workers(client: Any, address: str) -> None:
-    """Refuse a cluster without workers, and workers with another version."""
-    try:
-        client.wait_for_workers(1, timeout=_PATIENCE)
-    except TimeoutError:
-        raise InputError(
-            f"the Dask scheduler at {address} has no workers: start some with dask worker {address}"
-        ) from None
-    here = version("ccfem")
-    for name, there in client.run(_version).items():
-        if there != here:
-            raise InputError(
-                f"worker {name} has ccfem {there}, this is {here}: install the same on both"
-            )
-
-
-def _version() -> str:
-    """Version of ccfem on a worker."""
-    try:
-        return version("ccfem")
-    except ModuleNotFoundError:
-        return "not at all"
 
 
 # The folder of a study: one file a run, written whole, under the hash of all it depends on.
