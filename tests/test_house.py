@@ -133,7 +133,7 @@ def test_no_name_twice_for_two_ideas():
 
 
 def test_only_pickles_of_processes_of_its_own_are_read():
-    """What comes through pipes of its own; nothing that lies in a folder is unpickled."""
+    """What comes through pipes of its own, or from the cluster named; nothing from a folder."""
     loading = {"pickle", "cloudpickle", "dill", "joblib", "shelve", "marshal"}
     known = []
     for name, path in modules().items():
@@ -145,7 +145,8 @@ def test_only_pickles_of_processes_of_its_own_are_read():
                     known.append(name)
         assert "allow_pickle=True" not in text, name
         assert "read_pickle" not in text, name
-    assert set(known) == {"ccfem.base.parallel", "ccfem.comparison.studies.transport"}
+    cluster, pipes = "ccfem.base.cluster", "ccfem.base.parallel"
+    assert set(known) == {cluster, pipes, "ccfem.comparison.studies.transport"}
 
 
 def test_tables_with_text_are_written_in_one_place():
