@@ -5,7 +5,10 @@ large one. Where strength counts, fibre is therefore cut three ways: for the sti
 the strength as asked for, and for half of that.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
 
 from ccfem.base.parallel import in_processes
 from ccfem.judging.virtual_testing import Specimen, Strand
@@ -18,6 +21,7 @@ from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.judges import (
     Goal,
     Judge,
+    Judged,
     stiffest,
     stiffness_judge,
     strength_judge,
@@ -37,8 +41,14 @@ _FOR_BOTH = (False, True)
 _ROUGH, _EXACT = 1e-4, 1e-6
 """Relative residuals of the tests, and of the last one of moved paths, which gain little."""
 
-_Cut = Callable[[Toolpaths, float, int], Toolpaths]
-"""Cuts toolpaths to a length; takes toolpaths, weight of the strength and number of tests."""
+
+class _Cut(Protocol):
+    """Cuts toolpaths to a length, unless others are stiffer than any cut of them."""
+
+    def __call__(
+        self, toolpaths: Toolpaths, share: float, tests: int, least: Judged | None = None
+    ) -> Toolpaths:
+        """Cut, given the weight of the strength, the number of tests and the others."""
 
 
 def prune_and_move(
@@ -65,8 +75,10 @@ def prune_and_move(
     """
     goal = Goal.of(part)
 
-    def cut(toolpaths: Toolpaths, share: float, tests: int) -> Toolpaths:
-        return prune(toolpaths, goal, length, machine, strand, tests, share, tight)
+    def cut(
+        toolpaths: Toolpaths, share: float, tests: int, least: Judged | None = None
+    ) -> Toolpaths:
+        return prune(toolpaths, goal, length, machine, strand, tests, share, tight, least)
 
     def judges_of(aim: Goal, tolerance: float) -> tuple[Judge, ...]:
         if not strength:
@@ -117,12 +129,34 @@ def best_cut(
     filled = [paths for paths in candidates if len(paths)]
     if not filled:
         return candidates[0]
+    if not strength:
+        return _stiffest_cut(filled, cut, judge, rounds)
     paths, shares = zip(
         *(
             (paths, share * strength)
             for k, paths in enumerate(filled)
-            for share in (_SHARES if strength and k < _ALL_WAYS else _SHARES[:1])
+            for share in (_SHARES if k < _ALL_WAYS else _SHARES[:1])
         ),
         strict=True,
     )
     return stiffest(list(in_processes(cut, paths, shares, len(paths) * [rounds])), judge)
+
+
+def _stiffest_cut(
+    candidates: Sequence[Toolpaths], cut: _Cut, judge: Judge, rounds: int
+) -> Toolpaths:
+    """Cut candidates for the stiffness, the first in any case, and return the stiffest result.
+
+    The others are given up as soon as it is certain that they cannot be stiffer than the first.
+    """
+    first = cut(candidates[0], 0.0, rounds)
+    if len(candidates) == 1:
+        return first
+    least = judge(first)
+
+    def contender(paths: Toolpaths) -> tuple[Toolpaths, float]:
+        kept = cut(paths, 0.0, rounds, least)
+        return kept, judge(kept).value if len(kept) else -np.inf
+
+    others = [(first, least.value), *in_processes(contender, candidates[1:], shared=[candidates])]
+    return others[int(np.argmax([value for _, value in others]))][0]

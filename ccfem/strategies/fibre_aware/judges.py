@@ -12,7 +12,7 @@ from ccfem.base.parallel import in_processes
 from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity import StressField
 from ccfem.judging.virtual_testing import Specimen, Strand, Strands, cut_strands
-from ccfem.judging.virtual_testing.equilibrium import Equilibrium, equilibrium
+from ccfem.judging.virtual_testing.equilibrium import Equilibrium, bars, equilibrium
 from ccfem.judging.virtual_testing.several_cases import cases_failure, virtual_tests
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
@@ -147,6 +147,43 @@ def equilibria(
         ratios.append(ratio)
         works.append(before / ratio if part.forced else before * ratio)
     return Equilibria(tuple(with_strands), np.array(ratios), np.array(works))
+
+
+def most_merit(
+    goal: Goal,
+    strands: Strands,
+    length: float,
+    displacements: Sequence[FloatArray],
+    strand: Strand | None = None,
+) -> float:
+    """Merit that no choice of some strands exceeds, by the least energy of all displacements.
+
+    With fibre on the pieces P, any displacement v that the supports allow gives the compliance
+    ``W >= (f.v)^2 / (v.K v + sum over P of EA l eps(v)^2)``, and where supports move the energy
+    ``W <= v.K v + sum over P of EA l eps(v)^2``. The sum is largest over the pieces that v
+    stretches most.
+
+    Parameters
+    ----------
+    length : float, mm
+        Largest length of fibre of a choice.
+    displacements : sequence of (n, 3) arrays, mm
+        Of each load case: the nearer to the solution with the best choice, the lower the bound.
+    strand : Strand, optional
+        As of `equilibria`.
+    """
+    axial = (Strand() if strand is None else strand).stiffness(goal.parts[0].modulus)
+    pieces, ratios = bars(strands, goal.mesh), []
+    for part, u in zip(goal.parts, displacements, strict=True):
+        squares = np.maximum(pieces.strain(u), 0.0) ** 2
+        order = np.argsort(-squares, kind="stable")
+        before = np.cumsum(strands.length[order]) - strands.length[order]
+        taken = np.clip(length - before, 0.0, strands.length[order])
+        energy = np.vdot(u, part.matrix @ u.reshape(-1)) + axial * (squares[order] @ taken)
+        work = 2.0 * part.unreinforced.strain_energy
+        force = np.vdot(part.forces, u)
+        ratios.append(work * energy / force**2 if part.forced else energy / work)
+    return goal.merit(np.array(ratios))
 
 
 @dataclass(frozen=True)

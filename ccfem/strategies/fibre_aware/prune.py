@@ -7,6 +7,7 @@ its compliance over the least compliance that any paths could reach in it alone 
 rest is tested again, since it takes over the load.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +18,7 @@ from ccfem.fem.elasticity import StressField
 from ccfem.judging.virtual_testing import Specimen, Strand, Strands, cut_strands
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
-from ccfem.strategies.fibre_aware.judges import Goal, equilibria
+from ccfem.strategies.fibre_aware.judges import Goal, Judged, equilibria, most_merit
 from ccfem.strategies.fibre_aware.path_profile import Profile
 from ccfem.strategies.fibre_aware.shortening import shorten_bent, tight_share
 from ccfem.strategies.fibre_aware.strength_value import Worth, layer_normal, raised
@@ -54,6 +55,7 @@ def prune(
     rounds: int = 2,
     strength: float = 0.0,
     tight: float = 1.0,
+    least: Judged | None = None,
 ) -> Toolpaths:
     """Remove the least valuable fibre until no more than a wanted length is left.
 
@@ -82,11 +84,14 @@ def prune(
     tight : float in [0, 1], default 1
         Largest share of the fibre's length in bends tighter than the machine's radius. Where the
         paths have more, the least valuable bends go, and pieces that are then too short.
+    least : Judged, optional
+        Other paths that the result has to be stiffer than, to be wanted.
 
     Returns
     -------
     Toolpaths
-        The given paths where they are short enough and not bent too tightly.
+        The given paths where they are short enough and not bent too tightly. None where the other
+        paths, or a test, show that no part of the given ones is stiffer (`most_merit`).
 
     Raises
     ------
@@ -97,15 +102,24 @@ def prune(
     check_number("length of fibre", length, above=0.0, unit="mm")
     check_number("rounds", rounds, at_least=1)
     check_number("tight", tight, at_least=0.0, at_most=1.0)
-    length_now = fibre_length(toolpaths)
+    length_now, goal = fibre_length(toolpaths), Goal.of(part)
+
+    def beaten(strands: Strands, displacements: Sequence[FloatArray]) -> bool:
+        about = (goal, strands, length, displacements, strand)
+        return least is not None and most_merit(*about) <= least.value
+
+    if least is not None and beaten(cut_strands(toolpaths, goal.mesh), least.displacements):
+        return Toolpaths.empty()
     if length_now <= length and (tight >= 1.0 or tight_share(toolpaths, machine) <= tight):
         return toolpaths
-    goal, known = Goal.of(part), None
+    known = None
     worth = Worth.of(goal.parts, strand, strength) if strength else None
     for k in range(rounds):
         strands = cut_strands(toolpaths, goal.mesh)
         tested = equilibria(goal, strands, strand, known, _TOLERANCE)
         known, counts = tested.displacements, goal.counts(tested.ratios)
+        if beaten(strands, known):
+            return Toolpaths.empty()
         if worth is not None:
             value = worth(strands, tested.found, layer_normal(toolpaths), counts)
         else:

@@ -6,15 +6,23 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from ccfem.base.errors import InputError
+from ccfem.body.mesh import box_mesh
+from ccfem.fem.elasticity import Force, Problem, Support, solve
+from ccfem.fem.materials import isotropic
+from ccfem.judging.virtual_testing import Strand
 from ccfem.judging.virtual_testing.strands import cut_strands
 from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine
 from ccfem.paths.planning import plan
 from ccfem.paths.toolpaths import MATRIX, Toolpaths
+from ccfem.slicing.slicers import Planar
+from ccfem.strategies.fibre_aware.cut_and_move import prune_and_move
+from ccfem.strategies.fibre_aware.judges import Goal, equilibria, most_merit, stiffness_judge
 from ccfem.strategies.fibre_aware.path_profile import Profile
 from ccfem.strategies.fibre_aware.prune import profiles, prune
 from ccfem.strategies.fibre_aware.shortening import shorten
 from ccfem.strategies.isocurve import Isocurve
+from ccfem.strategies.zigzag import Zigzag
 
 MACHINE = Machine()
 SHORT = Machine(minimum_length=10.0)
@@ -221,3 +229,50 @@ def test_impossible_requests_are_refused(pulled_bar, options, message):
     stress, layers = pulled_bar
     with pytest.raises(InputError, match=message):
         prune(crossing_strands(layers[0]), stress, machine=SHORT, **options)
+
+
+def beam(moved):
+    """A beam clamped at one end; its other end is pushed sideways, or moved by a support."""
+    mesh = box_mesh((60.0, 24.0, 4.0), (12, 5, 2))
+    supports = [Support("x_min")]
+    if moved:
+        supports.append(Support("x_max", "y", (0.0, 0.5, 0.0)))
+    loads = {"tip": () if moved else (Force("x_max", (0, 50, 0)),)}
+    problem = Problem(mesh, isotropic(3500.0, 0.35), tuple(supports), loads, order=1)
+    return solve(problem, tolerance=1e-10)["tip"], Planar(count=2).cut(mesh)
+
+
+@pytest.mark.parametrize("moved", [False, True])
+def test_no_choice_of_strands_is_stiffer_than_the_energy_allows(moved, rng):
+    stress, layers = beam(moved)
+    paths, goal = plan(Isocurve(cap=60.0), layers, stress, SHORT), Goal.of(stress)
+    strands = cut_strands(paths, goal.mesh)
+    whole = equilibria(goal, strands, tolerance=1e-9)
+    # With all strands, their own displacement has the least energy: that of the equilibrium.
+    everything = most_merit(goal, strands, strands.total, whole.displacements)
+    assert everything == pytest.approx(whole.ratios[0], rel=1e-6)
+    bounds = []
+    for _ in range(4):
+        chosen = paths.select(rng.random(len(paths)) < 0.5)
+        length = float(chosen.lengths.sum())
+        reached = equilibria(goal, cut_strands(chosen, goal.mesh), tolerance=1e-9)
+        for near in (whole, reached):
+            bounds.append(most_merit(goal, strands, length, near.displacements))
+            assert reached.ratios[0] < bounds[-1]
+    assert min(bounds) < everything
+
+
+def test_what_cannot_be_stiffer_than_other_paths_is_given_up(bent_beam):
+    stress, layers = bent_beam
+    length, goal, judge = 4 * 150.0, Goal.of(stress), stiffness_judge(stress, SHORT)
+    curves = plan(Isocurve(cap=60.0), layers, stress, SHORT)
+    rows = plan(Zigzag(angle=90.0, turn=0.0), layers, stress, SHORT)
+    stiff, soft = (prune(paths, goal, length, SHORT) for paths in (curves, rows))
+    assert judge(soft).value < judge(stiff).value
+    assert not len(prune(rows, goal, length, SHORT, least=judge(stiff)))
+    np.testing.assert_array_equal(
+        prune(curves, goal, length, SHORT, least=judge(soft)).points, stiff.points
+    )
+    for candidates in ([curves, rows], [rows, curves]):
+        about = (candidates, layers, goal, length, SHORT, Strand(), 2, 0.0, 0)
+        np.testing.assert_array_equal(prune_and_move(*about).points, stiff.points)
