@@ -73,7 +73,7 @@ def in_threads(
     Exception
         The first that `work` raises, in the order of the items.
     """
-    count = min(processors(), processors() if most is None else most, max(len(items[0]), 1))
+    count = max(min(_left(), _left() if most is None else most, len(items[0])), 1)
     if count == 1:
         return [work(*arguments) for arguments in zip(*items, strict=True)]
     with ThreadPoolExecutor(count) as pool:
@@ -131,41 +131,119 @@ def in_processes(
     if elsewhere is not None and (results := elsewhere(work, arguments)) is not None:
         yield from results
         return
-    count = min(processors(), len(arguments))
-    within = multiprocessing.current_process().daemon
-    # Forks of several threads at once disturb each other.
-    thread = threading.current_thread() is not threading.main_thread()
-    if count < 2 or within or thread or sys.platform != "linux":
+    count = min(_left(), len(arguments))
+    if count < 2 or not _may_fork():
         for some in arguments:
             yield work(*some)
         return
-    here, there = zip(*(multiprocessing.Pipe() for _ in range(count)), strict=True)
-    context, known = multiprocessing.get_context("fork"), _reachable([arguments, shared])
-    about = (work, arguments, known)
-    processes = [
-        context.Process(target=_serve, args=(*about, end, (*here, *there)), daemon=True)
-        for end in there
-    ]
+    forks = _Forks(work, arguments, shared, count)
     try:
-        with warnings.catch_warnings():
-            # Python 3.12 warns of forks beside threads. The only one here draws a progress bar.
-            warnings.simplefilter("ignore", DeprecationWarning)
-            for process, end in zip(processes, there, strict=True):
-                process.start()
-                end.close()
-        for some, sent in zip(arguments, _in_order(here, len(arguments)), strict=True):
+        yield from forks.results()
+    finally:
+        forks.end()
+
+
+@contextmanager
+def beside(
+    work: Callable[[], Result], shared: Sequence[Any] = ()
+) -> Iterator[Callable[[], Result]]:
+    """Work in another process while the block runs, with what waits for the result.
+
+    Until it is done, one processor less is left for other work of this process. Where no second one
+    is left, the work is done here when its result is asked for.
+
+    Parameters
+    ----------
+    work : callable
+        Called without anything, at most once.
+    shared : sequence, optional
+        As of `in_processes`.
+    """
+    if _left() < 2 or not _may_fork() or _ELSEWHERE.get() is not None:
+        yield work
+        return
+    forks = _Forks(work, [()], shared, 1)
+    _besides.append(forks)
+    try:
+        yield lambda: next(forks.results())
+    finally:
+        _besides.remove(forks)
+        forks.end()
+
+
+def _left() -> int:
+    """Processors that nothing is done on beside this process."""
+    return processors() - sum(not forks.done for forks in _besides)
+
+
+def _may_fork() -> bool:
+    within = multiprocessing.current_process().daemon
+    # Forks of several threads at once disturb each other.
+    thread = threading.current_thread() is not threading.main_thread()
+    return not within and not thread and sys.platform == "linux"
+
+
+class _Forks:
+    """Copies of this process at work on some items, several at a time."""
+
+    def __init__(
+        self,
+        work: Callable[..., Any],
+        arguments: Sequence[tuple[Any, ...]],
+        shared: Sequence[Any],
+        count: int,
+    ) -> None:
+        here, there = zip(*(multiprocessing.Pipe() for _ in range(count)), strict=True)
+        self._work, self._arguments = work, arguments
+        self._known = _reachable([arguments, shared])
+        context, about = multiprocessing.get_context("fork"), (work, arguments, self._known)
+        self._processes = [
+            context.Process(target=_serve, args=(*about, end, (*here, *there)), daemon=True)
+            for end in there
+        ]
+        # Each end of a pipe, with the number of the item that was asked for through it.
+        self._asked: dict[Connection, int] = {}
+        try:
+            with warnings.catch_warnings():
+                # Python 3.12 warns of forks beside threads. The only one here draws a progress bar.
+                warnings.simplefilter("ignore", DeprecationWarning)
+                for process, end in zip(self._processes, there, strict=True):
+                    process.start()
+                    end.close()
+            for number, end in enumerate(here):
+                end.send(number)
+                self._asked[end] = number
+        except BaseException:
+            self.end()
+            raise
+
+    @property
+    def done(self) -> bool:
+        """Whether the outcomes of all that was asked for are there."""
+        return all(end.poll() for end in self._asked)
+
+    def results(self) -> Iterator[Any]:
+        """Yield the results in the order of the items."""
+        outcomes = _in_order(self._asked, len(self._arguments))
+        for some, sent in zip(self._arguments, outcomes, strict=True):
             if not sent:  # it cannot be sent, as a value of a class within a function
-                yield work(*some)
+                yield self._work(*some)
                 continue
-            result, error = _Unpickler(io.BytesIO(sent), known).load()
+            result, error = _Unpickler(io.BytesIO(sent), self._known).load()
             if error is not None:
                 raise error
             yield result
-    finally:
-        for process in processes:
+
+    def end(self) -> None:
+        """End the processes."""
+        for process in self._processes:
             if process.pid is not None:
                 process.kill()
                 process.join()
+
+
+_besides: list[_Forks] = []
+"""What is being done beside this process."""
 
 
 def give_back() -> None:
@@ -237,12 +315,9 @@ class _Unpickler(pickle.Unpickler):
         return self._known[identity]
 
 
-def _in_order(ends: Sequence[Connection], count: int) -> Iterator[bytes]:
-    """Ask the processes behind some ends of pipes for each outcome, and yield them in order."""
-    numbers = iter(range(count))
-    asked = {end: next(numbers) for end in ends}
-    for end, number in asked.items():
-        end.send(number)
+def _in_order(asked: dict[Connection, int], count: int) -> Iterator[bytes]:
+    """Yield each outcome in order, asking for the next where one has come."""
+    numbers = iter(range(len(asked), count))
     outcomes: dict[int, bytes] = {}
     for wanted in range(count):
         while wanted not in outcomes:
@@ -272,6 +347,7 @@ def _serve(
 
     An outcome is a result and an error, pickled; it is empty where it cannot be.
     """
+    _ELSEWHERE.set(None)  # its connection is that of the parent
     # The parent says that it was stopped.
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         signal.signal(getattr(signal, name), signal.SIG_IGN)

@@ -5,10 +5,10 @@ a plan to a stiffness, a run of a study and a front of fibre are all requests; n
 its own.
 """
 
-import itertools
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from functools import partial
 from inspect import signature
 from typing import Any
@@ -18,10 +18,11 @@ from threadpoolctl import threadpool_limits
 
 from ccfem.base.checks import refuse_keywords
 from ccfem.base.errors import InputError, SolveError
-from ccfem.base.parallel import in_processes, processors
+from ccfem.base.parallel import beside, processors
 from ccfem.base.progress import Progress, silent
 from ccfem.cases.case import Case
 from ccfem.cases.load_cases import weighted_cases
+from ccfem.comparison.bounds import bounded, bounds_of
 from ccfem.comparison.curve import Curve
 from ccfem.comparison.curve_stages import along_curve
 from ccfem.comparison.plan_to_stiffness import plan_to_stiffness
@@ -41,11 +42,13 @@ from ccfem.comparison.request import (
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.stages import (
+    Ahead,
     Part,
     Tell,
     Tests,
+    all_planned,
     counted,
-    evaluated,
+    judged,
     natural,
     planned,
     planned_to_lengths,
@@ -53,12 +56,10 @@ from ccfem.comparison.stages import (
     timed,
     to_length,
     with_breaking_load,
-    with_print,
     with_test,
 )
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.stress_field import GivenStress, PartStress, StressField, WeightedCases
-from ccfem.fem.elasticity.support_kinds import PressingSupport
 from ccfem.fem.stress_files.stress_file import read_stress
 from ccfem.judging.virtual_testing.progressive_failure import BreakingLoad, breaking_load
 from ccfem.judging.virtual_testing.several_cases import specimens
@@ -74,7 +75,7 @@ from ccfem.printing.support import SupportLayers, slice_with_support
 from ccfem.slicing.layers.layer import curved_layers
 from ccfem.slicing.layers.slicer import Slicer, has_field, slicer_remarks
 from ccfem.strategies.fibre_aware.smeared import on_linear_cells
-from ccfem.strategies.fibre_aware.upper_bound import UpperBound, upper_bound
+from ccfem.strategies.fibre_aware.upper_bound import UpperBound
 
 _REPLACED = {
     "slicing": "layers, a slicer or its name",
@@ -89,10 +90,6 @@ _ALIKE = 0.005
 
 _LEAST = 1.0 / 16.0
 """Least of several lengths over the largest: twice as much fibre says the same at every length."""
-
-_SAME_BOUND, _SAME_CASES_BOUND = 1.002, 1.01
-"""Largest length over the shortest for which one bound is taken, that of the largest; a bound of
-several load cases takes several times as long as one of one."""
 
 
 @dataclass(frozen=True)
@@ -257,22 +254,19 @@ def answer(
     if parts is None:
         with timed(seconds, "slice"):
             parts, refused = _cut(request, basis)
-    stages = 4 + request.print_plans + request.breaking_load
-    steps = stages * len(request.strategies) * len(parts) + 1
+    steps = (3 + request.breaking_load) * len(request.strategies) * len(parts) + 1
     tell = counted(progress, 0.1, steps)
-    parts, runs, wanted = _planned(request, basis, parts, tell)
-    runs = side_by_side("evaluating {}", evaluated, runs, parts, tell)
-    if request.print_plans:
-        runs = side_by_side("planning the print of {}", with_print, runs, parts, tell)
-    if basis.tests is not None:
-        test = partial(with_test, tests=basis.tests)
-        runs = side_by_side("testing {}", test, runs, parts, tell)
+    early = _Early(request, basis)
+    parts, runs, wanted = _planned(request, basis, parts, tell, early)
+    runs = side_by_side("judging {}", early.judged, runs, parts, tell)
     bare = None
     if request.breaking_load:
         runs, bare = _broken(request, basis, parts, runs, tell, seconds)
     curve = _curve(request, basis, parts, runs, wanted, tell, seconds)
-    bounds = _bounds(request, basis, parts, runs, wanted, tell, seconds)
-    runs = [_bounded(run, bounds, wanted) for run in runs]
+    about = (request, basis.cases, basis.tests, parts, runs, wanted)
+    seconds |= early.seconds
+    bounds = bounds_of(*about, tell, seconds, early.bounds)
+    runs = [bounded(run, bounds, wanted) for run in runs]
     stacks = {name: part.layers for name, part in parts.items()}
     said = tuple(
         f"{name}: {line}" if name else line for name, part in parts.items() for line in part.remarks
@@ -291,6 +285,51 @@ def answer(
         of_slicers=said,
         bare=bare,
     )
+
+
+@dataclass(frozen=True)
+class _Early:
+    """Judges runs, also while others are being planned: then with what bounds them.
+
+    Attributes
+    ----------
+    bounds : dict of length, mm, to UpperBound
+        What is bounded already.
+    seconds : dict of stage to float
+        That this took.
+    """
+
+    request: Request
+    basis: Solved
+    bounds: dict[float, UpperBound] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    def judged(self, run: Run, part: Part) -> Run:
+        """Take a planned run as far as its virtual test."""
+        return judged(run, part, self.request.print_plans, self.basis.tests)
+
+    def on(self, part: Part, wanted: Wanted) -> Ahead:
+        """Judge runs on a part in another process, and bound what any of their length reach."""
+
+        @contextmanager
+        def ahead(runs: Sequence[Run]) -> Iterator[Callable[[], Sequence[Run]]]:
+            def work() -> tuple[list[Run], dict[float, UpperBound], dict[str, float]]:
+                done, spent = [self.judged(run, part) for run in runs], dict[str, float]()
+                basis = self.basis
+                about = (self.request, basis.cases, basis.tests, {"": part}, done, wanted)
+                known = {} if wanted is None else bounds_of(*about, lambda _: None, spent)
+                return done, known, spent
+
+            def outcome() -> Sequence[Run]:
+                done, bounds, spent = result()
+                self.bounds.update(bounds)
+                self.seconds.update(spent)
+                return done
+
+            with beside(work, shared=[runs, part, self.basis]) as result:
+                yield outcome
+
+        return ahead
 
 
 def _broken(
@@ -380,7 +419,9 @@ _Plans = tuple[Mapping[str, Part], list[Run], Wanted]
 """The part as it is cut, its runs, and the length that all are held to."""
 
 
-def _planned(request: Request, basis: Solved, parts: Mapping[str, Part], tell: Tell) -> _Plans:
+def _planned(
+    request: Request, basis: Solved, parts: Mapping[str, Part], tell: Tell, early: _Early
+) -> _Plans:
     """Plan every strategy on every slicing to the amount that is asked for.
 
     A stiffness chooses among numbers of layers; every other amount leaves the slicings as they are.
@@ -393,13 +434,11 @@ def _planned(request: Request, basis: Solved, parts: Mapping[str, Part], tell: T
     if isinstance(amount, Spread):
         return parts, _spread(unplanned, parts, amount.points, tell), None
     if isinstance(amount, Shortest):
-        return parts, *_to_the_shortest(request, unplanned, parts, tell)
-    wanted = _per_layer(amount, parts)
-    runs = [
-        planned(run, part, wanted[name], tell)
-        for name, part in parts.items()
-        for run in unplanned[name]
-    ]
+        return parts, *_to_the_shortest(request, unplanned, parts, tell, early)
+    wanted, runs = _per_layer(amount, parts), list[Run]()
+    for name, part in parts.items():
+        plan = partial(planned, part=part, wanted=wanted[name], tell=tell)
+        runs += all_planned(unplanned[name], plan, early.on(part, wanted[name]))
     if not request.named:
         return parts, runs, wanted[""]
     return parts, runs, amount if isinstance(amount, InAll) else None
@@ -410,6 +449,7 @@ def _to_the_shortest(
     unplanned: Mapping[str, Sequence[Run]],
     parts: Mapping[str, Part],
     tell: Tell,
+    early: _Early,
 ) -> tuple[list[Run], Wanted]:
     """Plan all runs to the shortest natural length of any; with them that length."""
     alone = {name: natural(unplanned[name], part, tell) for name, part in parts.items()}
@@ -427,7 +467,8 @@ def _to_the_shortest(
         length = in_all / len(parts[name].layers)
         if sets is not None:
             least = length = of_slicing[sets].length_per_layer
-        runs += to_length(of_slicing, sets, length, parts[name], tell)
+        part = parts[name]
+        runs += to_length(of_slicing, sets, length, part, tell, early.on(part, length))
     return runs, InAll(in_all) if request.named else least
 
 
@@ -507,79 +548,6 @@ def _misses(runs: Sequence[Run], wanted: Wanted) -> bool:
         for run in runs
         if run.evaluation is not None
     )
-
-
-def _bounds(
-    request: Request,
-    basis: Solved,
-    parts: Mapping[str, Part],
-    runs: Sequence[Run],
-    wanted: Wanted,
-    tell: Tell,
-    seconds: dict[str, float],
-) -> dict[float, UpperBound]:
-    """Bound what any paths can reach, by the length of fibre in all, mm.
-
-    None if no run of the wanted length was tested, for supports that hold in one sense only, and
-    where slicings are compared. Slicings that differ in the number of flat
-    layers alone, as those of several lengths do, are bounded on the most layers.
-    """
-    equal = [run for run in runs if run.tested is not None and not off_length(run, wanted)]
-    several_lengths = isinstance(request.amount, Spread)
-    if request.named and not several_lengths:
-        return {}
-    part = max(parts.values(), key=lambda part: len(part.layers))
-    if not request.bound or basis.tests is None or not equal or presses(basis.cases):
-        return {}
-    several, strand = len(basis.cases) > 1, basis.tests.strand
-    laid = [float(run.toolpaths.lengths.sum()) for run in equal]
-    lengths = [max(laid)]
-    if several_lengths:
-        lengths = _lengths_to_bound(laid, _SAME_CASES_BOUND if several else _SAME_BOUND)
-    of = " in all load cases" if several else ""
-    bounds: dict[float, UpperBound] = {}
-    with timed(seconds, "bound"):
-        about = (part.machine, strand)
-        bounded = in_processes(
-            lambda length: upper_bound(basis.cases, part.layers, length, *about), lengths
-        )
-        for length in lengths:
-            tell(f"bounding what any paths of {1e-3 * length:.3g} m could reach{of}")
-            bounds[length] = next(bounded)
-    return bounds
-
-
-def presses(cases: WeightedCases) -> bool:
-    """Whether a support holds in one sense only, so that nothing is bounded."""
-    supports = [support for field in cases.fields for support in field.problem.supports]
-    return any(isinstance(support, PressingSupport) for support in supports)
-
-
-def _lengths_to_bound(lengths: Sequence[float], alike: float) -> list[float]:
-    """Lengths to be bounded, mm: of every run, and between them for the curve.
-
-    Lengths within the factor `alike` share a bound, that of the largest.
-    """
-    taken: list[float] = []
-    for length in sorted(lengths, reverse=True):
-        if not taken or alike * length < taken[-1]:
-            taken.append(length)
-    between = [0.5 * (longer + shorter) for longer, shorter in itertools.pairwise([*taken, 0.0])]
-    return sorted([*taken, *between])
-
-
-def _bounded(run: Run, bounds: Mapping[float, UpperBound], wanted: Wanted) -> Run:
-    """Run with the most that paths of its length can reach."""
-    length = float(run.toolpaths.lengths.sum())
-    enough = [longer for longer in bounds if longer >= length]
-    if not enough or run.tested is None or off_length(run, wanted):
-        return run
-    bound = bounds[min(enough)]
-    if run.cases:
-        tested = replace(run.tested, cases=replace(run.cases, bound=bound))
-    else:
-        tested = replace(run.tested, most=bound.ratio)
-    return replace(run, tested=tested)
 
 
 def compare(

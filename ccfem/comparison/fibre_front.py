@@ -10,7 +10,8 @@ from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
 from ccfem.base.progress import Progress, silent
 from ccfem.cases.case import Case
-from ccfem.comparison.engine import Solved, answer, presses, solved
+from ccfem.comparison.bounds import presses
+from ccfem.comparison.engine import Solved, answer, solved
 from ccfem.comparison.front_cases import PointCases
 from ccfem.comparison.front_points import FibreFront, FrontPoint
 from ccfem.comparison.plan_to_stiffness import counts_to_try

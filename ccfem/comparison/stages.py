@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import count
@@ -58,6 +58,9 @@ Tell = Callable[[str], None]
 _UNLIKE = 1.3
 """Factor on the least length of all, on a few layers, above which a strategy is not planned to its
 own amount."""
+
+_AHEAD = 4
+"""Runs that are judged while others are being planned: it takes about as long."""
 
 _MOST_LAYERS = 60
 """Layers on which indices are taken that some of more layers tell."""
@@ -311,8 +314,34 @@ def _sampled(run: Run, part: Part, tell: Tell) -> Run:
     return sampled if sampled.failure or sampled.sampled else _by_itself(sampled, part, tell)
 
 
+Ahead = Callable[[Sequence[Run]], AbstractContextManager[Callable[[], Sequence[Run]]]]
+"""Judges planned runs in another process, and gives them back when asked."""
+
+
+def all_planned(runs: Sequence[Run], plan: Callable[[Run], Run], ahead: Ahead) -> list[Run]:
+    """Plan runs; those whose strategy takes the length itself, which takes longest, come last.
+
+    Beside these, some of the others are judged.
+    """
+    late = {run.name for run in runs if isinstance(run.strategy, LengthStrategy)}
+    done = {run.name: plan(run) for run in runs if run.name not in late}
+    first = list(done.values())[:_AHEAD]
+    if late and first:
+        with ahead(first) as judged_ahead:
+            done |= {run.name: plan(run) for run in runs if run.name in late}
+            done |= {run.name: run for run in judged_ahead()}
+    else:
+        done |= {run.name: plan(run) for run in runs if run.name in late}
+    return [done[run.name] for run in runs]
+
+
 def to_length(
-    own: Mapping[str, Run], setter: str | None, length: float | None, part: Part, tell: Tell
+    own: Mapping[str, Run],
+    setter: str | None,
+    length: float | None,
+    part: Part,
+    tell: Tell,
+    ahead: Ahead,
 ) -> list[Run]:
     """Plan runs to a length per layer, mm, from their natural amounts.
 
@@ -324,7 +353,7 @@ def to_length(
         Name of the run whose natural length this is; it is not planned again.
     length : float, mm, optional
         None if no run lays fibre.
-    tell : callable
+    tell, ahead : callable
     """
 
     def level(run: Run) -> Run:
@@ -335,7 +364,8 @@ def to_length(
         start = Planned(run.strategy, run.toolpaths, run.length_per_layer)
         return planned(run, part, length, tell, start if len(run.toolpaths) else None)
 
-    return list(own.values()) if length is None else [level(run) for run in own.values()]
+    runs = list(own.values())
+    return runs if length is None else all_planned(runs, level, ahead)
 
 
 def _setter(natural_runs: dict[str, Run], part: Part, tell: Tell) -> str | None:
@@ -365,6 +395,15 @@ def _no_fibre(machine: Machine) -> str:
         "laid no fibre: the layers, or their areas in tension, are too small for the shortest "
         f"strand of the machine, {machine.shortest_strand:g} mm: check that all lengths are in mm"
     )
+
+
+def judged(run: Run, part: Part, prints: bool, tests: "Tests | None") -> Run:
+    """Evaluate what was planned, plan its print if that is wanted, and test it; once."""
+    if run.evaluation is not None:
+        return run
+    run = evaluated(run, part)
+    run = with_print(run, part) if prints else run
+    return run if tests is None else with_test(run, part, tests)
 
 
 def evaluated(run: Run, part: Part) -> Run:

@@ -14,7 +14,7 @@ import numpy as np
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.checks import check_choices, check_fields
 from ccfem.base.errors import InputError
-from ccfem.base.parallel import in_processes
+from ccfem.base.parallel import beside, in_processes
 from ccfem.fem.elasticity import PartStress, StressField
 from ccfem.fem.elasticity.stress_field import WeightedCases, solved
 from ccfem.judging.virtual_testing import RHO, Strand, specimens
@@ -253,7 +253,9 @@ class StreamFunction:
         _check_tension(cases.fields, layers)
         in_all, strand = [length * len(layers) for length in lengths], Strand(self.rho)
         bounds = measures(self.objective, cases, layers, max(in_all), machine, strand)
-        problem, group, designed = self.designed(cases, layers, machine, bounds)
+        with beside(lambda: self._plain(cases, layers, machine), shared=[cases, layers]) as plain:
+            problem, group, designed = self.designed(cases, layers, machine, bounds)
+            plain_paths = plain()
         parts = tuple(part.specimen for part in problem.parts)
         goal = Goal(parts, cases.weights, bounds, self.objective)
         fields_of = layers_by_case(cases.weights, layers) * problem.model.groups + group
@@ -276,16 +278,21 @@ class StreamFunction:
         cut_by = (_ROUNDS, self.strength, self.moves, TIGHT_SHARES[self.turns])
         # Fields are designed on linear cells; moves gain less than those may be off.
         last = replace(goal, parts=specimens(cases)) if self.moves else None
-        plain = plain_plans(cases, layers, machine) if self.inset <= _PLAIN_INSET else []
         plans = []
         for some, length in zip(tried, in_all, strict=True):
-            offered = [*some, *plain]
+            offered = [*some, *plain_paths]
             enough = [paths for paths in offered if float(paths.lengths.sum()) >= _WHOLE * length]
             offered = enough if whole and enough else offered
             plans.append(
                 prune_and_move(offered, layers, goal, length, machine, strand, *cut_by, last=last)
             )
         return plans
+
+    def _plain(
+        self, cases: WeightedCases, layers: Sequence[Layer], machine: Machine
+    ) -> list[Toolpaths]:
+        """Plans that are tested beside the designed ones."""
+        return plain_plans(cases, layers, machine) if self.inset <= _PLAIN_INSET else []
 
     def extraction(
         self,

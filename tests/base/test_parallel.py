@@ -1,5 +1,6 @@
 import os
 import threading
+import time
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -8,7 +9,7 @@ import pytest
 
 from ccfem.base.arrays import is_shared, read_only, shared_rows
 from ccfem.base.errors import InputError
-from ccfem.base.parallel import in_processes, in_threads, processors
+from ccfem.base.parallel import beside, in_processes, in_threads, processors
 
 
 @pytest.fixture
@@ -131,6 +132,39 @@ def test_processes_are_not_started_within_one(two):
         return set(in_processes(inner, [0, 1])) == {os.getpid()}
 
     assert list(in_processes(outer, [0, 1])) == [True, True]
+
+
+def test_work_is_done_beside_other_work_on_the_processor_that_is_left(two, tmp_path):
+    go = tmp_path / "go"
+
+    def work():
+        deadline = time.monotonic() + 10.0
+        while not go.exists() and time.monotonic() < deadline:
+            time.sleep(0.001)
+        return os.getpid()
+
+    with beside(work) as result:
+        # The second processor is taken, and nothing else is started on it.
+        assert list(in_processes(lambda _: os.getpid(), [0, 1])) == 2 * [os.getpid()]
+        with beside(os.getpid) as here:
+            assert here() == os.getpid()
+        go.touch()
+        assert result() != os.getpid()
+        assert os.getpid() not in in_processes(lambda _: os.getpid(), [0, 1])
+
+
+def test_an_error_beside_other_work_is_raised_where_its_result_is_asked_for(two):
+    with beside(lambda: 1 / 0) as result, pytest.raises(ZeroDivisionError):
+        result()
+
+
+def test_alone_work_beside_is_done_when_its_result_is_asked_for(monkeypatch):
+    monkeypatch.setenv("CCFEM_THREADS", "1")
+    done = []
+    with beside(lambda: done.append(1)) as result:
+        assert done == []
+        result()
+    assert done == [1]
 
 
 def test_threads_start_no_processes(two):
