@@ -258,7 +258,10 @@ def answer(
     tell = counted(progress, 0.1, steps)
     early = _Early(request, basis)
     parts, runs, wanted = _planned(request, basis, parts, tell, early)
-    runs = side_by_side("judging {}", early.judged, runs, parts, tell)
+    # One that is left alone has all processors for its layers.
+    left = [run for run in runs if run.evaluation is None]
+    done = iter(side_by_side("judging {}", early.judged, left, parts, tell))
+    runs = [next(done) if run.evaluation is None else run for run in runs]
     bare = None
     if request.breaking_load:
         runs, bare = _broken(request, basis, parts, runs, tell, seconds)

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, seen_only
 from ccfem.geometry.locate import Buckets, bucket
 from ccfem.geometry.polylines import lengths, resample, starts_segment
 
@@ -112,7 +112,7 @@ def beads(
     # Direction of each part in the plane of its layer.
     normal = _layer_normals(points, normals, offsets, middle, line)
     chord = nodes[start + 1] - nodes[start]
-    direction, straight, often = _chords(chord, length, line, first, closed)
+    direction, straight, often = _chords(chord, length, line, first, seen_only(closed))
     direction = direction - np.einsum("ij,ij->i", direction, normal)[:, None] * normal
     direction /= np.maximum(np.linalg.norm(direction, axis=1), 1e-300)[:, None]
     if not shared:

@@ -394,7 +394,8 @@ def _cut_at_faces(
     is followed from cell to cell where it keeps clear of edges; elsewhere all cells near it are
     tested.
     """
-    count, last = 0, -1
+    # Of a plain constant, what takes it would be compiled once more.
+    count, last = np.int64(0), np.int64(-1)
     met = np.empty(len(tables.origin), dtype=np.int64)
     ends = np.empty(2 * len(tables.origin) + 1)
     point, leap, middle = np.empty(3), np.empty(3), np.empty(3)
@@ -443,7 +444,7 @@ def _cut_at_faces(
                         real[count, 0], real[count, 1] = begin, end
                         real[count, 2] = 1.0 / sharing
                     count += 1
-    return count
+    return int(count)
 
 
 @njit(cache=True)
