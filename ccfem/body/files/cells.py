@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
+from typing import Any
 
 import numpy as np
 
@@ -284,4 +285,13 @@ def with_groups(mesh: TetMesh, groups: Mapping[str, IntArray]) -> TetMesh:
     border = outside(mesh)
     return mesh.with_patches(
         {name: border[are_among(border, facets)] for name, facets in groups.items()}
+    )
+
+
+def is_axis(values: Any) -> bool:
+    """Whether an array of a file is a direction in space."""
+    return (
+        values.dtype.kind in "fiu"
+        and values.size == 3
+        and bool(np.isfinite(values).all() and np.any(values))
     )

@@ -56,7 +56,7 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0, check: bool = Tr
         if scale != 1.0:
             with np.errstate(over="ignore"):  # what overflows is refused as infinite
                 points = mesh.points * scale
-            mesh = TetMesh(points, mesh.cells, mesh.patches)
+            mesh = TetMesh(points, mesh.cells, mesh.patches, mesh.axes)
         if not check:
             return mesh
         mesh, report = check_mesh(mesh)

@@ -184,7 +184,7 @@ def check_mesh(mesh: TetMesh, merge: bool = False) -> tuple[TetMesh, MeshReport]
         return mesh, report
     number = np.cumsum(still) - 1
     named = {name: number[facets] for name, facets in patches.items()}
-    return TetMesh(points[still], number[mended.cells], named, walls=mesh.walls), report
+    return TetMesh(points[still], number[mended.cells], named, mesh.axes, mesh.walls), report
 
 
 def about_slivers(mesh: TetMesh) -> str:

@@ -57,6 +57,17 @@ def test_round_trip(tmp_path_factory, build_box, suffix, seed, order, name):
     same(found, mesh)
 
 
+@pytest.mark.parametrize("suffix", [".npz", ".vtu"])
+def test_axes_of_round_patches_are_kept(box, tmp_path, suffix):
+    """A rough wall does not show the axis that its rule states: a part that is written keeps it."""
+    axis = np.array([0.0, 0.6, 0.8])
+    mesh = box.with_patches({"bore: 1": box.boundary[:2]}, {"bore: 1": axis})
+    write_mesh(mesh, tmp_path / f"part{suffix}")
+    found = read_mesh(tmp_path / f"part{suffix}", scale=25.4)
+    assert list(found.axes) == ["bore: 1"]
+    np.testing.assert_array_equal(found.axes["bore: 1"], axis)
+
+
 def test_scale_and_raw_reading(box, tmp_path):
     turned = TetMesh(box.points, box.cells[:, [1, 0, 2, 3]])
     path = tmp_path / "part.npz"

@@ -1,7 +1,8 @@
 """Meshes as NumPy archives: small, exact and quick to read.
 
-``points`` (n, 3) float64, ``cells`` (m, 4 or 10) integers, and a (k, 3) array of boundary facets
-named ``patch:NAME`` for each patch. Nothing in the archive is unpickled.
+``points`` (n, 3) float64, ``cells`` (m, 4 or 10) integers, a (k, 3) array of boundary facets named
+``patch:NAME`` for each patch, and the axis (3,) of round ones, ``axis:NAME``. Nothing in the
+archive is unpickled.
 """
 
 import zipfile
@@ -11,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from ccfem.base.errors import InputError, shown
+from ccfem.body.files.cells import is_axis
 from ccfem.body.mesh import TetMesh
 
-_PATCH = "patch:"
+_PATCH, _AXIS = "patch:", "axis:"
 _SMALL, _PACKED = 10_000_000, 200
 """Bytes that any archive may unpack to, and how many times its size more."""
 
@@ -40,7 +42,7 @@ def read(path: Path) -> TetMesh:
             f"{', '.join(sorted(arrays)) or 'none'}: write it with write_mesh"
         )
     for name, array in arrays.items():
-        wanted = "fiu" if name == "points" else "iu"
+        wanted = "fiu" if name == "points" or name.startswith(_AXIS) else "iu"
         if array.dtype.kind not in wanted:
             raise InputError(f"{path}: array {name} must be numbers; got {array.dtype}")
     patches = {
@@ -48,7 +50,18 @@ def read(path: Path) -> TetMesh:
         for name, facets in arrays.items()
         if name.startswith(_PATCH)
     }
-    return TetMesh(arrays["points"], arrays["cells"], patches)
+    axes = {
+        name.removeprefix(_AXIS): axis.reshape(-1)
+        for name, axis in arrays.items()
+        if name.startswith(_AXIS)
+    }
+    wrong = [name for name, axis in axes.items() if name not in patches or not is_axis(axis)]
+    if wrong:
+        raise InputError(
+            f"{path}: {_AXIS}{wrong[0]} must be three numbers, the axis of a patch that is there: "
+            "write it with write_mesh"
+        )
+    return TetMesh(arrays["points"], arrays["cells"], patches, axes)
 
 
 def _check_sizes(path: Path) -> None:
@@ -70,5 +83,7 @@ def write(mesh: TetMesh, path: Path) -> None:
     arrays: dict[str, Any] = {"points": mesh.points, "cells": mesh.cells.astype(np.int32)}
     for name in sorted(mesh.patches):
         arrays[_PATCH + name] = mesh.patches[name].astype(np.int32)
+    for name in sorted(mesh.axes):
+        arrays[_AXIS + name] = mesh.axes[name]
     with path.open("wb") as file:
         np.savez_compressed(file, **arrays)

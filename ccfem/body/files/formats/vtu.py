@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError
-from ccfem.body.files.cells import tetrahedra, triangles_of, with_groups
+from ccfem.body.files.cells import is_axis, tetrahedra, triangles_of, with_groups
 from ccfem.body.files.vtk_xml import write_vtk_xml
 from ccfem.body.isolated.process import ChildError, read_isolated
 from ccfem.body.mesh import TetMesh
 
-_PATCH = "patch:"
+_PATCH, _AXIS = "patch:", "axis:"
 SOLIDS = {
     10: "tetra",
     11: "hexahedron",
@@ -42,7 +42,8 @@ _TAGS = ("patch", "gmsh:physical", "CellEntityIds", "PhysicalIds")
 def read(path: Path) -> TetMesh:
     """Read a VTK unstructured grid.
 
-    Patches come from the field data ``patch:NAME`` that `write` writes, and from triangles and
+    Patches come from the field data ``patch:NAME`` that `write` writes, with the axes of round ones
+    in ``axis:NAME``, and from triangles and
     quadrangles with an integer cell array named patch, gmsh:physical, CellEntityIds or PhysicalIds
     (called by their number).
     """
@@ -53,7 +54,12 @@ def read(path: Path) -> TetMesh:
         for name, facets in grid.field.items()
         if name.startswith(_PATCH) and facets.dtype.kind in "iu" and facets.size % 3 == 0
     }
-    return with_groups(mesh, {**_tagged_triangles(grid), **groups})
+    axes = {
+        name.removeprefix(_AXIS): axis.reshape(-1)
+        for name, axis in grid.field.items()
+        if name.startswith(_AXIS) and name.removeprefix(_AXIS) in groups and is_axis(axis)
+    }
+    return with_groups(mesh, {**_tagged_triangles(grid), **groups}).with_patches({}, axes)
 
 
 @dataclass(frozen=True)
@@ -165,6 +171,8 @@ def write(
 ) -> None:
     """Write a mesh as VTK unstructured grid, its patches as field data ``patch:NAME``.
 
+    The axes of round ones are in ``axis:NAME``.
+
     To be called with a file of `whole_file`.
 
     Parameters
@@ -198,6 +206,7 @@ def write(
         },
         {
             **{_PATCH + name: facets for name, facets in mesh.patches.items() if len(facets)},
+            **{_AXIS + name: axis for name, axis in mesh.axes.items()},
             **(field or {}),
         },
         components,
