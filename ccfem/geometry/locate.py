@@ -125,20 +125,29 @@ def locate(
     if not len(queries) or not len(simplices):
         return triangle, weights
     corners = points[simplices]
-    origins, gradients, heights = _barycentric_maps(corners)
     by_corner = np.moveaxis(corners, 1, 0)
     low, high = reduce(np.minimum, by_corner), reduce(np.maximum, by_corner)
+    # Simplices away from all queries, as those off a layer of the part, need no more work.
+    rounding = 1e-9 * float(np.abs(corners).max())
+    most, least = np.fmax.reduce(queries), np.fmin.reduce(queries)
+    border = reach + rounding
+    near = np.flatnonzero(((low <= most + border) & (high >= least - border)).all(axis=1))
+    if not len(near):
+        return triangle, weights
+    corners, low, high = corners[near], low[near], high[near]
+    origins, gradients, heights = _barycentric_maps(corners)
     # First without reach, which needs the fewest candidates; then only what was not found.
     for margin in (0.0, reach) if reach > 0.0 else (0.0,):
         left = np.flatnonzero(triangle < 0)
         if not len(left):
             break
-        slack = margin + 1e-9 * float(np.abs(corners).max())
+        slack = margin + rounding
         grid = bucket(low - slack, high + slack)
         index, weight = _search(grid, origins, gradients, heights, queries[left], slack)
         weight = np.maximum(weight, 0.0)
         total = weight.sum(axis=1, keepdims=True)
-        triangle[left], weights[left] = index, weight / np.where(total > 0.0, total, 1.0)
+        triangle[left] = np.where(index >= 0, near[index], -1)
+        weights[left] = weight / np.where(total > 0.0, total, 1.0)
     return triangle, weights
 
 

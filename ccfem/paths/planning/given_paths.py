@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray
+from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError
 from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.machine.machine import Machine
@@ -17,6 +17,8 @@ from ccfem.paths.planning.strategy import Amount
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer, LayerStress
 
+_FEW, _RIVALS = 9, 3
+"""Points of a path that tell which layers may be nearest, and how many of these are looked at."""
 _SAME = 1e-3
 """Heights nearer than this, mm, are equal: it allows for the rounding of path files."""
 
@@ -126,18 +128,17 @@ class GivenPaths:
         if not len(paths):
             return self
         size = np.diff(paths.offsets)
-        feet = [nearest_on_triangles(each.points, each.triangles, paths.points) for each in layers]
-        apart = np.stack([foot.distance for foot in feet])
-        nearest = (np.add.reduceat(apart, start, axis=1) / size).argmin(axis=0)
+        nearest = self._nearest_layers(layers)
         points, normals = np.empty_like(paths.points), np.empty_like(paths.points)
-        of_point = np.repeat(nearest, size)
-        for k, (layer, foot) in enumerate(zip(layers, feet, strict=True)):
-            here = of_point == k
-            a, b, c = np.moveaxis(layer.points[layer.triangles[foot.triangle[here]]], 1, 0)
+        apart, of_point = np.empty(len(paths.points)), np.repeat(nearest, size)
+        for k in np.unique(nearest).tolist():
+            here, layer = of_point == k, layers[k]
+            foot = nearest_on_triangles(layer.points, layer.triangles, paths.points[here])
+            a, b, c = np.moveaxis(layer.points[layer.triangles[foot.triangle]], 1, 0)
             normal = np.cross(b - a, c - a)
-            points[here] = foot.points[here]
+            points[here], apart[here] = foot.points, foot.distance
             normals[here] = normal / np.linalg.norm(normal, axis=1, keepdims=True)
-        far = np.maximum.reduceat(apart[of_point, np.arange(len(of_point))], start)
+        far = np.maximum.reduceat(apart, start)
         off = far > 0.5 * np.array([layer.thickness for layer in layers])[nearest] + _SAME
         if off.any():
             path = int(np.flatnonzero(off)[0])
@@ -148,3 +149,29 @@ class GivenPaths:
             )
         index = np.array([layer.index for layer in layers])[nearest]
         return replace(self, toolpaths=replace(paths, points=points, normals=normals, layer=index))
+
+    def _nearest_layers(self, layers: Sequence[Layer]) -> IntArray:
+        """Find the layer from which the points of each path are least far on average.
+
+        A few points of each tell which layers come into question.
+        """
+        paths, size = self.toolpaths, np.diff(self.toolpaths.offsets)
+
+        def away(layer: Layer, chosen: IntArray, counts: IntArray) -> FloatArray:
+            """Mean distance of the paths, of which some points are chosen."""
+            foot = nearest_on_triangles(layer.points, layer.triangles, paths.points[chosen])
+            start = np.cumsum(counts) - counts
+            return np.asarray(np.add.reduceat(foot.distance, start) / counts)
+
+        few = np.minimum(size, _FEW)
+        share = np.concatenate([np.linspace(0.0, 1.0, count) for count in few])
+        first, length = (np.repeat(each, few) for each in (paths.offsets[:-1], size - 1))
+        sample = first + np.rint(share * length).astype(np.int64)
+        roughly = np.stack([away(layer, sample, few) for layer in layers])
+        mean = np.full(roughly.shape, np.inf)
+        order = np.argsort(roughly, axis=0)[:_RIVALS]
+        for k in np.unique(order).tolist():
+            wanted = (order == k).any(axis=0)
+            chosen = np.flatnonzero(np.repeat(wanted, size))
+            mean[k, wanted] = away(layers[k], chosen, size[wanted])
+        return np.asarray(mean.argmin(axis=0))
