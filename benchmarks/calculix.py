@@ -28,17 +28,22 @@ from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError, SolveError
+from ccfem.base.tensor import from_voigt
 from ccfem.body.files.cells import tetrahedra
 from ccfem.body.files.deck import ELEMENTS, NODES, Model, read_deck
 from ccfem.body.mesh import TetMesh
+from ccfem.body.mesh.curved_cells import gradients_at
 from ccfem.cases.part_file import part_case
 from ccfem.fem.elasticity import StressField, prepare, solve
-from ccfem.fem.elasticity.loads import heat_forces
+from ccfem.fem.elasticity.loads import free_strain, heat_forces
+from ccfem.fem.elasticity.recovery import times, voigt_strain
 
 _ALL = "CCFEM_ALL"
 """Name of the set of all nodes, and of all cells, that a copy of a deck gets."""
 _SAME = 1e-6
 """Distance of two nodes over the size of the part within which they are the same."""
+_SHARE = (5.0 - 5.0**0.5) / 20.0
+"""Least barycentric coordinate of the four points of a tetrahedron at which CalculiX integrates."""
 _SECONDS = 600
 """Time that CalculiX may take for a deck."""
 
@@ -133,7 +138,9 @@ def by_calculix(
         f"*{word}, {word}={_ALL}\n" + "".join(f"{label},\n" for label in labels[kind])
         for word, kind in (("NSET", NODES), ("ELSET", ELEMENTS))
     )
-    printed = f"*NODE PRINT, NSET={_ALL}\nU, RF\n*EL PRINT, ELSET={_ALL}, GLOBAL=YES\nS\n"
+    printed = (
+        f"*NODE PRINT, NSET={_ALL}, GLOBAL=YES\nU, RF\n*EL PRINT, ELSET={_ALL}, GLOBAL=YES\nS\n"
+    )
     text = re.sub(r"(?mi)^(?=\s*\*end\s*step\b)", printed, text)
     text = re.sub(r"(?mi)^(?=\s*\*step\b)", sets, text, count=1)
     text = re.sub(r"(?i)(\*element\b.*type\s*=\s*C3D8)\s*(?=,|$)", r"\1I", text, flags=re.M)
@@ -174,6 +181,24 @@ def _largest_difference(field: StressField, model: Model, table: FloatArray) -> 
     return float(np.linalg.norm(apart, axis=1).max() / np.abs(field.displacement).max())
 
 
+def _stress(field: StressField) -> FloatArray:
+    """Stress (m, 3, 3) of each cell as CalculiX has it, the mean at four points of quadratic ones.
+
+    On a curved cell that is not the stress at its centre.
+    """
+    mesh, problem = field.mesh, field.problem
+    if mesh.order == 1:
+        return field.stress
+    free, total = free_strain(problem, field.case), np.zeros((len(mesh.cells), 6))
+    nodes, moved = mesh.points[mesh.cells], field.displacement[mesh.cells].transpose(0, 2, 1)
+    for at in np.full((4, 4), _SHARE) + (1.0 - 4.0 * _SHARE) * np.eye(4):
+        strain = voigt_strain(moved @ gradients_at(nodes, at))
+        if free is not None:
+            strain = strain - np.einsum("a,mai->mi", at, free)
+        total += times(problem.cell_stiffness, strain)
+    return from_voigt(0.25 * total)
+
+
 def _differences(
     field: StressField,
     model: Model,
@@ -194,7 +219,7 @@ def _differences(
     split = tetrahedra(model.points, model.blocks, "deck")
     row = cKDTree(TetMesh(split.points, split.cells).centres).query(mesh.centres)[1]
     parent, weight = split.parent[row], mesh.volumes
-    parts = field.stress.reshape(-1, 9).T
+    parts = _stress(field).reshape(-1, 9).T
     sums = np.array([np.bincount(parent, weight * part) for part in parts]).T
     mean = (sums / np.bincount(parent, weight)[:, None]).reshape(-1, 3, 3)
     loads = prepare(problem).forces_in(field.case) - heat_forces(problem, field.case)

@@ -5,7 +5,7 @@ their nodes make facets, and nodes elsewhere; sections (`ccfem.cases.deck_materi
 What cannot be taken over is a mistake, with its line.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -19,7 +19,7 @@ from ccfem.body.files.deck import read_deck
 from ccfem.body.files.formats.inp import mesh_of
 from ccfem.body.mesh.check import check_coordinates
 from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.cases.deck_constraints import DEGREES, Coupling, DeckConstraints, tied
+from ccfem.cases.deck_constraints import DEGREES, Coupling, DeckConstraints, Tie, tied
 from ccfem.cases.deck_materials import TAKE_OUT, CellMaterials, DeckMaterials, DeckReading
 from ccfem.cases.deck_steps import BODY, DeckSteps, FaceLoad, State
 from ccfem.fem.elasticity.load_kinds import (
@@ -43,6 +43,7 @@ from ccfem.fem.elasticity.support_kinds import (
     NodeSupport,
     RigidPatch,
     Support,
+    TiedPatch,
 )
 from ccfem.fem.materials import Material
 from ccfem.geometry.facets import are_among, facet_keys
@@ -115,10 +116,11 @@ def read_analysis(path: Path, scale: float = 1.0, step: str | None = None) -> De
     used = np.zeros(len(model.points), dtype=bool)
     used[model.nodes[model.nodes >= 0]] = True
     check_coordinates(model.points, used)
-    model, cells, mistakes, remarks = tied(model, deck, path)
+    joined = tied(model, deck, path)
+    model, cells = joined.model, joined.cells
     reading = DeckReading(model, deck, scale, cells)
-    reading.mistakes.lines += mistakes
-    reading.remarks += remarks
+    reading.mistakes.lines += joined.mistakes
+    reading.remarks += joined.remarks
     mesh = mesh_of(model, cells, path)
     constraints = DeckConstraints(reading, mesh)
     for block, scope in deck.rest:
@@ -136,7 +138,7 @@ def read_analysis(path: Path, scale: float = 1.0, step: str | None = None) -> De
     for kind, count in deck.bare.items():
         what = f"elements {kind or 'without type'}, which have no volume"
         reading.remarks.append(f"{path}: {count} lines of {what}, are left out")
-    conversion = _Conversion(steps, known.expand)
+    conversion = _Conversion(steps, known.expand, joined.ties)
     cases = conversion.chosen(step, path)
     reading.mistakes.complain()
     assert materials is not None
@@ -167,7 +169,8 @@ class _Conversion:
         Whether some material grows by heat.
     """
 
-    def __init__(self, steps: DeckSteps, expand: bool) -> None:
+    def __init__(self, steps: DeckSteps, expand: bool, ties: Sequence[Tie]) -> None:
+        self.ties = ties
         self.steps, self.reading, self.mesh, self.expand = steps, steps.reading, steps.mesh, expand
         self.constraints = steps.constraints
         self._border_nodes = steps.mesh.facet_nodes(steps.border)
@@ -248,6 +251,10 @@ class _Conversion:
         for (title, chosen_bytes, system), values in joined.items():
             chosen = np.frombuffer(chosen_bytes, dtype=np.int64)
             supports += self._held_nodes(title, chosen, system, values)
+        for tie in self.ties:
+            slave, master = map(self._patch, tie.titles, (tie.slave, tie.master))
+            within = None if tie.within is None else self.reading.scale * tie.within
+            supports.append(TiedPatch(slave, master, within))
         for number, coupling in enumerate(self.constraints.couplings):
             supports += self._coupled(coupling, at_reference.get(number, {}))
         moves = any(any(held.values()) for held in at_reference.values())
@@ -293,6 +300,11 @@ class _Conversion:
                 )
             return
         patch = self._patch(coupling.title, coupling.facets)
+        alone = coupling.held(held)
+        if alone is not None:
+            x, y, z = (alone.get(letter, 0.0) for letter in "xyz")
+            yield Support(patch, coupling.components, (x, y, z))
+            return
         if set(held) == set(DEGREES) and not any(held.values()):
             yield Support(patch)
             return
@@ -357,6 +369,11 @@ class _Conversion:
         """Force and moment (6,) of a reference node as they act on the faces that hang on it."""
         if not total.any():
             return
+        if coupling.components != "xyz":
+            raise InputError(
+                f"a force acts on the reference node that '{coupling.title}' follows in "
+                f"{coupling.components} alone: {TAKE_OUT}"
+            )
         patch, scale = self._patch(coupling.title, coupling.facets), self.reading.scale
         area, _ = self.mesh.facet_areas(coupling.facets)
         centroid = area @ self.mesh.points[coupling.facets].mean(axis=1) / area.sum()

@@ -1,11 +1,12 @@
 """Constraints of a deck: *TRANSFORM, *COUPLING, *RIGID BODY and *TIE.
 
 A reference node moves the faces coupled to it as a rigid body (*KINEMATIC, *RIGID BODY), or what
-acts on it is spread over them (*DISTRIBUTING). A *TIE joins surfaces whose meshes coincide: their
-nodes become the same. What no means of the solver takes is a mistake, with its line.
+acts on it is spread over them (*DISTRIBUTING). A *TIE joins surfaces: where their meshes coincide
+their nodes become the same, else those of one follow the faces of the other. What no means of the
+solver takes is a mistake, with its line.
 """
 
-from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -32,6 +33,7 @@ from ccfem.body.files.formats.inp import facets_of_surface
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases.deck_materials import TAKE_OUT, DeckReading, check_parameters, numbers
 from ccfem.fem.elasticity.support_kinds import local_axes
+from ccfem.fem.elasticity.tied_faces import tied_nodes
 from ccfem.geometry.facets import are_among, connected
 
 DEGREES = "xyzuvw"
@@ -72,12 +74,40 @@ class Coupling:
         Of the reference node, in the unit of the deck.
     rigid : bool
         Whether they move with it as a rigid body; else it passes loads on alone.
+    components : str, default "xyz"
+        In which they move with it.
     """
 
     title: str
     facets: IntArray
     place: FloatArray
     rigid: bool
+    components: str = "xyz"
+
+    def held(self, at: Mapping[str, float]) -> dict[str, float] | None:
+        """Displacement of its faces by component where its node is held; None for "xyz".
+
+        Parameters
+        ----------
+        at : mapping of degree of freedom to value
+            At which the reference node is held.
+
+        Raises
+        ------
+        InputError
+            Where single components follow a node that is free, or turns.
+        """
+        if self.components == "xyz":
+            return None
+        turns = {DEGREES[3 + k] for k in range(3) if set(self.components) - {DEGREES[k]}}
+        needed = {*self.components, *turns}
+        if not needed <= set(at) or any(at[letter] for letter in turns):
+            free = ", ".join(str(1 + DEGREES.index(letter)) for letter in sorted(needed - set(at)))
+            raise InputError(
+                f"single components of '{self.title}' follow a reference node that is "
+                f"{f'free in {free}' if free else 'turned'}, and it must be held there: {TAKE_OUT}"
+            )
+        return {letter: at[letter] for letter in self.components}
 
 
 class DeckConstraints:
@@ -198,16 +228,18 @@ class DeckConstraints:
                         f"{shown(', '.join(items))}: correct them"
                     )
                 coupled |= set(range(int(first), int(last) + 1))
-        if rigid and coupled and not {1, 2, 3} <= coupled:
+        components = "".join(DEGREES[k - 1] for k in sorted(coupled & {1, 2, 3}))
+        if rigid and coupled and not components:
             raise InputError(
-                f"degrees of freedom 1 to 3 are coupled together; got {sorted(coupled)}: {TAKE_OUT}"
+                f"solids have degrees of freedom 1 to 3; got {sorted(coupled)}: couple one of them"
             )
         name, item = (coupling.parameters.get(key, "") for key in ("SURFACE", "REFNODE"))
         facets = facets_of_surface(self._reading.model, name, self.border)
         facets = self.border[are_among(self.border, facets)]
         if not len(facets):
             raise InputError(f"surface {shown(name)} has no face on the outside: {TAKE_OUT}")
-        self._refer(item, Coupling(name, facets, self._place(item), rigid))
+        followed = components or "xyz"
+        self._refer(item, Coupling(name, facets, self._place(item), rigid, followed))
 
     def _rigid_body(self, block: Block) -> None:
         """Take a *RIGID BODY of nodes that make faces."""
@@ -259,53 +291,117 @@ class DeckConstraints:
 # Surfaces that are tied.
 
 
-def tied(model: Model, deck: Deck, path: Path) -> tuple[Model, SplitCells, list[str], list[str]]:
-    """Model whose tied surfaces share their nodes, its tetrahedra, mistakes, and remarks."""
+@dataclass(frozen=True)
+class Tie:
+    """Two surfaces of a *TIE, whose meshes do not match, by their facets (k, 3).
+
+    Attributes
+    ----------
+    within : float, optional
+        Distance up to which nodes are tied, in the unit of the deck.
+    """
+
+    titles: tuple[str, str]
+    slave: IntArray
+    master: IntArray
+    within: float | None
+
+
+@dataclass
+class TiedModel:
+    """A model whose tied surfaces share their nodes where their meshes match.
+
+    Attributes
+    ----------
+    ties : list of Tie
+        The other ones.
+    """
+
+    model: Model
+    cells: SplitCells
+    ties: list[Tie]
+    mistakes: list[str]
+    remarks: list[str]
+
+
+def tied(model: Model, deck: Deck, path: Path) -> TiedModel:
+    """Take the *TIE of a deck: the facets of surfaces that do not match are those of its cells."""
     cells = tetrahedra(model.points, model.blocks, path)
-    blocks = [block for block, _ in deck.rest if block.keyword == "TIE"]
-    if not blocks:
-        return model, cells, [], []
+    result = TiedModel(model, cells, [], [], [])
     before = TetMesh(cells.points, cells.cells)
-    pairs, mistakes, remarks = [np.zeros((0, 2), dtype=np.int64)], [], []
-    for block in blocks:
+    pairs = [np.zeros((0, 2), dtype=np.int64)]
+    for block in (block for block, _ in deck.rest if block.keyword == "TIE"):
         try:
             known = ("NAME", "POSITION TOLERANCE", "ADJUST", "TYPE", "NO ROTATION")
             check_parameters(block, *known)
+            given = numbers([block.parameters.get("POSITIONTOLERANCE", "")], 1)[0]
             for line in block.lines:
-                pairs.append(_coinciding(model, before, [x.strip() for x in line.split(",")]))
-                remarks.append(f"{block.where}: *TIE glues {len(pairs[-1])} coinciding nodes")
+                tie = _tie(model, before, [x.strip() for x in line.split(",")], given or None)
+                same = _coinciding(model, before, tie)
+                if same is None:
+                    result.ties.append(tie)
+                    result.remarks.append(f"{block.where}: *TIE: {_followed(before, tie)}")
+                    continue
+                pairs.append(same)
+                result.remarks.append(f"{block.where}: *TIE glues {len(same)} coinciding nodes")
         except InputError as error:
-            mistakes.append(f"{block.where}: *TIE: {error}")
+            result.mistakes.append(f"{block.where}: *TIE: {error}")
+    if len(pairs) == 1:
+        return result
     piece = connected(np.concatenate(pairs), len(model.points))
     _, first = np.unique(piece, return_index=True)
-    joined = _renumbered(model, first[piece])
-    cells = tetrahedra(joined.points, joined.blocks, path)
-    mistakes += _open_faces(joined, TetMesh(cells.points, cells.cells), blocks, first[piece])
-    return joined, cells, mistakes, remarks
+    leader = first[piece]
+    result.model = _renumbered(model, leader)
+    result.cells = tetrahedra(result.model.points, result.model.blocks, path)
+    whole = np.arange(len(cells.points))
+    whole[: len(leader)] = leader
+    result.ties = [
+        replace(tie, slave=whole[tie.slave], master=whole[tie.master]) for tie in result.ties
+    ]
+    return result
 
 
-def _coinciding(model: Model, mesh: TetMesh, names: list[str]) -> IntArray:
-    """Pairs (k, 2) of the nodes of two surfaces that coincide."""
+def _tie(model: Model, mesh: TetMesh, names: list[str], within: float | None) -> Tie:
+    """Faces of the outside of two surfaces."""
     if len(names) < 2:
         raise InputError(f"expected two surfaces; got {shown(', '.join(names))}: name two")
-    border, nodes = outside(mesh), []
+    border, faces = outside(mesh), []
     for name in names[:2]:
         facets = facets_of_surface(model, name, border)
-        facets = border[are_among(border, facets)]
-        of_file = np.unique(mesh.facet_nodes(facets))
-        nodes.append(of_file[of_file < len(model.points)])
-        if not len(facets):
+        faces.append(border[are_among(border, facets)])
+        if not len(faces[-1]):
             raise InputError(f"surface {shown(name)} has no face on the outside: {TAKE_OUT}")
-    slave, master = nodes
-    near = _SAME * float(np.linalg.norm(np.ptp(model.points[np.concatenate(nodes)], axis=0)))
+    return Tie((names[0], names[1]), *faces, within)
+
+
+def _followed(mesh: TetMesh, tie: Tie) -> str:
+    """Say how many nodes of one surface follow the faces of the other."""
+    (slave, master), nodes = tie.titles, np.unique(mesh.facet_nodes(tie.slave))
+    joined = tied_nodes(mesh, nodes, tie.master, tie.within, f"'{slave}'")
+    return (
+        f"{len(joined.nodes)} of {len(nodes)} nodes of '{slave}' follow the faces of '{master}', "
+        "whose mesh is another one"
+    )
+
+
+def _coinciding(model: Model, mesh: TetMesh, tie: Tie) -> IntArray | None:
+    """Pairs (k, 2) of the nodes of two surfaces that coincide; None where their faces do not."""
+    slave, master = (
+        np.unique(nodes[nodes < len(model.points)])
+        for nodes in map(mesh.facet_nodes, (tie.slave, tie.master))
+    )
+    places = model.points[np.concatenate([slave, master])]
+    near = _SAME * float(np.linalg.norm(np.ptp(places, axis=0)))
     distance, at = cKDTree(model.points[master]).query(model.points[slave])
     same = distance <= near
-    if not same.all() and np.count_nonzero(same) < len(master):
-        raise InputError(
-            f"{np.count_nonzero(~same)} of {len(slave)} nodes of {shown(names[0])} lie on no node "
-            f"of {shown(names[1])}, and meshes that do not match are not tied: mesh both alike, or "
-            "take it out"
-        )
+    # The smaller surface lies on faces of the larger one.
+    leader = np.arange(len(mesh.points))
+    leader[slave[same]] = master[at[same]]
+    few, many = leader[tie.slave], tie.master
+    if len(few) > len(many):
+        few, many = many, few
+    if not are_among(few, many).all():
+        return None
     return np.column_stack([slave[same], master[at[same]]])
 
 
@@ -322,27 +418,3 @@ def _renumbered(model: Model, leader: IntArray) -> Model:
         rows=rows,
         nodes=nodes,
     )
-
-
-def _open_faces(
-    model: Model, mesh: TetMesh, blocks: Iterable[Block], leader: IntArray
-) -> list[str]:
-    """Mistakes of ties whose faces do not match although their nodes do."""
-    border, mistakes = outside(mesh), []
-    shared = np.zeros(len(mesh.points), dtype=bool)
-    shared[: len(leader)] = np.bincount(leader, minlength=len(leader)) > 1
-    for block in blocks:
-        for line in block.lines:
-            names = [item.strip() for item in line.split(",")][:2]
-            try:
-                facets = np.concatenate([facets_of_surface(model, x, border) for x in names])
-            except InputError:  # it is a mistake already
-                continue
-            still = facets[are_among(facets, border)]
-            count = int(shared[still].all(axis=1).sum())
-            if count:
-                mistakes.append(
-                    f"{block.where}: *TIE: {count} faces of its surfaces do not match although "
-                    "their nodes do: mesh both alike, or take it out"
-                )
-    return mistakes

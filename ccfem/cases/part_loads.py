@@ -35,6 +35,7 @@ from ccfem.fem.elasticity.support_kinds import (
     SlidingSupport,
     Spring,
     Support,
+    TiedPatch,
 )
 
 LOADS: dict[str, Callable[..., Load]] = {
@@ -67,6 +68,7 @@ SUPPORTS: dict[str, Callable[..., AnySupport]] = {
     "point_spring": PointSpring,
     "foundation": Foundation,
     "pressing": PressingSupport,
+    "tied": TiedPatch,
 }
 """Supports by their kind."""
 

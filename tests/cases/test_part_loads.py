@@ -41,6 +41,7 @@ from ccfem.fem.elasticity import (
     Spring,
     Support,
     Temperature,
+    TiedPatch,
     Traction,
     prepare,
     solve,
@@ -153,6 +154,11 @@ tangential = 0.5
 kind = "pressing"
 patch = "y_min"
 normal = "-y"
+[[supports]]
+kind = "tied"
+patch = "z_min"
+to = "x_min"
+within = 0.1
 """
     problem = read(folder, PART + text + PULLED)
     assert problem.supports == (
@@ -168,6 +174,7 @@ normal = "-y"
         PointSpring((20.0, 0.0, 0.0), (0.0, 3.0, 0.0)),
         Foundation("z_max", 4.0, 0.5),
         PressingSupport("y_min", "-y"),
+        TiedPatch("z_min", "x_min", 0.1),
     )
     assert len(problem.supports) == len(SUPPORTS)
 
@@ -372,6 +379,7 @@ def test_every_kind_is_weighed_on_a_surface_before_it_is_meshed():
         PointSpring((20.0, 0.0, 0.0), (1.0, 1.0, 1.0)),
         Foundation("right", 1.0, 1.0),
         PressingSupport("below"),
+        TiedPatch("below", "left", 50.0),
     )
     assert {type(each) for each in others} | {Support} == set(SUPPORTS.values())
     for other in others:

@@ -126,7 +126,7 @@ _KINDS = (
     (r"D?C3D15", "wedge15", 15),
     (r"D?C3D5", "pyramid", 5),
     (r"D?C3D13", "pyramid13", 13),
-    (r"D?C3D27", "polyhedron27", 0),
+    (r"D?C3D27", "hexahedron27", 27),
     (r"(CPS|CPE|S|M3D|SFM3D|R3D|DS|STRI)3|S3R", "triangle", 3),
     (r"(CPS|CPE|M3D|SFM3D|DS|S)6|STRI65", "triangle6", 6),
     (r"(CPS|CPE|S|M3D|SFM3D|R3D|DS)4", "quad", 4),

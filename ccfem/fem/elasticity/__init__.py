@@ -34,6 +34,7 @@ from ccfem.fem.elasticity.support_kinds import (
     SlidingSupport,
     Spring,
     Support,
+    TiedPatch,
 )
 from ccfem.fem.elasticity.system import System, prepare
 
@@ -71,6 +72,7 @@ __all__ = [
     "Support",
     "System",
     "Temperature",
+    "TiedPatch",
     "Traction",
     "add_blocks",
     "assemble",

@@ -7,6 +7,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.errors import InputError
+from ccfem.fem.elasticity.tied_faces import TiedNodes
 
 # Nodes with axes of their own, and nodes that move together as a rigid body.
 #
@@ -14,7 +16,14 @@ from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 # with axes F has ``u = F q``. A node of a rigid body has ``u = t + w x r``, with the translation t
 # of its centre and the rotation w. Each rigid body adds two nodes after those of the mesh: its
 # translation, and its rotation times the size of the body, which makes it a length. The nodes of
-# the body itself stay, but nothing depends on them.
+# the body itself stay, but nothing depends on them. A node that is tied to a face has
+# ``u = P F q + (1 - P) sum w u_k``: P is onto what supports hold there, and the nodes k of the face
+# may be tied or rigid themselves.
+
+_CASCADE = 10
+"""How often ties are followed, twice as far each time, before they must end."""
+_NOTHING = 1e-12
+"""Share of a displacement that counts as rounding."""
 
 
 @dataclass(frozen=True)
@@ -49,12 +58,16 @@ class Ties:
         Nodes with axes of their own.
     frames : (k, 3, 3) array
         Their axes as columns.
+    bodies : tuple of Body
+    tied : TiedNodes, optional
+        Nodes that follow a face.
     """
 
     points: FloatArray
     turned: IntArray
     frames: FloatArray
     bodies: tuple[Body, ...] = ()
+    tied: TiedNodes | None = None
 
     @cached_property
     def count(self) -> int:
@@ -89,8 +102,35 @@ class Ties:
             columns += [np.full(count, n + 2 * k), np.full(count, n + 2 * k + 1)]
             # w x r = -r x w
             blocks += [np.tile(body.axes, (count, 1, 1)), -_cross(arm) @ body.axes]
-        return _block_matrix(np.concatenate(rows), np.concatenate(columns), np.concatenate(blocks),
-                       (n, self.count))  # fmt: skip
+        along = _block_matrix(np.concatenate(rows), np.concatenate(columns),
+                              np.concatenate(blocks), (n, self.count))  # fmt: skip
+        return along if self._follow is None else (self._follow @ along).tobsr((3, 3))
+
+    @cached_property
+    def _follow(self) -> sp.bsr_array | None:
+        """Matrix (3n, 3n) that gives tied nodes the displacement of what they are tied to."""
+        tied, n = self.tied, len(self.points)
+        if tied is None:
+            return None
+        others = np.setdiff1d(np.arange(n), tied.nodes)
+        axes = self.axes[tied.nodes]
+        own = np.einsum("kij,kj,klj->kil", axes, tied.held, axes)
+        shares = tied.weights[:, :, None, None] * (np.eye(3) - own)[:, None]
+        rows = [others, tied.nodes, np.repeat(tied.nodes, tied.leaders.shape[1])]
+        columns = [others, tied.nodes, tied.leaders.reshape(-1)]
+        blocks = [np.tile(np.eye(3), (len(others), 1, 1)), own, shares.reshape(-1, 3, 3)]
+        result = _block_matrix(
+            np.concatenate(rows), np.concatenate(columns), np.concatenate(blocks), (n, n)
+        )
+        # What tied nodes would do by themselves must not reach any node in the end.
+        rest = _block_matrix(tied.nodes, tied.nodes, np.eye(3) - own, (n, n))
+        for _ in range(_CASCADE):
+            if abs(result @ rest).max() <= _NOTHING:
+                return result
+            result = (result @ result).tobsr((3, 3))
+        raise InputError(
+            "tied patches are tied to each other in a circle: tie each to one that is not tied"
+        )
 
     def reduce(self, matrix: sp.bsr_array) -> sp.bsr_array:
         """Stiffness (3 n', 3 n') of the remaining nodes: ``T^T K T``."""
@@ -126,7 +166,16 @@ class Ties:
 
     def touched(self, held: BoolArray) -> BoolArray:
         """Mask (n,) of nodes on which held components (n', 3), or a rigid body, act."""
-        return held[: len(self.points)].any(axis=1) | self.slaves
+        held = held[: len(self.points)].copy()
+        if self.tied is not None:
+            held[self.tied.nodes] = self.tied.held
+        return held.any(axis=1) | self.slaves
+
+    def carried(self, forces: FloatArray) -> FloatArray:
+        """Move forces (n, 3) on tied nodes to what they are tied to."""
+        if self._follow is None:
+            return forces
+        return np.asarray(self._follow.T @ forces.reshape(-1)).reshape(-1, 3)
 
     def prolongation(self, ends: IntArray) -> sp.bsr_array:
         """From the corners of a quadratic mesh and the rigid bodies to all remaining nodes.
@@ -146,9 +195,12 @@ class Ties:
         halves = np.tile(0.5 * np.eye(3), (2 * n, 1, 1))
         middles = _block_matrix(np.repeat(node, 2), ends.reshape(-1), halves, (n, n))
         corner = (ends[:, 0] == node) & (ends[:, 1] == node)
-        masters = np.flatnonzero(~self.slaves)
+        leads = ~self.slaves
+        if self.tied is not None:
+            leads[self.tied.nodes] = False
+        masters = np.flatnonzero(leads)
         bodies = n + np.arange(2 * len(self.bodies))
-        kept = np.concatenate([np.flatnonzero(corner & ~self.slaves), bodies])
+        kept = np.concatenate([np.flatnonzero(corner & leads), bodies])
         pick = _block_matrix(kept, kept, np.tile(np.eye(3), (len(kept), 1, 1)), 2 * (self.count,))
         back = _block_matrix(
             masters, masters, np.swapaxes(self.axes[masters], 1, 2), (self.count, n)
@@ -156,7 +208,10 @@ class Ties:
         rigid = _block_matrix(
             bodies, bodies, np.tile(np.eye(3), (len(bodies), 1, 1)), 2 * (self.count,)
         )
-        return (back @ (middles @ (self.matrix @ pick)) + rigid).tobsr((3, 3))
+        result = back @ (middles @ (self.matrix @ pick)) + rigid
+        if self.tied is not None:  # corners follow midpoints, which follow other corners
+            result = back @ (middles @ (self.matrix @ result)) + rigid
+        return result.tobsr((3, 3))
 
 
 def _cross(vectors: FloatArray) -> FloatArray:
@@ -366,7 +421,14 @@ class Held:
         """Keep what of nodal forces (n, 3) acts on held components; zero elsewhere."""
         if self.ties is None:
             return np.where(self.free, 0.0, forces)
-        return np.where(self.ties.touched(~self.free)[:, None], forces, 0.0)
+        touched = self.ties.touched(~self.free)
+        return np.where(touched[:, None], self.ties.carried(forces), 0.0)
+
+    def lost_in_ties(self, forces: FloatArray) -> FloatArray:
+        """Find what ties change in nodal forces (n, 3): a moment where faces lie apart."""
+        if self.ties is None or self.ties.tied is None:
+            return np.zeros_like(forces)
+        return forces - self.ties.carried(forces)
 
     def modes(self, points: FloatArray) -> FloatArray:
         """Rigid motions (3k, 6) of points (n, 3), mm, as solutions of the reduced system.

@@ -29,6 +29,7 @@ from ccfem.fem.elasticity.support_kinds import (
     PointSpring,
     PointSupport,
     RigidPatch,
+    TiedPatch,
 )
 from ccfem.fem.elasticity.supports import held
 from ccfem.fem.materials import Material
@@ -211,7 +212,8 @@ def support_forces(problem: Problem, reactions: FloatArray) -> dict[str, FloatAr
         As `StressField.reactions`.
     """
     mesh = problem.mesh
-    claims = [_claim(mesh, support) for support in problem.supports]
+    holding = (each for each in problem.supports if not isinstance(each, TiedPatch))
+    claims = [_claim(mesh, support) for support in holding]
     held = np.zeros(mesh.points.shape)
     for _, nodes, components in claims:
         held[np.ix_(nodes, components)] += 1.0

@@ -5,7 +5,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
-from ccfem.base.checks import BED, SPRING, Range
+from ccfem.base.checks import BED, SPRING, Range, check_number
 from ccfem.base.errors import InputError
 from ccfem.base.plain import plain_dataclass
 from ccfem.body.mesh.patches import unit_vector
@@ -309,6 +309,38 @@ class Pin:
 
 
 @plain_dataclass
+class TiedPatch:
+    """A patch glued to another one, whose mesh is a different one: its nodes follow the other's.
+
+    Attributes
+    ----------
+    patch : str
+        Whose nodes follow: the finer mesh of the two.
+    to : str
+        The patch that they follow.
+    within : float, mm, optional
+        Nodes farther from it stay free; by default a twentieth of a mean side of its facets.
+    """
+
+    patch: str
+    to: str
+    within: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.patch == self.to:
+            raise InputError(f"patch '{self.patch}' is tied to itself: name two patches that touch")
+        if self.within is not None:
+            check_number(
+                f"within of the tied patch '{self.patch}'", self.within, above=0.0, unit="mm"
+            )
+
+    @property
+    def patches(self) -> tuple[str, str]:
+        """Both patches."""
+        return self.patch, self.to
+
+
+@plain_dataclass
 class Spring:
     """Springs to the ground, spread evenly over a patch.
 
@@ -377,6 +409,7 @@ AnySupport = (
     | PressingSupport
     | RigidPatch
     | Pin
+    | TiedPatch
     | Spring
     | PointSpring
     | Foundation

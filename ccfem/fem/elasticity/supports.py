@@ -40,8 +40,10 @@ from ccfem.fem.elasticity.support_kinds import (
     SlidingSupport,
     Spring,
     Support,
+    TiedPatch,
     local_axes,
 )
+from ccfem.fem.elasticity.tied_faces import TiedNodes, tied_nodes
 
 
 def held(problem: SupportedProblem) -> Held:
@@ -81,7 +83,7 @@ def held_in(problem: SupportedProblem, case: str, at_rest: Held) -> Held:
         return at_rest
     for patch, vector in moves.items():
         holding = [s for s in problem.supports if type(s) in _KINDS and _moves(s) == patch]
-        holding = [s for s in holding if not isinstance(s, PressingSupport)]
+        holding = [s for s in holding if not isinstance(s, PressingSupport | TiedPatch)]
         turned = [s for s in holding if isinstance(s, LocalSupport)]
         known = {letter for s in holding for letter in getattr(s, "components", "xyz")}
         known |= set("xyz" if turned else "")
@@ -144,6 +146,7 @@ class _Collected:
     pressing: list[tuple[IntArray, FloatArray]] = field(default_factory=list)
     rigid: list[_Rigid] = field(default_factory=list)
     soft: list[tuple[IntArray, FloatArray]] = field(default_factory=list)
+    tied: list[TiedNodes] = field(default_factory=list)
 
     def components(
         self, nodes: IntArray, components: str, value: Sequence[float], what: str
@@ -179,7 +182,11 @@ class _Collected:
         return Holds(
             nodes=np.concatenate([nodes, *(n for n, _ in more)]),
             directions=np.concatenate([directions, *(d for _, d in more)]),
-            bodies=tuple(r.body.nodes for r in self.rigid),
+            # Nodes that are tied, and those that they follow, move alike.
+            bodies=(
+                *(r.body.nodes for r in self.rigid),
+                *(np.union1d(t.nodes, t.leaders) for t in self.tied),
+            ),
             centres=np.array([r.body.centre for r in self.rigid]).reshape(-1, 3),
             moved=which,
             along=np.array([a for _, a in moved]).reshape(-1, 3),
@@ -195,10 +202,13 @@ class _Collected:
         unused[self.mesh.cells] = False
         free[unused] = False
         presses = np.zeros(free.shape, dtype=bool)
-        if self.oblique or self.rigid or self.pressing:
+        if self.oblique or self.rigid or self.pressing or self.tied:
             turned, frames = node_frames(self.oblique, self.pressing, free, value, presses)
-            ties = Ties(self.mesh.points, turned, frames, tuple(r.body for r in self.rigid))
+            bodies, tied = tuple(r.body for r in self.rigid), self._tied(free, presses)
+            ties = Ties(self.mesh.points, turned, frames, bodies, tied)
             self._check_slaves(ties, free)
+            if tied is not None:
+                free[tied.nodes] = False
             free[ties.slaves] = False
             for rigid in self.rigid:
                 free = np.concatenate([free, ~rigid.held])
@@ -212,6 +222,22 @@ class _Collected:
             ties,
             read_only(presses, np.bool_) if presses.any() else None,
         )
+
+    def _tied(self, free: BoolArray, presses: BoolArray) -> TiedNodes | None:
+        """All tied nodes; what the first of several tied patches ties counts."""
+        if not self.tied:
+            return None
+        nodes, first = np.unique(np.concatenate([t.nodes for t in self.tied]), return_index=True)
+        if presses[nodes].any() or any(np.isin(r.body.nodes, nodes).any() for r in self.rigid):
+            raise InputError(
+                "a tied patch has nodes that a pressing support or a rigid patch holds as well: "
+                "leave a gap between them, or tie the other patch to it"
+            )
+        leaders, weights = (
+            np.concatenate([getattr(t, name) for t in self.tied])[first]
+            for name in ("leaders", "weights")
+        )
+        return TiedNodes(nodes, leaders, weights, ~free[nodes])
 
     def _check_slaves(self, ties: Ties, free: BoolArray) -> None:
         """Refuse nodes of a rigid patch that are also held, or belong to two rigid patches."""
@@ -350,6 +376,13 @@ def _add_body(
     collected.rigid.append(_Rigid(label, body, held, value * np.array([[1.0], [size]])))
 
 
+def _tie(collected: _Collected, support: TiedPatch, move: Sequence[float] | None) -> None:
+    nodes = patch_nodes(collected.mesh, support.patch)
+    facets = patch_facets(collected.mesh, support.to)
+    what = f"patch '{support.patch}'"
+    collected.tied.append(tied_nodes(collected.mesh, nodes, facets, support.within, what))
+
+
 _KINDS: dict[type, Callable[..., None]] = {
     Support: _patch,
     EdgeSupport: _edge,
@@ -360,6 +393,7 @@ _KINDS: dict[type, Callable[..., None]] = {
     PressingSupport: _pressing,
     RigidPatch: _rigid,
     Pin: _pin,
+    TiedPatch: _tie,
 }
 """Functions that collect supports of each kind, except elastic ones."""
 

@@ -138,11 +138,13 @@ class System:
         forces, free = self.forces_in(case), free_strain(problem, case)
         mesh, soft = problem.mesh, soft_supports(problem)
         held = self.held_in(case)
-        reactions = held.supported(internal - forces)
+        residual = internal - forces
+        reactions = held.supported(residual)
         if soft:
             reactions = reactions + spring_forces(mesh, soft, displacement)
         moved = bool(held.value.any())
-        check_balance(problem, case, displacement, forces, reactions, moved)
+        outside = reactions + held.lost_in_ties(residual)
+        check_balance(problem, case, displacement, forces, outside, moved)
         energy = 0.5 * float(np.vdot(displacement, internal))
         if free is not None:
             stress = times(scaled, free)

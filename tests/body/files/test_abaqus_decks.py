@@ -97,7 +97,7 @@ def test_abaqus_sets_and_surfaces(tmp_path):
     [
         (("1, 20, 30, 40, 50", "1, 20, 30, 40, 60"), "names node 60, which"),
         (("C3D4", "C3D8R"), "10 numbers do not make rows of 9"),
-        (("C3D4", "C3D27"), "has cells of type polyhedron27, which are not split"),
+        (("C3D4", "C3D27"), "10 numbers do not make rows of 28"),
         (("C3D4", "B31"), "holds no tetrahedra"),
         (("*Part, name=PART-1", "*Part, name=A\n*Part, name=B"), "holds 2 parts"),
         (("20,  0., 0., 0.", "20, 0, 0, 0, 30, 0, 1, 0, 0"), "line 5: .NODE .* more than a label"),

@@ -230,3 +230,24 @@ def test_cells_that_cannot_be_split(blocks, message):
     filled = [(kind, np.arange(np.prod(shape)).reshape(shape)) for kind, shape in blocks]
     with pytest.raises(InputError, match=message):
         tetrahedra(np.zeros((8, 3)), filled, "part.vtu")
+
+
+def test_cells_of_27_nodes_in_a_deck(tmp_path):
+    """Their centres of faces and of the cell are not needed: the volume is that of the cube."""
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    corners = np.concatenate([corners, corners + np.array([0, 0, 1])])
+    sides = [[0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3], [1, 2, 3, 0, 5, 6, 7, 4, 4, 5, 6, 7]]
+    faces = [[0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
+    middles, centres = corners[sides].mean(axis=0), corners[faces].mean(axis=1)
+    points = 2.0 * np.concatenate([corners, middles, corners.mean(axis=0)[None], centres])
+    rows = "".join(f"{k}, {x}, {y}, {z}\n" for k, (x, y, z) in enumerate(points.tolist(), 1))
+    nodes = ", ".join(map(str, range(1, 28)))
+    text = f"*NODE\n{rows}*ELEMENT, TYPE=C3D27\n1, {nodes}\n*SURFACE, NAME=top\n1, S2\n"
+    (tmp_path / "cube.inp").write_text(text)
+    with pytest.warns(UserWarning, match="split"):
+        mesh = read_mesh(tmp_path / "cube.inp")
+    assert mesh.order == 2
+    assert mesh.volumes.sum() == pytest.approx(8.0)
+    area, normal = mesh.facet_areas(mesh.patches["top"])
+    assert area.sum() == pytest.approx(4.0)
+    np.testing.assert_allclose(normal, np.tile([0.0, 0.0, 1.0], (len(normal), 1)), atol=1e-12)
