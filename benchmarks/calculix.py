@@ -6,9 +6,14 @@ CalculiX takes C3D8 as C3D8I, since they are too stiff in bending. The table
 gives, for each load case, the largest difference of a displacement, of a stress (the mean of a
 cell) and of the resultant of the supports, over the largest of each. Where the results of a deck
 lie beside it (NAME.dat.ref or NAME.dat, as in the CalculiX test suite), the displacements that they
-print are compared, too. A deck that is not taken over has the reason in its row.
+print are compared, too. A deck that is not taken over has the reason in its row. NLGEOM is taken
+out, since ccfem leaves it out.
 
-Decks are not stored here: fetch those of the CalculiX test suite and examples, or take your own.
+``--tetrahedra`` gives CalculiX the tetrahedra into which ccfem splits the cells of a deck: what
+then differs is not the cells, but what was taken over.
+
+Decks are not stored here: take your own, or fetch those of the CalculiX test suite and of FreeCAD's
+tests, as Debian's packages ``calculix-ccx-test`` and ``freecad-common`` have them.
 CalculiX is the command ``ccx``, or the one that ``--ccx`` names; without it there are the results
 beside the decks. On linear cells it lumps centrifugal loads at the centre of a cell, which differs
 by some per cent on coarse meshes.
@@ -29,8 +34,8 @@ from scipy.spatial import cKDTree
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError, SolveError
 from ccfem.base.tensor import from_voigt
-from ccfem.body.files.cells import tetrahedra
-from ccfem.body.files.deck import ELEMENTS, NODES, Model, read_deck
+from ccfem.body.files.cells import tetrahedra as split_cells
+from ccfem.body.files.deck import ELEMENTS, NODES, Model, chosen_rows, read_deck
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.curved_cells import gradients_at
 from ccfem.cases.part_file import part_case
@@ -42,8 +47,12 @@ _ALL = "CCFEM_ALL"
 """Name of the set of all nodes, and of all cells, that a copy of a deck gets."""
 _SAME = 1e-6
 """Distance of two nodes over the size of the part within which they are the same."""
+_LOCAL = "L"
+"""Behind the components that CalculiX prints along the axes of a *TRANSFORM."""
 _SHARE = (5.0 - 5.0**0.5) / 20.0
 """Least barycentric coordinate of the four points of a tetrahedron at which CalculiX integrates."""
+_PRINTS = ("NODE PRINT", "EL PRINT", "NODE FILE", "EL FILE", "HEADING")
+"""Keywords that a deck does without."""
 _SECONDS = 600
 """Time that CalculiX may take for a deck."""
 
@@ -53,6 +62,7 @@ def main() -> None:
     words = argparse.ArgumentParser(prog="benchmarks.calculix", description=__doc__)
     words.add_argument("folder", type=Path, help="folder of decks (.inp)")
     words.add_argument("--ccx", default="ccx", help="command of CalculiX")
+    words.add_argument("--tetrahedra", action="store_true", help="the same cells in both")
     given = words.parse_args()
     decks = sorted(given.folder.glob("*.inp"))
     if not decks:
@@ -67,20 +77,27 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|")
     for path in decks:
         try:
-            for row in compared(path, ccx):
+            for row in compared(path, ccx, given.tetrahedra):
                 print(f"| {path.name} | {row} |", flush=True)
         except (InputError, SolveError, subprocess.SubprocessError) as error:
             print(f"| {path.name} | {' '.join(str(error).split())} | | | | | |", flush=True)
 
 
-def compared(path: Path, ccx: str | None = "ccx") -> list[str]:
+def compared(path: Path, ccx: str | None = "ccx", tetrahedra: bool = False) -> list[str]:
     """Rows of the table of one deck, a row a load case; without CalculiX as far as that goes.
+
+    With `tetrahedra` both take the deck on those into which its cells are split.
 
     Raises
     ------
     InputError
         For a deck that ccfem does not take over, or that CalculiX does not solve.
     """
+    if tetrahedra:
+        with tempfile.TemporaryDirectory() as folder:
+            other = Path(folder) / path.name
+            other.write_text(split_deck(path), encoding="utf-8")
+            return compared(other, ccx)
     model, _ = read_deck(path)
     linear = {kind for kind, _ in model.blocks} == {"tetra"}
     content = {"mesh": path.name, "analysis": "deck", "order": 1 if linear else 2}
@@ -106,15 +123,69 @@ def compared(path: Path, ccx: str | None = "ccx") -> list[str]:
     return rows
 
 
+def split_deck(path: Path) -> str:
+    """Text of a deck on the tetrahedra into which its cells are split.
+
+    Added nodes are in the sets that both ends of their diagonal are in, but for those of forces.
+
+    Raises
+    ------
+    InputError
+        For a deck with loads on faces, which have other numbers then, or with temperatures.
+    """
+    model, deck = read_deck(path)
+    split, words = (
+        split_cells(model.points, model.blocks, path),
+        {block.keyword for block, _ in deck.rest},
+    )
+    faces = any(re.search(r",\s*[PS]\d", line) for block, _ in deck.rest for line in block.lines)
+    if faces or words & {"TEMPERATURE", "SURFACE"} or len(model.scopes) > 1:
+        raise InputError("a deck with temperatures, parts, or loads on faces is not split")
+    forces = {x.split(",")[0].strip().upper() for block, _ in deck.rest for x in block.lines
+              if block.keyword == "CLOAD"}  # fmt: skip
+    lines = ["*NODE"]
+    lines += [f"{k}, {x!r}, {y!r}, {z!r}" for k, (x, y, z) in enumerate(split.points.tolist(), 1)]
+    lines.append(f"*ELEMENT, TYPE=C3D{split.cells.shape[1]}")
+    lines += [
+        ", ".join(map(str, [k, *cell])) for k, cell in enumerate((split.cells + 1).tolist(), 1)
+    ]
+    for (kind, name), members in model.scopes[""].sets.items():
+        rows = chosen_rows(model, "", kind, members)
+        word = "NSET" if kind == NODES else "ELSET"
+        if kind == NODES:
+            inside = np.isin(np.arange(len(split.points)), rows)
+            inside[len(inside) - len(split.ends) :] = inside[split.ends].all(axis=1)
+            chosen = rows if name in forces else np.flatnonzero(inside)
+        else:
+            chosen = np.flatnonzero(np.isin(split.parent, rows))
+        lines += [f"*{word}, {word}={name}", *(f"{k + 1}," for k in chosen.tolist())]
+    for block, _ in deck.rest:
+        if block.keyword in _PRINTS:
+            continue
+        given = "".join(f", {k}={v}" if v else f", {k}" for k, v in block.parameters.items())
+        lines.append(f"*{block.keyword}{given}")
+        for line in block.lines:
+            first, comma, rest = line.partition(",")
+            if block.keyword in ("BOUNDARY", "CLOAD") and first.strip().isdecimal():
+                first = str(int(model.rows[NODES, ""].at(np.array([int(first)]))[0]) + 1)
+            lines.append(first + comma + rest)
+    return "\n".join(lines) + "\n"
+
+
 def results_beside(path: Path) -> list[FloatArray]:
-    """Tables (n, 4) of node and displacement, a table a step, of a file beside a deck, if any."""
+    """Tables (n, 4) of node and displacement, a table a step, of a file beside a deck, if any.
+
+    Those along local axes are not taken.
+    """
     for suffix in (".dat.ref", ".dat"):
         file = path.with_suffix(suffix)
         if file.exists():
             bodies = re.findall(
                 r"^ displacements \(.*\n\n((?:.*\S.*\n)*)", file.read_text(errors="replace"), re.M
             )
-            rows = ([line.split() for line in body.splitlines()] for body in bodies)
+            rows = [[line.split() for line in body.splitlines()] for body in bodies]
+            if any(row[-1] == _LOCAL for table in rows for row in table):
+                return []
             return [np.array(table, dtype=float) for table in rows]
     return []
 
@@ -143,6 +214,7 @@ def by_calculix(
     )
     text = re.sub(r"(?mi)^(?=\s*\*end\s*step\b)", printed, text)
     text = re.sub(r"(?mi)^(?=\s*\*step\b)", sets, text, count=1)
+    text = re.sub(r"(?i)^(\*step\b.*?), *NLGEOM *(= *\w+)?", r"\1", text, flags=re.M)
     text = re.sub(r"(?i)(\*element\b.*type\s*=\s*C3D8)\s*(?=,|$)", r"\1I", text, flags=re.M)
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "deck.inp").write_text(text, encoding="utf-8")
@@ -216,7 +288,7 @@ def _differences(
     xx, yy, zz, xy, xz, yz = stress[:, 1:].T
     tensor = np.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz], axis=1).reshape(-1, 3, 3)
     # Of an element that was split the mean of its tetrahedra is compared.
-    split = tetrahedra(model.points, model.blocks, "deck")
+    split = split_cells(model.points, model.blocks, "deck")
     row = cKDTree(TetMesh(split.points, split.cells).centres).query(mesh.centres)[1]
     parent, weight = split.parent[row], mesh.volumes
     parts = _stress(field).reshape(-1, 9).T
