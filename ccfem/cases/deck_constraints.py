@@ -371,7 +371,8 @@ def _tie(model: Model, mesh: TetMesh, names: list[str], within: float | None) ->
         faces.append(border[are_among(border, facets)])
         if not len(faces[-1]):
             raise InputError(f"surface {shown(name)} has no face on the outside: {TAKE_OUT}")
-    return Tie((names[0], names[1]), *faces, within)
+    slave, master = faces
+    return Tie((names[0], names[1]), slave, master, within)
 
 
 def _followed(mesh: TetMesh, tie: Tie) -> str:

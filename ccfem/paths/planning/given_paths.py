@@ -169,7 +169,7 @@ class GivenPaths:
         sample = first + np.rint(share * length).astype(np.int64)
         roughly = np.stack([away(layer, sample, few) for layer in layers])
         mean = np.full(roughly.shape, np.inf)
-        order = np.argsort(roughly, axis=0)[:_RIVALS]
+        order = np.argsort(roughly, axis=0, kind="stable")[:_RIVALS]
         for k in np.unique(order).tolist():
             wanted = (order == k).any(axis=0)
             chosen = np.flatnonzero(np.repeat(wanted, size))
