@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ccfem.comparison.headline import HEADLINE, cell_text, headline_values
+from ccfem.comparison.headline import HEADLINE, TEST_COLUMNS, cell_text, headline_values
 from ccfem.comparison.request import InAll, Wanted
 from ccfem.comparison.runs import Run
 from ccfem.judging.virtual_testing.equilibrium import IN_COMPRESSION, PARTIAL, TENSION
@@ -77,9 +77,9 @@ def best_values(runs: Sequence[Run], wanted: Wanted) -> dict[str, float]:
     ]
     order = ranking(equal, wanted)
     stiffest = len(order) > 1 and all(order_of(order[0], other) == FIRST for other in order[1:])
-    best = {}
+    best, columns = {}, [headline_values(run) for run in equal]
     for head in HEADLINE:
-        values = [headline_values(run).get(head.column, np.nan) for run in equal]
+        values = [of_run.get(head.column, np.nan) for of_run in columns]
         known = sorted(value for value in values if np.isfinite(value))
         if not head.better or len(known) < 2 or known[0] == known[-1]:
             continue
@@ -131,7 +131,18 @@ def off_length(run: Run, wanted: Wanted) -> bool:
 
 def stiffness_ratio(run: Run, mode: str = TENSION) -> float:
     """Stiffness over that without fibre, in a mode of the test; NaN where untested."""
-    return headline_values(run).get(f"stiffness_ratio_{mode}", np.nan)
+    if run.evaluation is None or run.tested is None:
+        return float("nan")
+    ratio = _RATIOS[mode](run.tested)
+    return float("nan") if ratio is None else ratio
+
+
+_RATIOS = {
+    index.name.removeprefix("stiffness_ratio_"): index.value
+    for index in TEST_COLUMNS
+    if index.name.startswith("stiffness_ratio_")
+}
+"""What takes the ratio of each mode from a test; None under supports that were not tested."""
 
 
 def merit(run: Run, mode: str = TENSION) -> float:

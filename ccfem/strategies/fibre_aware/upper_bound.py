@@ -82,8 +82,6 @@ _MOST_MOMENTUM = 0.9
 _TRACE = 1e-9
 """Least density in each direction as a share of the largest: a density of 0 would stay 0."""
 
-_BISECTIONS = 60
-
 
 @dataclass(frozen=True)
 class UpperBound:
@@ -553,10 +551,14 @@ class DensityAscent:
     def _fitted(self, weight: FloatArray) -> FloatArray:
         """Densities proportional to weights (m, k), with the given length and within the room."""
         total = weight.sum(axis=1)
-        low, high = 1e-12, 1e12
-        for _ in range(_BISECTIONS):
-            middle = float(np.sqrt(low * high))
-            fitted = float(self.volume @ np.minimum(self.most, total / middle))
-            low, high = (middle, high) if fitted > self.length else (low, middle)
-        scale = np.minimum(self.most, total / high) / np.maximum(total, 1e-300)
+        # The length grows with the factor, at a slope that falls where a cell becomes full.
+        full = self.most / np.maximum(total, 1e-300)
+        order = np.argsort(full)
+        room, volume = (self.volume * self.most)[order], (self.volume * total)[order]
+        filled = np.cumsum(room) - room
+        slope = np.cumsum(volume[::-1])[::-1]
+        reached = filled + slope * full[order]
+        k = min(int(np.searchsorted(reached, self.length)), len(order) - 1)
+        factor = min((self.length - filled[k]) / max(slope[k], 1e-300), full[order[k]])
+        scale = np.minimum(full, factor)
         return np.maximum(weight * scale[:, None], _TRACE * self.most[:, None])

@@ -20,6 +20,7 @@ from ccfem.strategies.fibre_aware.upper_bound import (
     LEAST,
     SUM,
     WORST,
+    DensityAscent,
     certificate,
     largest_gathered,
     upper_bound,
@@ -375,3 +376,21 @@ def test_a_support_that_moves_counts_as_a_force_does(pulled_and_moved, objective
         told = [parts[0].unreinforced, replace(parts[1].unreinforced, work=factor * 14.0)]
         least = certificate(parts, told, cases.weights * scale, axial, most, 600.0)
         assert least <= exact * (1.0 + 1e-9)
+
+
+def test_densities_have_the_length_and_are_proportional_where_there_is_room(rng):
+    volume, most = rng.uniform(0.5, 2.0, 40), rng.uniform(0.1, 1.0, 40)
+    most[:3] = 0.0
+    weight = rng.uniform(0.0, 3.0, (40, 5))
+    weight[2:6] = 0.0
+    for share in (0.01, 0.5, 0.85):
+        length = share * float(volume @ most)
+        ascent = DensityAscent.even(volume, most, length, 5)
+        density = ascent.step(weight / ascent.density.max(), 1.0).density
+        total = density.sum(axis=1)
+        assert volume @ total == pytest.approx(length, rel=1e-6)
+        assert (total <= most * (1.0 + 1e-6)).all()
+        inner = (total > 1e-6) & (total < 0.999 * most)
+        power = (weight / weight.max()) ** 1.4 * most[:, None]
+        factor = density[inner] / power[inner]
+        np.testing.assert_allclose(factor, factor.flat[0], rtol=1e-6)
