@@ -47,7 +47,7 @@ STRATEGIES: dict[str, tuple[str, dict[str, int]]] = {
 """Names and parameters of what is compared."""
 
 
-def lever() -> TetMesh:
+def lever(size: float = 2.2) -> TetMesh:
     """Make a wrench-like lever 150 mm long, 8 thick: a jaw of 24 mm at one end, a slender arm."""
     head, tip = shapely.Point(0.0, 0.0).buffer(24.0), shapely.Point(118.0, 0.0).buffer(10.0)
     arm = shapely.Polygon([(0.0, 12.0), (118.0, 8.0), (118.0, -8.0), (0.0, -12.0)])
@@ -59,7 +59,7 @@ def lever() -> TetMesh:
         "support": Box((-30.0, 8.95, -1.0), (5.0, 9.05, 9.0)),
         "load": Cylinder((118.0, 0.0, 0.0), "z", 4.0),
     }
-    return patches_from_rules(extrude(outline, 8.0, 2.2), rules)
+    return patches_from_rules(extrude(outline, 8.0, size), rules)
 
 
 def arch() -> TetMesh:

@@ -77,21 +77,20 @@ def test_a_stiffness_that_makes_no_sense_is_answered_in_one_line(ccfem, words, a
 
 
 def test_with_all_load_cases_every_one_is_as_stiff():
-    mesh = box_mesh((60.0, 24.0, 4.0), (15, 6, 2))
+    mesh = box_mesh((40.0, 16.0, 4.0), (10, 4, 2))
     loads = {"pull": (Force("x_max", (300.0, 0.0, 0.0)),), "side": (Force("x_max", (0, 40.0, 0)),)}
     problem = Problem(mesh, isotropic(3500.0, 0.3), (Support("x_min"),), loads, order=1)
-    machine = Machine(minimum_length=15.0)
-    case = Case("beam", "", problem, slicing=Planar(count=4), machine=machine)
-    strategy = create("stream_function", {"evaluations": 6, "phases": 1})
-    planned = compare(case, {"stream": strategy}, layers=4, load_case="all", stiffness="1.5")
+    machine = Machine(minimum_length=10.0)
+    case = Case("beam", "", problem, slicing=Planar(count=2), machine=machine)
+    strategy = create("stream_function", {"evaluations": 4, "phases": 1})
+    planned = compare(case, {"stream": strategy}, layers=2, load_case="all", stiffness="1.3")
     (run,) = planned.runs
     assert run.strategy.objective == "least"
     said = " ".join(planned.remarks)
-    assert "stream: 1.5 times the stiffness without fibre in every load case takes" in said
+    assert "stream: 1.3 times the stiffness without fibre in every load case takes" in said
     ratios = run.tested.cases.tension.ratios
-    # Strands come and go one by one: between 278 and 300 mm a layer the least ratio leaps between
-    # 1.48 and 1.545, and the search ends within .5 % of a length that is not enough.
-    assert 1.5 - 1e-5 < ratios.min() < 1.545
+    # Strands come and go one by one, and the least ratio leaps with each.
+    assert 1.3 - 1e-5 < ratios.min() < 1.32
     for name, ratio in zip(("pull", "side"), ratios, strict=True):
         assert f"{ratio:.4g} times in '{name}'" in said
 

@@ -210,7 +210,7 @@ def test_verdicts_of_random_tables_are_true(compared):
     """Ties and near ties, missing numbers, runs that failed, lay more, or cannot be printed."""
     some, kinds = np.random.default_rng(5), Counter()
     base = [run for run in compared.runs if run.tested is not None][:4]
-    for _ in range(250):
+    for _ in range(150):
         spread, missing = some.choice([0.0, 0.003, 0.02, 0.1]), some.choice([0.0, 0.03, 0.3])
         wanted = some.choice([None, 1000.0])
         other = some.random() < 0.3

@@ -36,7 +36,9 @@ def loop():
         },
     )
     force = Force("load", (0.0, 0.0, 1000.0))
-    problem = Problem(mesh, isotropic(3500.0, 0.35), (Support("support"),), {"pull": (force,)})
+    problem = Problem(
+        mesh, isotropic(3500.0, 0.35), (Support("support"),), {"pull": (force,)}, order=1
+    )
     layers = Planar(heights=0.25 + 0.5 * np.arange(4)).cut(mesh, (0, 1, 0))
     paths = read_waypoints(folder / "GcodeGenerater_Zigzag_Contour_raw.txt", layers[0].plane.frame)
     return solve(problem)["pull"], layers, paths.select(paths.layer < 4)

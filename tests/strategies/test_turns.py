@@ -24,7 +24,7 @@ from ccfem.strategies import create, named
 MACHINE = Machine()
 WITH_TURNS = sorted(name for name, kind in named().items() if hasattr(kind, "turns"))
 NEEDS_JOINTS = {"winding"}
-TESTED = {"pruned": {}, "stream_function": {"evaluations": 10, "phases": 1}}
+TESTED = {"pruned": {}, "stream_function": {"evaluations": 3, "phases": 1}}
 """Strategies that choose by virtual tests which bends stay, up to 1 %, with quick parameters."""
 MOVES = {
     "plain": np.eye(3),
