@@ -1,4 +1,4 @@
-"""What ``ccfem mesh`` does: a surface or a CAD file to a mesh with its faces as patches."""
+"""What ``ccfem mesh`` does: a surface, CAD file or stack of layers to a mesh."""
 
 from pathlib import Path
 from typing import Any
@@ -16,10 +16,12 @@ def mesh_file(body: Path, size: float, out: Path, scale: float, mesher: Any) -> 
     """Mesh a file, write the mesh, and say what it is."""
     check_mesh_name(out)
     check_writable(out)
-    if not surface.is_surface(body) and not cad.is_cad(body):
+    if not body.is_dir() and not surface.is_surface(body) and not cad.is_cad(body):
         *others, last = (*surface.SUFFIXES, *cad.SUFFIXES)
         names = f"{', '.join(others)} or {last}"
-        raise InputError(f"cannot mesh {body}: its name must end in {names}")
+        raise InputError(
+            f"cannot mesh {body}: its name must end in {names}, or be that of a folder of layers"
+        )
     mesh, findings = mesh_body(body, size, scale, mesher)
     write_mesh(mesh, out)
     for line in findings:

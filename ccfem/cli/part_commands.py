@@ -93,7 +93,11 @@ def _cite(
 def _mesh(
     body: Annotated[
         Path,
-        typer.Argument(metavar="BODY", help="Surface ({surfaces}) or CAD file ({cad_files})."),
+        typer.Argument(
+            metavar="BODY",
+            help="Surface ({surfaces}), CAD file ({cad_files}), or folder of curved layers of a "
+            "solid (.obj).",
+        ),
     ],
     size: Annotated[float, typer.Option("--size", metavar="MM", help="Edge length of the cells.")],
     out: Annotated[
@@ -107,7 +111,7 @@ def _mesh(
         str, typer.Option(metavar="auto|gmsh|ftetwild", help="What meshes a surface.")
     ] = "auto",
 ) -> None:
-    """Mesh a surface or a CAD file, its faces as patches: face_1, face_2, or their names."""
+    """Mesh a surface or CAD file, faces as patches (face_1, or their names), or curved layers."""
     from ccfem.cli.mesh_body import mesh_file
 
     mesh_file(body, size, out, scale, mesher)

@@ -4,8 +4,9 @@ import numpy as np
 import shapely
 
 from ccfem.body.meshing import triangulate
+from ccfem.geometry.facets import border_edges
 from ccfem.slicing.layers.layer import Layer, Plane
-from ccfem.slicing.layers.level_cut import border_edges, chain
+from ccfem.slicing.layers.level_cut import chain
 
 
 def layer_of(section, edge_length=1.5):

@@ -6,7 +6,7 @@ import os
 import re
 import zipfile
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -17,6 +17,7 @@ import numpy as np
 from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
 from ccfem.base.whole import existing_file, whole_file
+from ccfem.body.files.layer_files import layer_files, read_layer
 from ccfem.body.files.surface import Surface, read_surface
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.face_places import BodyFaces
@@ -25,6 +26,7 @@ from ccfem.body.mesh.round_walls import RoundWall
 from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE, given_faces, smooth_faces
 from ccfem.body.meshing.cad import Joined, is_cad, mesh_cad, read_cad
 from ccfem.body.meshing.volume import Mesher, fill
+from ccfem.geometry.layer_stack import median_gap, stack_surface
 
 
 def mesh_body(
@@ -36,10 +38,14 @@ def mesh_body(
     angle: float = FEATURE_ANGLE,
     joined: Joined = "glued",
 ) -> tuple[TetMesh, tuple[str, ...]]:
-    """Mesh a file of a closed surface (STL, OBJ, PLY) or of solids (STEP, IGES, BREP).
+    """Mesh a file of a closed surface (STL, OBJ, PLY) or of solids (STEP, IGES, BREP), or layers.
 
     Parameters
     ----------
+    path : path
+        A folder holds the curved layers of a part, OBJ files from the first to the last by the
+        numbers in their names: see `ccfem.geometry.layer_stack`. The mesh then has no patches, and
+        is made by fTetWild by default.
     edge_length : float, mm
     scale : float, default 1
         Factor on the coordinates, to make them mm.
@@ -61,14 +67,19 @@ def mesh_body(
     findings : tuple of str
         Who made it, its volume and its distance from the surface.
     """
-    path = existing_file(path, "CAD file" if is_cad(path) else "surface file")
+    path, folder = Path(path), Path(path).is_dir()
+    if not folder:
+        path = existing_file(path, "CAD file" if is_cad(path) else "surface file")
+    elif mesher == "auto":
+        mesher = "ftetwild"
+    files = layer_files(path) if folder else (path,)
     check_number("edge length", edge_length, above=0.0, unit="mm")
     check_number("scale", scale, above=0.0)
 
     def make() -> tuple[TetMesh, tuple[str, ...]]:
         if is_cad(path):
             return mesh_cad(path, edge_length, scale, joined)
-        surface = read_surface(path, scale)
+        surface, *said = _solid(files, scale) if folder else (read_surface(path, scale),)
         if before is not None:
             before(surface)
         mesh, fit, who = fill(surface, edge_length, mesher)
@@ -78,7 +89,8 @@ def mesh_body(
                 "; fTetWild gives a different mesh each time, so this one is stored on this "
                 "machine for reuse"
             )
-        return with_faces_of(surface, mesh, angle), (about, *fit.doubts)
+        named = mesh if folder else with_faces_of(surface, mesh, angle)
+        return named, (*said, about, *fit.doubts)
 
     asked: dict[str, object] = {
         "edge_length": float(edge_length),
@@ -86,9 +98,20 @@ def mesh_body(
         "mesher": mesher,
         "angle": float(angle),
         "joined": joined,
-        "suffix": Path(path).suffix.lower(),
+        "suffix": "layers" if folder else path.suffix.lower(),
     }
-    return kept(path.read_bytes(), asked, make)
+    return kept(b"\0".join(file.read_bytes() for file in files), asked, make)
+
+
+def _solid(files: Sequence[Path], scale: float) -> tuple[Surface, str]:
+    """Surface of the solid that layers fill, and what is to be said of it."""
+    layers = [(scale * points, triangles) for points, triangles in map(read_layer, files)]
+    gap = median_gap(layers)
+    surface = Surface(*stack_surface(layers))
+    return surface, (
+        f"{len(files)} layers, {gap:.3g} mm apart, fill {surface.volume:.5g} mm^3: faces of the "
+        "part are known to about half of that, and its edges are rounded by as much"
+    )
 
 
 # Meshes that were made before, kept by what they were made of.

@@ -15,11 +15,11 @@ from ccfem.body.files.surface import Surface
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.face_rules import check_box
 from ccfem.body.mesh.patches import Vector, unit_vector
-from ccfem.geometry.facets import counter_clockwise
+from ccfem.geometry.facets import border_edges, counter_clockwise
 from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer, Plane
-from ccfem.slicing.layers.level_cut import border_edges, chain
+from ccfem.slicing.layers.level_cut import chain
 
 # Shapes that say where fibre may lie, and their sections with the plane of a layer.
 

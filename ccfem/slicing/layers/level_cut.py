@@ -134,21 +134,6 @@ def _drop_repeated(triangles: IntArray, cell: IntArray) -> tuple[IntArray, IntAr
     return triangles[keep], cell[keep]
 
 
-def border_edges(triangles: IntArray, n: int) -> IntArray:
-    """Directed edges (e, 2) that only one triangle has, with the material on their left.
-
-    An edge shared by more triangles, where sheets meet, counts as often as it is used more in one
-    sense than in the other, so that borders always close.
-    """
-    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    low, high = edges.min(axis=1), edges.max(axis=1)
-    known, inverse = np.unique(low * n + high, return_inverse=True)
-    net = np.bincount(inverse, np.where(edges[:, 0] == low, 1.0, -1.0), len(known)).astype(int)
-    ends = np.stack(np.divmod(known, n), axis=1)
-    ends[net < 0] = ends[net < 0, ::-1]
-    return np.asarray(np.repeat(ends, np.abs(net), axis=0))
-
-
 def chain(border: IntArray) -> tuple[IntArray, ...]:
     """Chain directed edges to closed loops; each edge is used once where loops touch."""
     leaving: dict[int, list[int]] = {}

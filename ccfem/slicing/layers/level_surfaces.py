@@ -14,9 +14,9 @@ from ccfem.base.parallel import in_threads
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.round_walls import RoundWall
 from ccfem.fem.elasticity import cell_gradients
-from ccfem.geometry.facets import sides_at
+from ccfem.geometry.facets import border_edges, sides_at
 from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.level_cut import border_edges, chain, cut_at_zero
+from ccfem.slicing.layers.level_cut import chain, cut_at_zero
 
 _SNAP = 1e-5
 """Distance from the level, as a share of the step, below which nodes count as lying on it."""

@@ -11,8 +11,9 @@ import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.body.mesh import TetMesh
+from ccfem.geometry.facets import border_edges
 from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.level_cut import border_edges, chain
+from ccfem.slicing.layers.level_cut import chain
 from ccfem.slicing.layers.level_surfaces import LevelSurfaces, level_surfaces, thickness_at_nodes
 
 _OFF = 1e-3

@@ -11,10 +11,10 @@ from ccfem.base.errors import InputError
 from ccfem.base.plain import plain_dataclass
 from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity import PartStress
-from ccfem.geometry.facets import counter_clockwise
+from ccfem.geometry.facets import border_edges, counter_clockwise
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer, Plane, plane_frame
-from ccfem.slicing.layers.level_cut import border_edges, chain, cut_at_zero, patch_edges, wall_edges
+from ccfem.slicing.layers.level_cut import chain, cut_at_zero, patch_edges, wall_edges
 from ccfem.slicing.layers.slicer import Vector, check_heights
 
 _TOP = 1e-3

@@ -8,7 +8,7 @@ from scipy.integrate import dblquad
 from ccfem.body.mesh import TetMesh, box_mesh
 from ccfem.body.mesh.patches import Cylinder, patches_from_rules
 from ccfem.body.meshing import extrude
-from ccfem.slicing.layers.level_cut import border_edges
+from ccfem.geometry.facets import border_edges
 from ccfem.slicing.layers.level_surfaces import clean, level_surfaces
 
 RADIUS = 40.0
