@@ -17,6 +17,7 @@ from ccfem.base.arrays import FloatArray, IntArray, read_only
 from ccfem.base.errors import InputError, SolveError
 from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity import cell_gradients
+from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.slicing.guidance.energies import (
     alignment_energy,
     gradient_energy,
@@ -56,12 +57,17 @@ class Weights:
         Layers normal to the axes of the joints, or of one value round them.
     length : float, mm
         Length over which smoothness acts.
+    holes : float, default 0
+        Layers normal to the axes of holes within a reach of their walls, besides the joints' term.
+    reach : float, mm, default 0
     """
 
     stress: float
     smoothness: float
     joints: float
     length: float
+    holes: float = 0.0
+    reach: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -112,6 +118,9 @@ def guidance_field(
     * "axis": ``w_b sum_k sum_e V_e |g_e - s_k a_k|^2`` over the cells of each joint, s_k = 1 or -1;
     * "literal": one value in each joint, as the paper prints it (eq. 3);
     * "ring": one value in each slab of a joint normal to its direction.
+
+    To each, ``w_h sum_k sum_e V_e |g_e - (g_e . a_k) a_k|^2`` over the cells within a reach of the
+    wall of a hole is added, which leaves the thickness of the layers there alone.
 
     The last two set no scale, so it is set by a mean gradient along the axes. Joints without a
     direction have no effect in "axis". If no joint has a direction, ``0.01 sum_e V_e |g_e - d|^2``
@@ -231,7 +240,22 @@ def _quadratic(
             first += number
         if joint.direction is not None:
             sources.append(gradient_source(gradients, cells, joint.direction, share, count))
+        if weights.holes > 0.0 and joint.direction is not None and joint.radius > 0.0:
+            near = cells_at_wall(mesh, joint, weights.reach)
+            share = np.zeros(len(cells))
+            share[near] = weights.holes * volume[near]
+            for across in np.linalg.svd(joint.direction[None])[2][1:]:
+                every = np.broadcast_to(across, (len(cells), 3))
+                matrix = matrix + alignment_energy(gradients, cells, every, share, count)
     return matrix, sources
+
+
+def cells_at_wall(mesh: TetMesh, joint: Joint, reach: float) -> IntArray:
+    """Cells of a joint, one of whose corners lies within a reach, mm, of its wall."""
+    facets = mesh.boundary[np.isin(mesh.boundary, joint.wall).all(axis=1)]
+    nodes, corners = np.unique(mesh.corners[joint.region], return_inverse=True)
+    away = nearest_on_triangles(mesh.points, facets[:, :3], mesh.points[nodes]).distance
+    return joint.region[(away[corners.reshape(-1, 4)] < reach).any(axis=1)]
 
 
 def _joint_groups(

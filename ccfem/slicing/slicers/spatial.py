@@ -87,6 +87,11 @@ class Spatial:
     joint_weight : float, default 1
         Weight of layers normal to the axes of the joints; smaller values follow the stress better.
         An axis is the one that the rule of the patch states, else that of its wall.
+    hole_weight : float, default 0
+        Further weight of layers normal to the axes of bolt holes near their walls, so that strands
+        can wind round them (Zhang et al. 2025).
+    hole_reach : float, mm, default 2
+        Distance from the walls up to which it counts.
     length : float, mm, optional
         Length over which the field is smoothed; by default a thirtieth of the part's diagonal.
     form : {"axis", "ring", "literal"}
@@ -116,6 +121,8 @@ class Spatial:
     stress_weight: float = 1.0
     smoothness: float = 0.01
     joint_weight: float = 1.0
+    hole_weight: float = 0.0
+    hole_reach: float = 2.0
     length: float | None = None
     form: JointForm = "axis"
     rings: int = 4
@@ -139,7 +146,10 @@ class Spatial:
             value = getattr(self, name)
             if value is not None and not 0.0 < value < np.inf:
                 raise InputError(f"spatial.{name} must be above 0; got {value}")
-        for name in ("stress_weight", "joint_weight", "least_area", "flat_within"):
+        for name in (
+            *("stress_weight", "joint_weight", "hole_weight", "hole_reach"),
+            *("least_area", "flat_within"),
+        ):
             if not 0.0 <= getattr(self, name) < np.inf:
                 raise InputError(f"spatial.{name} must be at least 0; got {getattr(self, name)}")
 
@@ -166,7 +176,8 @@ class Spatial:
         strongest, region = joint_lines(stress, joints, self.lines)
         diagonal = float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
         length = diagonal * _SMOOTH_OVER if self.length is None else self.length
-        weights = Weights(self.stress_weight, self.smoothness, self.joint_weight, length)
+        holes = (self.hole_weight, self.hole_reach)
+        weights = Weights(self.stress_weight, self.smoothness, self.joint_weight, length, *holes)
         up = np.asarray(build, dtype=np.float64)
         guidance = guidance_field(
             mesh,

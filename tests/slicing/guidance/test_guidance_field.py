@@ -219,6 +219,26 @@ def test_literal_joint_makes_thick_layers_where_an_axis_makes_even_ones(plate, s
     assert share[0] < 1.3 < share[1]
 
 
+def test_layers_near_holes_stand_square_to_their_axes(plate, square_to):
+    """Stress across a gradient that leans over: without the term the layers at the wall do, too.
+
+    Their thickness hardly changes, as the term leaves the size of the gradient alone.
+    """
+    x, y, _ = centres(plate).T
+    tau = square_to(np.stack([y / 80.0, x / 80.0, np.ones_like(x)], axis=1))
+    joints = [joint_of(plate, "left"), joint_of(plate, "right")]
+    wall, size = [], []
+    away = np.abs(np.hypot(*(centres(plate)[:, :2] - [15.0, 15.0]).T) - 5.0)
+    for holes in (0.0, 30.0):
+        weights = Weights(1.0, 0.01, 0.1, 3.0, holes=holes, reach=2.0)
+        field = guidance_field(plate, tau, np.ones(len(tau)), joints, weights)
+        off = angles(field, np.broadcast_to([0.0, 0.0, 1.0], tau.shape))
+        wall.append(np.average(off[away < 2.0], weights=plate.volumes[away < 2.0]))
+        size.append(np.linalg.norm(field.gradient[away < 2.0], axis=1).mean())
+    assert wall[1] < 3.0 < 6.0 < wall[0]
+    assert size[1] == pytest.approx(size[0], rel=0.1)
+
+
 def test_nothing_to_follow_is_refused(plate):
     m = len(plate.cells)
     with pytest.raises(InputError, match="nothing to follow"):
