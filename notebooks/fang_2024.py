@@ -77,6 +77,27 @@ assert total["joints_linked"] > 2.9
 assert total["crossings"] == 0
 
 # %% [markdown]
+# ## Dense strands
+#
+# Zhang et al. (arXiv:2410.16851) fill such layers: strands side by side along the tension, which end
+# where it converges. Here `stripes`, whose strands are never shorter than the cutter allows, beside
+# the rings above on some of the layers. Both on the T-bracket, beside the authors' own strands, are
+# `ccfem reproduce zhang_2025`.
+
+# %%
+some = [layer for layer in sliced.layers if layer.index in paths.layer][::3]
+dense = plan(create("stripes"), some, stress, case.machine)
+rings = paths.select(np.isin(paths.layer, [layer.index for layer in some]))
+filled = {}
+for name, strands in (("winding", rings), ("stripes", dense)):
+    filled[name] = evaluate(strands, some, stress, case.machine, build=case.build).total
+    covered, angle = filled[name]["coverage"], filled[name]["angle_mean"]
+    print(f"{name}: {covered:.0%} of the layers covered, {angle:.0f} degrees to the tension")
+assert dense.lengths.min() >= case.machine.minimum_length
+assert filled["stripes"]["coverage"] > 1.5 * filled["winding"]["coverage"]
+assert filled["stripes"]["angle_mean"] < filled["winding"]["angle_mean"]
+
+# %% [markdown]
 # ## What it asks of the robot
 #
 # The head stands on its layer: it tilts from the build direction as the layers do, here by a right
