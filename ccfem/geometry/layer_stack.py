@@ -70,15 +70,13 @@ def median_gap(layers: list[Triangles]) -> float:
     )
 
 
-def stack_surface(layers: list[Triangles], step: float | None = None) -> Triangles:
+def stack_surface(layers: list[Triangles]) -> Triangles:
     """Make the closed surface of the solid that layers fill.
 
     Parameters
     ----------
     layers : list of ((n, 3) array, mm, and (t, 3) int array)
         Points and triangles of at least two layers, from the first to the last.
-    step : float, mm, optional
-        Of the grid on which the solid is sampled; by default 0.75 of the gap between layers.
 
     Returns
     -------
@@ -88,14 +86,14 @@ def stack_surface(layers: list[Triangles], step: float | None = None) -> Triangl
     Raises
     ------
     InputError
-        For fewer than two layers, layers without distance, and a grid of too many points.
+        For fewer than two layers, layers without distance or border, and a grid of too many points.
     """
     if len(layers) < 2:
         raise InputError(
             f"a solid is made of at least two layers; got {len(layers)}: give the folder of all"
         )
     sheets, gap = _sheets(layers)
-    step = _STEP * gap if step is None else step
+    step = _STEP * gap
     low = np.min([sheet.points.min(axis=0) for sheet in sheets], axis=0) - 3.0 * gap
     high = np.max([sheet.points.max(axis=0) for sheet in sheets], axis=0) + 3.0 * gap
     shape = np.ceil((high - low) / step).astype(np.int64) + 1
@@ -143,7 +141,12 @@ def _sheet(layers: list[Triangles], k: int, usual: float) -> _Sheet:
     normals = np.where(turned[piece][:, None], -normals, normals)
     count = np.sum(np.isfinite(known), axis=0)
     gaps = np.where(count > 0, np.nansum(known, axis=0) / np.maximum(count, 1), usual)
-    return _Sheet(points, triangles, normals, border_edges(triangles, len(points)), gaps)
+    border = border_edges(triangles, len(points))
+    if not len(border):
+        raise InputError(
+            f"layer {k} is closed, without a border: give layers as open surfaces, one a file"
+        )
+    return _Sheet(points, triangles, normals, border, gaps)
 
 
 def _normals(points: FloatArray, triangles: IntArray) -> FloatArray:
@@ -244,7 +247,7 @@ def _on_border(sheet: _Sheet, near: Nearest) -> BoolArray:
     open_ = np.zeros(sheet.triangles.shape, dtype=bool)
     open_[triangle, (side + 2) % 3] = True  # by the corner opposite a side
     corner = np.isin(sheet.triangles, sheet.border)
-    none, all_ = near.weights < 1e-9, near.weights > 1.0 - 1e-9
+    none, all_ = near.weights < 1e-6, near.weights > 1.0 - 1e-6
     found = (none & open_[near.triangle]) | (all_ & corner[near.triangle])
     return np.asarray(found.any(axis=1))
 

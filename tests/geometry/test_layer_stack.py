@@ -80,3 +80,6 @@ def test_stacks_that_are_none_are_one_line():
     near = [(points, triangles), (points + np.array([0.0, 0.0, 1e-3]), triangles)]
     with pytest.raises(InputError, match=r"layers 0\.001 mm apart over 18 mm: are they in mm"):
         stack_surface(near)
+    mesh = plate()
+    with pytest.raises(InputError, match="layer 0 is closed, without a border"):
+        stack_surface([(mesh.points, mesh.boundary), (mesh.points + 0.5, mesh.boundary)])
