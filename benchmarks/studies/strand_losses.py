@@ -31,7 +31,7 @@ from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies.fibre_aware.cut_and_move import prune_and_move
-from ccfem.strategies.fibre_aware.heights import nearest_layer
+from ccfem.strategies.fibre_aware.heights import nearest_layer, room_for_fibre
 from ccfem.strategies.fibre_aware.prune import prune
 from ccfem.strategies.fibre_aware.smeared import SmearedPart
 from ccfem.strategies.fibre_aware.stream_design import SLACK, StreamProblem, design
@@ -82,9 +82,9 @@ def along_one_direction(part: SmearedPart, bound: UpperBound, axial_stiffness: f
     return part.ratio(part.solve(fibre, tolerance=1e-4).work)
 
 
-def tension_of(bound: UpperBound, capacity: FloatArray, layer: Layer) -> Tension:
+def tension_of(bound: UpperBound, room: FloatArray, layer: Layer) -> Tension:
     """Strands a width of a bound's density, and their direction, on the triangles of a layer."""
-    size, _, angle = largest_in_plane(bound.tensor[layer.cell] / capacity[layer.cell, None])
+    size, _, angle = largest_in_plane(bound.tensor[layer.cell] / room[layer.cell, None])
     direction = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     return Tension(direction, size, size > _NONE)
 
@@ -111,7 +111,8 @@ def losses(
         posed = StreamProblem.alone(scaled)
         start = start_fields(posed, (stress,), middle, strategy.cap)
         rows[what] = float(design(posed, start, strategy.evaluations).objective.ratio[0])
-    begun = [tension_of(bound, model.capacity, layer) for layer in middle]
+    room = room_for_fibre(model.part, layers, machine)
+    begun = [tension_of(bound, room, layer) for layer in middle]
     start = field_along(exact.model, middle, begun, 100.0)
     begun_there = design(exact, start, strategy.evaluations)
     rows["designed field, begun there"] = float(begun_there.objective.ratio[0])

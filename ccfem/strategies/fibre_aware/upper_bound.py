@@ -1,11 +1,11 @@
 """The stiffness that no fibre paths can exceed, for a given length of fibre and number of layers.
 
 Paths are replaced by a density of fibre m in each cell and direction in the plane of the layers. It
-may jump from cell to cell and cross itself, with at most one strand a width in each layer. A search
-approaches the best density, until what it reaches and the bound are close. Any displacements u_i
-prove a bound by duality. The compliance C_i of a part with fibre under load case i is the largest
-value over all u of ``2 f_i.u - u.K u - EA int m (t.eps t)^2``, so for any factors v_i, with the
-best scale,
+may jump from cell to cell and cross itself, with at most one strand a width on each flat layer that
+cuts a cell. A search approaches the best density, until what it reaches and the bound are close.
+Any displacements u_i prove a bound by duality. The compliance C_i of a part with fibre under load
+case i is the largest value over all u of ``2 f_i.u - u.K u - EA int m (t.eps t)^2``, so for any
+factors v_i, with the best scale,
 
     sum v_i C_i >= (sum v_i f_i.u_i)^2 / (sum v_i u_i.K u_i + EA S),
 
@@ -46,7 +46,7 @@ from ccfem.judging.virtual_testing import Strand
 from ccfem.judging.virtual_testing.equilibrium import BONDED, TENSION
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer
-from ccfem.strategies.fibre_aware.heights import fibre_capacity
+from ccfem.strategies.fibre_aware.heights import room_for_fibre
 from ccfem.strategies.fibre_aware.layer_axes import frames_in_cells
 from ccfem.strategies.fibre_aware.smeared import SmearedPart, SmearedSolution, smeared_cases
 
@@ -229,7 +229,7 @@ def upper_bound(
     parts = smeared_cases(cases.fields, frames_in_cells(cases.mesh.centres, layers))
     alone = (layers, length, machine, strand, _SINGLE_ITERATIONS, mode)
     singles = measures(objective, cases, *alone)
-    volume, most = parts[0].mesh.volumes, fibre_capacity(parts[0], layers, machine)
+    volume, most = parts[0].mesh.volumes, room_for_fibre(parts[0], layers, machine)
     length = min(length, float(volume @ most))
     axial = (Strand() if strand is None else strand).stiffness(parts[0].modulus)
     smeared = _Smeared(parts, singles, axial, most, length, mode)
@@ -545,7 +545,9 @@ class DensityAscent:
         stepped = self._fitted(self.density * power)
         density, momentum = stepped, min((steps - 1.0) / (steps + 2.0), _MOST_MOMENTUM)
         if self.stepped is not None and momentum > 0.0:
-            density = self._fitted(stepped * (stepped / self.stepped) ** momentum)
+            density = self._fitted(
+                stepped * (stepped / np.maximum(self.stepped, 1e-300)) ** momentum
+            )
         return DensityAscent(self.volume, self.most, self.length, density, stepped, steps, merit)
 
     def _fitted(self, weight: FloatArray) -> FloatArray:
