@@ -188,7 +188,10 @@ def _about_scatter(tested: Sequence[Run]) -> list[str]:
 def _about_joints(tested: Sequence[Run]) -> list[str]:
     """Say at which load a pin tears out of the best run, by the matrix alone: all are alike."""
     best = tested[0].tested if tested else None
-    return list(filter(None, [said_of_pins(best.joints)])) if best and not best.cases else []
+    if best is None:
+        return []
+    said = said_of_pins(() if best.cases else best.joints, best.pins_not_judged)
+    return [said] if said else []
 
 
 def _about_links(total: Mapping[str, float]) -> list[str]:

@@ -45,6 +45,8 @@ class Tested:
         The tests under all load cases, if paths are planned for several.
     joints : tuple of PinnedJoint
         Holes that pins press on, the weakest first; none where a strength is unknown.
+    pins_not_judged : str
+        In which holes pins press where the wall is not round; empty without any.
     scatter : RatioScatter, optional
         Of the stiffness ratio in tension only.
     """
@@ -58,6 +60,7 @@ class Tested:
     cases: TestedCases | None = None
     scatter: RatioScatter | None = None
     joints: tuple[PinnedJoint, ...] = ()
+    pins_not_judged: str = ""
 
     __repr__ = in_brief
 

@@ -16,7 +16,7 @@ from ccfem.comparison.tested_cases import in_all_cases
 from ccfem.fem.elasticity.stress_field import PartStress, StressField, WeightedCases
 from ccfem.judging.evaluation import evaluate
 from ccfem.judging.evaluation.strand_rules import StrandVerdict, strand_verdict, why_not
-from ccfem.judging.virtual_testing.pinned_joints import pinned_joints
+from ccfem.judging.virtual_testing.pinned_joints import pinned_joints, pins_not_judged
 from ccfem.judging.virtual_testing.progressive_failure import breaking_load
 from ccfem.judging.virtual_testing.scatter import DEFAULT_SCATTER, Scatter, ratio_scatter
 from ccfem.judging.virtual_testing.specimen import Specimen
@@ -538,8 +538,15 @@ def _test(
     except InputError as error:
         return Tested(bracket, None, str(error), scatter=scatter)
     limits = Limits.of(test.solution.problem.material, strand)
-    joints = pinned_joints(test.solution, specimen.forces, test.force, limits)
-    return Tested(bracket, failure, matrix_before=before, scatter=scatter, joints=joints)
+    pins = test.solution, specimen.forces, test.force
+    return Tested(
+        bracket,
+        failure,
+        matrix_before=before,
+        scatter=scatter,
+        joints=pinned_joints(*pins, limits),
+        pins_not_judged=pins_not_judged(*pins),
+    )
 
 
 def with_breaking_load(run: Run, part: Part, specimen: Specimen, strand: Strand) -> Run:

@@ -14,7 +14,7 @@ The strengths are those of the matrix. Strands, also those that ring the hole, a
 strength of printed ones in such a joint is known here.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -23,9 +23,10 @@ import numpy as np
 from ccfem.base.arrays import FloatArray, IntArray, freeze
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.smooth_faces import Face, given_faces
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity import StressField
 from ccfem.fem.elasticity.load_kinds import patches_in_use
-from ccfem.geometry.facets import connected
+from ccfem.geometry.facets import connected, facet_keys
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import Limits
 from ccfem.judging.virtual_testing.strands import cut_steps
@@ -38,6 +39,10 @@ _HALF = 120.0
 """Least turn of a loaded wall, degrees: a fillet turns by less, half a hole by more."""
 _IDLE = 1e-3
 """Share of the load of the part below which a hole is not loaded across its axis."""
+_AHEAD = 0.7
+"""Least cosine between the force and the middle of the round end of a slot that takes it."""
+_ROUND = 0.02
+"""Share of its area by which a wall goes all round, and along one axis: as for round walls."""
 _OFF = 0.01
 """Distance of the planes of shear-out from the hole, in radii: chords of the wall lie inside it."""
 _GAP = 0.05
@@ -115,23 +120,80 @@ def pinned_joints(
     limits : Limits
         Its strength of the matrix is the tensile one.
     """
+    joints = [
+        _joint(stress, hole.face, hole.patch, hole.facets, hole.force, size, limits)
+        for hole in _holes(stress, forces, size)
+        if hole.face is not None
+    ]
+    return tuple(sorted(joints, key=lambda joint: joint.load))
+
+
+def pins_not_judged(stress: StressField, forces: FloatArray, size: float) -> str:
+    """Say in which holes pins press where the wall is not round; empty without any."""
+    names = dict.fromkeys(h.patch for h in _holes(stress, forces, size) if h.face is None)
+    if not names:
+        return ""
+    listed = ", ".join(f"'{name}'" for name in names)
+    return f"pins are not judged in {listed}: loaded where the wall of the hole is not round"
+
+
+class _Hole(NamedTuple):
+    """Loaded hole: the patch, its wall or round end (None where it is not round) and the force."""
+
+    patch: str
+    face: Face | None
+    facets: IntArray
+    force: FloatArray
+
+
+def _holes(stress: StressField, forces: FloatArray, size: float) -> Iterator[_Hole]:
+    """Find the holes across which a pin presses."""
     problem, mesh = stress.problem, stress.mesh
     loaded = patches_in_use((), {stress.case: problem.loads_of(stress.case)})
     held = patches_in_use(problem.all_supports, {})
-    joints = []
     for name in sorted({*loaded, *held}):
         facets = mesh.patch(name)
         # At the rim the nodes are also those of other patches: their supports are not the pin.
         outer = forces * (name in loaded) + stress.reactions * (name in held)
-        for face in given_faces(mesh.points, facets, _pieces(facets)):
-            if face.kind != "cylinder" or not face.hollow or face.turn < _HALF:
-                continue
-            piece = facets[face.facets]
+        for whole in given_faces(mesh.points, facets, _pieces(facets)):
+            piece, face = facets[whole.facets], whole
             force = outer[np.unique(mesh.facet_nodes(piece))].sum(axis=0)
-            force = force - (force @ face.direction) * face.direction
-            if np.linalg.norm(force) > _IDLE * size:
-                joints.append(_joint(stress, face, name, piece, force, size, limits))
-    return tuple(sorted(joints, key=lambda joint: joint.load))
+            axis, hollow = whole.direction, whole.hollow and whole.turn >= _HALF
+            if whole.kind != "cylinder":
+                axis, hollow = _axis_of_hole(mesh, piece)
+            force = force - (force @ axis) * axis
+            if not hollow or np.linalg.norm(force) <= _IDLE * size:
+                continue
+            if whole.kind != "cylinder":
+                face, piece = _end_ahead(mesh, piece, force)
+            yield _Hole(name, face, piece, force)
+
+
+def _axis_of_hole(mesh: TetMesh, facets: IntArray) -> tuple[FloatArray, bool]:
+    """Axis (3,) along which a wall runs, and whether it is that of a hole and goes all round."""
+    area, normal = mesh.facet_areas(facets)
+    total = area.sum()
+    spread, axes = np.linalg.eigh((area * normal.T) @ normal / total)
+    middles = mesh.points[facets].mean(axis=1)
+    inward = np.einsum("ki,ki->k", area @ middles / total - middles, normal)
+    closed = np.linalg.norm(area @ normal) < _ROUND * total
+    return axes[:, 0], bool(closed and spread[0] < _ROUND and area @ inward > 0.0)
+
+
+def _end_ahead(mesh: TetMesh, facets: IntArray, force: FloatArray) -> tuple[Face | None, IntArray]:
+    """Round end of a slot against which a force presses a pin, and its facets; None without."""
+    own, boundary = facet_keys(facets, mesh.boundary)
+    order = np.argsort(boundary)
+    wall_of = mesh.wall_of[order[np.searchsorted(boundary, own, sorter=order)]]
+    for wall in np.unique(wall_of[wall_of >= 0]).tolist():
+        end = facets[wall_of == wall]
+        (face,) = given_faces(mesh.points, end, [np.arange(len(end))])
+        area, normal = mesh.facet_areas(end)
+        ahead = -(area @ normal) @ force
+        straight = ahead >= _AHEAD * np.linalg.norm(area @ normal) * np.linalg.norm(force)
+        if face.kind == "cylinder" and face.hollow and face.turn >= _HALF and straight:
+            return face, end
+    return None, facets
 
 
 def about_pins(stress: StressField) -> str:
@@ -145,17 +207,18 @@ def about_pins(stress: StressField) -> str:
         return f"pins in holes are not judged: {error}"
     size = specimen.force(stress.reactions)
     joints = pinned_joints(stress, specimen.forces, size, Limits.of(stress.material))
-    return said_of_pins(joints)
+    return said_of_pins(joints, pins_not_judged(stress, specimen.forces, size))
 
 
-def said_of_pins(joints: Sequence[PinnedJoint]) -> str:
-    """Remark on the weakest of some joints, which comes first; empty without any."""
+def said_of_pins(joints: Sequence[PinnedJoint], besides: str = "") -> str:
+    """Remark on the weakest of some joints, which comes first, and `pins_not_judged` besides."""
     if not joints:
-        return ""
-    return (
+        return besides
+    said = (
         f"pins in holes, not part of first failure: {joints[0].about}, of {len(joints)} "
         f"hole{'s' * (len(joints) > 1)}, by the matrix alone; strands round a hole are not counted"
     )
+    return "; ".join(filter(None, [said, besides]))
 
 
 def _pieces(facets: IntArray) -> list[IntArray]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.body.mesh.patches import Cylinder, Plane, patches_from_rules
+from ccfem.body.mesh.patches import Box, Cylinder, Plane, patches_from_rules
 from ccfem.body.meshing import extrude
 from ccfem.comparison.tested_cases import in_all_cases
 from ccfem.fem.elasticity import Bearing, Temperature
@@ -69,6 +69,33 @@ def test_a_round_end_is_shorter_beside_the_middle_and_a_push_stretches_nothing()
     assert pushed.mode == "bearing"
     (aside,) = joints(lug(round_end=True), (Bearing("hole", (0.0, 100.0, 0.0)),))
     assert aside.net_area == pytest.approx((WIDTH / 2 + 30.0 - DIAMETER) * THICKNESS, rel=1e-3)
+
+
+def slotted():
+    """The lug with a slot in place of its hole: round ends about x = 0 and x = -12."""
+    slot = shapely.LineString([(-12.0, 0.0), (0.0, 0.0)]).buffer(DIAMETER / 2, quad_segs=16)
+    strip = shapely.box(-40.0, -WIDTH / 2, END, WIDTH / 2)
+    mesh = extrude(strip.difference(slot), THICKNESS, 4.0)
+    inside = Box((-17.0, -4.5, -1.0), (4.5, 4.5, THICKNESS + 1.0), normal=None)
+    mesh = patches_from_rules(mesh, {"slot": inside, "root": Plane("x", "min")})
+    _, normal = mesh.facet_areas(mesh.patch("slot"))
+    wall = mesh.patch("slot")[np.abs(normal[:, 2]) < 0.5]
+    return mesh.with_patches({**mesh.patches, "slot": wall})
+
+
+def test_a_pin_in_the_end_of_a_slot_is_judged_and_one_on_its_side_is_named():
+    # Ahead of the end the lug is that of a round hole; what lies beside it is, too.
+    mesh = slotted()
+    (joint,) = joints(mesh, (Force("slot", (100.0, 0.0, 0.0)),))
+    assert joint.loads["bearing"] == pytest.approx(CRUSHING * DIAMETER * THICKNESS, rel=2e-3)
+    net = TENSILE * (WIDTH - DIAMETER) * THICKNESS
+    assert joint.loads["net section"] == pytest.approx(net, rel=2e-3)
+    shear = TENSILE / np.sqrt(3.0) * 2.0 * END * THICKNESS
+    assert joint.loads["shear-out"] == pytest.approx(shear, rel=2e-3)
+    loads = {"up": (Force("slot", (0.0, 100.0, 0.0)),)}
+    problem = Problem(mesh, MATERIAL, (Support("root"),), loads, order=1)
+    said = about_pins(solve(problem)["up"])
+    assert said == "pins are not judged in 'slot': loaded where the wall of the hole is not round"
 
 
 def test_a_held_hole_is_judged_by_its_reaction_and_an_idle_one_is_not():
