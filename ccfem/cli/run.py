@@ -269,6 +269,7 @@ def with_given_paths(
         return strategies
     from ccfem.paths.planning.given_paths import GivenPaths
     from ccfem.printing.export.path_table import read_paths
+    from ccfem.printing.export.waypoints import pattern_of
     from ccfem.slicing.layers.layer import plane_frame
 
     named = dict(strategies)
@@ -279,7 +280,7 @@ def with_given_paths(
         toolpaths = read_paths(file, plane_frame(case.build), frame)
         if not len(toolpaths):
             raise InputError(f"{file} holds no paths: check its name")
-        named[name] = GivenPaths(toolpaths, file)
+        named[name] = GivenPaths(toolpaths, file, pattern_of(file))
     return named
 
 

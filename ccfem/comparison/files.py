@@ -27,6 +27,7 @@ from ccfem.comparison.runs import Run
 from ccfem.comparison.shown import file_stem
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.judging.virtual_testing.progressive_failure import BreakingLoad
+from ccfem.paths.planning.given_paths import pattern_that_folds
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import curved_layers
 
@@ -305,7 +306,8 @@ def _write_paths(comparison: Comparison, folder: Path, cell: bool) -> None:
             files.append(partial(write_robot_waypoints, file, run.toolpaths, layers, machine))
         else:
             file = folder / f"{stem}_waypoints.txt"
-            files.append(partial(write_waypoints, file, run.toolpaths, layers))
+            pattern = pattern_that_folds(run.strategy, run.name)
+            files.append(partial(write_waypoints, file, run.toolpaths, layers, pattern))
     for _ in in_processes(lambda write: write(), files, writes=True):
         pass
 

@@ -32,10 +32,9 @@ from ccfem.paths.planning.equal_fibre import (
     plan_to_lengths,
     sampled_length,
 )
-from ccfem.paths.planning.given_paths import GivenPaths
+from ccfem.paths.planning.given_paths import GivenPaths, pattern_that_folds
 from ccfem.paths.planning.plan import plan
 from ccfem.paths.planning.strategy import LengthStrategy, Planned
-from ccfem.paths.planning.unfolding import may_fold
 from ccfem.paths.plastic.plastic import SOLID, Plastic
 from ccfem.paths.splitting.printed_strands import printed_strands
 from ccfem.paths.toolpaths import Toolpaths
@@ -419,9 +418,8 @@ def evaluated(run: Run, part: Part) -> Run:
         most = None if part.every_layer else _MOST_LAYERS
         about = (part.layers, part.stress, part.machine, part.strand, part.build, most)
         evaluation = evaluate(run.toolpaths, *about, part.cases.heaviest.problem.filled)
-        # Who planned given paths is not known: their folds are no published pattern.
-        given = isinstance(run.strategy, GivenPaths)
-        by_design = not given and may_fold(run.strategy)
+        # Who planned given paths is not known, but where their file says so.
+        by_design = bool(pattern_that_folds(run.strategy, run.name))
         what = (run.toolpaths, part.layers, part.machine, by_design)
         rules = strand_verdict(*what, with_parts=part.tests(run))
         reasons = [

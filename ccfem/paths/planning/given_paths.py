@@ -14,6 +14,7 @@ from ccfem.base.errors import InputError
 from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.strategy import Amount
+from ccfem.paths.planning.unfolding import may_fold
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer, LayerStress
 
@@ -33,10 +34,14 @@ class GivenPaths:
         In the frame of the mesh.
     source : str
         Where they come from; for reports.
+    pattern : str
+        Published pattern that they are of, by their file, whose turns back are then kept as those
+        of the pattern are; they carry nothing in either.
     """
 
     toolpaths: Toolpaths
     source: str = ""
+    pattern: str = ""
 
     amount: ClassVar[Amount] = Amount("", 1.0, 1.0)
     crosses: ClassVar[bool] = True
@@ -175,3 +180,10 @@ class GivenPaths:
             chosen = np.flatnonzero(np.repeat(wanted, size))
             mean[k, wanted] = away(layers[k], chosen, size[wanted])
         return np.asarray(mean.argmin(axis=0))
+
+
+def pattern_that_folds(strategy: object, name: str) -> str:
+    """Name of the published pattern that turns back by design: a strategy's, or a file's; or ""."""
+    if isinstance(strategy, GivenPaths):
+        return strategy.pattern
+    return name if may_fold(strategy) else ""

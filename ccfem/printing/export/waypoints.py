@@ -3,7 +3,8 @@
 A line ``;Layer_CCF: i`` starts layer i. Coordinates are those of the tool: X and Y along the two
 in-plane axes of a layer's frame, Z along the build direction. (For the authors' meshes, built along
 y, the tool's X, Y, Z are x, -z, y of the mesh.) The format cannot mark links (`Toolpaths.link`):
-paths that are read back have none.
+paths that are read back have none. A first line ``;Turns back by design: NAME`` names a published
+pattern whose turns are meant.
 """
 
 from collections.abc import Sequence
@@ -25,6 +26,7 @@ LARGEST_NUMBER = 1e15
 _FARTHEST = 1e5
 """Coordinate, mm, beyond which a unit is wrong."""
 _MARK = ";Layer_CCF:"
+_PATTERN = ";Turns back by design: "
 
 
 def read_waypoints(path: str | Path, frame: FloatArray) -> Toolpaths:
@@ -61,6 +63,14 @@ def read_waypoints(path: str | Path, frame: FloatArray) -> Toolpaths:
         kind=np.full(len(lines), FIBRE),
         closed=np.array(closed),
     )
+
+
+def pattern_of(path: str | Path) -> str:
+    """Name of the published pattern whose turns a file of paths says that it means; else empty."""
+    if Path(path).is_dir():
+        return ""
+    first, *_ = text_of(path, "paths").splitlines() or [""]
+    return first.removeprefix(_PATTERN).strip() if first.startswith(_PATTERN) else ""
 
 
 def check_near(points: FloatArray, name: str) -> None:
@@ -134,7 +144,9 @@ def close_rings(lines: Sequence[FloatArray]) -> list[bool]:
     return closed
 
 
-def write_waypoints(path: str | Path, toolpaths: Toolpaths, layers: Sequence[Layer]) -> None:
+def write_waypoints(
+    path: str | Path, toolpaths: Toolpaths, layers: Sequence[Layer], pattern: str = ""
+) -> None:
     """Write fibre paths to a waypoint file, whole or not at all, rounded to 0.0001 mm.
 
     Parameters
@@ -144,6 +156,8 @@ def write_waypoints(path: str | Path, toolpaths: Toolpaths, layers: Sequence[Lay
         Paths of other kinds than fibre are left out.
     layers : sequence of Layer
         Layers that the paths lie on; every one of them gets its line in the file.
+    pattern : str, default ""
+        Name of a published pattern that turns back by design, for the first line.
 
     Raises
     ------
@@ -155,6 +169,8 @@ def write_waypoints(path: str | Path, toolpaths: Toolpaths, layers: Sequence[Lay
     if missing:
         raise InputError(f"paths lie on layer {min(missing)}, which is not among the layers given")
     with whole_file(path) as temporary, temporary.open("w", encoding="utf-8") as file:
+        if pattern:
+            file.write(f"{_PATTERN}{pattern}\n")
         for layer in layers:
             out = [f"{_MARK} {layer.index}"]
             for line in fibre.on_layer(layer.index):

@@ -8,7 +8,7 @@ import pytest
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.paths.toolpaths import MATRIX, Toolpaths
-from ccfem.printing.export.waypoints import read_waypoints, write_waypoints
+from ccfem.printing.export.waypoints import pattern_of, read_waypoints, write_waypoints
 from ccfem.slicing.layers import plane_frame
 from ccfem.slicing.slicers.planar import Planar
 
@@ -70,6 +70,11 @@ def test_what_is_written_is_read_again(tmp_path):
     write_waypoints(path, found, layers)
     assert path.read_text() == text
     assert text.count(";Layer_CCF:") == 3
+    assert pattern_of(path) == pattern_of(tmp_path) == ""
+    write_waypoints(path, found, layers, "contour_zigzag")
+    assert path.read_text() == f";Turns back by design: contour_zigzag\n{text}"
+    assert pattern_of(path) == "contour_zigzag"
+    assert np.array_equal(read_waypoints(path, layers[0].plane.frame).points, found.points)
     assert [p.name for p in tmp_path.iterdir()] == ["paths_raw.txt"]
 
 
