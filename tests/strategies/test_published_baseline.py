@@ -69,3 +69,12 @@ def test_full_fill_keeps_strands_apart(loop, name):
     assert total.total["spacing_below"] < 0.01
     assert total.total["spacing_1"] > 0.98
     assert total.total["outside_length"] == 0.0
+
+
+def test_published_strands_are_as_short_as_the_way_from_the_cutter():
+    """What `held_length` of 0 rests on: nothing has to lie when the shortest strands are cut."""
+    files = [*Path(os.environ[FOLDER]).glob("*/GcodeGenerater_*_raw.txt")]
+    assert len(files) == 6
+    size = np.concatenate([read_waypoints(file, np.eye(3)).lengths for file in files])
+    assert len(size) == 1047
+    assert size.min() == pytest.approx(MACHINE.tail + MACHINE.held_length, abs=0.5)
