@@ -16,6 +16,12 @@ _FINEST = 0.15
 """Shortest edge there, over that size."""
 _GROWTH = 0.4
 """Growth of the edges with the distance from a round wall."""
+_SAGITTA = 0.04
+"""Distance of the chords from the faces of a CAD file that are neither flat nor round walls, mm.
+
+Round walls are followed exactly whatever their chords are, these faces by their chords alone."""
+_KNOWN = ("Plane", "Cylinder", "Cone", "Sphere")
+"""Kinds of faces that are flat or round walls."""
 
 
 def cad_volume(path: str, size: float, scale: float, joined: str) -> dict[str, Any]:
@@ -28,6 +34,7 @@ def cad_volume(path: str, size: float, scale: float, joined: str) -> dict[str, A
     with _model() as gmsh:
         given = _solids(gmsh, path, joined)
         _sizes(gmsh, size / scale)
+        _follow_free_forms(gmsh, _SAGITTA / scale)
         gmsh.model.mesh.generate(3)
         return {**_mesh(gmsh, scale), **_faces(gmsh, path, *given, joined)}
 
@@ -149,6 +156,26 @@ def _sizes(gmsh: Any, size: float, turn: int = _ROUND) -> None:
         ("MeshSizeExtendFromBoundary", int(turn > 0)),
     ):
         gmsh.option.setNumber(f"Mesh.{option}", value)
+
+
+def _follow_free_forms(gmsh: Any, sagitta: float) -> None:
+    """Make edges on free-form faces so short that their chords lie close to the faces.
+
+    The size by curvature is that of a circle in `_ROUND` edges, which tells its radius.
+    """
+    faces = [
+        tag for _, tag in gmsh.model.getEntities(2) if gmsh.model.getType(2, tag) not in _KNOWN
+    ]
+    if not faces:
+        return
+    bounds = {abs(tag) for face in faces for tag in gmsh.model.getAdjacencies(2, face)[1]}
+    free = {(2, tag) for tag in faces} | {(1, tag) for tag in bounds}
+    share = 8.0 * sagitta * _ROUND / (2.0 * math.pi)
+    gmsh.model.mesh.setSizeCallback(
+        lambda dim, tag, _x, _y, _z, size: (
+            min(size, math.sqrt(share * size)) if (dim, tag) in free else size
+        )
+    )
 
 
 def _size_at(x: float, y: float, z: float, size: float, walls: list[list[float]]) -> float:

@@ -96,13 +96,17 @@ class RoundWall:
         _, normal = self.distances(places)
         return -normal if self.hollow else normal
 
+    def near(self, places: FloatArray, chords: float = 0.0) -> np.ndarray:
+        """Whether places (k, 3), mm, lie on the wall, or on chords up to a distance off it, mm."""
+        distance, _ = self.distances(places)
+        height = (places - self.centre) @ self.direction
+        slack = max(self.tolerance, chords) + _SLACK * self.radius
+        within = (height >= self.low - slack) & (height <= self.high + slack)
+        return within & (np.abs(distance) <= slack)
+
     def has(self, corners: FloatArray, normals: FloatArray) -> np.ndarray:
         """Whether facets with corners (k, 3, 3) and outward normals (k, 3) lie on the wall."""
-        distance, _ = self.distances(corners.reshape(-1, 3))
-        height = (corners - self.centre) @ self.direction
-        slack = self.tolerance + _SLACK * self.radius
-        near = (np.abs(distance).reshape(-1, 3) <= slack).all(axis=1)
-        near &= (height.min(axis=1) >= self.low - slack) & (height.max(axis=1) <= self.high + slack)
+        near = self.near(corners.reshape(-1, 3)).reshape(-1, 3).all(axis=1)
         exact = self.normals_at(corners.mean(axis=1))
         return near & (np.einsum("ki,ki->k", exact, normals) > _FACING)
 

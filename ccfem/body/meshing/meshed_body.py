@@ -117,7 +117,7 @@ def _solid(files: Sequence[Path], scale: float) -> tuple[Surface, str]:
 # Meshes that were made before, kept by what they were made of.
 
 
-_FORMAT = 5
+_FORMAT = 6
 """Raised when meshing changes, or what is said of it: meshes of before are made anew."""
 _MOST = 100
 """Meshes that are kept; the ones not used for longest go."""

@@ -1,6 +1,6 @@
 """Curved layers: level surfaces of a field on the mesh, cleaned, with a thickness at each point."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -171,22 +171,29 @@ def _surface(
         "loops": chain(border),
         "thickness": float(mean),
         "patches": patches,
-        "walls": tuple(_along_walls(mesh, keys[used], points[used], triangles, on_wall)),
+        "walls": tuple(
+            along_walls(
+                mesh.round_walls,
+                [np.isin(keys[used], edges) for edges in on_wall],
+                points[used],
+                triangles,
+            )
+        ),
         "local_thickness": local,
     }
     return surface, bubbles, specks
 
 
-def _along_walls(
-    mesh: TetMesh,
-    keys: IntArray,
+def along_walls(
+    walls: Sequence[RoundWall],
+    on_wall: Sequence[BoolArray],
     points: FloatArray,
     triangles: IntArray,
-    on_wall: list[IntArray],
 ) -> Iterator[tuple[RoundWall, IntArray]]:
     """Round walls, and the border edges (k, 2) that are chords of each: both ends lie on it.
 
-    Of a chord the surface ends at the wall, so that both look the same way.
+    Of a chord the surface ends at the wall, so that both look the same way. For each wall is given
+    which of the points (n, 3), mm, lie on it.
     """
     border = border_edges(triangles, len(points))
     triangle, side = sides_at(border, triangles)
@@ -196,8 +203,8 @@ def _along_walls(
     square = np.maximum(np.einsum("ed,ed->e", along, along), 1e-300)
     inwards -= (np.einsum("ed,ed->e", inwards, along) / square)[:, None] * along
     inwards /= np.maximum(np.linalg.norm(inwards, axis=1), 1e-300)[:, None]
-    for wall, edges in zip(mesh.round_walls, on_wall, strict=True):
-        on = np.isin(keys, edges)[border].all(axis=1)
+    for wall, of_points in zip(walls, on_wall, strict=True):
+        on = of_points[border].all(axis=1)
         outwards = wall.normals_at(points[border[on]].mean(axis=1))
         facing = np.einsum("ed,ed->e", outwards, -inwards[on]) > _FACING
         if facing.any():

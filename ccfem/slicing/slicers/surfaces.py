@@ -15,6 +15,7 @@ from ccfem.geometry.locate import locate, nearest_on_triangles
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.level_cut import chain
+from ccfem.slicing.layers.level_surfaces import along_walls
 from ccfem.slicing.layers.slicer import Vector
 
 
@@ -50,6 +51,14 @@ class Surfaces:
 
 _ON_PATCH = 0.6
 """Distance, mm, of both ends of a border edge from a patch up to which the edge lies on it."""
+
+
+def _chords_of(mesh: TetMesh, wall: int) -> float:
+    """How far the sides of a mesh's facets on a round wall are off it, mm."""
+    corners = mesh.points[mesh.boundary[mesh.wall_of == wall]]
+    middles = 0.5 * (corners + np.roll(corners, 1, axis=1))
+    off, _ = mesh.round_walls[wall].distances(middles.reshape(-1, 3))
+    return float(np.abs(off).max(initial=0.0))
 
 
 def layer_from_surface(
@@ -98,6 +107,7 @@ def layer_from_surface(
     cell, _ = locate(mesh.points, mesh.corners, middle, tolerance)
     cell = np.where(cell < 0, holder[triangles[:, 0]], cell)
     border = border_edges(triangles, len(points))
+    near = [wall.near(points, _chords_of(mesh, k)) for k, wall in enumerate(mesh.round_walls)]
     patches = {}
     for name, facets in mesh.patches.items():
         ends = nearest_on_triangles(mesh.points, facets, points[border.ravel()]).distance
@@ -112,4 +122,5 @@ def layer_from_surface(
         index=index,
         thickness=thickness,
         patches=patches,
+        walls=tuple(along_walls(mesh.round_walls, near, points, triangles)),
     )
