@@ -23,7 +23,7 @@ from ccfem.paths.planning.strategy import Strategy
 from ccfem.printing.before_solving import check_print, check_support
 from ccfem.printing.course import WITHOUT_HALT, Course
 from ccfem.slicing.layers.layer import plane_frame
-from ccfem.slicing.layers.slicer import Slicer, has_field
+from ccfem.slicing.layers.slicer import Slicer
 from ccfem.slicing.slicers import as_slicer, from_text
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
@@ -272,8 +272,7 @@ class Request:
         case = self.case
         (slicing,) = self.slicings.values()
         layers = case.known_layers(slicing.slicer)
-        curved = has_field(slicing.slicer or case.slicing)
-        check_print(case.problem.mesh, case.build, case.machine, layers, case.bed, curved)
+        check_print(case.problem.mesh, case.build, case.machine, layers, case.bed)
         if self.support and layers:
             check_support(case.problem.mesh, layers, case.machine)
 

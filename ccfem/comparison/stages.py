@@ -40,13 +40,13 @@ from ccfem.paths.splitting.printed_strands import printed_strands
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.bed_layout import AS_IT_STANDS, BedLayout
 from ccfem.printing.before_solving import in_air, refusal
-from ccfem.printing.copies import arranged
 from ccfem.printing.course import WITHOUT_HALT, Course, on_course
 from ccfem.printing.curved_plan import curved_plan
 from ccfem.printing.part_moves import part_moves
 from ccfem.printing.print_plan import plan_print
 from ccfem.printing.print_totals import print_totals
 from ccfem.printing.support import SupportLayers
+from ccfem.printing.together import arranged
 from ccfem.slicing.layers import Layer
 from ccfem.slicing.layers.layer import curved_layers
 from ccfem.strategies.fibre_aware.plan_cases import plan_cases, plan_cases_to_lengths
@@ -135,8 +135,7 @@ class Part:
     def refusal(self) -> str:
         """Why no print of it is planned, whatever its paths are; else empty."""
         build = self.build or (0.0, 0.0, 1.0)
-        about = (self.machine, self.flat_layers, self.layout, bool(curved_layers(self.layers)))
-        return refusal(self.stress.mesh, build, *about)
+        return refusal(self.stress.mesh, build, self.machine, self.flat_layers, self.layout)
 
     @cached_property
     def why_not_printable(self) -> tuple[str, ...]:
@@ -450,7 +449,7 @@ def with_print(run: Run, part: Part) -> Run:
             if curved
             else plan_print(*what, part.propped, spin, part.plastic)
         )
-        plan = on_course(arranged(plan, part.layout, part.machine), part.course, part.machine)
+        plan = on_course(arranged([plan], [part.layout], part.machine), part.course, part.machine)
         moves = part_moves(plan, part.machine)
     except InputError as error:
         why = "; ".join(filter(None, (str(error), run.why_not)))

@@ -9,11 +9,11 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.machine.machine import Machine
 from ccfem.paths.splitting.slabs import check_cover, slabs_of
 from ccfem.printing.bed_layout import AS_IT_STANDS, BedLayout
-from ccfem.printing.copies import arranged, check_copies, outline
 from ccfem.printing.line_counts import check_matrix_lines
 from ccfem.printing.part_moves import part_moves
 from ccfem.printing.print_plan import check_bed, check_machine
 from ccfem.printing.support.overhang import overhang
+from ccfem.printing.together import arranged, outline
 from ccfem.slicing.layers.layer import Layer, plane_frame
 
 
@@ -23,7 +23,6 @@ def check_print(
     machine: Machine,
     layers: Sequence[Layer] = (),
     layout: BedLayout = AS_IT_STANDS,
-    curved: bool = False,
 ) -> None:
     """Refuse a print that its machine cannot make, whatever the paths are.
 
@@ -38,24 +37,20 @@ def check_print(
         stands upright, as its layers lie.
     layout : BedLayout
         Turn, place and copies on the bed.
-    curved : bool
-        Whether layers are curved, or will be.
 
     Raises
     ------
     InputError
         For speeds of 0, a cutter farther from the nozzle than the shortest strand is long, more
         lines than are planned, a part or copies that do not fit on the bed with all that is laid
-        beside them, several copies of curved layers, and layers without room, or without matrix to
-        hold them.
+        beside them, and layers without room, or without matrix to hold them.
     """
     up = _upwards(build, layers)
     check_machine(machine)
     check_matrix_lines(mesh, up, machine)
-    check_copies(layout, not curved)
     if not layers:
         return
-    _check_room(mesh, up, machine, layout)
+    check_room([mesh], [up], [layout], machine)
     level = mesh.points[np.unique(mesh.corners)] @ up
     check_cover(slabs_of(layers, float(level.min()), float(level.max()), machine), machine)
 
@@ -65,17 +60,31 @@ def _upwards(build: Sequence[float], layers: Sequence[Layer]) -> tuple[float, ..
     return tuple(layers[0].plane.frame[2].tolist() if layers else build)
 
 
-def _check_room(mesh: TetMesh, build: Sequence[float], machine: Machine, layout: BedLayout) -> None:
-    """Print the outline of the part's box, once at its top: with all that is laid beside it."""
-    corners = mesh.points[np.unique(mesh.corners)] @ layout.frame(plane_frame(build)).T
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    half = 0.5 * np.maximum(high - low - machine.matrix_width, 0.0)[:2]
-    middle, height = 0.5 * np.array(machine.gcode.bed[:2]), float(high[2] - low[2])
-    ends = (np.append(middle - half, height), np.append(middle + half, height))
-    # Of one part the fibre stays on the bed where the matrix does; whether copies do, is computed.
-    plan = outline(*ends, machine.matrix_height, layout.count > 1)
-    check_bed(plan, machine)
-    part_moves(arranged(plan, layout, machine), machine)
+def check_room(
+    meshes: Sequence[TetMesh],
+    builds: Sequence[Sequence[float]],
+    layouts: Sequence[BedLayout],
+    machine: Machine,
+    names: Sequence[str] = ("",),
+) -> None:
+    """Print the outlines of the boxes of parts, each once at its top, with all beside them.
+
+    Raises
+    ------
+    InputError
+        For parts that do not fit on the bed.
+    """
+    plans, many = [], sum(layout.count for layout in layouts) > 1
+    for mesh, build, layout in zip(meshes, builds, layouts, strict=True):
+        corners = mesh.points[np.unique(mesh.corners)] @ layout.frame(plane_frame(build)).T
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        half = 0.5 * np.maximum(high - low - machine.matrix_width, 0.0)[:2]
+        middle, height = 0.5 * np.array(machine.gcode.bed[:2]), float(high[2] - low[2])
+        ends = (np.append(middle - half, height), np.append(middle + half, height))
+        # Of one part the fibre stays on the bed where the matrix does; of several that is computed.
+        plans.append(outline(*ends, machine.matrix_height, many))
+        check_bed(plans[-1], machine)
+    part_moves(arranged(plans, layouts, machine, names), machine)
 
 
 def refusal(
@@ -84,11 +93,10 @@ def refusal(
     machine: Machine,
     layers: Sequence[Layer] = (),
     layout: BedLayout = AS_IT_STANDS,
-    curved: bool = False,
 ) -> str:
     """Say why `check_print` refuses a print; empty where it does not."""
     try:
-        check_print(mesh, build, machine, layers, layout, curved)
+        check_print(mesh, build, machine, layers, layout)
     except InputError as error:
         return str(error)
     return ""

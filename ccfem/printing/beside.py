@@ -1,6 +1,7 @@
 """Auxiliary lines beside a part: skirt, brim, priming block, and a bar for a first strand."""
 
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 import shapely
@@ -24,15 +25,15 @@ _BAR_MORE = 20.0
 
 @dataclass(frozen=True)
 class Beside:
-    """Lines beside the part, each (n, 2), mm.
+    """Lines beside the parts, each (n, 2), mm.
 
     Attributes
     ----------
     skirt : tuple of arrays
         Loops round the first layer, the outermost first; those of the brim come last.
-    block : tuple of arrays
-        Loops of the block from its contour inwards, or lines to and fro; on each matrix layer as
-        many as its volume needs, at least two.
+    blocks : tuple of tuples of arrays
+        For each stack of layers the loops of its block from its contour inwards, or lines to and
+        fro; on each matrix layer as many as its volume needs, at least two.
     bar : tuple of arrays
         Lines of the bar, on each matrix layer below the first strand.
     strand : (2, 2) array or None
@@ -40,7 +41,7 @@ class Beside:
     """
 
     skirt: tuple[FloatArray, ...] = ()
-    block: tuple[FloatArray, ...] = ()
+    blocks: tuple[tuple[FloatArray, ...], ...] = ((),)
     bar: tuple[FloatArray, ...] = ()
     strand: FloatArray | None = None
 
@@ -51,22 +52,27 @@ def beside(plan: PrintPlan, machine: Machine) -> Beside:
     Returns
     -------
     Beside
-        The block is left of the part and of fibre that leaves it, the bar in front of it, and the
-        skirt round all of them.
+        The blocks are left of the parts and of fibre that leaves them, the bar in front of them,
+        and the skirt round all of them.
     """
     process, width = machine.process, machine.matrix_width
     low, high = plan.paths.points[:, :2].min(axis=0), plan.paths.points[:, :2].max(axis=0)
     half = 0.5 * width
     aside = _head_aside(plan, machine)
     low, high = low - half - aside, high + half + aside
-    block: list[FloatArray] = []
+    stacks = int(plan.stack.max(initial=0)) + 1
+    blocks: list[list[FloatArray]] = [[] for _ in range(stacks)]
     bar: list[FloatArray] = []
     strand = None
     if process.prime != "none":
         right, middle = low[0] - GAP, 0.5 * (low[1] + high[1])
-        matrix = np.setdiff1d(plan.paths.layer, plan.paths.layer[plan.paths.kind == FIBRE])
-        least = float(plan.thickness[matrix].min(initial=machine.highest_line))
-        block = _block(right, middle, least, machine)
+        sizes = [_block_size(plan, stack, machine) for stack in range(stacks)]
+        long = 4.0 * process.prime_size if process.prime == "line" else 0.0
+        front = middle - 0.5 * (sum(max(size, long) + width for size in sizes) - width)
+        for stack, size in enumerate(sizes):
+            deep = max(size, long)
+            blocks[stack] = _block(right, front + 0.5 * deep, size, machine)
+            front += deep + width
     if process.prime != "none" and bool((plan.paths.kind == FIBRE).any()):
         long = machine.tail + _BAR_MORE
         left = 0.5 * (low[0] + high[0] - long)
@@ -77,8 +83,8 @@ def beside(plan: PrintPlan, machine: Machine) -> Beside:
         strand = np.array([[left, 0.0], [left + long, 0.0]])
         strand[:, 1] = front + 0.5 * (_BAR_LINES - 1) * width
         strand = strand.round(COORDINATE_DIGITS)
-    skirt = _skirt(plan, (*block, *bar), machine)
-    return Beside(tuple(skirt), tuple(block), tuple(bar), strand)
+    skirt = _skirt(plan, (*chain.from_iterable(blocks), *bar), machine)
+    return Beside(tuple(skirt), tuple(map(tuple, blocks)), tuple(bar), strand)
 
 
 def _head_aside(plan: PrintPlan, machine: Machine) -> float:
@@ -91,13 +97,23 @@ def _head_aside(plan: PrintPlan, machine: Machine) -> float:
     return machine.head_length / float(np.cos(half)) * float(np.sin(min(tilt + half, np.pi / 2)))
 
 
-def _block(right: float, middle: float, height: float, machine: Machine) -> list[FloatArray]:
-    """Lines of the block, given its right side; on layers so high they hold the primed volume."""
+def _block_size(plan: PrintPlan, stack: int, machine: Machine) -> float:
+    """Side of the block of a stack, mm: on its lowest layer it holds the primed volume."""
     process, width = machine.process, machine.matrix_width
-    size = process.prime_size
+    if process.prime != "block":
+        return process.prime_size
+    mine = plan.stack == stack
+    layers, kinds = plan.paths.layer[mine], plan.paths.kind[mine]
+    matrix = np.setdiff1d(layers, layers[kinds == FIBRE])
+    least = float(plan.thickness[matrix].min(initial=machine.highest_line))
+    # Loops over the whole block hold its volume but for half a line round it.
+    return float(max(process.prime_size, np.sqrt(1.01 * process.prime_volume / least) + width))
+
+
+def _block(right: float, middle: float, size: float, machine: Machine) -> list[FloatArray]:
+    """Lines of a block, given its right side, the middle of that and its size."""
+    process, width = machine.process, machine.matrix_width
     if process.prime == "block":
-        # Loops over the whole block hold its volume but for half a line round it.
-        size = max(size, np.sqrt(1.01 * process.prime_volume / height) + width)
         insets = (np.arange(max(int(0.5 * size / width), 1)) + 0.5) * width
         half = 0.5 * size - insets[insets < 0.5 * size]
         corners = np.array([[1, -1], [1, 1], [-1, 1], [-1, -1], [1, -1]])
@@ -114,8 +130,7 @@ def _block(right: float, middle: float, height: float, machine: Machine) -> list
 def _skirt(plan: PrintPlan, others: tuple[FloatArray, ...], machine: Machine) -> list[FloatArray]:
     """Loops round the first layer and the lines beside it, and the loops that touch it."""
     process, width = machine.process, machine.matrix_width
-    first = plan.paths.on_layer(int(plan.paths.layer.min()))
-    lines = [line[:, :2] for line in first]
+    lines = [line[:, :2] for line in plan.paths.select(plan.lowest)]
     skirt: list[FloatArray] = []
     if process.skirt_loops:
         points = np.concatenate([*lines, *others])

@@ -1,5 +1,6 @@
 """From a plan to all actions of the machine: one sequence for every file that is written."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -42,7 +43,7 @@ _UP = np.array([0.0, 0.0, 1.0])
 
 
 def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
-    """Turn the plan of a part into moves.
+    """Turn the plan of a print into moves.
 
     Layer by layer: tool changes with their lifts and temperatures, first filament on a block beside
     the part and on a bar, the skirt, lines of matrix, strands with their cuts, pauses. Of a plan
@@ -58,24 +59,26 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
     InputError
         Where a nozzle would leave the bed.
     """
-    flat = bool((plan.paths.normals[:, 2] > 1.0 - 1e-9).all())
-    recorder = Recorder(machine)
-    paths, site = plan.paths, _Site(beside(plan, machine), None if flat else plan.thickness.max())
+    recorder, paths = Recorder(machine), plan.paths
+    sites, lowest = _sites(plan, machine), plan.lowest
     numbers = np.unique(paths.layer).tolist()
     below = dict(zip(numbers, [0.0, *(float(plan.top[k]) for k in numbers[:-1])], strict=True))
     for number in [k for k in numbers if k < plan.first]:
-        site.printed(float(plan.top[number]), paths.kind[paths.layer == number] == FIBRE)
+        for stack, site in enumerate(sites):
+            mine = paths.kind[(paths.layer == number) & (plan.stack == stack)]
+            if len(mine):
+                site.printed(float(plan.top[number]), mine == FIBRE)
     numbers = [k for k in numbers if k >= plan.first]
-    prepared = in_processes(
-        lambda number: _prepared(plan, number, _speed(below[number], machine), machine), numbers
-    )
+    prepared = in_processes(lambda number: _prepared(plan, number, lowest, machine), numbers)
     for number, lines in zip(numbers, prepared, strict=True):
         top, thickness = float(plan.top[number]), float(plan.thickness[number])
         begin_layer(recorder, number, top, below[number], machine)
         if number in plan.pauses:
             _pause(recorder, number, machine)
-        for line in lines:
-            tool = int(isinstance(line, StrandSteps))
+        mine = paths.layer == number
+        on_bed, stacks = lowest[mine].tolist(), plan.stack[mine].tolist()
+        for line, first, stack in zip(lines, on_bed, stacks, strict=True):
+            site, tool = sites[stack], int(isinstance(line, StrandSteps))
             changed = change_tool(recorder, tool, top, machine)
             if isinstance(line, StrandSteps):
                 site.first_strand(recorder, top, thickness, machine)
@@ -83,7 +86,7 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
                 lay_strand(recorder, line, machine)
                 continue
             if changed or site.height < top:
-                site.prime(recorder, top, below[number] == 0.0, changed, machine)
+                site.prime(recorder, top, first, changed, machine)
             lay_line(recorder, line, machine)
     # Away from the part, before the end of the file moves the carriage home.
     recorder.rise(recorder.top + machine.process.tool_lift)
@@ -95,10 +98,27 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
     return moves
 
 
+def _sites(plan: PrintPlan, machine: Machine) -> "list[_Site]":
+    """Blocks of all stacks; the skirt goes with the first, and the bar with the first fibre."""
+    around, paths = beside(plan, machine), plan.paths
+    fibre = np.flatnonzero(paths.kind == FIBRE)
+    with_bar = int(plan.stack[fibre[:1]].max(initial=-1))
+    tilted = np.flatnonzero(paths.normals[:, 2] <= 1.0 - 1e-9)
+    curved = plan.stack[np.searchsorted(paths.offsets, tilted, side="right") - 1]
+    sites = []
+    for stack, block in enumerate(around.blocks):
+        own = Beside(() if stack else around.skirt, (block,))
+        if stack == with_bar:
+            own = replace(own, bar=around.bar, strand=around.strand)
+        highest = plan.thickness[paths.layer[plan.stack == stack]].max(initial=0.0)
+        sites.append(_Site(own, float(highest) if stack in curved else None))
+    return sites
+
+
 def _prepared(
-    plan: PrintPlan, number: int, speed: float, machine: Machine
+    plan: PrintPlan, number: int, lowest: BoolArray, machine: Machine
 ) -> "list[Steps | StrandSteps]":
-    """Find the moves along the paths of a layer, in their order; the speed is that of matrix."""
+    """Find the moves along the paths of a layer, in their order; `lowest` are slower ones."""
     paths, lines = plan.paths, list[Steps | StrandSteps]()
     thickness = float(plan.thickness[number])
     for k in np.flatnonzero(paths.layer == number).tolist():
@@ -110,6 +130,7 @@ def _prepared(
         what = "short" if plan.short[k] else "contour" if paths.closed[k] else "infill"
         what = "pad" if paths.kind[k] == SUPPORT else "sparse" if plan.sparse[k] else what
         heights, room = plan.laid[start : end - 1], float(plan.room[k])
+        speed = _speed(bool(lowest[k]), machine)
         lines.append(matrix_steps(line, normals, heights, what, machine, speed, room))
     return lines
 
@@ -125,9 +146,9 @@ def _pause(recorder: Recorder, number: int, machine: Machine) -> None:
     recorder.note(PAUSE, number)
 
 
-def _speed(below: float, machine: Machine) -> float:
-    """Speed of matrix on a layer that lies on this height."""
-    slower = machine.process.first_layer_speed if below == 0.0 else 1.0
+def _speed(on_bed: bool, machine: Machine) -> float:
+    """Speed of matrix on the bed or above it."""
+    slower = machine.process.first_layer_speed if on_bed else 1.0
     return machine.matrix_speed * slower
 
 
@@ -170,7 +191,7 @@ class _Site:
         self.height = top
         if height <= 0.0:
             return
-        speed = _speed(0.0 if first else 1.0, machine)
+        speed = _speed(first, machine)
 
         def lay(line: FloatArray, what: str, high: float) -> None:
             points = np.column_stack([line, np.full(len(line), top)])
@@ -180,7 +201,7 @@ class _Site:
             lay_line(recorder, steps, machine)
 
         volume = 0.0
-        for k, line in enumerate(self.around.block):
+        for k, line in enumerate(self.around.blocks[0]):
             if k >= 2 and (volume >= process.prime_volume or not changed):
                 break
             lay(line, "block", height)

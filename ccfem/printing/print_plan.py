@@ -10,6 +10,7 @@ import shapely
 from ccfem.base.arrays import (
     BoolArray,
     FloatArray,
+    IntArray,
     RowBuffer,
     freeze,
     in_brief,
@@ -41,8 +42,17 @@ from ccfem.slicing.layers import Layer
 
 
 @dataclass(frozen=True)
+class Standing:
+    """A part that stands on the bed: its name, and corners of the box round its lines, mm."""
+
+    name: str
+    low: tuple[float, float]
+    high: tuple[float, float]
+
+
+@dataclass(frozen=True)
 class PrintPlan:
-    """All layers of a part, from the bed to the top.
+    """All layers of a print, of one part or several, from the bed to the top.
 
     Attributes
     ----------
@@ -74,8 +84,11 @@ class PrintPlan:
     touched : tuple of 3 floats, mm
         Length of the paths on curved layers along which the head touches what is printed: layer by
         layer, in the order chosen, and as it leans.
-    copies : int
-        How many times the part is printed: all but `warnings` is of all of them.
+    standing : tuple of Standing
+        The parts on the bed, where it was laid out for them.
+    stack : (K,) int array, optional
+        Stack of layers that each path belongs to: those of parts with the same layers are one, with
+        a block of its own beside the parts. By default all are one.
     pauses : tuple of int
         Layers before which the print halts.
     first : int
@@ -94,10 +107,11 @@ class PrintPlan:
     warnings: tuple[str, ...] = ()
     ended: float = 0.0
     touched: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    copies: int = 1
+    standing: tuple[Standing, ...] = ()
     pauses: tuple[int, ...] = ()
     first: int = 0
     sparse: BoolArray = None  # type: ignore[assignment]
+    stack: IntArray = None  # type: ignore[assignment]
 
     __repr__ = in_brief
 
@@ -107,17 +121,30 @@ class PrintPlan:
             object.__setattr__(self, "laid", whole)
         if self.room is None:
             object.__setattr__(self, "room", np.ones(len(self.paths)))
-        for name in ("short", "sparse"):
+        for name in ("short", "sparse", "stack"):
             if getattr(self, name) is None:
                 object.__setattr__(self, name, np.zeros(len(self.paths), dtype=bool))
         if self.trims is None:
             object.__setattr__(self, "trims", np.zeros((0, 3)))
         freeze(self, trims=float, top=float, thickness=float, laid=float)
-        for name, kind in (("room", float), ("short", bool), ("sparse", bool)):
+        kinds = {"room": float, "short": bool, "sparse": bool, "stack": np.int64}
+        for name, kind in kinds.items():
             object.__setattr__(self, name, shared_rows(getattr(self, name), kind))
 
+    @property
+    def copies(self) -> int:
+        """Number of parts on the bed."""
+        return max(len(self.standing), 1)
+
+    @property
+    def lowest(self) -> BoolArray:
+        """Mask (K,) of the paths on the lowest layer of their stack, which lies on the bed."""
+        first = np.full(int(self.stack.max(initial=0)) + 1, len(self.top))
+        np.minimum.at(first, self.stack, self.paths.layer)
+        return np.asarray(self.paths.layer == first[self.stack])
+
     def volume(self, machine: Machine) -> float:
-        """Volume of matrix and of fibre inside the part, mm^3."""
+        """Volume of matrix and of fibre inside the parts, mm^3."""
         begins = starts_segment(self.paths.offsets)[:-1]
         matrix = np.repeat(self.paths.kind == MATRIX, np.diff(self.paths.offsets))[:-1] & begins
         volume = float((step_lengths(self.paths.points)[matrix] * self.laid[:-1][matrix]).sum())

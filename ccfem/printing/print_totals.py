@@ -1,6 +1,6 @@
 """Time, filament and cost of a whole print: one count for the head of its file and every table."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -9,7 +9,11 @@ import numpy as np
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.machine.machine import Machine
 from ccfem.printing.duration import durations, waits
-from ccfem.printing.moves import TRAVEL, Moves
+from ccfem.printing.moves import LAY, TRAVEL, Moves
+from ccfem.printing.print_plan import Standing
+
+_ROUNDING = 1e-3
+"""Of places in moves, mm."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,30 @@ class SpoolUse:
 
 
 @dataclass(frozen=True)
+class PartTotals:
+    """What a part on the bed takes of a print, without changes of tools and what is beside it.
+
+    Attributes
+    ----------
+    name : str
+    count : int
+        How often it stands on the bed: all else is of all of these.
+    seconds : float, s
+        Of its lines and strands, with the ways to them.
+    fibre : float, m
+        That is fed for its strands, up to their cuts.
+    fibre_mass, matrix_mass : float, g
+    """
+
+    name: str
+    count: int
+    seconds: float
+    fibre: float
+    fibre_mass: float
+    matrix_mass: float
+
+
+@dataclass(frozen=True)
 class PrintTotals:
     """What a print takes.
 
@@ -83,6 +111,8 @@ class PrintTotals:
     cost : mapping of str to float
         Of "matrix", "fibre" and "machine", where they have prices (`ccfem.machine.Costs`).
     currency : str
+    parts : tuple of PartTotals
+        Shares of the parts on the bed, in the order of their names.
     """
 
     seconds: float
@@ -96,6 +126,7 @@ class PrintTotals:
     spools: tuple[SpoolUse, ...] = ()
     cost: Mapping[str, float] = field(default_factory=dict)
     currency: str = ""
+    parts: tuple[PartTotals, ...] = ()
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -108,8 +139,8 @@ class PrintTotals:
         return tuple(lines)
 
 
-def print_totals(moves: Moves, machine: Machine) -> PrintTotals:
-    """Count what all moves of a print take."""
+def print_totals(moves: Moves, machine: Machine, standing: Sequence[Standing] = ()) -> PrintTotals:
+    """Count what all moves of a print take, and of them the parts that stand on the bed."""
     moving = durations(moves, machine, heating=False)
     waiting = waits(moving, moves, machine)
     heating = float(waiting.sum())
@@ -118,6 +149,7 @@ def print_totals(moves: Moves, machine: Machine) -> PrintTotals:
     area = 0.25 * np.pi * machine.matrix_diameter**2
     seconds = float(moving.sum()) + heating
     mass = 1e-3 * matrix_fed * area * machine.matrix_density
+    parts = part_totals(moving, moves, machine, standing)
     prices = machine.costs
     cost = {
         "matrix": (prices.matrix, 1e-3 * mass),
@@ -136,7 +168,37 @@ def print_totals(moves: Moves, machine: Machine) -> PrintTotals:
         spool_uses(moves, machine),
         {what: price * much for what, (price, much) in cost.items() if price is not None},
         prices.currency,
+        parts,
     )
+
+
+def part_totals(
+    moving: FloatArray, moves: Moves, machine: Machine, standing: Sequence[Standing]
+) -> tuple[PartTotals, ...]:
+    """Count what parts on the bed take, where all rows take some seconds (n,) without heating.
+
+    A row belongs to the part whose line or strand it lays, or leads to.
+    """
+    names = list(dict.fromkeys(spot.name for spot in standing))
+    owner = np.full(len(moves), -1)
+    for spot in standing:
+        low, high = np.array(spot.low) - _ROUNDING, np.array(spot.high) + _ROUNDING
+        place = moves.place[:, :2]
+        owner[((place >= low) & (place <= high)).all(axis=1)] = names.index(spot.name)
+    laid = np.flatnonzero(moves.event == LAY)
+    following = np.searchsorted(laid, np.arange(len(moves)))
+    owner = np.append(owner[laid], -1)[following]
+    area = 0.25e-3 * np.pi * machine.matrix_diameter**2 * machine.matrix_density
+    parts = []
+    for k, name in enumerate(names):
+        mine = owner == k
+        fibre = float(moves.feed[mine & (moves.tool == 1)].sum())
+        matrix = float(moves.feed[mine & (moves.tool == 0)].sum() + moves.beside[mine].sum())
+        count = sum(spot.name == name for spot in standing)
+        mass = fibre * machine.fibre_mass_per_length
+        seconds = float(moving[mine].sum())
+        parts.append(PartTotals(name, count, seconds, 1e-3 * fibre, mass, area * matrix))
+    return tuple(parts)
 
 
 def layer_seconds(seconds: FloatArray, moves: Moves) -> dict[int, float]:

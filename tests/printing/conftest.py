@@ -9,9 +9,9 @@ from ccfem.body.mesh.box import box_mesh
 from ccfem.machine import Machine, machine_table, updated
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.bed_layout import BedLayout
-from ccfem.printing.copies import arranged
 from ccfem.printing.export.gcode import gcode
 from ccfem.printing.print_plan import plan_print
+from ccfem.printing.together import arranged
 from ccfem.slicing.slicers.planar import Planar
 
 SIZE = (85.0, 26.0, 1.8)
@@ -36,14 +36,14 @@ LINES = (
 class SmallPart(Job):
     """A box with strands on two layers: its file, what the printer did, and what was planned."""
 
-    size, heights = np.array(SIZE), np.array(HEIGHTS)
-
-    def __init__(self, name, values=None, lines=LINES, copies=(1,)):
+    def __init__(self, name, values=None, lines=LINES, copies=(1,), size=SIZE, heights=HEIGHTS):
+        self.size, self.heights = np.array(size), np.array(heights)
         machine = updated(Machine(), machine_table(name), values or {})
-        mesh = box_mesh(SIZE, (8, 3, 1))
-        layers = Planar(heights=HEIGHTS).cut(mesh)
+        mesh = box_mesh(size, (8, 3, 1))
+        layers = Planar(heights=heights).cut(mesh)
         paths = Toolpaths.concatenate(Toolpaths.from_plane(lines, layer) for layer in layers)
-        plan = arranged(plan_print(paths, layers, mesh, machine), BedLayout(copies=copies), machine)
+        plan = plan_print(paths, layers, mesh, machine)
+        plan = arranged([plan], [BedLayout(copies=copies)], machine)
         middle, half = 0.5 * np.array(machine.gcode.bed[:2]), 0.5 * self.size[:2]
         self.corner = middle - half
         # Copies are as far apart as the part from the block, 4 mm; here all fit round the middle.

@@ -13,16 +13,14 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases import read
-from ccfem.cases.inspection import check
-from ccfem.comparison.request import Request
 from ccfem.machine import Machine, machine_names, machine_table, updated
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.bed_layout import BedLayout, bed_of, bed_table, turned
 from ccfem.printing.before_solving import refusal
 from ccfem.printing.beside import beside
-from ccfem.printing.copies import arranged
 from ccfem.printing.part_moves import part_moves
 from ccfem.printing.print_plan import plan_print
+from ccfem.printing.together import arranged
 from ccfem.slicing.layers.layer import plane_frame
 from ccfem.slicing.slicers.planar import Planar
 
@@ -143,7 +141,7 @@ def test_a_refusal_says_how_many_fit_and_so_many_do(name, brim):
     machine = updated(Machine(), machine_table(name), {"process": {"brim_loops": brim}})
     mesh, layers, plan = box_plan(machine)
     with pytest.raises(InputError, match="do not fit on the bed") as refused:
-        arranged(plan, BedLayout(copies=(100,)), machine)
+        arranged([plan], [BedLayout(copies=(100,))], machine)
     assert len(refused.value.mistakes) == 1
     most = int(str(refused.value).split(";")[1].split()[0])
     bed = np.prod(np.array(machine.gcode.bed[:2]) // (np.array([60.0, 40.0]) + 4.0))
@@ -152,16 +150,16 @@ def test_a_refusal_says_how_many_fit_and_so_many_do(name, brim):
         layout = BedLayout(copies=(count,))
         assert (refusal(mesh, (0.0, 0.0, 1.0), machine, layers, layout) == "") == good
         if good:
-            part_moves(arranged(plan, layout, machine), machine)  # it checks both nozzles
+            part_moves(arranged([plan], [layout], machine), machine)  # it checks both nozzles
         else:
             with pytest.raises(InputError, match=f"{most} fit"):
-                arranged(plan, layout, machine)
+                arranged([plan], [layout], machine)
 
 
 def test_copies_keep_their_distance_and_their_brims_apart():
     machine = updated(Machine(), {"process": {"brim_loops": 6}})
     *_, plan = box_plan(machine)
-    copied = arranged(plan, BedLayout(copies=(2, 1)), machine)
+    copied = arranged([plan], [BedLayout(copies=(2, 1))], machine)
     first = copied.paths.on_layer(0)
     x = np.unique(np.concatenate([line[:, 0] for line in first]).round(3))
     assert np.diff(x).max() == pytest.approx(4.0 + 2 * 6 * 0.8 + 0.8, abs=2e-3)
@@ -174,16 +172,16 @@ def test_copies_keep_their_distance_and_their_brims_apart():
 def test_a_part_stands_where_it_is_wanted():
     machine = Machine()
     mesh, layers, plan = box_plan(machine)
-    placed = arranged(plan, BedLayout(centre=(200.0, 90.5)), machine)
+    placed = arranged([plan], [BedLayout(centre=(200.0, 90.5))], machine)
     ends = placed.paths.points[:, :2]
     np.testing.assert_allclose(0.5 * (ends.min(axis=0) + ends.max(axis=0)), [200.0, 90.5])
-    group = arranged(plan, BedLayout(centre=(180.0, 150.0), copies=(3,)), machine).paths.points
+    group = arranged([plan], [BedLayout(centre=(180.0, 150.0), copies=(3,))], machine).paths.points
     middle = 0.5 * (group.min(axis=0) + group.max(axis=0))
     np.testing.assert_allclose(middle[:2], [180.0, 150.0], atol=1e-3)
     for layout in (BedLayout(centre=(10.0, 150.0)), BedLayout(centre=(60.0, 150.0), copies=(3, 1))):
         assert "mm" in refusal(mesh, (0.0, 0.0, 1.0), machine, layers, layout)
         with pytest.raises(InputError):
-            arranged(plan, layout, machine)
+            arranged([plan], [layout], machine)
     # The range that is named is the range that is taken, to 0.1 mm.
     said = refusal(mesh, (0.0, 0.0, 1.0), machine, layers, BedLayout(centre=(1.0, 1.0)))
     least, most, *_ = (float(x) for x in re.findall(r"[\d.]+(?= to| and Y)", said))
@@ -192,20 +190,8 @@ def test_a_part_stands_where_it_is_wanted():
         assert (refusal(mesh, (0.0, 0.0, 1.0), machine, layers, layout) == "") == good
     # Copies that fit beside the block only out of the middle stand aside.
     wide, *_, long = box_plan(machine, (85.0, 40.0, 2.0))
-    part_moves(arranged(long, BedLayout(copies=(3, 1)), machine), machine)
+    part_moves(arranged([long], [BedLayout(copies=(3, 1))], machine), machine)
     assert "do not fit" in refusal(wide, (0.0, 0.0, 1.0), machine, layers, BedLayout(copies=(4, 1)))
-
-
-def test_copies_of_curved_layers_are_refused_in_one_line():
-    case = read("arm_bracket").on_bed({"copies": "2"})
-    said = refusal(case.problem.mesh, case.build, case.machine, (), case.bed, curved=True)
-    assert check(case).not_printable == (said,)
-    with pytest.raises(InputError, match="flat layers"):
-        Request.of(case, ["fiso"], print_plans=True)
-    # Of a slicer of one's making nothing is known before the solve.
-    Request.of(case, ["fiso"], lambda *_: (), print_plans=True)
-    assert "flat layers" in said
-    assert "\n" not in said
 
 
 @pytest.mark.parametrize(

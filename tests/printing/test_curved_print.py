@@ -11,9 +11,12 @@ from ccfem.body.mesh.box import box_mesh
 from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.machine import Kinematics, Machine
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
+from ccfem.printing.bed_layout import BedLayout
 from ccfem.printing.curved_plan import curved_plan
 from ccfem.printing.export.gcode import gcode
+from ccfem.printing.part_moves import part_moves
 from ccfem.printing.poses import limited_tilt
+from ccfem.printing.together import arranged
 from ccfem.slicing.layers.level_surfaces import level_surfaces
 
 MACHINE = Machine(filament_area=0.05, minimum_length=30.0, cutter_distance=30.0)
@@ -150,3 +153,52 @@ def test_the_tilt_has_a_limit():
     np.testing.assert_allclose(angle, [0.0, 10.0, 30.0, 30.0], atol=1e-6)
     heading = np.arctan2(found[1:, 1], found[1:, 0]) % (2 * np.pi)
     np.testing.assert_allclose(heading, turn[1:], atol=1e-9)
+
+
+def slanted():
+    """Layers that rise by 17 degrees, so that the high end of a copy faces the low end of one."""
+    mesh = box_mesh((40.0, 12.0, 12.0), (10, 3, 3))
+    x, _, z = mesh.points.T
+    levels = np.array([4.0, 5.0, 6.0])
+    layers = level_surfaces(mesh, z - 0.3 * (x - 20.0), levels, 1.0, 1.0, 5.0).layers
+    parts = []
+    for layer in layers:
+        low, high = layer.points.min(axis=0), layer.points.max(axis=0)
+        ends = np.add([low, high], [[2.0, 6.0, 0.6], [-2.0, -6.0, -0.6]])
+        line = np.linspace(*ends, 41)
+        parts.append(Toolpaths.in_space([line], [np.tile(layer.normals[0], (41, 1))], layer))
+    return Toolpaths.concatenate(parts), layers, mesh
+
+
+@pytest.mark.parametrize("kind", ["three_axes", "head_head"])
+def test_copies_stand_as_far_apart_as_the_head_needs_and_hardly_more(kind):
+    """No point of one copy lies in the cone of the head anywhere near the other."""
+    machine = replace(MACHINE, kinematics=Kinematics(kind, CENTRE, 90.0))
+    plan = curved_plan(*slanted(), machine)
+    whole = arranged([plan], [BedLayout(copies=(2, 1))], machine)
+    moves = part_moves(whole, machine)
+    left, right = whole.standing
+    gap = right.low[0] - left.high[0]
+    axes = moves.normal if kind == "head_head" else np.tile([0.0, 0.0, 1.0], (len(moves), 1))
+    x, laid = moves.place[:, 0], moves.in_part
+    beside_it = x < 0.5 * (left.high[0] + right.low[0])
+
+    def touches(nearer):
+        found = 0
+        for tips, other, way in ((beside_it, ~beside_it, -nearer), (~beside_it, beside_it, nearer)):
+            for rows in np.array_split(np.flatnonzero(tips & (x > left.low[0] - 2.0))[::4], 20):
+                points = moves.place[: rows[-1]][(other & laid)[: rows[-1]]][::2]
+                off = points[None] - np.add(moves.place[rows], [-way, 0.0, 0.0])[:, None]
+                along = np.einsum("tpk,tk->tp", off, axes[rows])
+                aside = np.sqrt(np.maximum((off**2).sum(axis=2) - along**2, 0.0))
+                reach = along * np.tan(np.radians(machine.head_angle))
+                found += int(((aside < reach) & (along < machine.head_length)).sum())
+        return found
+
+    assert touches(0.0) == 0
+    assert touches(2.0) > 0
+    assert gap > 4.0 + machine.matrix_width
+    with pytest.raises(InputError, match=f"{gap - machine.matrix_width:.3g} mm apart"):
+        arranged([plan], [BedLayout(copies=(6, 1))], machine)
+    with pytest.raises(InputError, match="head_length"):
+        arranged([plan], [BedLayout(copies=(2,))], replace(machine, head_length=8.0))

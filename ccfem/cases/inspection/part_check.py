@@ -35,7 +35,6 @@ from ccfem.geometry.facets import connected, facet_keys
 from ccfem.paths.plastic.plastic import SOLID
 from ccfem.printing.before_solving import in_air, refusal
 from ccfem.slicing.layers.layer import Layer
-from ccfem.slicing.layers.slicer import has_field
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -317,8 +316,7 @@ def check(part: str | os.PathLike[str] | Case, **parameters: Any) -> Check:
         case.check_layers()
         known = case.known_layers()
         mesh, machine = problem.mesh, case.machine
-        curved = has_field(case.slicing)
-        refused = refusal(mesh, case.build, machine, known, case.bed, curved)
+        refused = refusal(mesh, case.build, machine, known, case.bed)
         not_printable = tuple(filter(None, (refused, in_air(mesh, machine, known))))
     fibre = () if case.fibre is None else known
     plastic: tuple[str, ...] = ()
