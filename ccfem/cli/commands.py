@@ -15,6 +15,7 @@ import typer
 from ccfem.base.errors import InputError
 from ccfem.base.progress import progress_bar
 from ccfem.cli.arguments import bed_table_of, drawings_of, names_of, parameters_by_strategy, path_of
+from ccfem.cli.bed import bed
 from ccfem.cli.fibre_amounts import front
 from ccfem.cli.machines import MachineName, SetMachine, machines
 from ccfem.cli.optimising import optimise
@@ -251,6 +252,7 @@ CALLS = {
     "optimise": "ccfem.cases.optimise(CASE, VOLUME_FRACTION)",
     "compare": "ccfem.compare(CASE, [A, B]), and ccfem.save(comparison, DIR)",
     "plan": "ccfem.compare(CASE, [S], natural=True), or ccfem.plan(STRATEGY, LAYERS, STRESS)",
+    "bed": "ccfem.comparison.bed_print.print_together([REQUEST, ..])",
     "solve": "ccfem.solve(CASE.problem)",
     "calibrate": "ccfem.calibrate(PROBLEM, CURVE)",
     "reproduce": "ccfem.reproduce(PAPER, PART)",
@@ -634,6 +636,7 @@ def calibrate(
     fit_material(read, unreinforced, reinforced, strategy, parameters, options, out)
 
 
+app.command()(bed)
 app.command()(front)
 app.command()(optimise)
 app.command()(reproduce)

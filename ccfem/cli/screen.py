@@ -18,8 +18,9 @@ from rich.table import Table
 from ccfem.base.checks import check_known
 from ccfem.base.tensor import von_mises
 from ccfem.cli.docstring import about, attributes
+from ccfem.comparison.bed_print import BedPrint
 from ccfem.comparison.result import Comparison
-from ccfem.comparison.runs import Run
+from ccfem.comparison.runs import Printed
 from ccfem.comparison.shown import file_stem
 from ccfem.comparison.table import FIRST_REMARKS, Cell, Row, Table as Values, load_cases_table
 from ccfem.fem.elasticity.stress_field import StressField, about_cells
@@ -200,12 +201,35 @@ def print_comparison(
     _print_where(console, where, seconds)
 
 
-def _print_file(console: Console, file: Path, run: Run) -> None:
-    """Print where the file of a print is, its time and its mass, of all copies in it."""
+def print_bed(bed: BedPrint, where: Path, seconds: float) -> None:
+    """Print what each part of a file takes, what is doubtful, and where the file is.
+
+    Parameters
+    ----------
+    where : Path
+        Folder of the results.
+    seconds : float
+        That it took.
+    """
+    console = Console(highlight=False, emoji=False)
+    console.print(", ".join(bed.comparisons), style="bold", markup=False)
+    if not console.is_terminal and "COLUMNS" not in os.environ:
+        console.width = max(console.width, 160)
+    _print_rows(console, bed.table)
+    for line in bed.print_plan.warnings:
+        console.print(line, style="dim", markup=False)
+    _print_file(console, where / "bed.gcode", bed)
+    _print_where(console, where, seconds)
+
+
+def _print_file(console: Console, file: Path, run: Printed) -> None:
+    """Print where the file of a print is, its time and its mass, of all parts in it."""
     totals, plan = run.print_totals, run.print_plan
     assert totals is not None
     assert plan is not None
-    many = f"{plan.copies} copies in " if plan.copies > 1 else ""
+    kinds = {spot.name for spot in plan.standing}
+    what = "parts" if len(kinds) > 1 else "copies"
+    many = f"{plan.copies} {what} in " if plan.copies > 1 else ""
     said = (
         f"{file}  {many}{clock(totals.seconds)} of printing, {totals.matrix_mass:.2f} g of matrix, "
         f"{totals.fibre_mass:.2f} g of fibre"

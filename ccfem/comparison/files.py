@@ -23,10 +23,11 @@ from ccfem.base.result_folder import whole_folder
 from ccfem.comparison.headline import TEST_COLUMNS, headline_values, print_values
 from ccfem.comparison.plot.colours import palette
 from ccfem.comparison.result import Comparison
-from ccfem.comparison.runs import Run
+from ccfem.comparison.runs import Printed, Run
 from ccfem.comparison.shown import file_stem
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.judging.virtual_testing.progressive_failure import BreakingLoad
+from ccfem.machine.machine import Machine
 from ccfem.paths.planning.given_paths import pattern_that_folds
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import curved_layers
@@ -252,20 +253,20 @@ def _write_matrix(comparison: Comparison, folder: Path) -> None:
     write_robot_waypoints(folder / "matrix_waypoints.csv", matrix, layers, machine, MATRIX)
 
 
-def _write_gcode(folder: Path, name: str, run: Run, comparison: Comparison) -> None:
-    """Write what a printer does to print a part, several layers at a time."""
+def write_printed(
+    path: Path, printed: Printed, machine: Machine, title: str, doubts: Sequence[str]
+) -> None:
+    """Write what a printer does to print a run or parts together, several layers at a time."""
     from ccfem.printing.export.gcode import gcode_pieces
 
-    case, plan, moves = comparison.case, run.print_plan, run.moves
+    plan, moves = printed.print_plan, printed.moves
     assert plan is not None
     assert moves is not None
-    doubts = [run.why_not] if run.why_not else []
-    about = (f"{case.name}, {name}", doubts, run.print_totals)
-    with (folder / f"{name}.gcode").open("w", encoding="utf-8", newline="\n") as file:
-        file.writelines(gcode_pieces(moves, plan, case.machine, *about))
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.writelines(gcode_pieces(moves, plan, machine, title, doubts, printed.print_totals))
 
 
-def _files_of_print(folder: Path, name: str, run: Run, cell: bool) -> list[_Write]:
+def files_of_print(folder: Path, name: str, run: Printed, cell: bool) -> list[_Write]:
     """Files of the same chain of moves for a cell of robots, and of where strands are trimmed."""
     from ccfem.printing.export.robot_cell import write_robot_cell
     from ccfem.printing.export.trim_table import write_trims
@@ -294,8 +295,10 @@ def _write_paths(comparison: Comparison, folder: Path, cell: bool) -> None:
     files: list[_Write] = []
     for run in runs:
         if run.print_plan is not None and run.moves is not None:
-            _write_gcode(folder, _stem(run.slicing, run), run, comparison)
-            files += _files_of_print(folder, _stem(run.slicing, run), run, cell)
+            stem, doubts = _stem(run.slicing, run), [run.why_not] if run.why_not else []
+            title = f"{comparison.case.name}, {stem}"
+            write_printed(folder / f"{stem}.gcode", run, machine, title, doubts)
+            files += files_of_print(folder, stem, run, cell)
     if not comparison.over_slicings and runs and curved_layers(comparison.layers):
         files.append(partial(_write_matrix, comparison, folder))
     files.append(write_all_paths)
@@ -397,7 +400,7 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
         "ccfem": version("ccfem"),
         "command": command,
         "made": datetime.now(UTC).isoformat(timespec="seconds"),
-        "versions": _versions(),
+        "versions": versions(),
         "case": {
             "name": case.name,
             "title": case.title,
@@ -420,9 +423,9 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
         "seconds": {**seconds, **comparison.seconds},
     }
     if comparison.over_slicings:
-        return cast("Record", _plain(about | _of_slicings(comparison)))
+        return cast("Record", plain_record(about | _of_slicings(comparison)))
     about["case"] |= _of_layers(comparison)
-    return cast("Record", _plain(about | _of_strategies(comparison) | _of_bound(comparison)))
+    return cast("Record", plain_record(about | _of_strategies(comparison) | _of_bound(comparison)))
 
 
 def _of_layers(comparison: Comparison) -> dict[str, Any]:
@@ -437,7 +440,7 @@ def _of_strategies(comparison: Comparison) -> dict[str, Any]:
     return {
         "slicer": member_name(slicer),
         "fibre_per_layer": comparison.fibre_per_layer,
-        "strategies": [_run_record(run) for run in comparison.runs],
+        "strategies": [run_record(run) for run in comparison.runs],
     }
 
 
@@ -487,7 +490,8 @@ def _load(stress: StressField) -> list[float] | None:
     return [float(size * share) for share in np.round(total / size, 6) + 0.0]
 
 
-def _run_record(run: Run) -> dict[str, Any]:
+def run_record(run: Run) -> dict[str, Any]:
+    """Say what a strategy did, with which parameters, and what came of it."""
     return {
         "name": run.name,
         "methods": _methods(run),
@@ -500,7 +504,7 @@ def _run_record(run: Run) -> dict[str, Any]:
         "seconds": run.seconds,
         "untested": run.untested,
         "total": headline_values(run),
-        "print": _print_record(run),
+        "print": print_record(run),
         "load_cases": run.cases.values() if run.cases else None,
         "first_failure": vars(run.tested.failure) if run.tested and run.tested.failure else None,
         "first_failure_alternative": _alternative_failure(run),
@@ -526,7 +530,7 @@ def _breaking_record(broken: BreakingLoad | None) -> dict[str, Any] | None:
     }
 
 
-def _print_record(run: Run) -> dict[str, Any] | None:
+def print_record(run: Printed) -> dict[str, Any] | None:
     """Say of how many copies a print is, what it takes by layer and of spools, and its cost."""
     totals, plan = run.print_totals, run.print_plan
     if totals is None or plan is None:
@@ -554,24 +558,25 @@ def _alternative_failure(run: Run) -> dict[str, Any] | None:
     return vars(other.failure) if other is not None and other.failure is not None else None
 
 
-def _versions() -> dict[str, str]:
-    versions = {"python": platform.python_version(), "system": platform.platform()}
+def versions() -> dict[str, str]:
+    """Versions of what computes."""
+    known = {"python": platform.python_version(), "system": platform.platform()}
     for package in _PACKAGES:
         try:
-            versions[package] = version(package)
+            known[package] = version(package)
         except PackageNotFoundError:
-            versions[package] = "not installed"
-    return versions
+            known[package] = "not installed"
+    return known
 
 
-def _plain(value: Any) -> Any:
+def plain_record(value: Any) -> Any:
     """Turn mappings, arrays and numbers into what JSON holds; NaN and infinity become null."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(entry) for key, entry in value.items()}
+        return {str(key): plain_record(entry) for key, entry in value.items()}
     if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
+        return plain_record(value.tolist())
     if isinstance(value, list | tuple):
-        return [_plain(entry) for entry in value]
+        return [plain_record(entry) for entry in value]
     if isinstance(value, float) and not np.isfinite(value):
         return None
     return value if value is None or isinstance(value, bool | int | float | str) else str(value)

@@ -471,7 +471,7 @@ def named_strategies(
             made[strategy] = create(strategy, own)
         else:
             check_instance("strategy", strategy)
-            made[_free_name(member_name(strategy), {*made, *names})] = strategy
+            made[free_name(member_name(strategy), {*made, *names})] = strategy
     return made
 
 
@@ -504,11 +504,11 @@ def named_slicings(slicings: Mapping[str, Slicer] | Sequence[str | Slicer]) -> d
             made[name] = Slicing(slicer, isinstance(slicer, Planar) and not counted)
         else:
             check_instance("slicer", given)
-            made[_free_name(member_name(given), set(made))] = Slicing(given)
+            made[free_name(member_name(given), set(made))] = Slicing(given)
     return made
 
 
-def _free_name(name: str, taken: set[str]) -> str:
+def free_name(name: str, taken: set[str]) -> str:
     """Name, with a number behind it where it is taken."""
     if name not in taken:
         return name

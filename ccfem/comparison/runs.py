@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from html import escape
-from typing import Any
+from typing import Any, Protocol
 
 from ccfem.base.arrays import freeze, in_brief
 from ccfem.comparison.tested_cases import TestedCases
@@ -21,6 +21,26 @@ from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.moves import Moves
 from ccfem.printing.print_plan import PrintPlan
 from ccfem.printing.print_totals import PrintTotals
+
+
+class Printed(Protocol):
+    """What is printed in one file: a run, or several parts together."""
+
+    @property
+    def name(self) -> str:
+        """Name of the print."""
+
+    @property
+    def print_plan(self) -> PrintPlan | None:
+        """All layers; None where no print is planned."""
+
+    @property
+    def moves(self) -> Moves | None:
+        """All that the machine does."""
+
+    @property
+    def print_totals(self) -> PrintTotals | None:
+        """What it takes."""
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from importlib.resources import files
 from typing import Any, TypedDict
@@ -13,6 +14,7 @@ from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import spared
 from ccfem.base.tensor import von_mises
 from ccfem.cases.inspection import Check, check
+from ccfem.comparison.bed_print import BedPrint
 from ccfem.comparison.citations import bibtex, cited, methods_of, sentence
 from ccfem.comparison.headline import TEST_COLUMNS
 from ccfem.comparison.plot.breaking_curves import breaking_picture
@@ -26,6 +28,7 @@ from ccfem.comparison.report.print_view import print_views
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.table import (
     FIRST_REMARKS,
+    Table,
     against_each_other,
     all_indices,
     curve_table,
@@ -63,6 +66,45 @@ class Record(TypedDict, total=False):
     seconds: dict[str, float]
     left_out: list[str]
     files: list[str]
+
+
+def bed_html(bed: BedPrint, record: Record, left_out: list[str]) -> str:
+    """Return the report of parts that are printed together as one HTML text, as `report_html`.
+
+    Parameters
+    ----------
+    left_out : list of str
+        Views that fail are added.
+    """
+    runs = bed.runs
+    data: dict[str, Any] = {"part": None, "layers": {"stacks": []}, "print": {"runs": []}}
+    data["charts"] = {}
+    with spared("view of the print", left_out):
+        data["print"] = print_views([bed])
+    named = [replace(run, name=name) for name, run in runs.items()]
+    context = {
+        "title": ", ".join(bed.comparisons),
+        "facts": [f"{bed.print_plan.copies} parts in one file", "units: mm, N, MPa"],
+        "left_out": left_out,
+        "parts": bed.table,
+        "remarks": bed.print_plan.warnings,
+        "standing": bed.print_plan.standing,
+        "headline": _without_best(headline_table(named, None)),
+        "notes": [(name, one.notes) for name, one in bed.comparisons.items() if one.notes],
+        "command": record["command"],
+        "versions": {"ccfem": record["ccfem"], **record["versions"]},
+        "made": record["made"],
+    }
+    return filled_page(context, data, "bed.html.jinja")
+
+
+def _without_best(table: Table) -> Table:
+    """Table of different parts, of which none is better than another."""
+    rows = [
+        (name, tuple(replace(cell, best=False) for cell in cells), why)
+        for name, cells, why in table.rows
+    ]
+    return replace(table, rows=tuple(rows))
 
 
 def report_html(
@@ -249,8 +291,10 @@ def _rows(values: Mapping[str, Any]) -> list[tuple[str, str]]:
 # The page itself: a template filled with texts, and the data and programs that it holds.
 
 
-def filled_page(context: Mapping[str, Any], data: Mapping[str, Any]) -> str:
-    """Fill the template of the report.
+def filled_page(
+    context: Mapping[str, Any], data: Mapping[str, Any], template: str = "report.html.jinja"
+) -> str:
+    """Fill the template of a report.
 
     Parameters
     ----------
@@ -264,12 +308,16 @@ def filled_page(context: Mapping[str, Any], data: Mapping[str, Any]) -> str:
     str
         HTML that needs no other file and no network.
     """
-    return _template().render(
-        **context,
-        style=_text("report.css"),
-        script=_text("report.js"),
-        data=pack(data),
-        plotly=_plotly(),
+    return (
+        _templates()
+        .get_template(template)
+        .render(
+            **context,
+            style=_text("report.css"),
+            script=_text("report.js"),
+            data=pack(data),
+            plotly=_plotly(),
+        )
     )
 
 
@@ -278,14 +326,17 @@ def _text(name: str) -> str:
 
 
 @cache
-def _template() -> Any:
-    """Template with all texts escaped; a name that nothing is given for is an error."""
-    from jinja2 import Environment, StrictUndefined
+def _templates() -> Any:
+    """Templates with all texts escaped; a name that nothing is given for is an error."""
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
 
-    surroundings = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    return Environment(
+        loader=FunctionLoader(_text),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
-    return surroundings.from_string(_text("report.html.jinja"))
 
 
 @cache

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.comparison.report.packing import Rounded
-from ccfem.comparison.runs import Run
+from ccfem.comparison.runs import Printed
 from ccfem.printing.moves import LAY, ROLES, TRAVEL, Moves
 
 KINDS = ("contour", "matrix", "fibre", "support and pads", "beside the part", "travel")
@@ -43,7 +43,7 @@ _STEP = 0.01
 """What coordinates are rounded to, mm."""
 
 
-def print_views(runs: Sequence[Run]) -> dict[str, Any]:
+def print_views(runs: Sequence[Printed]) -> dict[str, Any]:
     """Lines of the print of each run that has one, layer by layer.
 
     Returns

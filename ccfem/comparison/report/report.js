@@ -729,7 +729,7 @@ async function start() {
   if (data.part) {
     partScene(data.part);
     if (!byId("layers").hidden) spaceScene(data.part, data.layers);
-  } else byId("part-view").hidden = true;
+  } else if (byId("part-view")) byId("part-view").hidden = true;
   if (data.print.runs.length) printScene(data.print);
   charts(data.charts);
   document.body.dataset.ready = "yes";

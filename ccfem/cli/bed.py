@@ -1,0 +1,168 @@
+"""What ``ccfem bed`` does: different parts, each with its own fibre, in one file."""
+
+import shlex
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from math import prod
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+import typer
+
+from ccfem.base.errors import InputError
+from ccfem.cli.arguments import bed_table_of, parameters_by_strategy
+from ccfem.cli.machines import MachineName, SetMachine
+from ccfem.cli.options import (
+    Backend,
+    Force,
+    FromLayer,
+    Out,
+    Pause,
+    PrintedSupport,
+    RobotCell,
+    SetOfStrategies,
+    TestOrNot,
+)
+from ccfem.cli.part_choices import SetPlastic
+
+if TYPE_CHECKING:
+    from ccfem.comparison.request import Request
+
+_EACH = "once for all parts, or once for each in their order"
+
+
+def bed(
+    parts: Annotated[
+        list[str],
+        typer.Argument(metavar="CASE_OR_PART.toml ...", help="Parts; one may be named twice."),
+    ],
+    strategy: Annotated[
+        list[str] | None,
+        typer.Option(metavar="S", help=f"Strategy, {_EACH}; default stream_function."),
+    ] = None,
+    set_: SetOfStrategies = None,
+    layers: Annotated[
+        list[int] | None, typer.Option(metavar="N", help=f"Layers of fibre, {_EACH}.")
+    ] = None,
+    copies: Annotated[
+        list[str] | None,
+        typer.Option(metavar="N|NXxNY", help=f"How many, as 4, or 2x3 by X and Y, {_EACH}."),
+    ] = None,
+    turn: Annotated[
+        list[str] | None, typer.Option(metavar="AXIS=DEGREES", help=f"Turn, as z=37, {_EACH}.")
+    ] = None,
+    centre: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="X,Y",
+            help="Middle of each part on the bed, mm; else they are laid out in rows.",
+        ),
+    ] = None,
+    machine: MachineName = None,
+    set_machine: SetMachine = None,
+    set_plastic: SetPlastic = None,
+    support: PrintedSupport = False,
+    virtual_test: TestOrNot = None,
+    backend: Backend = "auto",
+    pause: Pause = None,
+    from_layer: FromLayer = 0,
+    cell: RobotCell = False,
+    out: Out = None,
+    force: Force = False,
+) -> None:
+    """Print several parts, each with its own fibre, in one file.
+
+    Each part is planned by one strategy, with its natural amount of fibre. A part file says in its
+    table [bed] how the part is turned, where it stands and how often; parts without a centre are
+    laid out in rows. A print with a part that cannot be printed as planned is written, and ends
+    with exit code 3; with --force it ends with 0.
+    """
+    from ccfem.base.progress import progress_bar
+    from ccfem.base.result_folder import whole_folder
+    from ccfem.cli.first_run import compiling_beside
+    from ccfem.cli.run import load, plan_code
+    from ccfem.cli.screen import print_bed
+    from ccfem.comparison.bed_files import BED_FILES, write_bed
+    from ccfem.comparison.bed_print import needs_support, print_together
+    from ccfem.comparison.request import (
+        DEFAULT_STRAND,
+        LONGEST_TEST,
+        Request,
+        named_strategies,
+    )
+    from ccfem.printing.course import Course
+
+    began, where = time.perf_counter(), out or Path("results") / "bed"
+
+    def ask() -> "list[Request]":
+        columns = (
+            _for_each("--strategy", strategy or ["stream_function"], parts),
+            _for_each("--layers", layers, parts),
+            _for_each("--turn", turn, parts),
+            _for_each("--centre", centre, parts),
+        )
+        many = _for_each("--copies", copies, parts)
+        wanted: dict[tuple[Any, ...], list[str | None]] = {}
+        for part, *about, number in zip(parts, *columns, many, strict=True):
+            wanted.setdefault((part, *about), []).append(number)
+        parameters = parameters_by_strategy(set_ or ())
+        requests = []
+        for (part, chosen, count, about_z, place), numbers in wanted.items():
+            turns = None if about_z is None else [about_z]
+            table = bed_table_of(turns, place, _together(numbers))
+            case = load(part, None, False, machine, set_machine, None, table, set_plastic)
+            own = {name: given for name, given in parameters.items() if name == chosen}
+            request = Request.of(
+                case,
+                named_strategies(case, (chosen,), own),
+                count,
+                natural=True,
+                strand=DEFAULT_STRAND if virtual_test is not False else None,
+                backend=backend,
+                print_plans=True,
+                longest_test=LONGEST_TEST if virtual_test is None else float("inf"),
+            )
+            requests.append(replace(request, support=support and needs_support(request)))
+        return requests
+
+    with (
+        whole_folder(where, BED_FILES, force) as folder,
+        compiling_beside(),
+        progress_bar(lines=True) as progress,
+    ):
+        course = Course(tuple(pause or ()), from_layer)
+        printed = print_together(ask(), course, progress)
+        progress("writing results", 1.0)
+        write_bed(printed, folder, shlex.join(["ccfem", *sys.argv[1:]]), cell)
+    print_bed(printed, where, time.perf_counter() - began)
+    codes = [plan_code(comparison, force) for comparison in printed.comparisons.values()]
+    if any(codes):
+        raise typer.Exit(max(codes))
+
+
+Given = TypeVar("Given")
+
+
+def _for_each(
+    option: str, given: Sequence[Given] | None, parts: Sequence[str]
+) -> Sequence[Given | None]:
+    """Values of an option for each part: one for all, or as many as there are parts."""
+    if not given:
+        return [None] * len(parts)
+    if len(given) not in (1, len(parts)):
+        raise InputError(
+            f"{option} is given {_EACH}; got {len(given)} for {len(parts)} parts: give it once "
+            f"or {len(parts)} times"
+        )
+    return list(given) * (len(parts) if len(given) == 1 else 1)
+
+
+def _together(numbers: Sequence[str | None]) -> str | None:
+    """Count copies of a part that is named once or several times."""
+    from ccfem.printing.bed_layout import copies_of
+
+    if len(numbers) == 1:
+        return numbers[0]
+    return str(sum(prod(copies_of(number or 1)) for number in numbers))
