@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from ccfem.base.checks import check_choices
-from ccfem.base.errors import InputError
+from ccfem.base.errors import InputError, shown
 from ccfem.machine.ranges import check_ranges
 
 _ALWAYS = (
@@ -34,6 +34,19 @@ _FIELDS = {
 _FIELD = re.compile(r"\{(\w*)\}")
 _BRACES = re.compile(r"\{[^{}]*\}|[{}]")
 """What stands in braces, and a brace without its other one."""
+
+
+_PICTURE = (16, 1024)
+"""Least and largest side of a picture at the head of a file, pixels."""
+
+
+def _check_size(text: str) -> None:
+    sides = re.fullmatch(r"(\d{1,4})x(\d{1,4})", text)
+    if sides is None or not all(_PICTURE[0] <= int(side) <= _PICTURE[1] for side in sides.groups()):
+        raise InputError(
+            f"gcode.thumbnails must be sizes as 300x200, each side from {_PICTURE[0]} to "
+            f"{_PICTURE[1]} pixels; got {shown(text)}: write that"
+        )
 
 
 @dataclass(frozen=True)
@@ -135,6 +148,8 @@ class GcodeProfile:
         than they are.
     longest_feed : float, mm
         Longest feed in one move. Marlin refuses more than EXTRUDE_MAXLENGTH, by default 200.
+    thumbnails : tuple of str
+        Sizes in pixels, as ``"300x200"``, of pictures at the head of a file, which displays show.
     """
 
     start: tuple[str, ...] = (
@@ -203,12 +218,15 @@ class GcodeProfile:
     arcs: bool = False
     arc_tolerance: float = 0.02
     longest_feed: float = 190.0
+    thumbnails: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         check_choices(self)
         for name in _FIELDS:
             for line in getattr(self, name):
                 self._check_line(name, line)
+        for size in self.thumbnails:
+            _check_size(size)
         check_ranges(self)
 
     @staticmethod

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.comparison.report.packing import Rounded
 from ccfem.comparison.runs import Printed
+from ccfem.printing.export.thumbnail import LINE_COLOURS
 from ccfem.printing.moves import LAY, ROLES, TRAVEL, Moves
 
 KINDS = ("contour", "matrix", "fibre", "support and pads", "beside the part", "travel")
 """What the lines of a print are drawn as."""
-COLOURS = ("#6b7686", "#a9b4c2", "#0d2f5c", "#b08968", "#cfd8c8", "#b3261e")
+COLOURS = (*LINE_COLOURS, "#cfd8c8", "#b3261e")
 """Colour of each of them."""
 FILLS, BESIDE, MOVES = 1, 4, 5
 """Kinds whose lines are not always drawn: what fills a layer, what is beside the part, travel."""
