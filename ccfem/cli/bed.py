@@ -2,7 +2,6 @@
 
 import shlex
 import sys
-import time
 from collections.abc import Sequence
 from dataclasses import replace
 from math import prod
@@ -82,7 +81,7 @@ def bed(
     from ccfem.base.progress import progress_bar
     from ccfem.base.result_folder import whole_folder
     from ccfem.cli.first_run import compiling_beside
-    from ccfem.cli.run import load, plan_code
+    from ccfem.cli.run import elapsed, load, plan_code
     from ccfem.cli.screen import print_bed
     from ccfem.comparison.bed_files import BED_FILES, write_bed
     from ccfem.comparison.bed_print import needs_support, print_together
@@ -94,7 +93,7 @@ def bed(
     )
     from ccfem.printing.course import Course
 
-    began, where = time.perf_counter(), out or Path("results") / "bed"
+    where = out or Path("results") / "bed"
 
     def ask() -> "list[Request]":
         columns = (
@@ -136,7 +135,7 @@ def bed(
         printed = print_together(ask(), course, progress)
         progress("writing results", 1.0)
         write_bed(printed, folder, shlex.join(["ccfem", *sys.argv[1:]]), cell)
-    print_bed(printed, where, time.perf_counter() - began)
+    print_bed(printed, where, elapsed())
     codes = [plan_code(comparison, force) for comparison in printed.comparisons.values()]
     if any(codes):
         raise typer.Exit(max(codes))

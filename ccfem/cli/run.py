@@ -32,6 +32,11 @@ _SOLVED = 0.75
 """Share of the progress bar at which the comparison is made and the pictures begin."""
 
 
+def elapsed() -> float:
+    """Seconds since the program began."""
+    return time.perf_counter() - _STARTED
+
+
 def complain(*messages: str) -> int:
     """Print mistakes on standard error, one line each; the exit code."""
     for message in messages:
@@ -234,7 +239,7 @@ def run(
         command, rest = shlex.join(["ccfem", *sys.argv[1:]]), _part(progress, _SOLVED, 1.0)
         about = (command, seconds, rest, output.pictures, _text_of(name), output.drawings)
         write_results(comparison, folder, *about, cell=output.cell)
-    print_comparison(comparison, where, time.perf_counter() - _STARTED, output.details)
+    print_comparison(comparison, where, elapsed(), output.details)
     return comparison
 
 

@@ -193,7 +193,8 @@ def part_totals(
     for k, name in enumerate(names):
         mine = owner == k
         fibre = float(moves.feed[mine & (moves.tool == 1)].sum())
-        matrix = float(moves.feed[mine & (moves.tool == 0)].sum() + moves.beside[mine].sum())
+        lines = mine & (moves.event == LAY)  # what is drawn back comes again
+        matrix = float(moves.feed[lines & (moves.tool == 0)].sum() + moves.beside[lines].sum())
         count = sum(spot.name == name for spot in standing)
         mass = fibre * machine.fibre_mass_per_length
         seconds = float(moving[mine].sum())
