@@ -5,7 +5,9 @@ out of its hole. The three ways in which it does are judged here as in the desig
 and lugs: by mean stresses on the areas that would part, which are measured in the mesh.
 
 * bearing: the pin crushes the wall, ``F / (d t)`` against the compressive strength; of a part of a
-  wall, as at a plane of symmetry, its own width across the force counts in place of ``d``;
+  wall, as at a plane of symmetry, its own width across the force counts in place of ``d``. With
+  infill only the share counts that is filled, up to a radius ahead of the wall: a few lines round
+  a hole are crushed with what does not hold them;
 * net section: the material beside the hole breaks, ``F / ((W - d) t)`` against the tensile one;
 * shear-out: what lies ahead of the pin is pushed out between two planes that touch the hole along
   the force, ``F / (2 e t)`` against the tensile strength over the root of 3 (von Mises).
@@ -37,6 +39,8 @@ _HEIGHTS = 5
 """Places along the axis at which a hole's surroundings are measured."""
 _HALF = 120.0
 """Least turn of a loaded wall, degrees: a fillet turns by less, half a hole by more."""
+_AHEAD = np.radians((-45.0, 0.0, 45.0))
+"""Places on a wall, from the force on, ahead of which it is looked at whether it is filled."""
 _IDLE = 1e-3
 """Share of the load of the part below which a hole is not loaded across its axis."""
 _AHEAD = 0.7
@@ -258,12 +262,15 @@ def _joint(
         float(np.einsum("k,kij,i,j->", ray.filled, stress.stress[ray.cell], ahead, ahead))
         for ray in beside
     )
+    places = np.cos(_AHEAD)[:, None] * ahead + np.sin(_AHEAD)[:, None] * aside
+    crushed = _rays(stress, (middles[:, None] + radius * places).reshape(-1, 3), ahead, radius)
+    solid = float(crushed.filled.sum() / crushed.length.sum()) if len(crushed.cell) else 1.0
     material = stress.problem.material
     bearing = limits.matrix
     if material.compressive_strength is not None:
         bearing = material.compressive_strength
     strengths = {
-        BEARING: bearing * radius * _width(stress, wall, facets, aside) * thickness,
+        BEARING: solid * bearing * radius * _width(stress, wall, facets, aside) * thickness,
         NET_SECTION: limits.matrix * net_area if stretched > 0.0 else np.inf,
         SHEAR_OUT: limits.matrix / np.sqrt(3.0) * shear_area,
     }
@@ -292,16 +299,17 @@ def _width(stress: StressField, wall: Face, facets: IntArray, aside: FloatArray)
 
 
 class _Rays(NamedTuple):
-    """What rays cross up to their first gap: cells (k,), and the length in each that is filled."""
+    """What rays cross up to their first gap: cells (k,), way in each, and what of it is filled."""
 
     cell: IntArray
+    length: FloatArray
     filled: FloatArray
 
 
-def _rays(stress: StressField, start: FloatArray, along: FloatArray) -> _Rays:
-    """Follow rays from points (r, 3), on the wall of a hole, through the part."""
+def _rays(stress: StressField, start: FloatArray, along: FloatArray, most: float = np.inf) -> _Rays:
+    """Follow rays from points (r, 3), on the wall of a hole, through the part, at most so far."""
     mesh, fill = stress.mesh, stress.problem.fill
-    reach = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+    reach = min(float(np.linalg.norm(np.ptp(mesh.points, axis=0))), most)
     step = np.broadcast_to(reach * along, start.shape)
     cut = cut_steps(start, step.copy(), np.full(len(start), reach), mesh)
     end, kept = np.zeros(len(start)), []
@@ -312,4 +320,4 @@ def _rays(stress: StressField, start: FloatArray, along: FloatArray) -> _Rays:
             kept.append(k)
     length = (cut.end - cut.begin)[kept] * cut.share[kept] * reach
     cell = cut.cell[kept]
-    return _Rays(cell, length if fill is None else length * fill[cell])
+    return _Rays(cell, length, length if fill is None else length * fill[cell])

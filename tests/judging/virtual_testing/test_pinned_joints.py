@@ -38,8 +38,8 @@ def lug(round_end=False):
     return patches_from_rules(mesh, rules)
 
 
-def joints(mesh, load, held="root"):
-    problem = Problem(mesh, MATERIAL, (Support(held),), {"pull": load}, order=1)
+def joints(mesh, load, held="root", fill=None):
+    problem = Problem(mesh, MATERIAL, (Support(held),), {"pull": load}, order=1, fill=fill)
     stress = solve(problem)["pull"]
     forces = prepare(problem).forces_in("pull")
     return pinned_joints(stress, forces, 100.0, Limits.of(MATERIAL))
@@ -57,6 +57,20 @@ def test_a_pulled_lug_fails_as_in_closed_form():
     assert joint.loads["shear-out"] == pytest.approx(shear, rel=1e-3)
     assert joint.mode == "bearing"
     assert joint.about == "bearing of 'hole' at 1920 N (net section 2400, shear-out 2771)"
+
+
+def test_infill_is_crushed_where_the_pin_presses():
+    """Filled by three tenths on one side of the pin; half of what it shears lies there too."""
+    mesh = lug()
+    middle = mesh.points[mesh.corners].mean(axis=1)[:, 0]
+    fill = np.where(middle > 0.0, 0.3, 1.0)
+    for way, share in ((1.0, 0.3), (-1.0, 1.0)):
+        (joint,) = joints(mesh, (Bearing("hole", (way * 100.0, 0.0, 0.0)),), fill=fill)
+        bearing = share * CRUSHING * DIAMETER * THICKNESS
+        assert joint.loads["bearing"] == pytest.approx(bearing, rel=0.02)
+    (joint,) = joints(mesh, (Bearing("hole", (100.0, 0.0, 0.0)),), fill=np.full(len(fill), 0.3))
+    for mode, solid in (("bearing", 1920.0), ("net section", 2400.0), ("shear-out", 2771.0)):
+        assert joint.loads[mode] == pytest.approx(0.3 * solid, rel=2e-3)
 
 
 def test_a_round_end_is_shorter_beside_the_middle_and_a_push_stretches_nothing():
