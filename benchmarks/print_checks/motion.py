@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 
 import numpy as np
+import shapely
+import shapely.ops
 
 from benchmarks.print_checks.height_map import HeightMap, sampled
 from benchmarks.print_checks.job import PART, Job, Lines
@@ -74,12 +76,21 @@ def speeds(job: Job, run: Run) -> list[str]:
 
 
 def travel(job: Job, run: Run) -> list[str]:
-    """Above all that is laid, this layer's lines included, and never with fibre that is not cut."""
+    """Above all that is laid, this layer's lines included, and never with fibre that is not cut.
+
+    From one line of sparse infill to the next the nozzle may stay down, if it crosses no line of
+    the layer and does not leave the part.
+    """
     wrong, lift = [], job.machine.gcode.lift
     lines, area = Lines.of(run), HeightMap(job.machine.gcode.bed)
     across = np.abs(lines.end - lines.start)[:, :2].max(axis=1) > 0.0
     moved = lines.rapid & across
     moved[:2] = False
+    down = np.zeros(len(moved), dtype=bool)
+    down[1:] = moved[1:] & (np.abs(lines.end[1:, 2] - lines.end[:-1, 2]) < 1e-9)
+    down &= (lines.tool == 0) & (lines.kind == PART[2]) & _follows_laying(down, lines.lays)
+    wrong += _crossings(job, lines, down)
+    moved &= ~down
     # Batches: each ends where a line lies higher than those of the batch.
     tops = np.maximum.accumulate(np.where(lines.lays, lines.end[:, 2], 0.0))
     edges = np.flatnonzero(np.diff(tops, prepend=-1.0) > 1e-9).tolist()
@@ -104,6 +115,34 @@ def travel(job: Job, run: Run) -> list[str]:
         if step.rapid and hanging:
             wrong.append(f"fibre is dragged by step {step.number}")
             hanging = False
+    return wrong
+
+
+def _follows_laying(moved: np.ndarray, lays: np.ndarray) -> np.ndarray:
+    """Which moves are the first ones behind a line, or follow such a move."""
+    begins = moved & np.append(False, lays[:-1])
+    number = np.maximum.accumulate(np.where(moved, 0, np.arange(len(moved))))
+    return moved & np.append(begins, False)[np.minimum(number + 1, len(moved))]
+
+
+def _crossings(job: Job, lines: Lines, down: np.ndarray) -> list[str]:
+    """Ways of a nozzle that stays down, and crosses a line of its layer or leaves the part."""
+    wrong, height = [], lines.end[:, 2].round(3)
+    first = np.flatnonzero(down & ~np.append(False, down[:-1]))
+    last = np.flatnonzero(down & ~np.append(down[1:], False))
+    for z in np.unique(height[down]).tolist():
+        laid = np.flatnonzero(lines.lays & (height == z))
+        ends = np.stack([lines.start[laid], lines.end[laid]], axis=1)[:, :, :2]
+        tree, section = shapely.STRtree(shapely.linestrings(ends)), job.section(z)
+        for a, b in zip(first.tolist(), last.tolist(), strict=True):
+            if height[a] != z:
+                continue
+            way = shapely.LineString(np.concatenate([lines.start[a : a + 1], lines.end[a : b + 1]]))
+            # Without its ends, where it leaves one line and comes to the next.
+            middle = shapely.ops.substring(way, 2e-3, way.length - 2e-3)
+            met = laid[tree.query(middle, predicate="intersects")]
+            if (met < a).any() or not section.contains(middle):
+                wrong.append(f"down at {z:g} over a line, or out of the part: step {a}")
     return wrong
 
 

@@ -1,10 +1,17 @@
-"""Lines of sparse infill, clipped to a region; those of all layers of a part fit each other."""
+"""Lines of sparse infill, clipped to a region; those of all layers of a part fit each other.
+
+Ends of neighbouring lines are joined along the border of the region.
+"""
+
+from collections.abc import Sequence
 
 import contourpy
 import numpy as np
 import shapely
 
 from ccfem.base.arrays import FloatArray
+from ccfem.geometry.offsets import rings
+from ccfem.geometry.polylines import between, line_length
 from ccfem.geometry.shapes import Region, open_lines
 
 _STEPS = 32
@@ -62,3 +69,51 @@ def gyroid_lines(region: Region, height: float, period: float) -> list[FloatArra
     drawn = [shapely.LineString(line) for line in lines if len(line) > 1]
     drawn = shapely.simplify(np.array(drawn, dtype=object), _OFF * period)
     return open_lines(shapely.intersection(drawn, region))
+
+
+_ON_BORDER = 1e-6
+"""Distance from the border of a region, mm, up to which a line ends on it."""
+
+
+def border_joints(
+    lines: Sequence[FloatArray], region: Region, longest: float
+) -> list[tuple[int, int, FloatArray]]:
+    """Ways along the border of a region that join the ends of lines clipped to it.
+
+    Only ends that follow each other on a ring are joined, the nearest first, so that no way crosses
+    a line; none of the lines becomes a ring.
+
+    Parameters
+    ----------
+    lines : sequence of (n, 2) arrays, mm
+    longest : float, mm
+        Of a way.
+
+    Returns
+    -------
+    list of (int, int, (k, 2) array)
+        Two ends, of which line k has 2 k and 2 k + 1, and the points between them.
+    """
+    ends = np.array([line[[0, -1]] for line in lines]).reshape(-1, 2)
+    ways: list[tuple[float, int, int, FloatArray]] = []
+    for ring in rings(region):
+        border, points = shapely.LineString(ring), shapely.points(ends)
+        mine = np.flatnonzero(shapely.distance(points, border) < _ON_BORDER)
+        place = shapely.line_locate_point(border, points[mine])
+        order = np.argsort(place, kind="stable")
+        mine, place, whole = mine[order], place[order], line_length(ring)
+        twice = np.concatenate([ring[:-1], ring])
+        for k in range(len(mine) if len(mine) > 1 else 0):
+            following = (k + 1) % len(mine)
+            start, end = place[k], place[following] + (whole if following <= k else 0.0)
+            if end - start <= longest:
+                way = between(twice, start, end)[1:-1]
+                ways.append((end - start, int(mine[k]), int(mine[following]), way))
+    joined = np.arange(len(lines))
+    free, joints = np.ones(len(ends), dtype=bool), []
+    for _, a, b, way in sorted(ways, key=lambda one: one[:3]):
+        if free[a] and free[b] and joined[a // 2] != joined[b // 2]:
+            free[[a, b]] = False
+            joined[joined == joined[a // 2]] = joined[b // 2]
+            joints.append((a, b, way))
+    return joints

@@ -49,7 +49,8 @@ class Toolpaths(Shown):
         Default: no step is a link.
         A strategy marks links that may leave the section or cross a void, as `svt` does, since
         these are evaluated separately. Short links inside the section that follow the border or the
-        field, as those of `isocurve` and `zigzag`, count as fibre and are not marked.
+        field, as those of `isocurve` and `zigzag`, count as fibre and are not marked. Of matrix it
+        is a way to the next line, on which nothing is laid.
     """
 
     points: FloatArray

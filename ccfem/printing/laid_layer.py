@@ -103,7 +103,9 @@ def matrix_layer(
     height, thickness : float, mm
         Top of the layer over the bed, and its own height.
     """
-    matrix, which = _printed(fill.lines, height, number, MATRIX)
+    solid = fill.lines[: len(fill.lines) - fill.sparse]
+    ways = [np.zeros(len(line), dtype=bool) for line in solid] + fill.ways
+    matrix, which = _printed(fill.lines, height, number, MATRIX, ways)
     sparse = which >= len(fill.lines) - fill.sparse
     heights, warning = np.zeros(0), ""
     room = np.array(fill.widths)[which] / machine.matrix_width
@@ -145,12 +147,16 @@ def fibre_layer(
 
 
 def _printed(
-    lines: Sequence[FloatArray], height: float, number: int, kind: int
+    lines: Sequence[FloatArray],
+    height: float,
+    number: int,
+    kind: int,
+    ways: Sequence[BoolArray] | None = None,
 ) -> tuple[Toolpaths, IntArray]:
     """Paths of one layer in printer coordinates, in the order of printing; and their lines."""
     points, offsets = pack(lines)
     points = points.round(COORDINATE_DIGITS) + 0.0
-    points, offsets, *_ = merge_repeated(points, offsets)
+    points, offsets, kept = merge_repeated(points, offsets)
     pieces = np.split(points, offsets[1:-1]) if len(offsets) > 1 else []
     which = np.array([k for k, line in enumerate(pieces) if len(line) > 1], dtype=np.int64)
     lines = [pieces[k] for k in which.tolist()]
@@ -159,10 +165,16 @@ def _printed(
     order, backward, _ = nearest_end_order(
         np.array([line[0] for line in lines]), np.array([line[-1] for line in lines])
     )
-    lines = [
-        lines[k][::-1] if back else lines[k]
-        for k, back in zip(order.tolist(), backward.tolist(), strict=True)
-    ]
+    turned = list(zip(order.tolist(), backward.tolist(), strict=True))
+    lines = [lines[k][::-1] if back else lines[k] for k, back in turned]
+    link = None
+    if ways is not None and any(way.any() for way in ways):
+        # The step from a point is that to the next one that is kept.
+        step = np.concatenate(ways)[np.append(kept[1:], sum(map(len, ways))) - 1]
+        steps = [np.split(step, offsets[1:-1])[k][:-1] for k in which.tolist()]
+        link = np.concatenate(
+            [np.append(steps[k][::-1] if back else steps[k], False) for k, back in turned]
+        )
     points, offsets = pack(lines)
     height = round(height, COORDINATE_DIGITS)
     points = np.column_stack([points, np.full(len(points), height)])
@@ -173,5 +185,6 @@ def _printed(
         layer=np.full(len(lines), number),
         kind=np.full(len(lines), kind),
         closed=np.array([is_closed(line) for line in lines]),
+        link=link,  # type: ignore[arg-type]
     )
     return paths, which[order]

@@ -19,7 +19,7 @@ import shapely
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.errors import InputError
 from ccfem.geometry.polylines import starts_segment, subdivide
-from ccfem.geometry.shapes import Region, strings
+from ccfem.geometry.shapes import Region, Shapes, strings
 from ccfem.machine.machine import Machine
 from ccfem.paths.splitting.slabs import StrandDensity
 from ccfem.paths.toolpaths import Toolpaths
@@ -91,6 +91,8 @@ def with_flow(
     volume = height + below - _density(strands, sections, middle, machine)
     least = min(machine.least_line, height)
     warning = _check(volume, length, height, below, least, machine)
+    way = paths.link[segment]
+    length[way[start]] = 0.0  # nothing is laid there
     wanted = np.maximum(volume, least)
     # Of neighbouring pieces with the same height level only the first keeps its point.
     level = np.full(len(points), -1)
@@ -103,12 +105,13 @@ def with_flow(
     share = np.bincount(run, wanted * length, len(kept)) / np.maximum(long, 1e-300)
     line = np.searchsorted(np.searchsorted(kept, offsets), np.arange(len(kept)), "right") - 1
     if shares is not None:
+    level[way] = -2
         share *= shares[line]
     scaled = np.ones(len(kept), dtype=bool) if sparse is None else ~sparse[line]
     inside = shapely.length(shapely.intersection(strings(strands), section))
     room = section.area * (height + below) - float(inside @ np.asarray(sections))
     if sparse is not None and sparse.any():
-        ends = strings([line[:, :2] for line in paths.select(sparse)])
+        ends = _laid_lines(paths.select(sparse))
         overlap = float(shapely.length(shapely.intersection(ends, section)).sum())
         room -= machine.matrix_width * (height + below) * overlap
     scale = room / (machine.matrix_width * (share * long)[scaled].sum())
@@ -121,9 +124,16 @@ def with_flow(
         points=points[kept],
         normals=np.broadcast_to(paths.normals[0], (len(kept), 3)),
         offsets=np.searchsorted(kept, offsets),
-        link=np.zeros(len(kept), dtype=bool),
+        link=way[kept],
     )
     return fewer, share, warning
+def _laid_lines(paths: Toolpaths) -> Shapes:
+    """Lines of matrix, without the ways between them on which nothing is laid."""
+    start = np.flatnonzero(starts_segment(paths.offsets) & ~paths.link)
+    ends = np.stack([paths.points[start], paths.points[start + 1]], axis=1)
+    return shapely.linestrings(ends[:, :, :2])
+
+
 
 
 def pad_flow(

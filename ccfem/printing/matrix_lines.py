@@ -7,17 +7,18 @@ import numpy as np
 import shapely
 from scipy.spatial import Voronoi
 
-from ccfem.base.arrays import FloatArray
+from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.parallel import in_processes
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.hatch import zigzag
-from ccfem.geometry.infill_lines import gyroid_lines, parallel_lines
+from ccfem.geometry.infill_lines import border_joints, gyroid_lines, parallel_lines
 from ccfem.geometry.offsets import inset, offset_rings
 from ccfem.geometry.polylines import along_line, is_closed, points_along
 from ccfem.geometry.shapes import Region, bands, open_lines, strings
 from ccfem.machine.machine import Machine
+from ccfem.paths.linking.joining import Joined, Joint, join
 from ccfem.paths.plastic.plastic import SOLID, Plastic
-from ccfem.paths.plastic.sparse_regions import NOTHING, matrix_sections
+from ccfem.paths.plastic.sparse_regions import NOTHING, MatrixSection, matrix_sections
 from ccfem.paths.splitting.slabs import Slab
 from ccfem.slicing.layers.layer import Layer
 
@@ -26,6 +27,9 @@ _DIRECTED = 0.1
 _OVERLAP = 0.25
 """Overlap of the ends of zigzag and infill with what lies round them, in line widths. Our
 choice."""
+_EVEN, _ROUNDS = 2e-3, 3
+"""Share by which the density of infill may be off in the mean of all layers, and how often its
+spacing is changed for that."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,8 @@ class MatrixFill:
         Of each line; less than the machine's in gaps.
     sparse : int
         Number of lines of sparse infill; they are the last ones.
+    ways : list of (n,) bool arrays
+        Which steps of each of these are ways to a neighbour, on which nothing is laid.
     """
 
     section: Region = field(default_factory=shapely.Polygon)
@@ -49,6 +55,7 @@ class MatrixFill:
     lines: list[FloatArray] = field(default_factory=list)
     widths: list[float] = field(default_factory=list)
     sparse: int = 0
+    ways: list[BoolArray] = field(default_factory=list)
 
 
 def matrix_fills(
@@ -94,26 +101,30 @@ def matrix_fills(
     def filled(section: Region, sparse: Region, angle: float, phase: float) -> MatrixFill:
         solid = section if sparse.is_empty else shapely.difference(section, sparse)
         lines, widths = _solid_lines(section, solid, float(np.radians(angle)), plastic, machine)
-        infill = _infill_lines(sparse, phase, plastic, machine)
+        infill = _joined_infill(sparse, phase, spacing, plastic, machine)
         drawn = [_begun(on_bed(line), plastic.seam, width) for line in lines]
         return MatrixFill(
             shapely.transform(section, on_bed),
             shapely.transform(solid, on_bed),
-            drawn + [on_bed(line) for line in infill],
-            widths + [width] * len(infill),
-            len(infill),
+            drawn + [on_bed(line) for line in infill.lines],
+            widths + [width] * len(infill.lines),
+            len(infill.lines),
+            infill.link,
         )
 
+    spacing = _even_spacing(list(sections.values()), slabs[0].lower, plastic, width)
+    # Skins on lines of no one direction: over a gyroid along its axes, where gaps are shortest.
+    even = 0.0 if plastic.infill == "gyroid" else profile.matrix_angle
     # Layers of equal section, filled in the same directions, are filled once.
     asked: dict[int, tuple[Region, Region, float, float]] = {}
     below = NOTHING, 0.0
     for number, k in enumerate(of_matrix):
         if k in sections:
             slab, section, sparse = sections[k]
-            height = 0.5 * (slab.lower + slab.upper) - slabs[0].lower
+            height = _middle_height(slab, slabs[0].lower)
             angle = (profile.matrix_angle + profile.matrix_turn * number) % 360.0
             if shapely.difference(below[0], sparse).area > width**2:
-                angle = _across(_infill_lines(*below, plastic, machine), profile.matrix_angle)
+                angle = _across(_infill_lines(*below, spacing, plastic, machine), even)
             phase = {"lines": number % 2, "gyroid": height}.get(plastic.infill, 0.0)
             asked[k] = (section, sparse, angle, 0.0 if sparse.is_empty else float(phase))
             below = asked[k][1], asked[k][3]
@@ -142,17 +153,65 @@ def _solid_lines(
     return lines + gaps, [width] * len(lines) + widths
 
 
+def _middle_height(slab: Slab, bottom: float) -> float:
+    """Height of the middle of a slab over the bed, mm."""
+    return 0.5 * (slab.lower + slab.upper) - bottom
+
+
+def _even_spacing(
+    sections: Sequence[MatrixSection], bottom: float, plastic: Plastic, width: float
+) -> float:
+    """Distance of lines of infill, mm, with which all layers together have their density.
+
+    How long the lines of a gyroid are changes with the height, and layers near fibre are few: over
+    these, not over all heights, its period is right in the mean.
+    """
+    spacing = plastic.spacing(width)
+    layers = [one for one in sections if not one.sparse.is_empty]
+    if plastic.infill != "gyroid" or not layers:
+        return spacing
+    slabs, _, regions = zip(*layers, strict=True)
+    high = np.array([slab.upper - slab.lower for slab in slabs])
+    wanted = plastic.density * float(high @ shapely.area(regions))
+
+    def length(slab: Slab, sparse: Region) -> float:
+        lines = gyroid_lines(sparse, _middle_height(slab, bottom), spacing)
+        return float(shapely.length(strings(lines)).sum()) if lines else 0.0
+
+    for _ in range(_ROUNDS):
+        lengths = list(in_processes(length, slabs, regions))
+        ratio = width * float(high @ lengths) / wanted
+        spacing *= np.clip(ratio, 0.8, 1.25)
+        if abs(ratio - 1.0) < _EVEN:
+            break
+    return float(spacing)
+
+
+def _joined_infill(
+    sparse: Region, phase: float, spacing: float, plastic: Plastic, machine: Machine
+) -> Joined:
+    """Lines of sparse infill, joined where the way along the wall is sooner gone than over it."""
+    lines, profile = _infill_lines(sparse, phase, spacing, plastic, machine), machine.gcode
+    lift = profile.lift / profile.lift_speed + profile.retract / profile.retract_speed
+    joints = border_joints(lines, _up_to_walls(sparse, machine), 2.0 * lift * machine.travel_speed)
+    return join(lines, [Joint(*joint, marked=True) for joint in joints])
+
+
+def _up_to_walls(sparse: Region, machine: Machine) -> Region:
+    """Region in which lines of sparse infill lie: they end on what lies round them."""
+    return shapely.buffer(sparse, _OVERLAP * machine.matrix_width)
+
+
 def _infill_lines(
-    sparse: Region, phase: float, plastic: Plastic, machine: Machine
+    sparse: Region, phase: float, spacing: float, plastic: Plastic, machine: Machine
 ) -> list[FloatArray]:
-    """Lines of sparse infill, which end on what lies round them.
+    """Lines of sparse infill.
 
     The phase is the height of a gyroid, mm, and 0 or 1 for lines of the one or the other direction.
     """
     if sparse.is_empty:
         return []
-    width = machine.matrix_width
-    region, spacing = shapely.buffer(sparse, _OVERLAP * width), plastic.spacing(width)
+    region = _up_to_walls(sparse, machine)
     if plastic.infill == "gyroid":
         return gyroid_lines(region, phase, spacing)
     angle = float(np.radians(machine.gcode.matrix_angle))

@@ -398,11 +398,11 @@ def matrix_steps(
 ) -> Steps:
     """Find the moves along a line (n, 3) of matrix, so high (n - 1,) on each of its steps.
 
-    Heights and `room` are those of `line_sizes`.
+    Heights and `room` are those of `line_sizes`; where a height is 0 nothing is laid.
     """
     width, heights = line_sizes(heights, room, machine)
     feed = width * heights / matrix_area(machine)
-    speeds = np.full(len(heights), speed)
+    speeds = np.where(heights > 0.0, speed, machine.travel_speed)
     return steps_along(line, normals, speeds, feed, width, heights, what, machine)
 
 

@@ -96,6 +96,10 @@ class Recorder:
     """Rows of `Moves` so far, and the state of the machine after them."""
 
     def __init__(self, machine: Machine) -> None:
+    if what == "sparse":
+        bare = heights[at] == 0.0
+        rows[bare, _COLUMNS["event"]], rows[bare, _COLUMNS["role"]] = TRAVEL, role("travel")
+        rows[np.ix_(bare, [_COLUMNS["width"], _COLUMNS["height"]])] = 0.0
         self.machine = machine
         self.rows: list[tuple[float, ...]] = []
         self.blocks: list[FloatArray] = []

@@ -6,6 +6,7 @@ import shapely
 
 from benchmarks.print_checks.infill import beyond, bridges, regions_of, volumes
 from benchmarks.print_checks.job import PART, Job, Lines
+from benchmarks.print_checks.motion import travel
 from ccfem.body.mesh.box import box_mesh
 from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.offsets import offset_rings
@@ -54,9 +55,9 @@ def box():
     return of
 
 
-@pytest.mark.parametrize(("infill", "close"), [("lines", 0.015), ("grid", 0.03), ("gyroid", 0.02)])
+@pytest.mark.parametrize(("infill", "close"), [("lines", 0.015), ("grid", 0.03), ("gyroid", 0.01)])
 def test_each_region_is_as_full_as_it_should_be(box, infill, close):
-    """A grid's lines are far apart, and a gyroid's length changes with the height."""
+    """A grid's lines are far apart; a gyroid is as dense as it should be in the mean of layers."""
     job, plastic, regions = box(infill)
     solid, sparse = volumes(job, regions, plastic.density)
     assert solid == pytest.approx(1.0, abs=0.01)
@@ -74,6 +75,30 @@ def test_nothing_is_laid_in_air_but_bridges(box, infill, spacing):
     assert bridge - 2.0 * width < in_skins < bridge
     assert 0.0 < share < 0.4
     assert beyond(job, regions) < 2e-3
+
+
+@pytest.mark.parametrize("infill", ["lines", "grid", "gyroid"])
+def test_the_nozzle_stays_down_between_lines_of_infill(box, infill):
+    """Along the wall: it crosses no line of its layer, and the check finds a way that does."""
+    job, *_ = box(infill)
+    lines = Lines.of(job.done)
+    sparse = (lines.kind == PART[2]) & (lines.tool == 0)
+    off = lines.rapid & sparse
+    begins = sparse & lines.lays & np.append(False, off[:-1])
+    level = np.abs(lines.end[:, 2] - lines.start[:, 2]) < 1e-9
+    first = off & level & np.append(False, lines.lays[:-1])
+    assert first.sum() > 0.6 * begins.sum() > 20
+    assert travel(job, job.done) == []
+    text = job.text.splitlines()
+    down = max(
+        k
+        for k, line in enumerate(text)
+        if line.startswith("G0 X") and text[k - 1].startswith("G1 X") and "Z" not in line
+    )
+    middle = 0.5 * np.array(MACHINE.gcode.bed[:2])
+    text.insert(down, f"G0 X{middle[0] + 30.0} Y{middle[1] - 14.0}")
+    text.insert(down, f"G0 X{middle[0] - 30.0} Y{middle[1] + 14.0}")
+    assert any("down at" in one for one in travel(job, job.run("\n".join(text))))
 
 
 def test_comments_call_infill_what_it_is(box):
