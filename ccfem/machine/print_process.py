@@ -62,6 +62,12 @@ class Process:
         Loops round the first layer, and their distance to it.
     brim_loops : int
         Loops that touch the first layer.
+    support_interface : int
+        Solid layers of pads, and of columns of support, right below what lies on them.
+    support_gap : float, mm
+        Least height between columns of support and the part on them, in whole layers of matrix.
+    support_clearance : float, mm
+        Distance of pads and columns of support to the walls of the part (Aura: 0.7).
     first_layer_height : float, mm
         Of matrix on the bed, where there is more room; 0 to make it as high as the others.
     first_layer_speed : float
@@ -101,6 +107,9 @@ class Process:
     skirt_loops: int = 2
     skirt_gap: float = 6.0
     brim_loops: int = 0
+    support_interface: int = 2
+    support_gap: float = 0.0
+    support_clearance: float = 0.7
     first_layer_height: float = 0.2
     first_layer_speed: float = 0.5
     warm_height: float = 0.5

@@ -301,7 +301,8 @@ def _layers(
     """All layers, from the bed to the top, several at a time."""
     sections = [fill and fill.section for fill in fills]
     lines = [strands.lines(slab.fibre) for slab in slabs]
-    pads = pad_regions(sections, lines, machine, in_air)
+    levels = [(slab.lower, slab.upper) for slab in slabs]
+    pads = pad_regions(sections, lines, machine, in_air, levels)
     del lines  # as large as all strands
 
     def laid(number: int) -> LaidLayer:
@@ -378,17 +379,14 @@ def check_bed(plan: PrintPlan, machine: Machine) -> None:
 
 _MORE = 1.0
 """Width by which a pad extends beyond the strands on it, mm. Our choice."""
-_CLEAR = 0.7
-"""Distance from a pad to the part, mm (Aura)."""
 _SHARE = 0.25
 """Share of a pad that is filled (Aura)."""
-_SOLID = 2
-"""Number of solid layers of matrix under a strand. Our choice."""
 _SPAN = 2.0
 """Longest way over the gap between a pad and the part, mm. A bent strand may hang over 3 mm, and
 lines of matrix do not reach every corner of pad and part."""
 _ARC = 4
 """Segments per quarter circle in the borders of pads."""
+_SAME = 1e-6
 _NONE = shapely.Polygon()
 
 
@@ -397,6 +395,7 @@ def pad_regions(
     strands: Sequence[Sequence[FloatArray]],
     machine: Machine,
     in_air: Region = _NONE,
+    levels: Sequence[tuple[float, float]] = (),
 ) -> list[tuple[Region, Region]]:
     """Regions where each layer of matrix needs pads, and where they are solid.
 
@@ -408,6 +407,8 @@ def pad_regions(
         Fibre on each of them.
     in_air : (Multi)Polygon, mm
         Where layers that hang over get pads, seen from above.
+    levels : sequence of (float, float), mm
+        Bottom and top of each layer, for the gap below layers that hang over.
 
     Returns
     -------
@@ -415,11 +416,13 @@ def pad_regions(
         All of the pads, and their solid part; empty on layers of fibre.
     """
     reach, half = 0.5 * machine.fibre_width + _MORE, 0.5 * machine.matrix_width
+    clear, solid_layers = machine.process.support_clearance, machine.process.support_interface
     # Where a section is narrower than a line, nothing is laid.
     sections = [one and _opened(one, half) for one in sections]
     wide: Region = _NONE
     along: Region = _NONE
     recent: list[Region] = []
+    waiting: list[tuple[float, Region]] = []
     pads: list[tuple[Region, Region]] = []
     for k in range(len(sections))[::-1]:
         section = sections[k]
@@ -427,7 +430,7 @@ def pad_regions(
             below = next((one for one in sections[:k][::-1] if one is not None), None)
             if below is not None and len(strands[k]):
                 free = shapely.difference(strings(strands[k]), below)
-                along = free_area(_along_border(free, below), reach)
+                along = free_area(_along_border(free, below, clear), reach)
                 recent = [shapely.union(free_area(free, reach), _union(recent[:1])), *recent[1:]]
             pads.append((_NONE, _NONE))
             continue
@@ -436,13 +439,19 @@ def pad_regions(
             pads.append((_NONE, _NONE))
         else:
             # Clear of the part, except below strands that run along its border.
-            room = shapely.buffer(section, _CLEAR, quad_segs=_ARC)
+            room = shapely.buffer(section, clear, quad_segs=_ARC)
             room = shapely.union(shapely.difference(room, along), section)
-            solid = _union(recent[:_SOLID])
+            solid = _union(recent[:solid_layers])
             pads.append((shapely.difference(wide, room), shapely.difference(solid, room)))
-        below = next((one for one in sections[:k][::-1] if one is not None), section)
+        lower = next((j for j in range(k)[::-1] if sections[j] is not None), None)
+        below = section if lower is None else sections[lower]
         hangs = shapely.intersection(shapely.difference(section, below), in_air)
-        recent, along = [hangs, *recent[: _SOLID - 1]], _NONE
+        if machine.process.support_gap and lower is not None and len(levels):
+            # Columns end at the first layer whose top is so far below.
+            waiting.append((levels[k][0] - machine.process.support_gap, hangs))
+            hangs = _union([one for level, one in waiting if levels[lower][1] <= level + _SAME])
+            waiting = [one for one in waiting if levels[lower][1] > one[0] + _SAME]
+        recent, along = [hangs, *recent[: solid_layers - 1]], _NONE
     return pads[::-1]
 
 
@@ -452,9 +461,9 @@ def _opened(section: Region, half: float) -> Region:
     return shapely.buffer(inner, half, quad_segs=_ARC)
 
 
-def _along_border(free: shapely.Geometry, below: Region) -> shapely.Geometry:
+def _along_border(free: shapely.Geometry, below: Region, clear: float) -> shapely.Geometry:
     """Pieces of lines that run on in the gap between a pad and the part."""
-    near = shapely.intersection(free, shapely.buffer(below, _CLEAR, quad_segs=_ARC))
+    near = shapely.intersection(free, shapely.buffer(below, clear, quad_segs=_ARC))
     lines = [line for line in open_lines(near) if line_length(line) > _SPAN]
     return strings(lines) if lines else np.array([_NONE])
 

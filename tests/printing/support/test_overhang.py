@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.print_checks.job import PART
 from benchmarks.print_checks.motion import in_air
 from benchmarks.print_checks.printer import follow
 from ccfem.body.mesh.box import box_mesh
 from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.machine import Machine
+from ccfem.machine import Machine, updated
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.export.gcode import gcode
 from ccfem.printing.print_plan import plan_print
@@ -104,6 +105,27 @@ def test_support_stands_beside_the_stem_and_below_the_arms(files):
     assert abs(x).max() <= 30.0
     assert abs(y).max() <= 10.0
     assert propped.volume(Machine()) == pytest.approx(bare.volume(Machine()), rel=1e-6)
+
+
+def test_interface_gap_and_clearance_are_as_asked_for():
+    mesh, layers = tee(), Planar(heights=(2.0, 27.5)).cut(tee())
+    asked = {"support_interface": 4, "support_gap": 0.5, "support_clearance": 3.0}
+    machine = updated(Machine(), {"process": asked})
+    fibre = Toolpaths.from_plane([np.array([[5.0, 10.0], [55.0, 10.0]])], layers[1])
+    plan = plan_print(fibre, layers, mesh, machine, True)
+    run = follow(gcode(plan, machine), "chen2021")
+    steps = [s for s in run.steps if s.lays and s.kind == "Support material"]
+    x = np.array([s.end[0] for s in steps]) - 0.5 * machine.gcode.bed[0]
+    assert abs(x).min() == pytest.approx(13.0 + 0.5 * machine.matrix_width, abs=0.01)
+    # The first layer of the arms begins where that below it ends; columns end 0.5 mm lower.
+    z = np.array([s.end[2] for s in steps]).round(3)
+    part = [s.end for s in run.steps if s.lays and s.kind in PART]
+    arms = min(end[2] for end in part if abs(end[0] - 0.5 * machine.gcode.bed[0]) > 11.0)
+    below = plan.top[plan.top < arms - 1e-3].max()
+    assert z.max() == plan.top[plan.top < below - 0.5 + 1e-3].max()
+    # Four layers are solid, and the others a quarter of that.
+    length = np.array([sum(s.length for s in steps if round(s.end[2], 3) == at) for at in set(z)])
+    assert np.count_nonzero(length > 2.0 * np.median(length)) == 4
 
 
 @pytest.mark.parametrize("deep", [6.0, 20.0])
