@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 
 from benchmarks.print_checks.job import Job
 from benchmarks.print_checks.sections import Sections
@@ -16,9 +17,11 @@ from ccfem.fem.elasticity import solve
 from ccfem.fem.elasticity.stress_field import PartStress
 from ccfem.machine import machine_table, updated
 from ccfem.paths.planning import plan
-from ccfem.paths.toolpaths import Toolpaths
+from ccfem.paths.toolpaths import MATRIX, Toolpaths
+from ccfem.printing.bed_layout import AS_IT_STANDS, BedLayout
+from ccfem.printing.copies import arranged
 from ccfem.printing.export.gcode import gcode
-from ccfem.printing.print_plan import plan_print
+from ccfem.printing.print_plan import PrintPlan, plan_print
 from ccfem.printing.support.overhang import overhang
 from ccfem.slicing.layers.layer import Layer, plane_frame
 from ccfem.strategies import create
@@ -62,7 +65,9 @@ def _plate() -> Case:
         return read_part(file)
 
 
-def job_of(part: Part, machine_name: str) -> tuple[Job, dict[str, float]]:
+def job_of(
+    part: Part, machine_name: str, layout: BedLayout = AS_IT_STANDS
+) -> tuple[Job, dict[str, float]]:
     """Plan a part for a machine, write its file and follow it; seconds of each."""
     case = part.case
     machine, mesh = updated(case.machine, machine_table(machine_name)), case.problem.mesh
@@ -72,19 +77,20 @@ def job_of(part: Part, machine_name: str) -> tuple[Job, dict[str, float]]:
     paths = plan(strategy, layers, part.stress, machine)
     planned = time.process_time()
     hangs = overhang(mesh, case.build, machine) is not None
-    printed = plan_print(paths, layers, mesh, machine, hangs, plastic=case.plastic)
+    printed = plan_print(paths, layers, mesh, machine, hangs, layout.spin, case.plastic)
+    printed = arranged(printed, layout, machine)
     text = gcode(printed, machine)
     written = time.process_time()
-    strands, sections = on_bed(paths, mesh, case.build, machine.gcode.bed)
+    copies = on_bed(paths, mesh, case.build, machine.gcode.bed, layout, printed)
     job = Job(
         machine_name,
         machine,
         printed,
         text,
-        strands,
-        sections.region,
-        sections.area,
-        float(mesh.volumes.sum()),
+        [line for strands, _ in copies for line in strands],
+        lambda z: shapely.union_all([sections.region(z) for _, sections in copies]),
+        lambda z: sum(sections.area(z) for _, sections in copies),
+        layout.count * float(mesh.volumes.sum()),
         _BENT,
     )
     followed = time.process_time()
@@ -93,11 +99,34 @@ def job_of(part: Part, machine_name: str) -> tuple[Job, dict[str, float]]:
 
 
 def on_bed(
-    paths: Toolpaths, mesh: TetMesh, build: Sequence[float], bed: Sequence[float]
-) -> tuple[list[np.ndarray], Sections]:
-    """Strands on the bed, the part in its middle; and sections of the part there by height."""
-    frame = plane_frame(tuple(build))
+    paths: Toolpaths,
+    mesh: TetMesh,
+    build: Sequence[float],
+    bed: Sequence[float],
+    layout: BedLayout = AS_IT_STANDS,
+    printed: PrintPlan | None = None,
+) -> list[tuple[list[np.ndarray], Sections]]:
+    """Strands on the bed, and sections of the part there by height, of each copy in a row along X.
+
+    The middle of all of them is that of the bed. How far they are apart is seen in the plan.
+    """
+    turn = np.radians(layout.spin)
+    spin = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    frame = plane_frame(tuple(build)).copy()
+    frame[:2] = spin @ frame[:2]
     corners = mesh.points[np.unique(mesh.corners)] @ frame.T
     low, high = corners.min(axis=0), corners.max(axis=0)
-    shift = np.append(0.5 * (low + high)[:2] - 0.5 * np.array(bed[:2]), low[2])
-    return [line @ frame.T - shift for line in paths], Sections(mesh, frame, shift)
+    middle = 0.5 * (low + high)[:2] - 0.5 * np.array(bed[:2])
+    apart = 0.0
+    if printed is not None and layout.count > 1:
+        walls = printed.paths.select(printed.paths.closed & (printed.paths.kind == MATRIX))
+        lowest = [wall for wall, layer in zip(walls, walls.layer, strict=True) if not layer]
+        longest = max(np.ptp(wall[:, 0]) for wall in lowest)
+        outer = [wall[:, 0].min() for wall in lowest if np.ptp(wall[:, 0]) > longest - 2e-3]
+        apart = float(np.ptp(outer)) / (layout.count - 1)
+    places = apart * (np.arange(layout.count) - 0.5 * (layout.count - 1))
+    found = []
+    for place in places.tolist():
+        shift = np.append(middle - [place, 0.0], low[2])
+        found.append(([line @ frame.T - shift for line in paths], Sections(mesh, frame, shift)))
+    return found

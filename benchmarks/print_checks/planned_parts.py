@@ -18,7 +18,7 @@ from pathlib import Path
 from benchmarks.print_checks.results_folder import Folder, agreement, tally
 from benchmarks.studies import own_parts
 
-__all__ = ["LAYERS", "PLANS", "main", "planned"]
+__all__ = ["LAYERS", "PLANS", "main", "part_file", "planned"]
 
 ROOT = Path(__file__).parents[2]
 LAYERS = {"loop": 12, "lever": 6, "hook": 6, "bridge": 2}
@@ -32,7 +32,7 @@ _BODIES = {"bracket": "l_bracket.step", "hook": "crane_hook.stl", "lever": "brak
 _MAKERS = {"bracket": "l_bracket", "hook": "crane_hook", "lever": "brake_lever"}
 
 
-def _part(name: str, folder: Path) -> str:
+def part_file(name: str, folder: Path) -> str:
     """Name of a case, or a part file that is made with its body."""
     if name not in _BODIES:
         return name
@@ -57,7 +57,7 @@ def _ccfem(*words: str) -> None:
 def planned(plan: str, folder: Path) -> Folder:
     """Plan a part, where it is not yet planned, and read its folder."""
     name, strategy, machine, layers = (*plan.split(":"), "", "")[:4]
-    part, mesh = _part(name, folder), folder / f"{name}.vtu"
+    part, mesh = part_file(name, folder), folder / f"{name}.vtu"
     if not mesh.exists():
         _ccfem("solve", part, "-o", str(mesh))
     results = folder / plan.replace(":", "-")
