@@ -134,6 +134,7 @@ def _crossings(job: Job, lines: Lines, down: np.ndarray) -> list[str]:
         laid = np.flatnonzero(lines.lays & (height == z))
         ends = np.stack([lines.start[laid], lines.end[laid]], axis=1)[:, :, :2]
         tree, section = shapely.STRtree(shapely.linestrings(ends)), job.section(z)
+        shapely.prepare(section)
         for a, b in zip(first.tolist(), last.tolist(), strict=True):
             if height[a] != z:
                 continue

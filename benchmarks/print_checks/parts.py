@@ -3,6 +3,7 @@
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import shapely
@@ -88,7 +89,7 @@ def job_of(
         printed,
         text,
         [line for strands, _ in copies for line in strands],
-        lambda z: shapely.union_all([sections.region(z) for _, sections in copies]),
+        cache(lambda z: shapely.union_all([sections.region(z) for _, sections in copies])),
         lambda z: sum(sections.area(z) for _, sections in copies),
         layout.count * float(mesh.volumes.sum()),
         _BENT,

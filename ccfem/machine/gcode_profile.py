@@ -146,6 +146,10 @@ class GcodeProfile:
     arc_tolerance : float, mm
         Largest distance between an arc and the lines that it replaces; it is at most 0.1 % longer
         than they are.
+    compact : bool
+        Whether the file says no more than the printer needs: no ends of zeros, no width and height
+        of lines, flow of matrix over fibre and speed of strands in fewer steps
+        (`ccfem.printing.matrix_flow`, `ccfem.printing.part_moves`).
     longest_feed : float, mm
         Longest feed in one move. Marlin refuses more than EXTRUDE_MAXLENGTH, by default 200.
     thumbnails : tuple of str
@@ -217,6 +221,7 @@ class GcodeProfile:
     matrix_turn: float = 45.0
     arcs: bool = False
     arc_tolerance: float = 0.02
+    compact: bool = False
     longest_feed: float = 190.0
     thumbnails: tuple[str, ...] = ()
 

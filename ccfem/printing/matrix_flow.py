@@ -16,10 +16,10 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from ccfem.base.arrays import BoolArray, FloatArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.errors import InputError
 from ccfem.geometry.polylines import starts_segment, subdivide
-from ccfem.geometry.shapes import Region, Shapes, strings
+from ccfem.geometry.shapes import Region, Shapes, bends, strings
 from ccfem.machine.machine import Machine
 from ccfem.paths.splitting.slabs import StrandDensity
 from ccfem.paths.toolpaths import Toolpaths
@@ -28,6 +28,11 @@ _PIECE = 2.0
 """Longest piece, mm, over which the height is constant."""
 _STEP = 0.05
 """Steps in which the height changes along a line, over that of the layer."""
+_MISPLACED = 1.0
+"""Matrix that a compact file lays elsewhere along a line, at most, in mm of a line as high as its
+layer. Our choice."""
+_STRETCH = 1e3
+"""Of the way along lines, so that what is laid elsewhere is the distance from a simplified line."""
 _SCALE = 1.1
 """Largest factor by which a layer is scaled. If lines miss a tenth of a section, as between walls
 nearer than a line is wide, more flow would not reach it either. Our choice."""
@@ -86,26 +91,31 @@ def with_flow(
     start = np.flatnonzero(starts_segment(offsets))
     length = np.linalg.norm(points[start + 1] - points[start], axis=1)
     middle = 0.5 * (points[start] + points[start + 1])[:, :2]
+    way = paths.link[segment]
+    length[way[start]] = 0.0  # nothing is laid there
     if sections is None:
         sections = [machine.strand_area] * len(strands)
     volume = height + below - _density(strands, sections, middle, machine)
     least = min(machine.least_line, height)
     warning = _check(volume, length, height, below, least, machine)
-    way = paths.link[segment]
-    length[way[start]] = 0.0  # nothing is laid there
     wanted = np.maximum(volume, least)
+    if machine.gcode.compact:
+        last = np.searchsorted(start, offsets[1:]) - 1
+        wanted = _evened(wanted / height, length, last) * height
     # Of neighbouring pieces with the same height level only the first keeps its point.
     level = np.full(len(points), -1)
     level[start] = np.round(wanted / (_STEP * height)).astype(np.int64)
+    level[way] = -2
     keep = np.append(True, np.diff(segment) > 0)
     keep[1:] |= level[1:] != level[:-1]
     kept = np.flatnonzero(keep)
     run = (np.cumsum(keep) - 1)[start]
     long = np.bincount(run, length, len(kept))
     share = np.bincount(run, wanted * length, len(kept)) / np.maximum(long, 1e-300)
+    if machine.gcode.compact:
+        share = share.round(6)  # equal heights are exactly equal
     line = np.searchsorted(np.searchsorted(kept, offsets), np.arange(len(kept)), "right") - 1
     if shares is not None:
-    level[way] = -2
         share *= shares[line]
     scaled = np.ones(len(kept), dtype=bool) if sparse is None else ~sparse[line]
     inside = shapely.length(shapely.intersection(strings(strands), section))
@@ -127,6 +137,8 @@ def with_flow(
         link=way[kept],
     )
     return fewer, share, warning
+
+
 def _laid_lines(paths: Toolpaths) -> Shapes:
     """Lines of matrix, without the ways between them on which nothing is laid."""
     start = np.flatnonzero(starts_segment(paths.offsets) & ~paths.link)
@@ -134,6 +146,23 @@ def _laid_lines(paths: Toolpaths) -> Shapes:
     return shapely.linestrings(ends[:, :, :2])
 
 
+def _evened(share: FloatArray, length: FloatArray, last: IntArray) -> FloatArray:
+    """Heights of steps (s,) in as few runs of one height as `_MISPLACED` allows.
+
+    What is laid up to a place, over the way to there, is a line that is simplified.
+
+    Parameters
+    ----------
+    share, length : (s,) arrays
+        Height of each step over that of the layer, and its length, mm.
+    last : (K,) int array
+        Steps that paths end with: no run goes on from one path to the next.
+    """
+    along, laid = (np.append(0.0, np.cumsum(column)) for column in (length, share * length))
+    curve = np.column_stack([_STRETCH * along, laid])
+    at = bends(curve, last[:-1] + 1, _MISPLACED)
+    run = np.diff(laid[at]) / np.maximum(np.diff(along[at]), 1e-300)
+    return np.repeat(run, np.diff(at))
 
 
 def pad_flow(

@@ -519,6 +519,8 @@ _REACH = 2.0
 """Least length over which curvature is taken, in fibre widths; that of `ccfem.paths.linking`."""
 _PIECES = 5
 """Pieces of the ramp from the start speed to the normal one."""
+_RATIO = 1.25
+"""Ratio of neighbouring speeds of strands in a compact file. Our choice."""
 _SAME = 1e-3
 _NEAR = 0.02
 """Places where the speed changes are moved to points of the strand that are nearer than this, mm:
@@ -567,7 +569,13 @@ def strand_speeds(line: FloatArray, machine: Machine) -> tuple[FloatArray, Float
         speeds[near] = slow[near]
     tail = middle > cut
     speeds[tail] = np.minimum(speeds[tail], process.finish_speed)
-    return positions, speeds, cut
+    return positions, _stepped(speeds) if machine.gcode.compact else speeds, cut
+
+
+def _stepped(speeds: FloatArray) -> FloatArray:
+    """Speeds on a scale of few, whole mm/min: each is the next lower one, mm/s."""
+    scale = _RATIO ** np.floor(np.log(60.0 * speeds) / np.log(_RATIO) + 1e-9)
+    return np.asarray(np.ceil(scale) / 60.0)
 
 
 def _normal_speeds(line: FloatArray, machine: Machine) -> tuple[FloatArray, BoolArray]:

@@ -12,11 +12,11 @@ from ccfem.machine.machine import Machine
 from ccfem.printing.laid_layer import COORDINATE_DIGITS
 from ccfem.printing.moves import FEED, KINDS, LAY, TRAVEL, Moves, role
 
-_FEED_DIGITS = 5
-"""Decimals of what is fed, mm."""
 _SAME = 1e-9
 _STRAIGHT = 1.5 * 10.0**-COORDINATE_DIGITS
 """Distance from a straight line, mm, within which rounded points lie on it."""
+_COMPACT = 0.01
+"""The same in a compact file. Our choice."""
 _BLOCKS = 500
 """Blocks of rows that are kept as such: many small ones leave holes in memory."""
 _COLUMNS: dict[str, int | slice] = {
@@ -30,6 +30,11 @@ _COLUMNS: dict[str, int | slice] = {
 _POSE = ("place", "normal")
 _LEVEL = 0.1
 """Cosine of the tilt below which a head's own axis leads too far aside to leave along it."""
+
+
+def feed_digits(machine: Machine) -> int:
+    """Decimals of what is fed, mm."""
+    return 4 if machine.gcode.compact else 5
 
 
 class Steps(NamedTuple):
@@ -62,7 +67,8 @@ def steps_along(
     """
     begin, up = line[0], normals[0]
     alike = [speeds, feed, widths, heights, *([] if beside is None else [beside])]
-    kept = _ends_of_moves(line, normals, np.column_stack(alike))
+    off = _COMPACT if machine.gcode.compact else _STRAIGHT
+    kept = _ends_of_moves(line, normals, np.column_stack(alike), off)
     line, normals, index = line[kept], normals[kept], kept[:-1]
     if len(index) and feed.max() > 0.0:
         ends, longest = np.array([0, len(line)]), machine.gcode.longest_feed
@@ -71,9 +77,10 @@ def steps_along(
         normals, index = normals[step], index[step[:-1]]
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
     # Rounded in sum, so that no feed is lost however short the steps are.
-    fed = np.diff(np.append(0.0, np.cumsum(feed[index] * steps)).round(_FEED_DIGITS))
+    digits = feed_digits(machine)
+    fed = np.diff(np.append(0.0, np.cumsum(feed[index] * steps)).round(digits))
     with_it = np.zeros(len(fed)) if beside is None else beside[index] * steps
-    with_it = np.diff(np.append(0.0, np.cumsum(with_it)).round(_FEED_DIGITS))
+    with_it = np.diff(np.append(0.0, np.cumsum(with_it)).round(digits))
     moved = np.flatnonzero(steps > 0.0)
     at = index[moved]
     columns = {
@@ -89,6 +96,10 @@ def steps_along(
     rows[:, _COLUMNS["event"]], rows[:, _COLUMNS["role"]] = LAY, role(what)
     for name, values in columns.items():
         rows[:, _COLUMNS[name]] = values
+    if what == "sparse":
+        bare = heights[at] == 0.0
+        rows[bare, _COLUMNS["event"]], rows[bare, _COLUMNS["role"]] = TRAVEL, role("travel")
+        rows[np.ix_(bare, [_COLUMNS["width"], _COLUMNS["height"]])] = 0.0
     return Steps(rows, begin, up, float(line[:, 2].max()))
 
 
@@ -96,10 +107,6 @@ class Recorder:
     """Rows of `Moves` so far, and the state of the machine after them."""
 
     def __init__(self, machine: Machine) -> None:
-    if what == "sparse":
-        bare = heights[at] == 0.0
-        rows[bare, _COLUMNS["event"]], rows[bare, _COLUMNS["role"]] = TRAVEL, role("travel")
-        rows[np.ix_(bare, [_COLUMNS["width"], _COLUMNS["height"]])] = 0.0
         self.machine = machine
         self.rows: list[tuple[float, ...]] = []
         self.blocks: list[FloatArray] = []
@@ -121,7 +128,7 @@ class Recorder:
     def feed(self, length: float, speed: float, beside: float = 0.0) -> None:
         """Feed filament without moving, in steps that the firmware takes."""
         count = int(np.ceil(abs(length) / self.machine.gcode.longest_feed - 1e-9))
-        steps = np.diff(np.linspace(0.0, length, count + 1).round(_FEED_DIGITS))
+        steps = np.diff(np.linspace(0.0, length, count + 1).round(feed_digits(self.machine)))
         for part in steps.tolist():
             self._row(FEED, feed=part, beside=beside * part / length, speed=speed)
 
@@ -276,7 +283,9 @@ class Recorder:
         return Moves(**columns)
 
 
-def _ends_of_moves(line: FloatArray, normals: FloatArray, alike: FloatArray) -> IntArray:
+def _ends_of_moves(
+    line: FloatArray, normals: FloatArray, alike: FloatArray, off: float
+) -> IntArray:
     """Points of a line (n, 3) where a move ends: its bends, and where values (n - 1, k) change.
 
     Lines that are not level keep all points: the head turns along them.
@@ -284,4 +293,4 @@ def _ends_of_moves(line: FloatArray, normals: FloatArray, alike: FloatArray) -> 
     if len(line) < 2 or (normals[:, 2] < 1.0 - _SAME).any() or np.ptp(line[:, 2]) > 0.0:
         return np.arange(len(line))
     changes = np.flatnonzero((alike[1:] != alike[:-1]).any(axis=1)) + 1
-    return bends(line[:, :2], changes, _STRAIGHT)
+    return bends(line[:, :2], changes, off)

@@ -10,6 +10,7 @@ the path; the rest is dragged out and laid by G1 without E.
 All that happens is decided before, in `ccfem.printing`; here it is only written.
 """
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -46,9 +47,12 @@ from ccfem.printing.moves import (
 from ccfem.printing.part_moves import part_moves
 from ccfem.printing.print_plan import PrintPlan
 from ccfem.printing.print_totals import PrintTotals, print_totals
+from ccfem.printing.recorder import feed_digits
 
-_FEED_DIGITS = 5
-"""Decimals of E, mm."""
+_ZEROS = re.compile(r"\.?0+(?= |$)")
+"""Zeros at the end of a number with a point, and that point."""
+_AHEAD = re.compile(r"(?<=[A-Z])(-?)0(?=\.)")
+"""The zero ahead of a point."""
 
 TYPES = {
     "prusa": {
@@ -174,9 +178,10 @@ class _Rows:
         feeds = (moves.feed, moves.beside)
         if moves.arcs is None:
             return cls(moves, axes, _speeds(moves, axes), feeds, first)
-        summed = (_summed(feeds[0], moves.arcs), _summed(feeds[1], moves.arcs))
-        about = (axes, _speeds(moves, axes), summed, first)
-        return cls(moves, *about, _arcs_of(moves), _centres(moves.arcs, moves))
+        digits = feed_digits(machine)
+        summed = tuple(_summed(column, moves.arcs, digits) for column in feeds)
+        about = (axes, _speeds(moves, axes), summed, first, _arcs_of(moves))
+        return cls(moves, *about, _centres(moves.arcs, moves, machine.gcode.compact))
 
     def text(self, lines: "_Lines", some: slice) -> str:
         """Text of some rows."""
@@ -234,20 +239,22 @@ def _arcs_of(moves: Moves) -> IntArray:
     return arc_of
 
 
-def _summed(column: FloatArray, arcs: Arcs) -> FloatArray:
+def _summed(column: FloatArray, arcs: Arcs, digits: int) -> FloatArray:
     """Values of rows, at the end of each arc that of all its rows."""
     until = np.append(0.0, np.cumsum(column))
     summed = np.array(column)
     summed[arcs.last] = until[arcs.last + 1] - until[arcs.first]
-    return summed.round(_FEED_DIGITS)
+    return summed.round(digits)
 
 
-def _centres(arcs: Arcs, moves: Moves) -> list[str]:
+def _centres(arcs: Arcs, moves: Moves, compact: bool) -> list[str]:
     """Command of each arc with its centre from its start, {} for the place where it ends."""
     off = (arcs.centre - moves.start[arcs.first, :2]).round(COORDINATE_DIGITS) + 0.0
-    words = f"{{}} I%.{COORDINATE_DIGITS}f J%.{COORDINATE_DIGITS}f"
-    commands = np.where(arcs.sweep > 0.0, "G3 ", "G2 ").tolist()
-    return [kind + words % (x, y) for kind, (x, y) in zip(commands, off.tolist(), strict=True)]
+    words = f"I%.{COORDINATE_DIGITS}f J%.{COORDINATE_DIGITS}f"
+    places = [words % (x, y) for x, y in off.tolist()]
+    places = [_shorter(place) for place in places] if compact else places
+    commands = np.where(arcs.sweep > 0.0, "G3 {} ", "G2 {} ").tolist()
+    return [command + place for command, place in zip(commands, places, strict=True)]
 
 
 def _axes(moves: Moves, machine: Machine) -> FloatArray:
@@ -314,6 +321,7 @@ class _Lines:
         self._forget()
         self._letters = "".join(("X", "Y", "Z", *machine.kinematics.letters))
         self._rate, self._speed = "", -1.0
+        self._digits = feed_digits(machine)
         by_file = self.profile.offset_by == "gcode"
         self._offset = self.profile.offset if by_file else (0.0, 0.0, 0.0)
 
@@ -335,6 +343,8 @@ class _Lines:
         if kind != self._type:
             self._type = kind
             self.lines.append(kind)
+        if self.profile.compact:
+            return
         if width != self._width:
             self._width, said = width, f";WIDTH:{width:.4f}"
             if said != self._wide:
@@ -359,6 +369,8 @@ class _Lines:
             own = [k for k in range(axes.shape[1]) if number >> k & 1]
             said = " ".join(f"{self._letters[k]}%.{COORDINATE_DIGITS}f" for k in own)
             words[rows] = [said % at for at in zip(*axes[rows][:, own].T.tolist(), strict=True)]
+        if self.profile.compact:
+            return [_shorter(place) for place in words]
         return words.tolist()
 
     def move(
@@ -394,8 +406,9 @@ class _Lines:
     def _fed(self, tool: int, feed: float, beside: float) -> str:
         """Words of what is fed; nothing where nothing is."""
         letter = self.profile.axes.fibre if tool == 1 else "E"
-        word = f" {letter}{feed:.{_FEED_DIGITS}f}" if feed else ""
-        return word + (f" {self.profile.axes.matrix}{beside:.{_FEED_DIGITS}f}" if beside else "")
+        word = f" {letter}{feed:.{self._digits}f}" if feed else ""
+        word += f" {self.profile.axes.matrix}{beside:.{self._digits}f}" if beside else ""
+        return _shorter(word) if self.profile.compact else word
 
     def _at(self, speed: float) -> str:
         """Feed rate of a move, where it differs from that of the move before."""
@@ -439,6 +452,11 @@ class _Lines:
         ]
         self._forget()
         self.fill("layer", layer=number, number=number + 1, **self.progress.get(number, {}))
+
+
+def _shorter(words: str) -> str:
+    """Words without zeros that say nothing: X20.500 is X20.5, and E0.0300 is E.03."""
+    return _AHEAD.sub(r"\1", _ZEROS.sub("", words))
 
 
 # The head of a G-code file: how long it takes, how much it needs, where it lies.
