@@ -99,7 +99,7 @@ def steps_along(
     if what == "sparse":
         bare = heights[at] == 0.0
         rows[bare, _COLUMNS["event"]], rows[bare, _COLUMNS["role"]] = TRAVEL, role("travel")
-        rows[np.ix_(bare, [_COLUMNS["width"], _COLUMNS["height"]])] = 0.0
+        rows[bare, _COLUMNS["width"]] = rows[bare, _COLUMNS["height"]] = 0.0
     return Steps(rows, begin, up, float(line[:, 2].max()))
 
 

@@ -179,9 +179,9 @@ class _Rows:
         if moves.arcs is None:
             return cls(moves, axes, _speeds(moves, axes), feeds, first)
         digits = feed_digits(machine)
-        summed = tuple(_summed(column, moves.arcs, digits) for column in feeds)
-        about = (axes, _speeds(moves, axes), summed, first, _arcs_of(moves))
-        return cls(moves, *about, _centres(moves.arcs, moves, machine.gcode.compact))
+        feeds = (_summed(feeds[0], moves.arcs, digits), _summed(feeds[1], moves.arcs, digits))
+        centres = _centres(moves.arcs, moves, machine.gcode.compact)
+        return cls(moves, axes, _speeds(moves, axes), feeds, first, _arcs_of(moves), centres)
 
     def text(self, lines: "_Lines", some: slice) -> str:
         """Text of some rows."""
