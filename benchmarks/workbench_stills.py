@@ -51,11 +51,11 @@ def main(folder: Path = FOLDER) -> None:
         ]
         eye = max(holes, key=lambda number: bench.listing.face(number).radius)
         bolts = [number for number in holes if number != eye]
-        page.act(page.choose_all, bolts)
+        page.act(page.loads.choose_all, bolts)
         still("faces")
         tab.get_by_role("button", name="Hold").first.click()
         page.act(lambda: None).result()
-        page.act(page.choose, eye, False).result()
+        page.act(page.loads.choose, eye, False).result()
         tab.get_by_label("Force, N z").first.fill("200")
         tab.get_by_role("button", name="Add load").click()
         still("loads")

@@ -122,7 +122,11 @@ def read_toml(path: str | os.PathLike[str], what: str) -> dict[str, Any]:
     InputError
         When the file cannot be read or is none; with the line, and what helps.
     """
-    text = text_of(path, what)
+    return toml_of(text_of(path, what), f"{what} {path}")
+
+
+def toml_of(text: str, what: str) -> dict[str, Any]:
+    """Content of a text in TOML, as `read_toml` reads it; `what` names it in messages."""
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -132,7 +136,7 @@ def read_toml(path: str | os.PathLike[str], what: str) -> dict[str, Any]:
     line = lines[min(int(at[1]), len(lines)) - 1].strip() if at and lines else ""
     cures = (cure for pattern, cure in _MISTAKES if re.search(pattern, said))
     raise InputError(
-        f"{what} {path} is not a TOML file: {said}"
+        f"{what} is not a TOML file: {said}"
         + (f", '{line}'" if line.isprintable() and 0 < len(line) < 100 else "")
         + f": {next(cures, 'start from ccfem example bracket_plate')}"
     )

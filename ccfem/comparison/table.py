@@ -107,14 +107,13 @@ class Table:
         return lines
 
     def html(self, corner: str) -> str:
-        """HTML of the table for a notebook."""
-        rows = [
-            "".join(f"<th>{escape(text)}</th>" for text in (corner, *(h.title for h in self.heads)))
-        ]
+        """HTML of the table for a notebook or a page."""
+        titles = (corner, *(head.title for head in self.heads))
+        rows = ["".join(f'<th scope="col">{escape(text)}</th>' for text in titles)]
         for name, cells, why in self.rows:
             texts = "".join(f"<td>{escape(str(cell))}</td>" for cell in cells)
             texts += f'<td colspan="{len(self.heads)}">{escape(why)}</td>' if why else ""
-            rows.append(f"<td>{escape(name)}</td>{texts}")
+            rows.append(f'<th scope="row">{escape(name)}</th>{texts}')
         return f"<table>{''.join(f'<tr>{row}</tr>' for row in rows)}</table>"
 
 

@@ -6,8 +6,8 @@ Nothing is read outside the folder where the workbench was started, and nothing 
 
 import os
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,27 +21,55 @@ from ccfem.body.mesh.face_places import BodyFaces
 from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE
 from ccfem.body.meshing.cad import is_cad
 from ccfem.cases.inspection import Check, check, faces
+from ccfem.cases.inspection.beginning import empty_part
+from ccfem.cases.part_editing import Change, content_of, edited, files_in, rebased, valued
 from ccfem.cases.part_file import faces_of_content, part_case
 from ccfem.cases.part_writing import part_text
 from ccfem.cases.reading import create_case, named_cases
 from ccfem.cases.stored import data_folder
-from ccfem.workbench.part_edits import (
-    Change,
-    History,
-    begun,
-    check_files,
-    check_inside,
-    content_of,
-    edited,
-    files_in,
-    rebased,
-    valued,
-)
 
 UPLOADS = "uploads"
 """Folder in ``results/`` for files that were uploaded."""
 _LISTED = 100
 """Files that are offered."""
+
+
+@dataclass(frozen=True)
+class History:
+    """Texts of a part file, one after the other, and which of them is shown.
+
+    Attributes
+    ----------
+    texts : tuple of str
+        At least one.
+    place : int
+        Of the text that is shown.
+    field : str
+        Field whose value was changed last: to change it again is the same step.
+    """
+
+    texts: tuple[str, ...]
+    place: int = 0
+    field: str = ""
+
+    @property
+    def text(self) -> str:
+        """The text that is shown."""
+        return self.texts[self.place]
+
+    def after(self, text: str, field: str = "") -> "History":
+        """Add a text; what was undone is forgotten."""
+        if text == self.text:
+            return self
+        again = bool(field) and field == self.field and self.place > 0
+        kept = self.texts[: self.place + (0 if again else 1)]
+        return History((*kept, text), len(kept), field)
+
+    def moved(self, steps: int) -> "History":
+        """Go back by a number below 0, or forth again."""
+        place = min(max(self.place + steps, 0), len(self.texts) - 1)
+        return replace(self, place=place, field="")
+
 
 Said = tuple[tuple[str, str], ...]
 """What a check says: kind and line of each."""
@@ -132,7 +160,7 @@ class Bench:
         elif _is_body(path):
             existing_file(path, "the body")
             listing = faces(path)
-            text = begun(shown.as_posix(), listing)
+            text = empty_part(shown, listing)
             stem = re.sub(r"[^\w-]+", "_", path.stem) or "part"
             opened = Opened(stem, self.folder, None, text)
         else:
@@ -268,14 +296,44 @@ class Bench:
             return None, tuple(("mistake", line) for line in error.mistakes)
         except (SolveError, ArithmeticError, MemoryError) as error:
             return None, (("mistake", str(error)),)
-        lines = {
-            "mistake": checked.mistakes,
-            "cannot be planned": checked.not_planned,
-            "not printable": checked.not_printable,
-            "warning": checked.warnings,
-            "known": checked.facts,
-        }
+        lines = checked.faults | {"warning": checked.warnings, "known": checked.facts}
         return checked, tuple((kind, line) for kind, those in lines.items() for line in those)
+
+
+def check_files(text: str, home: Path, allowed: Collection[Path]) -> None:
+    """Refuse a part file that names a file outside the folders that are allowed.
+
+    Parameters
+    ----------
+    home : Path
+        Folder that its paths are relative to.
+
+    Raises
+    ------
+    InputError
+    """
+    for name in files_in(content_of(text)).values():
+        check_inside(home / name, allowed)
+
+
+def check_inside(path: Path, allowed: Collection[Path]) -> Path:
+    """Return a path with its links followed where it lies in one of the folders.
+
+    Raises
+    ------
+    InputError
+        Where it does not.
+    """
+    try:
+        real = path.resolve()
+    except (OSError, ValueError, RuntimeError):
+        raise InputError(f"{str(path)!r} is no path: correct it") from None
+    if not any(real.is_relative_to(folder.resolve()) for folder in allowed):
+        raise InputError(
+            f"{path} lies outside {', '.join(map(str, allowed))}: start ccfem open in a folder "
+            "that holds it"
+        )
+    return real
 
 
 def _is_body(path: Path) -> bool:

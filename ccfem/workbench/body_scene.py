@@ -14,7 +14,9 @@ from ccfem.body.mesh.face_rules import Faces, Holes
 from ccfem.body.mesh.patches import unit_vector
 from ccfem.body.mesh.smooth_faces import Face
 from ccfem.cases.inspection import Check
+from ccfem.cases.inspection.face_choice import holes_on
 from ccfem.cases.part_tables import rules_of
+from ccfem.comparison.plot.symbols import spread
 from ccfem.printing.bed_layout import bed_of
 from ccfem.slicing.layers.layer import plane_frame
 
@@ -109,22 +111,12 @@ class PatchPlace:
         areas = np.linalg.norm(self._across, axis=1)
         return np.asarray(areas @ self.corners.mean(axis=1) / max(float(areas.sum()), 1e-300))
 
-    @property
-    def normal(self) -> FloatArray:
-        """Mean outward normal (3,) by area: of length 1 of a plane, 0 of a whole round wall."""
-        areas = np.linalg.norm(self._across, axis=1)
-        return np.asarray(self._across.sum(axis=0) / max(float(areas.sum()), 1e-300))
-
     def spots(self, count: int) -> tuple[FloatArray, FloatArray]:
         """Up to some places (m, 3), mm, spread over the patch, and outward unit normals there."""
         middles, normals = self.corners.mean(axis=1), self._across
-        chosen: list[int] = []
-        away = np.full(len(middles), np.inf)
-        while len(chosen) < min(count, len(middles)):
-            chosen.append(int(np.argmax(np.round(away, 6))))
-            away = np.minimum(away, np.linalg.norm(middles - middles[chosen[-1]], axis=1))
-        sizes = np.linalg.norm(normals[chosen], axis=1)
-        return middles[chosen], normals[chosen] / np.maximum(sizes, 1e-300)[:, None]
+        rows = spread(middles, count)
+        sizes = np.linalg.norm(normals[rows], axis=1)
+        return middles[rows], normals[rows] / np.maximum(sizes, 1e-300)[:, None]
 
 
 def patch_places(
@@ -149,9 +141,7 @@ def patch_places(
             if isinstance(rule, Faces):
                 numbers = rule.numbers_on(listing)
             elif isinstance(rule, Holes):
-                chosen = {id(wall) for wall in rule.walls(listing.faces)}
-                pairs = zip(listing.numbers, listing.faces, strict=True)
-                numbers = tuple(k for k, face in pairs if id(face) in chosen)
+                numbers = tuple(holes_on(listing, rule))
             else:
                 continue
         except InputError:  # the check says so
@@ -192,43 +182,6 @@ def cones(tips: FloatArray, outward: FloatArray, size: float) -> tuple[FloatArra
     one = np.concatenate([side, base])
     triangles = (np.arange(count) * (sides + 2))[:, None, None] + one
     return points.reshape(-1, 3), triangles.reshape(-1, 3)
-
-
-def arrow(
-    place: PatchPlace, vector: FloatArray, length: float, body: FloatArray
-) -> tuple[FloatArray, bool]:
-    """Tail and tip (2, 3), mm, of the arrow of a force on a patch, outside of the part.
-
-    Also returns whether its tail is the free end: where the force presses on the patch.
-
-    Parameters
-    ----------
-    vector : (3,) array
-    length : float, mm
-        Of the arrow.
-    body : (t, 3, 3) array, mm
-        Corners of the triangles of the part.
-    """
-    along = vector / max(float(np.linalg.norm(vector)), 1e-300)
-    presses = float(place.normal @ along) < -0.2
-    free = -along if presses else along
-    near = place.centre + _way_out(place.centre, free, body) * free
-    ends = np.stack([near, near + length * free])
-    return (ends[::-1] if presses else ends), presses
-
-
-def _way_out(start: FloatArray, along: FloatArray, body: FloatArray) -> float:
-    """Distance, mm, along a unit vector beyond which no triangle (t, 3, 3) is met."""
-    a, b, c = np.moveaxis(body, 1, 0)
-    across = np.cross(along, c - a)
-    scale = np.einsum("ij,ij->i", b - a, across)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        first = np.einsum("ij,ij->i", start - a, across) / scale
-        turned = np.cross(start - a, b - a)
-        second = turned @ along / scale
-        far = np.einsum("ij,ij->i", c - a, turned) / scale
-        met = (first >= 0.0) & (second >= 0.0) & (first + second <= 1.0) & (far > 0.0)
-    return float(far[met].max(initial=0.0))
 
 
 def snapped(direction: FloatArray) -> FloatArray:

@@ -3,7 +3,6 @@
 import contextlib
 import os
 import re
-import shlex
 import signal
 import subprocess
 import sys
@@ -31,8 +30,6 @@ class RunState:
 
     Attributes
     ----------
-    command : str
-        What does the same in a terminal.
     share : float
         Of the work that is done.
     step : str
@@ -45,7 +42,6 @@ class RunState:
         Why it was stopped; empty where it was not.
     """
 
-    command: str
     share: float = 0.0
     step: str = "starting"
     lines: tuple[str, ...] = ()
@@ -98,7 +94,7 @@ class ChildRun:
         changed: Callable[[RunState], object],
         minutes: float | None = None,
     ) -> None:
-        self.state = RunState(shlex.join(["ccfem", *arguments]))
+        self.state = RunState()
         self._changed = changed
         self._process = subprocess.Popen(
             [*_PROGRAM, *arguments],

@@ -11,12 +11,12 @@ import numpy as np
 from ccfem import strategies as strategy_modules
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.errors import InputError
-from ccfem.comparison.plot.colours import LINK, OUTLINE, scale
+from ccfem.comparison.plot.colours import LINK, OUTLINE, rgb, scale
 from ccfem.comparison.report.print_view import BESIDE, COLOURS, FILLS, KINDS, MOVES
+from ccfem.comparison.report.reading import Pieces, PrintLayer, RunResults, read_results
 from ccfem.comparison.request import STRATEGIES
 from ccfem.workbench.child_run import ChildRun, RunState
 from ccfem.workbench.guard import Served, escaped
-from ccfem.workbench.result_views import Pieces, PrintLayer, RunResults, read_results
 from ccfem.workbench.tab import (
     FIBRE,
     MOVED,
@@ -26,7 +26,6 @@ from ccfem.workbench.tab import (
     Field,
     Tabbed,
     draw_lines,
-    table_html,
 )
 
 _NO_ONE, _FIRST, _ALL = "none", "the first", "all at once"
@@ -193,13 +192,8 @@ class CompareTab:
 
     def _show_results(self) -> None:
         assert self.results is not None
-        heads, rows = self.results.rows()
-        lines = [
-            [name, *(cells or [f"failed: {why}", *[""] * (len(heads) - 1)])]
-            for name, cells, why in rows
-        ]
-        names = self.results.names
-        self._table.content = table_html(["strategy", *heads], lines, names[0] if names else "")
+        names, table = self.results.names, self.results.table.html("strategy")
+        self._table.content = f'<div class="ccfem wide ranked" tabindex="0">{table}</div>'
         self._table.visible = True
         files = [name for name in self.results.record["files"] if self._is_taken(name)]
         items = "".join(
@@ -346,7 +340,7 @@ class CompareTab:
 
     def _lines(self, name: str, layer: PrintLayer, chosen: BoolArray) -> Any:
         """Pieces of a layer of the print, coloured by what they are."""
-        colours = _linear(np.array([_rgb(colour) for colour in COLOURS]) / 255.0)
+        colours = _linear(np.array([rgb(colour) for colour in COLOURS]) / 255.0)
         shades = np.repeat(colours[layer.kind[chosen]][:, None], 2, axis=1)
         return draw_lines(self.page.server.scene, name, layer.ends[chosen], shades)
 
@@ -364,7 +358,7 @@ class CompareTab:
         for k, name in enumerate(names):
             pieces = results.pieces(name, place)
             shades = np.repeat(self._colours(pieces)[:, None], 2, axis=1)
-            rim, width = _rgb(OUTLINE), _LINE * results.width
+            rim, width = rgb(OUTLINE), _LINE * results.width
             if len(rims):
                 drawn.append(draw_lines(scene, f"/fibre_{k}_rim", rims + k * step, rim))
             if len(pieces.ends):
@@ -403,7 +397,7 @@ class CompareTab:
         assert self.results is not None
         share = np.nan_to_num(pieces.force / self.results.most_force)
         colours = np.asarray(scale("size")(np.clip(share, 0.0, 1.0))[:, :3])
-        colours[pieces.link] = np.array(_rgb(LINK)) / 255.0
+        colours[pieces.link] = np.array(rgb(LINK)) / 255.0
         return _linear(colours)
 
 
@@ -412,11 +406,6 @@ def _linear(colours: FloatArray) -> Any:
     low = colours <= 0.04045
     linear = np.where(low, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
     return np.round(255.0 * linear).astype(np.uint8)
-
-
-def _rgb(name: str) -> tuple[int, int, int]:
-    red, green, blue = (int(name[k : k + 2], 16) for k in (1, 3, 5))
-    return red, green, blue
 
 
 def _share(share: float) -> tuple[int, ...]:

@@ -1,6 +1,6 @@
 """The tab for loads and supports: faces that are chosen, what may act on them, and what does."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,17 +8,10 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
+from ccfem.cases.inspection.face_choice import coplanar, like_holes
+from ccfem.cases.part_editing import appended, edited, patch_of, removed, valued
 from ccfem.workbench.body_scene import across
 from ccfem.workbench.guard import escaped
-from ccfem.workbench.part_edits import (
-    appended,
-    coplanar,
-    edited,
-    like_holes,
-    patch_of,
-    removed,
-    valued,
-)
 from ccfem.workbench.tab import Field, Tabbed
 
 _NO_FACE = "choose a face"
@@ -156,15 +149,29 @@ class LoadsTab:
     def _choose(self, name: str) -> None:
         if name != _NO_FACE:
             self._faces.value = _NO_FACE
-            self.page.choose(int(name.partition(":")[0]), True)
+            self.choose(int(name.partition(":")[0]), True)
 
     def _choose_more(self, how: str) -> None:
-        page, listing = self.page, self.page.bench.listing
         alike = {"Same radius": like_holes, "Same plane": coplanar}.get(how)
-        if alike is None:
-            page.choose_all([])
+        chosen, listing = self.page.chosen, self.page.bench.listing
+        self.choose_all(sorted({k for n in chosen for k in alike(listing, n)}) if alike else [])
+
+    def choose(self, number: int, more: bool) -> None:
+        """Choose a face, or with `more` one more; one that is chosen is left out again."""
+        before = self.page.chosen
+        if not more:
+            self.choose_all([] if before == [number] else [number])
+        elif number in before:
+            self.choose_all([k for k in before if k != number])
         else:
-            page.choose_all(sorted({k for n in page.chosen for k in alike(listing, n)}))
+            self.choose_all([*before, number])
+
+    def choose_all(self, numbers: Sequence[int]) -> None:
+        """Choose these faces."""
+        self.page.chosen = list(numbers)
+        self.page.paint()
+        self.show_chosen()
+        self.propose()
 
     def show_chosen(self) -> None:
         """Say which faces are chosen."""

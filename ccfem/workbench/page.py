@@ -7,20 +7,20 @@ is a function of the part file and of the run.
 import contextlib
 import io
 import threading
-from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
-from ccfem.base.errors import InputError, SolveError
+from ccfem.base.errors import InputError
 from ccfem.cases.inspection import Check
+from ccfem.cases.part_editing import valued
+from ccfem.comparison.plot.symbols import arrow_outside
 from ccfem.workbench.bench import Bench, Said
 from ccfem.workbench.body_scene import (
     PatchPlace,
-    arrow,
     bed_under,
     borders,
     box_edges,
@@ -37,9 +37,8 @@ from ccfem.workbench.file_tab import FileTab
 from ccfem.workbench.guard import Guard, Served, escaped, limit_uploads
 from ccfem.workbench.loads_tab import LoadsTab, Name, vector_of
 from ccfem.workbench.newest import Newest
-from ccfem.workbench.part_edits import Change, valued
 from ccfem.workbench.print_tab import PrintTab
-from ccfem.workbench.tab import MATT, PART, VIEWS, Field, draw_lines, draw_mesh
+from ccfem.workbench.tab import MATT, PART, VIEWS, Tabbed, draw_lines, draw_mesh
 
 _FACE, _CHOSEN = (203, 210, 216), (245, 190, 65)
 _HELD, _LOADED, _BOTH = (120, 168, 214), (226, 142, 120), (170, 140, 190)
@@ -59,7 +58,7 @@ def lines_of(said: Said) -> str:
     return f"<ul>{items}</ul>" if items else ""
 
 
-class Page:
+class Page(Tabbed):
     """The page of a bench, served on this machine.
 
     Parameters
@@ -72,17 +71,14 @@ class Page:
     def __init__(self, bench: Bench, port: int = 0) -> None:
         import viser
 
-        self.bench, self.guard = bench, Guard(self._served)
-        self.chosen: list[int] = []
-        self.fields: list[Field] = []
-        self.checked: Check | None = None
+        super().__init__(bench)
+        self.guard = Guard(self._served)
         self._checked_text, self._said = "", Said()
         self._faces: dict[int, Any] = {}
         self.body: Any = None
         self._listing: Any = None
         self._drawn: list[Any] = []
         self._dragging: int | None = None
-        self._acts = ThreadPoolExecutor(1, "page")
         self.drawn = threading.Event()
         """Set whenever a check has been drawn."""
         with self.guard.before_viser():
@@ -103,55 +99,6 @@ class Page:
         self._acts.shutdown(wait=False, cancel_futures=True)
         with contextlib.redirect_stdout(io.StringIO()):
             self.server.stop()
-
-    # Acting.
-
-    def act(self, what: Callable[..., None], *arguments: Any) -> "Future[None]":
-        """Do something when all before it is done; what goes wrong is said on the page."""
-        try:
-            return self._acts.submit(self._safely, what, *arguments)
-        except RuntimeError:  # the page is closed, or the program ends
-            ended: Future[None] = Future()
-            ended.cancel()
-            return ended
-
-    def _safely(self, what: Callable[..., None], *arguments: Any) -> None:
-        try:
-            with self.server.atomic():
-                what(*arguments)
-        except (InputError, SolveError, OSError) as error:
-            self.say(str(error))
-        except Exception as error:  # one act's fault ends no other
-            self.say(f"{type(error).__name__}: {error}")
-
-    def on(self, what: Callable[..., None], *arguments: Any) -> Callable[[Any], Any]:
-        """Return a callback of viser that does something; it is not called for values set here."""
-
-        async def heed(event: Any) -> None:
-            if event.client_id is not None:
-                self.act(what, *arguments)
-
-        return heed
-
-    def on_value(self, what: Callable[..., None], *arguments: Any) -> Callable[[Any], Any]:
-        """Return a callback as `on` does, that passes on what was clicked or uploaded."""
-
-        async def heed(event: Any) -> None:
-            if event.client_id is not None:
-                self.act(what, *arguments, event.target.value)
-
-        return heed
-
-    def say(self, text: str) -> None:
-        """Show a line at the top; an empty one takes it away."""
-        self.message.content = f'<p class="ccfem message" role="alert">{escaped(text)}</p>'
-        self.message.visible = bool(text)
-
-    def edit(self, change: Change | str, field: str = "") -> None:
-        """Change the part file, and show it."""
-        self.bench.edit(change, field)
-        self.say("")
-        self.show()
 
     def step(self, steps: int) -> None:
         """Undo or redo."""
@@ -292,33 +239,17 @@ class Page:
         for mesh in face_meshes(listing):
             name = f"/body/face_{mesh.number}"
             handle = draw_mesh(scene, name, mesh.points, mesh.triangles, _FACE, side="double")
-            handle.on_click(self.on(self.choose, mesh.number, False))
-            handle.on_click(modifier="shift")(self.on(self.choose, mesh.number, True))
+            handle.on_click(self.on(self.loads.choose, mesh.number, False))
+            handle.on_click(modifier="shift")(self.on(self.loads.choose, mesh.number, True))
             self._faces[mesh.number] = handle
         draw_lines(scene, "/body/borders", borders(listing), _EDGE)
         self.loads.list_faces()
-
-    def choose(self, number: int, more: bool) -> None:
-        """Choose a face, or with `more` one more; one that is chosen is left out again."""
-        if not more:
-            self.choose_all([] if self.chosen == [number] else [number])
-        elif number in self.chosen:
-            self.choose_all([k for k in self.chosen if k != number])
-        else:
-            self.choose_all([*self.chosen, number])
-
-    def choose_all(self, numbers: Sequence[int]) -> None:
-        """Choose these faces."""
-        self.chosen = list(numbers)
-        self._paint()
-        self.loads.show_chosen()
-        self.loads.propose()
 
     def places(self) -> dict[str, PatchPlace]:
         """Places of the patches, as far as they are known."""
         return patch_places(self.bench.content, self.bench.listing, self.checked)
 
-    def _paint(self) -> None:
+    def paint(self) -> None:
         """Colour the faces by what acts on them, and those that are chosen."""
         held, loaded = set[int](), set[int]()
         places = self.places()
@@ -359,7 +290,7 @@ class Page:
                 colour, shapes = _SUPPORT if support else _LOAD, cones(tips, outward, 0.035 * size)
                 self._drawn.append(draw_mesh(scene, name, *shapes, colour, flat_shading=True))
             elif np.any(force):
-                ends, presses = arrow(place, force, 0.22 * size, corners)
+                ends, presses = arrow_outside(place.centre, force, 0.22 * size, corners)
                 turned = partial(self._turn_force, called, presses)
                 said = f"{np.linalg.norm(force):.4g} N"
                 self._drawn += self._arrow(name, ends, presses, place.centre, said, turned)
@@ -373,7 +304,7 @@ class Page:
             ends = np.array([foot, foot + 0.22 * size * up])
             lay, name = self.prints.lay, "/body/build"
             self._drawn += self._arrow(name, ends, False, foot, "build direction", lay, _BED)
-        self._paint()
+        self.paint()
 
     def _arrow(
         self,

@@ -1,47 +1,119 @@
 """The tab for how a part is printed: machine, material, layers, fibre, plastic, its bed."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
+from functools import partial
 from typing import Any, get_args, get_type_hints
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
+from ccfem.cases.inspection.face_choice import direction_value
+from ccfem.cases.part_editing import appended, edited, patch_of, valued
 from ccfem.fem.materials import material_names
 from ccfem.machine import Machine
 from ccfem.machine.named_machines import machine_about, machine_names
 from ccfem.paths.plastic import Plastic
 from ccfem.printing.bed_layout import axis_and_angle
 from ccfem.workbench.guard import escaped
-from ccfem.workbench.part_edits import appended, edited, patch_of, valued, written
 from ccfem.workbench.tab import Field, Tabbed
 
-_COUNT = 12
-"""Layers that a part has which says nothing of them."""
 _STANDARD, _WRITTEN = "standard", "as the part file has it"
-_DIRECTIONS = ("z", "-z", "x", "-x", "y", "-y")
 _SPARSE = ("density", "skins", "fibre_skins")
 """What a solid part has nothing of."""
 
 
 @dataclass(frozen=True)
-class Setting:
-    """A value of the part file, and the field that shows it.
+class Row:
+    """A row of the panel for a value of the part file.
 
     Attributes
     ----------
     keys : tuple of str
-        Where it stands: a key, or a table and its key.
-    field : Field
+        Where the value stands: a key, or a table and its key.
+    label : str
     default
-        What is so where it does not stand there.
+        What is so where it does not stand there; its type is that of the field.
+    options : tuple of str
+        What can be chosen.
+    step, least : float
+        Of a number.
+    hint : str
     read : callable
         From the part file's value to that of the field; None where the field cannot show it.
+    write : callable
+        From the field's value to that of the part file.
+    always : bool
+        Whether the row is there where the part file has no such value.
     """
 
     keys: tuple[str, ...]
-    field: Field
+    label: str
     default: Any
-    read: Callable[[Any], Any]
+    options: tuple[str, ...] = ()
+    step: float = 1.0
+    least: float | None = 0.0
+    hint: str = ""
+    read: Callable[[Any], Any] | None = None
+    write: Callable[[Any], Any] = lambda value: value
+    always: bool = True
+
+    def add(self, gui: Any) -> Any:
+        """Add the row to the panel; returns the handle of viser."""
+        if self.options:
+            return gui.add_dropdown(self.label, self.options, initial_value=self.default)
+        if isinstance(self.default, str):
+            return gui.add_text(self.label, self.default, hint=self.hint)
+        if isinstance(self.default, tuple):
+            return gui.add_vector2(self.label, self.default, step=self.step)
+        bounds = {"min": self.least, "step": self.step, "hint": self.hint or None}
+        return gui.add_number(self.label, self.default, **bounds)
+
+    def shown(self, value: Any) -> Any:
+        """Value of the field for that of the part file; None where the field cannot show it."""
+        if self.read is not None:
+            return self.read(value)
+        if self.options:
+            other = _WRITTEN if _WRITTEN in self.options else None
+            return value if value in self.options else other
+        if isinstance(self.default, tuple):
+            numbers = isinstance(value, list) and all(isinstance(x, int | float) for x in value)
+            return tuple(map(float, value)) if numbers and len(value) == 2 else None
+        kind = type(self.default)
+        return kind(value) if isinstance(value, int | float) and kind(value) == value else None
+
+
+def _rows() -> dict[str, tuple[Row, ...]]:
+    """Rows of the panel by the folder that they stand in; one without a name is always open."""
+    edge = "Edge of cells, mm"
+    number = "Their number, as 4, or how many along X and Y, as 2x3."
+    around = "Counter-clockwise."
+    return {
+        "": (
+            Row(("machine", "profile"), "Machine", _STANDARD,
+                (_STANDARD, *machine_names(), _WRITTEN)),
+            Row(("material",), "Material", _WRITTEN, (*material_names(), _WRITTEN)),
+            Row(("build",), "Build direction", "z", ("z", "-z", "x", "-x", "y", "-y", _WRITTEN)),
+            Row(("layers",), "Layers of fibre", 12, least=1),
+            Row(("edge_length",), edge, 2.0, step=0.1, least=0.01, always=False),
+            Row(("planform", "edge_length"), edge, 2.0, step=0.1, least=0.01, always=False),
+        ),
+        "Plastic": tuple(map(_plastic_row, fields(Plastic))),
+        "On the bed": (
+            Row(("bed", "turn"), "Turn about z, °", 0.0, step=15.0, least=None, hint=around,
+                read=_turn_of, write=lambda angle: f"z={angle:.12g}"),
+            Row(("bed", "centre"), "Centre, mm", _middle_of_bed(Machine()), write=list),
+            Row(("bed", "copies"), "Copies", "1", hint=number,
+                read=lambda given: str(given) if isinstance(given, int | str) else None,
+                write=lambda text: int(text) if text.isdecimal() else text),
+        ),
+    }  # fmt: skip
+
+
+def _plastic_row(field: Any) -> Row:
+    value, label = field.default, field.name.replace("_", " ").capitalize()
+    options = get_args(get_type_hints(Plastic)[field.name]) if isinstance(value, str) else ()
+    step = 0.05 if isinstance(value, float) else 1.0
+    return Row(("plastic", field.name), label, value, options, step)
 
 
 class PrintTab:
@@ -49,83 +121,47 @@ class PrintTab:
 
     def __init__(self, page: Tabbed) -> None:
         self.page, gui = page, page.server.gui
-        self.settings: dict[str, Setting] = {}
-        machines, materials = (_STANDARD, *machine_names(), _WRITTEN), material_names()
-        self._choice("Machine", machines, ("machine", "profile"))
+        self.fields: dict[Row, Field] = {}
+        rows = _rows()
+        self._add(rows.pop(""))
         self._about = gui.add_html("")
-        self._choice("Material", (*materials, _WRITTEN), ("material",), _WRITTEN)
-        self._choice("Build direction", (*_DIRECTIONS, _WRITTEN), ("build",))
         down = gui.add_button("Chosen face on the bed", hint="Or drag the arrow at the bed.")
         down.on_click(page.on(self._lay_on_face))
-        layers = gui.add_number("Layers of fibre", _COUNT, min=1, step=1)
-        self._setting(layers, ("layers",), write=self._layers)
-        cells = gui.add_number("Edge of cells, mm", 2.0, min=0.01, step=0.1)
-        self.cells = Field(page, cells, self._cells)
         with gui.add_folder("Fibre in regions alone", expand_by_default=False):
             self.within = Field(page, gui.add_number("Within, mm", 6.0, min=0.1, step=0.5))
             near = gui.add_button_group("Fibre", ["Near faces", "In a box", "Everywhere"])
             near.on_click(page.on_value(self._regions))
         self._fibre_said = gui.add_html("")
-        with gui.add_folder("Plastic", expand_by_default=False):
-            self._add_plastic()
-        with gui.add_folder("On the bed", expand_by_default=False):
-            turn = gui.add_number("Turn about z, °", 0.0, step=15.0, hint="Counter-clockwise.")
-            self._setting(turn, ("bed", "turn"), _turn_of, lambda angle: f"z={angle:.12g}")
-            middle = gui.add_vector2("Centre, mm", Machine().gcode.bed[:2], step=1.0)
-            self._setting(middle, ("bed", "centre"), _pair_of, list)
-            hint = "Their number, as 4, or how many along X and Y, as 2x3."
-            copies = gui.add_text("Copies", "1", hint=hint)
-            self._setting(
-                copies,
-                ("bed", "copies"),
-                lambda given: str(given) if isinstance(given, int | str) else None,
-                lambda text: int(text) if text.isdecimal() else text,
-            )
+        for title, those in rows.items():
+            with gui.add_folder(title, expand_by_default=False):
+                self._add(those)
         self._said = gui.add_html("")
 
-    def _add_plastic(self) -> None:
-        gui, hints = self.page.server.gui, get_type_hints(Plastic)
-        for field in fields(Plastic):
-            key, value = field.name, field.default
-            label = key.replace("_", " ").capitalize()
-            if isinstance(value, str):
-                self._choice(label, get_args(hints[key]), ("plastic", key), value)
-            else:
-                step = 0.05 if isinstance(value, float) else 1
-                self._setting(gui.add_number(label, value, min=0, step=step), ("plastic", key))
+    def _add(self, rows: tuple[Row, ...]) -> None:
+        for row in rows:
+            handle, change = row.add(self.page.server.gui), partial(self._change, row)
+            self.fields[row] = Field(self.page, handle, change)
 
-    # From field to part file, and back.
+    def field(self, *keys: str) -> Field:
+        """Field of a value of the part file."""
+        return next(field for row, field in self.fields.items() if row.keys == keys)
 
-    def _choice(
-        self,
-        label: str,
-        options: tuple[str, ...],
-        keys: tuple[str, ...],
-        default: str = "",
-    ) -> None:
-        handle = self.page.server.gui.add_dropdown(
-            label, options, initial_value=default or options[0]
-        )
-        other = _WRITTEN if _WRITTEN in options else None
-        self._setting(handle, keys, lambda value: value if value in options else other)
+    def _change(self, row: Row, value: Any) -> None:
+        if value == _WRITTEN:
+            raise InputError(f"the part file has a {row.keys[-1]} of the list: choose another")
+        other = [key for key in ("heights", "slicing") if key in self.page.bench.content]
+        if row.keys == ("layers",) and other:
+            raise InputError(
+                f"the part file gives its layers by {other[0]}: change it there, or take it out"
+            )
+        usual = len(row.keys) > 1 and row.always and value == self._default(row)
+        self.page.edit(valued(row.keys, None if usual else row.write(value)), row.label)
 
-    def _setting(
-        self,
-        handle: Any,
-        keys: tuple[str, ...],
-        read: Callable[[Any], Any] | None = None,
-        write: Callable[[Any], Any] = lambda value: value,
-    ) -> None:
-        default, name = handle.value, keys[-1]
-
-        def change(value: Any) -> None:
-            if value == _WRITTEN:
-                raise InputError(f"the part file has a {name} of the list: choose another")
-            usual = len(keys) > 1 and value == self.settings[name].default
-            self.page.edit(valued(keys, None if usual else write(value)), handle.label)
-
-        field = Field(self.page, handle, change)
-        self.settings[name] = Setting(keys, field, default, read or _like(default))
+    def _default(self, row: Row) -> Any:
+        """Return what is so without the value; the place is the middle of the machine's bed."""
+        if row.keys != ("bed", "centre") or self.page.checked is None:
+            return row.default
+        return _middle_of_bed(self.page.checked.case.machine)
 
     def _lay_on_face(self) -> None:
         faces = [self.page.bench.listing.face(number) for number in self.page.chosen]
@@ -135,24 +171,9 @@ class PrintTab:
 
     def lay(self, up: FloatArray) -> None:
         """Have the part built along a direction."""
-        if not self.settings["turn"].field.handle.visible:
+        if not self.field("bed", "turn").handle.visible:
             raise InputError("the part file turns the part about x or y: take bed.turn out there")
-        self.page.edit(valued(("build",), written(up)))
-
-    def _layers(self, count: int) -> int:
-        other = [key for key in ("heights", "slicing") if key in self.page.bench.content]
-        if other:
-            raise InputError(
-                f"the part file gives its layers by {other[0]}: change it there, or take it out"
-            )
-        return count
-
-    def _cells(self, length: float) -> None:
-        content = self.page.bench.content
-        outer = ("planform",) if "planform" in content else ()
-        if not outer and "surface" not in content:
-            raise InputError("the part has the cells of its mesh file: only a body can be meshed")
-        self.page.edit(valued((*outer, "edge_length"), length), "cells")
+        self.page.edit(valued(("build",), direction_value(up)))
 
     def _regions(self, where: str) -> None:
         page, text = self.page, self.page.bench.text
@@ -171,39 +192,34 @@ class PrintTab:
 
     def show(self) -> None:
         """Show what the part file says; what no field can show is named."""
-        page, content = self.page, self.page.bench.content
-        machine = page.checked.case.machine if page.checked is not None else Machine()
-        middle = tuple(0.5 * size for size in machine.gcode.bed[:2])
-        self.settings["centre"] = replace(self.settings["centre"], default=middle)
-        hidden = [text for text in map(self._show, self.settings.values()) if text]
+        hidden = "; ".join(filter(None, (self._show(row) for row in self.fields)))
+        solid = self.field("plastic", "infill").value == "solid"
         for key in _SPARSE:
-            field = self.settings[key].field.handle
-            field.visible = field.visible and self.settings["infill"].field.value != "solid"
-        profile = self.settings["profile"].field.value
+            self.field("plastic", key).handle.visible &= not solid
+        profile = self.field("machine", "profile").value
         about = machine_about(profile) if profile in machine_names() else ""
-        self._about.content = f'<p class="ccfem small">{escaped(about)}</p>'
-        planform = content.get("planform")
-        edge = (planform if isinstance(planform, Mapping) else content).get("edge_length")
-        self.cells.handle.visible = isinstance(edge, int | float)
-        if isinstance(edge, int | float):
-            self.cells.put(float(edge))
-        said = _fibre_lies(content.get("fibre"))
-        self._fibre_said.content = f'<p class="ccfem">{escaped(said)}</p>'
-        kept = "As the part file has it: " + "; ".join(hidden) if hidden else ""
-        self._said.content = f'<p class="ccfem">{escaped(kept)}</p>'
+        fibre = _fibre_lies(self.page.bench.content.get("fibre"))
+        kept = f"As the part file has it: {hidden}" if hidden else ""
+        for handle, said in ((self._about, about), (self._fibre_said, fibre), (self._said, kept)):
+            handle.content = f'<p class="ccfem">{escaped(said)}</p>' if said else ""
 
-    def _show(self, setting: Setting) -> str:
-        """Show one setting; what it is, in words, where its field cannot."""
+    def _show(self, row: Row) -> str:
+        """Show one value; what it is, in words, where its field cannot."""
         table: Any = self.page.bench.content
-        for key in setting.keys[:-1]:
+        for key in row.keys[:-1]:
             table = table.get(key, {})
-        value = table.get(setting.keys[-1]) if isinstance(table, Mapping) else None
-        shown = setting.default if value is None else setting.read(value)
-        setting.field.handle.visible = shown is not None
+        value = table.get(row.keys[-1]) if isinstance(table, Mapping) else None
+        shown = self._default(row) if value is None else row.shown(value)
+        field = self.fields[row]
+        field.handle.visible = shown is not None and (row.always or value is not None)
         if shown is None:
-            return f"{'.'.join(setting.keys)} = {value}"
-        setting.field.put(shown)
+            return f"{'.'.join(row.keys)} = {value}"
+        field.put(shown)
         return ""
+
+
+def _middle_of_bed(machine: Machine) -> tuple[float, ...]:
+    return tuple(0.5 * size for size in machine.gcode.bed[:2])
 
 
 def _fibre_lies(fibre: object) -> str:
@@ -218,18 +234,6 @@ def _fibre_lies(fibre: object) -> str:
     if not all(words) or not words:
         return "Fibre lies where the part file says."
     return f"Fibre lies {' and '.join(words)}."
-
-
-def _like(default: float) -> Callable[[object], float | None]:
-    """Read a number of a kind, whole or not; None for anything else."""
-    kind = type(default)
-    return lambda x: kind(x) if isinstance(x, int | float) and kind(x) == x else None
-
-
-def _pair_of(value: object) -> tuple[float, ...] | None:
-    if isinstance(value, list) and [isinstance(x, int | float) for x in value] == [True, True]:
-        return float(value[0]), float(value[1])
-    return None
 
 
 def _turn_of(value: object) -> float | None:

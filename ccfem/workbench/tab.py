@@ -1,56 +1,112 @@
-"""What the tabs of the page share: what they ask of it, and how they show a table."""
+"""What the tabs of the page share: what they ask of it, its fields, and how things are drawn."""
 
-from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 
 from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.errors import InputError, SolveError
 from ccfem.cases.inspection import Check
+from ccfem.cases.part_editing import Change
 from ccfem.workbench.bench import Bench
 from ccfem.workbench.guard import escaped, send_again
-from ccfem.workbench.part_edits import Change
 
 PART, STRESS, MOVED, FIBRE, PRINT = VIEWS = ("Part", "Stress", "Deformed", "Fibre", "Print")
 """What the page shows in space: the part to be set up, or what the last run says of it."""
 
 
-class Tabbed(Protocol):
-    """The page, as its tabs see it."""
+class Tabbed:
+    """The page, as its tabs see it: it does one thing after the other, and says what goes wrong.
 
-    bench: Bench
+    Attributes
+    ----------
+    bench : Bench
+    server : viser.ViserServer
+    view : handle of viser
+        Which of `VIEWS` is shown.
+    message : handle of viser
+        A line at the top.
+    chosen : list of int
+        Numbers of the faces that are chosen.
+    checked : Check, optional
+        What the newest check knows of the part.
+    fields : list of Field
+    """
+
     server: Any
     view: Any
-    chosen: list[int]
-    checked: Check | None
-    fields: list["Field"]
+    message: Any
 
-    def act(self, what: Callable[..., None], *arguments: Any) -> Any:
-        """Do something when all before it is done."""
+    def __init__(self, bench: Bench) -> None:
+        self.bench, self.chosen = bench, list[int]()
+        self.checked: Check | None = None
+        self.fields: list[Field] = []
+        self._acts = ThreadPoolExecutor(1, "page")
+
+    def act(self, what: Callable[..., None], *arguments: Any) -> "Future[None]":
+        """Do something when all before it is done; what goes wrong is said on the page."""
+        try:
+            return self._acts.submit(self._safely, what, *arguments)
+        except RuntimeError:  # the page is closed, or the program ends
+            ended: Future[None] = Future()
+            ended.cancel()
+            return ended
+
+    def _safely(self, what: Callable[..., None], *arguments: Any) -> None:
+        try:
+            with self.server.atomic():
+                what(*arguments)
+        except (InputError, SolveError, OSError) as error:
+            self.say(str(error))
+        except Exception as error:  # one act's fault ends no other
+            self.say(f"{type(error).__name__}: {error}")
 
     def on(self, what: Callable[..., None], *arguments: Any) -> Callable[[Any], Any]:
-        """Return a callback of viser that does something."""
+        """Return a callback of viser that does something; it is not called for values set here."""
+
+        async def heed(event: Any) -> None:
+            if event.client_id is not None:
+                self.act(what, *arguments)
+
+        return heed
 
     def on_value(self, what: Callable[..., None], *arguments: Any) -> Callable[[Any], Any]:
-        """Return a callback of viser that does something with what was clicked or uploaded."""
+        """Return a callback as `on` does, that passes on what was clicked or uploaded."""
+
+        async def heed(event: Any) -> None:
+            if event.client_id is not None:
+                self.act(what, *arguments, event.target.value)
+
+        return heed
 
     def say(self, text: str) -> None:
-        """Show a line at the top."""
+        """Show a line at the top; an empty one takes it away."""
+        self.message.content = f'<p class="ccfem message" role="alert">{escaped(text)}</p>'
+        self.message.visible = bool(text)
 
     def edit(self, change: Change | str, field: str = "") -> None:
         """Change the part file, and show it."""
+        self.bench.edit(change, field)
+        self.say("")
+        self.show()
+
+    def show(self) -> None:
+        """Show what the part file says."""
+        raise NotImplementedError
+
+    def paint(self) -> None:
+        """Colour the faces by what acts on them, and those that are chosen."""
+        raise NotImplementedError
 
     def open(self, what: str) -> None:
-        """Open a part."""
-
-    def choose(self, number: int, more: bool) -> None:
-        """Choose a face."""
-
-    def choose_all(self, numbers: Sequence[int]) -> None:
-        """Choose these faces."""
+        """Open a part, and look at it."""
+        raise NotImplementedError
 
     def show_view(self, view: str) -> None:
-        """Show one of `VIEWS`."""
+        """Show the part to be set up, or what the last run says of it: one of `VIEWS`."""
+        raise NotImplementedError
 
 
 _DIGITS = 6
@@ -172,20 +228,3 @@ def draw_lines(
     """Draw straight pieces (s, 2, 3), mm, some pixels wide or, by unit "world", some mm."""
     where = ends.astype(np.float32)
     return scene.add_line_segments(name, where, colour, thickness=width, thickness_units=unit)
-
-
-def table_html(heads: Sequence[str], rows: Sequence[Sequence[str]], marked: str = "") -> str:
-    """HTML of a table whose first column names the rows; all texts are escaped.
-
-    Parameters
-    ----------
-    marked : str
-        Name of the row that is marked.
-    """
-    head = "".join(f'<th scope="col">{escaped(title)}</th>' for title in heads)
-    body = ""
-    for name, *cells in rows:
-        row = "".join(f"<td>{escaped(cell)}</td>" for cell in cells)
-        kind = ' class="best"' if name == marked else ""
-        body += f'<tr{kind}><th scope="row">{escaped(name)}</th>{row}</tr>'
-    return f'<div class="ccfem wide" tabindex="0"><table><tr>{head}</tr>{body}</table></div>'

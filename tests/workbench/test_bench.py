@@ -8,9 +8,9 @@ import pytest
 from ccfem.base.errors import InputError
 from ccfem.body.files import write_mesh
 from ccfem.body.mesh.box import box_mesh
+from ccfem.cases.part_editing import appended, edited, patch_of, valued
 from ccfem.cases.part_file import read_part
-from ccfem.workbench.bench import Bench
-from ccfem.workbench.part_edits import appended, edited, patch_of, valued
+from ccfem.workbench.bench import Bench, History, check_files
 
 BY_HAND = """\
 # A bar, by hand.
@@ -120,7 +120,7 @@ def test_a_case_opens_with_its_mesh(tmp_path):
         ("empty.stl", "empty.stl"),
         ("text.step", "text.step"),
         ("far.toml", "lies outside"),
-        ("bad.toml", "not TOML"),
+        ("bad.toml", "is not a TOML file"),
     ],
 )
 def test_what_cannot_be_opened_is_one_line_and_changes_nothing(bench, what, said):
@@ -159,3 +159,25 @@ def test_an_edit_that_would_read_elsewhere_is_said(bench):
         "mistake",
         f"/etc/x.vtu lies outside {bench.folder}: start ccfem open in a folder that holds it",
     )
+
+
+def test_undo_and_redo_are_other_texts():
+    history = History(("a",)).after("b").after("c", "force").after("d", "force")
+    assert history.texts == ("a", "b", "d")  # a number that is typed is one step
+    assert history.moved(-1).text == "b"
+    assert history.moved(-9).text == "a"
+    assert history.moved(-1).moved(1).text == "d"
+    assert history.moved(-2).after("e").texts == ("a", "e")
+    assert history.moved(-1).after("f", "force").texts == ("a", "b", "f")
+    assert history.after("d") is history
+
+
+def test_files_outside_the_folder_are_refused(tmp_path):
+    for name in ("../bar.vtu", "/etc/bar.vtu", "a/../../bar.vtu"):
+        text = BY_HAND.replace("bar.vtu", name)
+        with pytest.raises(InputError, match=r"lies outside .*: start ccfem open in a folder"):
+            check_files(text, tmp_path, [tmp_path])
+    (tmp_path / "link.vtu").symlink_to("/etc/passwd")
+    with pytest.raises(InputError, match="lies outside"):
+        check_files(BY_HAND.replace("bar.vtu", "link.vtu"), tmp_path, [tmp_path])
+    check_files(BY_HAND, tmp_path, [tmp_path])

@@ -9,7 +9,6 @@ from ccfem.body.meshing import extrude
 from ccfem.workbench.body_scene import (
     PatchPlace,
     across,
-    arrow,
     bed_under,
     borders,
     box_edges,
@@ -59,24 +58,6 @@ def square(height, normal):
         [[[0, 0, 0], [2, 0, 0], [2, 2, 0]], [[0, 0, 0], [2, 2, 0], [0, 2, 0]]], float
     )
     return PatchPlace((corners if normal > 0 else corners[:, ::-1]) + [0, 0, height])
-
-
-def test_arrows_stand_outside_the_part():
-    top = square(5.0, 1.0)
-    np.testing.assert_allclose(top.centre, [1, 1, 5])
-    np.testing.assert_allclose(top.normal, [0, 0, 1])
-    slab = np.concatenate([top.corners, square(2.0, -1.0).corners])
-    ends, presses = arrow(top, np.array([0, 0, 7.0]), 3.0, slab)
-    np.testing.assert_allclose(ends, [[1, 1, 5], [1, 1, 8]])
-    assert not presses
-    ends, presses = arrow(top, np.array([0, 0, -7.0]), 3.0, slab)
-    np.testing.assert_allclose(ends, [[1, 1, 8], [1, 1, 5]])
-    assert presses
-    below = square(2.0, -1.0)  # and out of the other side, where the patch does not face it
-    wall = PatchPlace(np.concatenate([below.corners, below.corners[:, ::-1]]))
-    ends, presses = arrow(wall, np.array([0.01, 0, 7.0]), 3.0, slab)
-    np.testing.assert_allclose(ends[0], [1, 1, 5], atol=0.01)
-    assert not presses
 
 
 def test_cones_touch_the_surface_with_their_tips():

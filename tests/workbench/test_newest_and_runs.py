@@ -103,11 +103,11 @@ def test_no_module_in_the_folder_of_a_run_is_executed(tmp_path):
 @pytest.mark.parametrize(
     ("state", "complaint"),
     [
-        (RunState(""), ""),
-        (RunState("", code=0), ""),
-        (RunState("", code=3), ""),
-        (RunState("", code=2, lines=("a", "ccfem: error: no load")), "no load"),
-        (RunState("", code=-9, lines=("a",)), "the run ended with exit code -9: a"),
+        (RunState(), ""),
+        (RunState(code=0), ""),
+        (RunState(code=3), ""),
+        (RunState(code=2, lines=("a", "ccfem: error: no load")), "no load"),
+        (RunState(code=-9, lines=("a",)), "the run ended with exit code -9: a"),
     ],
 )
 def test_the_end_of_a_run_is_one_line(state, complaint):

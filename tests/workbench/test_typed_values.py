@@ -141,27 +141,27 @@ def row(page, title):
 
 def test_a_typed_force_survives_what_is_shown_before_it_is_added(page, visit):
     loads = page.loads
-    page.act(page.choose, face(page, "x"), False).result()
+    page.act(page.loads.choose, face(page, "x"), False).result()
     assert loads.vector.value == (100.0, 0.0, 0.0)
     visit.type(loads.vector, 200.0, 0)
-    visit.type(page.prints.settings["layers"].field, 3)
-    page.act(page.choose, face(page, "y"), True)
-    page.act(page.choose, face(page, "y"), True)
+    visit.type(page.prints.field("layers"), 3)
+    page.act(page.loads.choose, face(page, "y"), True)
+    page.act(page.loads.choose, face(page, "y"), True)
     visit.settle()
     visit.type(loads.case, "more")
     visit.click("Add load")
     visit.settle()
     assert vectors(page, "more") == [[200.0, 0.0, 0.0]]
-    page.act(page.choose, face(page, "z"), False).result()
+    page.act(page.loads.choose, face(page, "z"), False).result()
     assert loads.vector.value == (0.0, 0.0, 100.0)  # of the next load, proposed again
 
 
 def test_a_force_typed_before_the_choice_was_seen_is_joined_with_its_direction(page, visit):
     visit.type(page.loads.vector, 0.0, 0)
-    page.act(page.choose, face(page, "z"), False).result()
+    page.act(page.loads.choose, face(page, "z"), False).result()
     page.loads.vector.typed = False
     with visit.busy():
-        page.act(page.choose, face(page, "x"), False)
+        page.act(page.loads.choose, face(page, "x"), False)
         for size in (2.0, 20.0, 200.0):
             visit.type(page.loads.vector, size, 0)
         visit.type(page.loads.case, "early")
@@ -217,7 +217,7 @@ def test_rows_are_known_whatever_comes_and_goes(page, visit):
 
 
 def test_a_value_that_is_refused_or_undone_is_shown_no_more(page, visit):
-    layers = page.prints.settings["layers"].field
+    layers = page.prints.field("layers")
     visit.type(layers, 5)
     visit.settle()
     page.act(page.step, -1).result()
@@ -242,7 +242,7 @@ copies = "2x3"
 """
     page.act(page.bench.edit, HELD + by_hand).result()
     page.act(page.show).result()
-    fields = {name: setting.field for name, setting in page.prints.settings.items()}
+    fields = {row.keys[-1]: field for row, field in page.prints.fields.items()}
     assert not fields["walls"].handle.visible
     assert not fields["turn"].handle.visible
     assert "plastic.walls = 2.5; bed.turn = " in page.prints._said.content
@@ -274,7 +274,7 @@ copies = "2x3"
 
 
 def test_a_turn_leaves_no_empty_table(page, visit):
-    turn = page.prints.settings["turn"].field
+    turn = page.prints.field("bed", "turn")
     visit.type(turn, 37.5)
     visit.settle()
     assert page.bench.content["bed"] == {"turn": "z=37.5"}
@@ -288,11 +288,11 @@ def test_a_face_that_is_clicked_lies_on_the_bed(page, visit):
     visit.click("Chosen face on the bed")
     visit.settle()
     assert "choose one plane face" in page.message.content
-    page.act(page.choose, face(page, "y"), False).result()
+    page.act(page.loads.choose, face(page, "y"), False).result()
     visit.click("Chosen face on the bed")
     visit.settle()
     assert page.bench.content["build"] == "-y"
-    assert page.prints.settings["build"].field.value == "-y"
+    assert page.prints.field("build").value == "-y"
     page.act(page.prints.lay, np.array([0.6, 0.0, 0.8])).result()
     assert page.bench.content["build"] == [0.6, 0.0, 0.8]
     page.act(page.bench.edit, HELD + '[bed]\nturn = "x=90"').result()

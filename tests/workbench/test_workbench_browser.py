@@ -15,8 +15,8 @@ from clicking import View, pixel
 
 from ccfem.body.files.surface import write_stl
 from ccfem.body.mesh.box import box_mesh
+from ccfem.cases.part_editing import valued
 from ccfem.workbench.bench import Bench
-from ccfem.workbench.part_edits import valued
 
 EVIL = "<img src=http://127.0.0.1:9/x onerror='window.broken=1'>"
 BY_HAND = f"""\

@@ -1,6 +1,8 @@
 """Part files to start from: one for a body, and examples."""
 
+import json
 import os
+import re
 from collections.abc import Iterable, Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -13,13 +15,12 @@ from ccfem.base.errors import InputError
 from ccfem.base.whole import existing_file, whole_file
 from ccfem.body.files.surface import is_surface
 from ccfem.body.mesh.face_places import BodyFaces
-from ccfem.body.mesh.smooth_faces import Face, direction_text, place_text
+from ccfem.body.mesh.smooth_faces import Face, place_text
 from ccfem.body.meshing.cad import is_cad
 from ccfem.cases.inspection.body_faces import faces as faces_of
+from ccfem.cases.inspection.face_choice import coplanar, face_rule
 from ccfem.cases.reading import is_analysis, read
 
-_PARALLEL = np.cos(np.radians(5.0))
-"""Cosine of the angle up to which planes face the same way."""
 _LISTED = 40
 """Faces that are listed in a new part file."""
 _MOST_HELD = 0.5
@@ -88,7 +89,7 @@ def new_part(
 def _of_deck(deck: Path, cases: Iterable[str]) -> str:
     """Text of the part file of a deck with its analysis."""
     return f'''# A part file for {deck}, whose supports, loads and materials are taken over.
-mesh = "{str(deck).replace(chr(92), "/")}"
+mesh = "{_plain(deck)}"
 analysis = "deck"            # its load cases: {", ".join(cases)}
 build = "z"                  # CHANGE: direction of printing
 layers = 12                  # CHANGE: layers of fibre
@@ -112,7 +113,7 @@ def _ends(listing: BodyFaces, edge: float) -> tuple[list[str], list[str], list[f
     """Rules of what is held and what is pulled, and the force, N: see `new_part`."""
     faces = listing.faces
     held = max(range(len(faces)), key=lambda k: (_faces_down(faces[k]), faces[k].area))
-    feet = _beside(faces, held, 1e-3 * listing.size)
+    feet = [listing.numbers.index(number) for number in coplanar(listing, listing.numbers[held])]
     areas = [max(faces[k].area, 1e-300) for k in feet]
     if sum(areas) > _MOST_HELD * sum(face.area for face in faces):
         height = listing.points[listing.triangles][..., 2]
@@ -134,24 +135,6 @@ def _ends(listing: BodyFaces, edge: float) -> tuple[list[str], list[str], list[f
     return _rule(listing, feet), _rule(listing, [pulled]), pull.tolist()
 
 
-def _beside(faces: Sequence[Face], held: int, reach: float) -> list[int]:
-    """Planes beside the one that is held, no farther above or below than `reach`, mm, and itself.
-
-    They face the same way, so that one normal says where all of them are.
-    """
-    foot = faces[held]
-    return [
-        k
-        for k, face in enumerate(faces)
-        if k == held
-        or (
-            foot.kind == face.kind == "plane"
-            and face.direction @ foot.direction > _PARALLEL
-            and abs((face.centre - foot.centre) @ foot.direction) <= reach
-        )
-    ]
-
-
 def _faces_down(face: Face) -> bool:
     return face.kind == "plane" and bool(face.direction[2] < -0.9)
 
@@ -159,6 +142,29 @@ def _faces_down(face: Face) -> bool:
 def _refuse_present(out: Path, force: bool) -> None:
     if os.path.lexists(out) and not force:
         raise InputError(f"{out} is there already: name another file (--out), or --force")
+
+
+def empty_part(body: Path, listing: BodyFaces) -> str:
+    """Text of a part file for a body on which nothing is held and nothing loaded yet."""
+    edge = usual_edge_length(listing) if is_surface(body) or is_cad(body) else None
+    head = "# Made with ccfem open. Lengths in mm, forces in N, stresses in MPa."
+    lines = [head, "", *_body_lines(body, edge, listing.doubt), 'material = "pla"', ""]
+    return "\n".join(lines)
+
+
+def _plain(path: Path) -> str:
+    return str(path).replace("\\", "/")
+
+
+def _body_lines(body: Path, edge: float | None, doubt: str) -> list[str]:
+    """Lines of a part file that say what its body is."""
+    name = json.dumps(_plain(body), ensure_ascii=False)
+    lines = [f"mesh = {name}"]
+    if edge is not None:
+        lines = [f"surface = {name}", f"edge_length = {edge:.3g}           # mm; of the cells"]
+    if doubt:
+        lines.append(f"scale = 1000                 # CHANGE: {doubt.partition(': scale')[0]}")
+    return lines
 
 
 def _text(
@@ -171,12 +177,7 @@ def _text(
     doubt: str,
 ) -> str:
     """Text of the part file."""
-    path = str(body).replace("\\", "/")
-    given = [f'mesh = "{path}"']
-    if edge is not None:
-        given = [f'surface = "{path}"', f"edge_length = {edge:.3g}           # mm; of the cells"]
-    if doubt:
-        given.append(f"scale = 1000                 # CHANGE: {doubt.partition(': scale')[0]}")
+    path = _plain(body)
     listed = [
         f"#   {number:>3}  at {place_text(listing.point_on(face))}, {face.shape}"
         + (f"  ({listing.names[k]})" if any(listing.names) else "")
@@ -189,7 +190,7 @@ def _text(
     return template.substitute(
         path=path,
         name="".join(c if c.isalnum() or c in "-_" else "_" for c in body.stem),
-        body="\n".join(given),
+        body="\n".join(_body_lines(body, edge, doubt)),
         faces="\n".join(listed),
         held="\n".join(held),
         pulled="\n".join(pulled),
@@ -198,21 +199,17 @@ def _text(
 
 
 def _rule(listing: BodyFaces, chosen: Sequence[int]) -> list[str]:
-    """Lines of the rule for faces of one kind, by their places."""
+    """Lines of the rule for faces, by their places."""
     numbers = [listing.numbers[k] for k in chosen]
-    places = [listing.place(number) for number in numbers]
-    points = [place_text(np.array(place["at"])) for place in places]
-    at = points[0] if len(points) == 1 else f"[{', '.join(points)}]"
     named = f"face{'s' if len(numbers) > 1 else ''} {', '.join(map(str, numbers))}"
-    lines = ['rule = "face"', f"at = {at}   # on {named} of the list above"]
-    for key in ("normal", "axis"):
-        if key in places[0]:
-            direction = direction_text(places[0][key])
-            lines.append(f"{key} = " + (direction if "[" in direction else f'"{direction}"'))
-    return [
-        *lines,
-        *(f"radius = {place['radius']:.5g}" for place in places[:1] if "radius" in place),
-    ]
+    lines = [f"{key} = {_toml(value)}" for key, value in face_rule(listing, numbers).items()]
+    lines[1] += f"   # on {named} of the list above"
+    return lines
+
+
+def _toml(value: object) -> str:
+    """Text of a value in TOML: whole numbers without a point."""
+    return re.sub(r"\.0(?=[,\]]|$)", "", json.dumps(value))
 
 
 def examples() -> dict[str, str]:

@@ -217,13 +217,18 @@ class Check(Shown):
             lines.append("nothing keeps this part from being solved")
         return "\n".join(line.rstrip() for line in lines)
 
-    def __str__(self) -> str:
-        faults = {
-            "not printable": self.not_printable,
-            "cannot be planned": self.not_planned,
+    @property
+    def faults(self) -> dict[str, tuple[str, ...]]:
+        """What keeps the part from being solved, planned or printed, by kind, the worst first."""
+        return {
             "mistake": self.mistakes,
+            "cannot be planned": self.not_planned,
+            "not printable": self.not_printable,
         }
-        said = (f"{kind}: {line}" for kind, lines in faults.items() for line in lines)
+
+    def __str__(self) -> str:
+        worst_last = reversed(self.faults.items())
+        said = (f"{kind}: {line}" for kind, lines in worst_last for line in lines)
         return "\n".join([self.known, *said])
 
     def __repr__(self) -> str:

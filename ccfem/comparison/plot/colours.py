@@ -53,6 +53,12 @@ def palette(names: Iterable[str]) -> dict[str, str]:
     return colours
 
 
+def rgb(colour: str) -> tuple[int, int, int]:
+    """Red, green and blue, 0 to 255, of a colour "#rrggbb"."""
+    red, green, blue = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
+    return red, green, blue
+
+
 def scale(name: str) -> Any:
     """Colour map of matplotlib.
 

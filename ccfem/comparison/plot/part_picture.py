@@ -1,15 +1,17 @@
 """A part with its patches, loads and supports: a picture, and a page on which it turns."""
 
 import json
+from collections.abc import Sequence
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
 from ccfem.cases.inspection import Check
-from ccfem.comparison.plot.colours import SECTION
+from ccfem.comparison.plot.colours import SECTION, rgb
 from ccfem.comparison.plot.part_views import Arrow, Label, part_figure
+from ccfem.comparison.plot.symbols import arrow_outside, spread
 from ccfem.fem.elasticity.load_kinds import patches_of, points_of
 from ccfem.geometry.facets import are_among
 
@@ -90,18 +92,26 @@ def support_marks(checked: Check, case: str | None = None) -> FloatArray:
         for name in patches_of(support):
             facets = problem.mesh.patches.get(name, np.zeros((0, 3), dtype=np.int64))
             middles = problem.mesh.points[facets].mean(axis=1)
-            marks.append(_spread(middles[np.lexsort(np.round(middles, 6).T)], _MARKS))
+            middles = middles[np.lexsort(np.round(middles, 6).T)]
+            marks.append(middles[spread(middles, _MARKS)])
     return np.concatenate([np.zeros((0, 3)), *marks])
 
 
-def _spread(points: FloatArray, count: int) -> FloatArray:
-    """Up to `count` of some points (k, 3), each the farthest from those before it."""
-    chosen: list[int] = []
-    away = np.full(len(points), np.inf)
-    while len(chosen) < min(count, len(points)):
-        chosen.append(int(np.argmax(np.round(away, 6))))
-        away = np.minimum(away, np.linalg.norm(points - points[chosen[-1]], axis=1))
-    return points[chosen]
+def drawn_arrows(arrows: Sequence[Arrow], length: float, body: FloatArray) -> list[dict[str, Any]]:
+    """Arrows as pages draw them, outside of a part: ``ends``, tail and tip, and ``text`` at ``at``.
+
+    Parameters
+    ----------
+    length : float, mm
+    body : (t, 3, 3) array, mm
+        Corners of the triangles of the part.
+    """
+    drawn = []
+    for arrow in arrows:
+        ends, presses = arrow_outside(arrow.place, arrow.direction, length, body)
+        free = ends[0 if presses else 1]
+        drawn.append({"text": arrow.text, "ends": ends.tolist(), "at": free.tolist()})
+    return drawn
 
 
 def part_page(checked: Check) -> str:
@@ -112,25 +122,15 @@ def part_page(checked: Check) -> str:
     known = list(dict.fromkeys(colours))
     points = mesh.points[used]
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
-    arrows = load_arrows(checked)
     data = {
         "points": points.round(3).tolist(),
         "triangles": triangles.reshape(-1, 3).tolist(),
-        "colours": [[int(name[k : k + 2], 16) for k in (1, 3, 5)] for name in known],
+        "colours": [rgb(name) for name in known],
         "colour": [known.index(name) for name in colours],
         "labels": [[label.text, label.place.round(3).tolist()] for label in labels],
         "marks": support_marks(checked).round(3).tolist(),
         "lines": [line.round(3).tolist() for line in fibre_outlines(checked)],
-        "arrows": [
-            [
-                arrow.text,
-                (arrow.place - arrow.direction * size / 5.0 / np.linalg.norm(arrow.direction))
-                .round(3)
-                .tolist(),
-                np.round(arrow.place, 3).tolist(),
-            ]
-            for arrow in arrows
-        ],
+        "arrows": drawn_arrows(load_arrows(checked), size / 5.0, mesh.points[mesh.boundary[:, :3]]),
     }
     text = json.dumps(data, separators=(",", ":")).replace("</", "<\\/")
     return _PAGE.replace("@TITLE@", escape(checked.case.title)).replace("@DATA@", text)
@@ -171,11 +171,11 @@ pen.fillStyle="#fff";pen.strokeStyle="#1d2430";
 for(const m of data.marks){const [x,y]=at(m);pen.beginPath();pen.moveTo(x,y-5);
 pen.lineTo(x-5,y+4);pen.lineTo(x+5,y+4);pen.closePath();pen.fill();pen.stroke();}
 pen.font="14px sans-serif";pen.textAlign="center";
-for(const [word,from,to] of data.arrows){const a=at(from),b=at(to),
+for(const {text,ends,at:place} of data.arrows){const [a,b,c]=[...ends,place].map(at),
 w=Math.atan2(b[1]-a[1],b[0]-a[0]);pen.strokeStyle=pen.fillStyle="#b3261e";pen.lineWidth=3;
 pen.beginPath();pen.moveTo(a[0],a[1]);pen.lineTo(b[0],b[1]);pen.stroke();pen.lineWidth=1;
 pen.beginPath();pen.moveTo(b[0],b[1]);for(const e of [2.7,-2.7])
-pen.lineTo(b[0]+14*Math.cos(w+e),b[1]+14*Math.sin(w+e));pen.fill();pen.fillText(word,a[0],a[1]-6);}
+pen.lineTo(b[0]+14*Math.cos(w+e),b[1]+14*Math.sin(w+e));pen.fill();pen.fillText(text,c[0],c[1]-6);}
 pen.fillStyle="#1d2430";for(const [word,p] of data.labels){const [x,y]=at(p);
 pen.fillText(word,x,y);}}
 let held=null;

@@ -19,7 +19,7 @@ from ccfem.comparison.citations import bibtex, cited, methods_of, sentence
 from ccfem.comparison.headline import TEST_COLUMNS
 from ccfem.comparison.plot.breaking_curves import breaking_picture
 from ccfem.comparison.plot.colours import palette
-from ccfem.comparison.plot.part_picture import coloured, load_arrows, support_marks
+from ccfem.comparison.plot.part_picture import coloured, drawn_arrows, load_arrows, support_marks
 from ccfem.comparison.plot.values import image
 from ccfem.comparison.report.charts import curve_charts, fronts, spreads
 from ccfem.comparison.report.layer_view import layer_views
@@ -131,6 +131,8 @@ def report_html(
     charts: dict[str, Any] = {"curve": [], "fronts": [], "spreads": []}
     data: dict[str, Any] = {"part": None, "layers": {"stacks": []}, "charts": charts}
     data["print"] = {"runs": []}
+    headline = headline_table(comparison.ranking, comparison.wanted, several)
+    data["table"] = dataclasses.asdict(headline.first)
     with spared("view of the part", left_out):
         data["part"] = part_view(checked, comparison.stress)
     with spared("view of layers and paths", left_out):
@@ -151,7 +153,7 @@ def report_html(
         "patches": checked.patches,
         "loads": checked.loads,
         "verdicts": comparison.verdicts,
-        "headline": headline_table(comparison.ranking, comparison.wanted, several),
+        "headline": headline,
         "colours": colours,
         "left_out": left_out,
         "remarks": comparison.notes,
@@ -380,6 +382,7 @@ def part_view(checked: Check, stress: StressField) -> dict[str, Any]:
     same = np.array_equal(stress.mesh.points[: len(mesh.points)], mesh.points)
     moved = stress.displacement[used] if same else None
     kept, triangles, drawn = _coarser(points, triangles.reshape(-1, 3), shade, size)
+    corners = mesh.points[mesh.boundary[:, :3]]
     view = {
         "points": Rounded(points[kept], 1e-4 * size),
         "triangles": triangles,
@@ -388,10 +391,7 @@ def part_view(checked: Check, stress: StressField) -> dict[str, Any]:
         "size": size,
         "labels": [{"text": label.text, "at": label.place.tolist()} for label in labels],
         "supports": support_marks(checked, stress.case).tolist(),
-        "arrows": [
-            {"text": arrow.text, "at": arrow.place.tolist(), "along": _unit(arrow.direction)}
-            for arrow in load_arrows(checked, stress.case)
-        ],
+        "arrows": drawn_arrows(load_arrows(checked, stress.case), 0.25 * size, corners),
         "coarser": len(kept) < len(points),
     }
     if moved is not None:
@@ -406,10 +406,6 @@ def part_view(checked: Check, stress: StressField) -> dict[str, Any]:
         high = float(np.quantile(mises, _HIGH))
         view |= {"stress": as_bytes(mises[kept], high), "most_stress": high}
     return view
-
-
-def _unit(direction: FloatArray) -> list[float]:
-    return [float(x) for x in direction / max(float(np.linalg.norm(direction)), 1e-300)]
 
 
 def _round_scale(scale: float) -> float:

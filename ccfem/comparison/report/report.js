@@ -212,29 +212,24 @@ function partScene(part) {
   const view = byId("part-view"), [x, y, z] = part.points;
   const t = [0, 1, 2].map((c) => Array.from({ length: part.triangles.length / 3 }, (_, k) => part.triangles[3 * k + c]));
   const body = { type: "mesh3d", i: t[0], j: t[1], k: t[2], flatshading: true, hoverinfo: "skip", ...MATT };
-  const middle = part.points.map((values) => (Math.min(...values) + Math.max(...values)) / 2);
   let words = [];
   const facecolor = Array.from(part.colour, (k) => part.colours[k]);
   function setUp() {
-    const reach = part.size / 4, column = (points, c) => points.map((p) => p[c]);
-    const along = (a, times) => a.at.map((v, c) => v + times * reach * a.along[c]);
-    const off = (p) => Math.hypot(...p.map((v, c) => v - middle[c]));
-    // What pulls begins where it acts, what pushes ends there: the arrow is outside of the part.
-    const pulls = part.arrows.map((a) => off(along(a, 1)) >= off(along(a, -1)));
-    const tips = part.arrows.map((a, k) => along(a, pulls[k] ? 1 : 0)), tails = part.arrows.map((a, k) => along(a, pulls[k] ? 0 : -1));
-    words = part.labels.map((l) => ({ text: l.text, at: l.at }));
-    part.arrows.forEach((a, k) => words.push({ text: a.text, at: pulls[k] ? tips[k] : tails[k], colour: RED }));
+    const column = (points, c) => points.map((p) => p[c]), tips = part.arrows.map((a) => a.ends[1]);
+    const along = (c) => part.arrows.map(({ ends: [tail, tip] }) => (tip[c] - tail[c]) / (part.size / 4));
+    words = [...part.labels, ...part.arrows.map((a) => ({ ...a, colour: RED }))];
     const traces = [{ ...body, x, y, z, facecolor }];
     if (part.supports.length)
       traces.push({ type: "scatter3d", mode: "markers", name: "held", hovertemplate: "held<extra></extra>",
         x: column(part.supports, 0), y: column(part.supports, 1), z: column(part.supports, 2),
         marker: { symbol: "diamond", size: 5, color: "#fff", line: { color: INK, width: 2 } } });
-    part.arrows.forEach((a, k) => traces.push({ type: "scatter3d", mode: "lines", x: [tails[k][0], tips[k][0]],
-      y: [tails[k][1], tips[k][1]], z: [tails[k][2], tips[k][2]], line: { color: RED, width: 7 }, hoverinfo: "skip" }));
+    for (const { ends } of part.arrows)
+      traces.push({ type: "scatter3d", mode: "lines", x: column(ends, 0), y: column(ends, 1), z: column(ends, 2),
+        line: { color: RED, width: 7 }, hoverinfo: "skip" });
     if (part.arrows.length)
       traces.push({ type: "cone", anchor: "tip", sizemode: "absolute", sizeref: part.size / 28, showscale: false,
         colorscale: [[0, RED], [1, RED]], hoverinfo: "skip", x: column(tips, 0), y: column(tips, 1), z: column(tips, 2),
-        u: part.arrows.map((a) => a.along[0]), v: part.arrows.map((a) => a.along[1]), w: part.arrows.map((a) => a.along[2]) });
+        u: along(0), v: along(1), w: along(2) });
     byId("part-said").textContent = "Red: resultants of the loads; diamonds: what is held; coloured: patches that carry " +
       "loads or supports. Drag to turn, wheel or pinch to zoom." + (part.coarser ? " Drawn with fewer facets than the mesh has." : "");
     return traces;

@@ -9,6 +9,7 @@ import pytest
 from ccfem.comparison.report import print_view
 from ccfem.comparison.report.packing import pack, unpack
 from ccfem.comparison.report.print_view import KINDS, print_views
+from ccfem.comparison.report.reading import RunResults
 from ccfem.comparison.runs import Run
 from ccfem.machine import Machine
 from ccfem.paths.toolpaths import MATRIX, Toolpaths
@@ -16,7 +17,6 @@ from ccfem.printing.moves import LAY, TRAVEL
 from ccfem.printing.part_moves import part_moves
 from ccfem.printing.print_plan import PrintPlan
 from ccfem.strategies import Zigzag
-from ccfem.workbench.result_views import RunResults
 
 
 @pytest.fixture(scope="module")
@@ -66,9 +66,9 @@ def test_all_that_is_laid_and_travelled_is_drawn(run):
     assert sum(len(layer["points"].values) for layer in view["layers"]) < 0.4 * len(moves)
 
 
-def test_the_workbench_reads_the_same_lines_from_the_report(run):
+def test_the_same_lines_are_read_back_from_the_report(run):
     views = print_views([run])
-    results = RunResults(Path(), {}, {}, {}, unpack(pack(views)))
+    results = RunResults(Path(), {}, unpack(pack({"print": views})))
     layers = results.print_layers("circles")
     assert layers[7].said == "Layer 8 of 8, up to 1.6 mm"
     for kind in range(len(KINDS)):

@@ -1,4 +1,4 @@
-"""What the page shows of a run: the views of its report, read back from the folder of results."""
+"""The views of a report read back from its folder: table, layers, strands, part and whole print."""
 
 import json
 import re
@@ -11,9 +11,8 @@ import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.errors import InputError
-from ccfem.comparison.headline import HEADLINE, value_text
 from ccfem.comparison.report.packing import unpack
-from ccfem.comparison.table import FIRST_COLUMNS
+from ccfem.comparison.table import Cell, Head, Table
 
 _DATA = re.compile(r'<script type="application/octet-stream" id="data">([^<]*)</script>')
 _NOT_KNOWN = 255
@@ -85,19 +84,20 @@ class RunResults:
     folder : Path
     record : dict
     views : dict
-        Layers and paths: see `ccfem.comparison.report.layer_view.layer_views`.
-    part : dict
-        The part with displacement and stress: see
-        `ccfem.comparison.report.html_report.part_view`; empty where the report has no such view.
-    prints : dict
-        Lines of the whole print: see `ccfem.comparison.report.print_view.print_views`.
+        What `ccfem.comparison.report.html_report.report_html` packs: the ``table``, the ``part``
+        with displacement and stress, ``layers`` with paths, the ``print``; empty where it has none.
     """
 
     folder: Path
     record: dict[str, Any]
     views: dict[str, Any]
-    part: dict[str, Any]
-    prints: dict[str, Any]
+
+    @property
+    def table(self) -> Table:
+        """Columns that are shown first, the best run on top."""
+        tree = self.views.get("table") or {"heads": [], "rows": []}
+        rows = ((name, tuple(Cell(**c) for c in cells), why) for name, cells, why in tree["rows"])
+        return Table(tuple(Head(**head) for head in tree["heads"]), tuple(rows))
 
     @property
     def names(self) -> list[str]:
@@ -117,21 +117,23 @@ class RunResults:
     @property
     def most_force(self) -> float:
         """End of the scale of forces, N."""
-        return float(self.views["scales"]["force"])
+        return float(self.views["layers"]["scales"]["force"])
 
     @property
     def width(self) -> float:
         """Width of a strand, mm."""
-        return float(self.views["width"])
+        return float(self.views["layers"]["width"])
 
     @cached_property
     def _stack(self) -> dict[str, Any]:
-        stacks = self.views.get("stacks") or [{"runs": [], "layers": [], "first": 0}]
+        stacks = (self.views.get("layers") or {}).get("stacks") or [
+            {"runs": [], "layers": [], "first": 0}
+        ]
         return dict(stacks[0])
 
     def surface(self, view: str) -> Surface | None:
         """Surface of the part without fibre, as "stress" or "moved"; None where it is not known."""
-        part = self.part
+        part = self.views.get("part") or {}
         if "moved" not in part:
             return None
         triangles = np.asarray(part["triangles"], dtype=np.int64).reshape(-1, 3)
@@ -143,28 +145,6 @@ class RunResults:
         said = f"displacement, up to {most:.3g} mm, drawn {times:g} times as large"
         points = part["points"] + times * part["moved"]
         return Surface(points, triangles, np.asarray(part["moved_size"]) / 254.0, said)
-
-    def rows(self) -> tuple[list[str], list[tuple[str, list[str], str]]]:
-        """Table of the first columns of the headline: titles, and name, cells and failure of each.
-
-        The best stands first.
-        """
-        totals = {str(run["name"]): run for run in self.record["strategies"]}
-        known = {key for run in totals.values() for key in run["total"]}
-        skipped = {"interlayer_load"}
-        skipped |= {"print_time_nearest"} if "whole_print_time" in known else set()
-        heads = [
-            head
-            for head in HEADLINE
-            if head.column in FIRST_COLUMNS and head.column in known - skipped
-        ]
-        order = [*self.names, *(name for name in totals if name not in self.names)]
-        rows = []
-        for name in order:
-            run = totals[name]
-            cells = [value_text(run["total"], head) for head in heads] if run["total"] else []
-            rows.append((name, cells, "" if cells else str(run["failure"])))
-        return [head.title for head in heads], rows
 
     def why_not(self, name: str) -> str:
         """Why the paths of a strategy cannot be printed; empty where they can."""
@@ -189,7 +169,8 @@ class RunResults:
 
     def print_layers(self, name: str) -> list[PrintLayer]:
         """Layers of the whole print of a strategy; empty where it has none."""
-        runs = [run for run in self.prints.get("runs", ()) if run["name"] == name]
+        prints = (self.views.get("print") or {}).get("runs", ())
+        runs = [run for run in prints if run["name"] == name]
         return [_print_layer(view, run["count"]) for run in runs for view in run["layers"]]
 
     def _laid(self, name: str, layer: int) -> dict[str, Any]:
@@ -238,6 +219,4 @@ def read_results(folder: Path) -> RunResults:
     except (OSError, ValueError) as error:
         raise InputError(f"{folder} holds no results that can be shown ({error})") from None
     data = _DATA.search(page)
-    views = unpack(data[1]) if data else {}
-    layers = views.get("layers") or {"stacks": []}
-    return RunResults(folder, record, layers, views.get("part") or {}, views.get("print") or {})
+    return RunResults(folder, record, unpack(data[1]) if data else {})

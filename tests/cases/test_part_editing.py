@@ -1,6 +1,7 @@
 """Edits of a part file's text: what they change reads right, and everything else stays."""
 
 import tomllib
+from pathlib import Path
 
 import pytest
 import shapely
@@ -8,20 +9,9 @@ import shapely
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.face_rules import Faces, numbered_faces
 from ccfem.body.meshing import extrude
-from ccfem.workbench.part_edits import (
-    History,
-    appended,
-    begun,
-    check_files,
-    coplanar,
-    edited,
-    like_holes,
-    patch_of,
-    rebased,
-    removed,
-    rule_of,
-    valued,
-)
+from ccfem.cases.inspection.beginning import empty_part
+from ccfem.cases.inspection.face_choice import coplanar, face_rule, like_holes
+from ccfem.cases.part_editing import appended, edited, patch_of, rebased, removed, valued
 
 TEXT = """\
 # A hook of the user's, with his remarks.
@@ -105,7 +95,7 @@ def test_an_edit_changes_what_it_says_and_keeps_the_rest(change, after):
 
 
 def test_a_new_part_reads_as_what_was_clicked(plate):
-    text = begun("plate.step", plate)
+    text = empty_part(Path("plate.step"), plate)
     text, bolts = patch_of(text, plate, holes_of(plate, 3.0))
     text, eye = patch_of(text, plate, holes_of(plate, 6.0))
     text = edited(text, appended(("supports",), {"patch": bolts}))
@@ -127,7 +117,7 @@ def test_a_rule_chooses_the_faces_that_were_clicked(plate, count):
         numbers = sorted(
             {plate.numbers[(first + 2 * k) % len(plate.numbers)] for k in range(count)}
         )
-        rule = dict(rule_of(plate, numbers))
+        rule = dict(face_rule(plate, numbers))
         if rule.pop("rule") == "face":
             assert sorted(Faces(**rule).numbers_on(plate)) == numbers
         else:
@@ -145,28 +135,6 @@ def test_faces_alike_are_chosen_together(plate):
         patch_of(TEXT, plate, [])
 
 
-def test_undo_and_redo_are_other_texts():
-    history = History(("a",)).after("b").after("c", "force").after("d", "force")
-    assert history.texts == ("a", "b", "d")  # a number that is typed is one step
-    assert history.moved(-1).text == "b"
-    assert history.moved(-9).text == "a"
-    assert history.moved(-1).moved(1).text == "d"
-    assert history.moved(-2).after("e").texts == ("a", "e")
-    assert history.moved(-1).after("f", "force").texts == ("a", "b", "f")
-    assert history.after("d") is history
-
-
-def test_files_outside_the_folder_are_refused(tmp_path):
-    for name in ("../hook.stl", "/etc/hook.stl", "a/../../hook.stl"):
-        text = TEXT.replace("hook.stl", name)
-        with pytest.raises(InputError, match=r"lies outside .*: start ccfem open in a folder"):
-            check_files(text, tmp_path, [tmp_path])
-    (tmp_path / "link.stl").symlink_to("/etc/passwd")
-    with pytest.raises(InputError, match="lies outside"):
-        check_files(TEXT.replace("hook.stl", "link.stl"), tmp_path, [tmp_path])
-    check_files(TEXT, tmp_path, [tmp_path])
-
-
 def test_a_copy_elsewhere_names_the_same_files(tmp_path):
     results = tmp_path / "results"
     moved = rebased(TEXT, tmp_path, results)
@@ -177,7 +145,7 @@ def test_a_copy_elsewhere_names_the_same_files(tmp_path):
 
 @pytest.mark.parametrize("text", ["a = ", "[[supports]]\n[supports]"])
 def test_a_text_that_is_not_toml_is_refused(text):
-    with pytest.raises(InputError, match="not TOML"):
+    with pytest.raises(InputError, match="is not a TOML file"):
         edited(text, valued(("layers",), 3))
 
 
