@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import tomlkit
-from tomlkit.items import AoT
+from tomlkit.items import AoT, InlineTable
 
 from ccfem.base.errors import InputError
 from ccfem.base.toml import toml_of
@@ -44,14 +44,13 @@ def edited(text: str, change: Change) -> str:
     InputError
         Where the text is laid out so that it would read as something else.
     """
-    wanted = content_of(text)
-    change(wanted)
-    document = tomlkit.parse(text)
+    wanted, document = content_of(text), tomlkit.parse(text)
     try:
+        change(wanted)
         change(document)
         after = tomlkit.dumps(document)
         right = tomllib.loads(after) == wanted
-    except (tomlkit.exceptions.TOMLKitError, tomllib.TOMLDecodeError, AttributeError, TypeError):
+    except (tomlkit.exceptions.TOMLKitError, AttributeError, LookupError, TypeError, ValueError):
         right = False
     if not right:
         raise InputError(
@@ -69,11 +68,12 @@ def valued(keys: Keys, value: Any) -> Change:
             if isinstance(key, str) and key not in at:
                 if value is None:
                     return
-                at[key] = _like(content, {})
+                at[key] = _like(content, {}, isinstance(at, InlineTable))
             at = at[key]
         if value is not None:
-            at[keys[-1]] = _like(content, value)
-            if _is_text(content) and isinstance(value, Mapping):
+            inline = isinstance(at, InlineTable)
+            at[keys[-1]] = _like(content, value, inline)
+            if _is_text(content) and isinstance(value, Mapping) and not inline:
                 at[keys[-1]].add(tomlkit.nl())
         elif keys[-1] in at:
             del at[keys[-1]]
@@ -96,6 +96,8 @@ def appended(keys: Keys, table: Mapping[str, Any]) -> Change:
         if last not in at:
             at[last] = tomlkit.aot() if _is_text(content) else []
         at[last].append(_like(content, table, inline=not isinstance(at[last], AoT)))
+        if isinstance(at[last], AoT):
+            at[last][-1].add(tomlkit.nl())
 
     return change
 
@@ -193,9 +195,11 @@ def patch_of(text: str, listing: BodyFaces, numbers: Collection[int]) -> tuple[s
     """
     if not numbers:
         raise InputError("no face is chosen: click one, or choose it from the list")
-    rule, known = face_rule(listing, numbers), content_of(text).get("patches", {})
+    rule, given = face_rule(listing, numbers), content_of(text).get("patches")
+    known = given if isinstance(given, Mapping) else {}
+    tables = [table for table in known.values() if isinstance(table, Mapping)]
     # All rules for faces of a part have one feature angle.
-    rule |= next(({"angle": table["angle"]} for table in known.values() if "angle" in table), {})
+    rule |= next(({"angle": table["angle"]} for table in tables if "angle" in table), {})
     for name, table in known.items():
         if table == rule:
             return text, name

@@ -3,6 +3,7 @@
 Everything heavy is imported where it is needed, so that ``ccfem --help`` answers at once.
 """
 
+import contextlib
 import shlex
 import sys
 import time
@@ -224,7 +225,7 @@ def run(
     from ccfem.comparison.engine import answer
     from ccfem.comparison.files import RESULT_FILES, write_results
 
-    imported = time.perf_counter()
+    imported, text = time.perf_counter(), _text_of(name)  # it may change while this runs
     request = ask()
     seconds = {"start": imported - _STARTED, "mesh": time.perf_counter() - imported}
     where = output.folder(request.case)
@@ -237,7 +238,7 @@ def run(
         comparison = answer(request, _part(progress, 0.0, _SOLVED))
         _check(comparison)
         command, rest = shlex.join(["ccfem", *sys.argv[1:]]), _part(progress, _SOLVED, 1.0)
-        about = (command, seconds, rest, output.pictures, _text_of(name), output.drawings)
+        about = (command, seconds, rest, output.pictures, text, output.drawings)
         write_results(comparison, folder, *about, cell=output.cell)
     print_comparison(comparison, where, elapsed(), output.details)
     return comparison
@@ -253,8 +254,10 @@ def plan_code(comparison: "Comparison", force: bool) -> int:
 
 
 def _text_of(name: str) -> str:
-    """Text of a part file; empty for the name of a case."""
-    return Path(name).read_text(encoding="utf-8") if name.endswith(".toml") else ""
+    """Text of a part file; empty for the name of a case, and where there is none to be read."""
+    with contextlib.suppress(OSError, ValueError):
+        return Path(name).read_text(encoding="utf-8") if name.endswith(".toml") else ""
+    return ""
 
 
 def with_given_paths(

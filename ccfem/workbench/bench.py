@@ -4,6 +4,7 @@ Nothing is read outside the folder where the workbench was started, and nothing 
 ``results/`` there.
 """
 
+import functools
 import os
 import re
 from collections.abc import Collection, Mapping
@@ -184,7 +185,7 @@ class Bench:
             text = part_text(case, f"{name}.vtu")
             self.results.mkdir(exist_ok=True)
             write_mesh(case.problem.mesh, self.results / f"{name}.vtu")
-        path = self._free(name, text)
+        path = self._free(self.results / f"{name}.toml", text.encode())
         self._write(path, text.encode())
         return path
 
@@ -195,7 +196,7 @@ class Bench:
             raise InputError(
                 f"{name} is no body and no part file: upload a STEP, STL or mesh file, or a .toml"
             )
-        path = self.results / UPLOADS / plain
+        path = self._free(self.results / UPLOADS / plain, content)
         self._write(path, content)
         return path.relative_to(self.folder).as_posix()
 
@@ -242,20 +243,24 @@ class Bench:
 
     def _save(self) -> None:
         if self._saved is None:
-            self._saved = self._free(self._there.stem, self.text)
-        text = rebased(self.text, self._there.home, self.results)
-        self._write(self._saved, text.encode())
+            place = self.results / f"{self._there.stem}.toml"
+            self._saved = self._free(place, self.text.encode())
+        self._write(self._saved, self._kept_text.encode())
 
-    def _free(self, stem: str, text: str) -> Path:
-        """Part file in ``results`` of a name, or that with a number, that replaces no other."""
-        count, name = 1, stem
+    @property
+    def _kept_text(self) -> str:
+        """The text that is shown, as it is kept in ``results``."""
+        return rebased(self.text, self._there.home, self.results)
+
+    def _free(self, place: Path, content: bytes) -> Path:
+        """Return a place in ``results``, or that with a number, where nothing else is replaced."""
+        count, path = 1, place
         while True:
-            path = self.results / f"{name}.toml"
             mine = self.opened is not None and path == self.opened.file
-            if mine or not path.exists() or path.read_bytes() == text.encode():
+            if mine or not path.exists() or path.read_bytes() == content:
                 return path
             count += 1
-            name = f"{stem}-{count}"
+            path = place.with_stem(f"{place.stem}-{count}")
 
     def _write(self, path: Path, content: bytes) -> None:
         """Write a file in ``results``."""
@@ -275,6 +280,10 @@ class Bench:
             self._save()
         assert self._saved is not None
         return self._saved
+
+    def is_of(self, text: str) -> bool:
+        """Whether a text, as a run has read it, is the part file that is shown."""
+        return text in (self.text, self._kept_text)
 
     def part_argument(self) -> str:
         """Name of that file from the folder, as a command takes it."""
@@ -341,7 +350,15 @@ def _is_body(path: Path) -> bool:
 
 
 def _looks_like_part(path: Path) -> bool:
-    """Whether a TOML file names a body."""
+    try:
+        return _names_body(path, path.stat().st_mtime_ns)
+    except OSError:
+        return False
+
+
+@functools.cache
+def _names_body(path: Path, _: int) -> bool:
+    """Whether a TOML file, as it was at some time, names a body."""
     try:
         content = content_of(text_of(path, "part file"))
     except InputError:

@@ -15,6 +15,7 @@ from ccfem.comparison.plot.colours import LINK, OUTLINE, rgb, scale
 from ccfem.comparison.report.print_view import BESIDE, COLOURS, FILLS, KINDS, MOVES
 from ccfem.comparison.report.reading import Pieces, PrintLayer, RunResults, read_results
 from ccfem.comparison.request import STRATEGIES
+from ccfem.workbench.bench import Opened
 from ccfem.workbench.child_run import ChildRun, RunState
 from ccfem.workbench.guard import Served, escaped
 from ccfem.workbench.tab import (
@@ -64,7 +65,7 @@ class CompareTab:
         self._said = gui.add_html("")
         self._command = gui.add_html("")
         old = "<p class='ccfem'><b>These results are of the part before it was changed.</b></p>"
-        self._old, self._ran = gui.add_html(old, visible=False), ""
+        self._old = gui.add_html(old, visible=False)
         self._table = gui.add_html("", visible=False)
         self._found = gui.add_folder("Layers", visible=False)
         with self._found:
@@ -127,21 +128,24 @@ class CompareTab:
         page.say("")
         page.bench.part_file()
         folder = page.bench.results / f"{page.bench.name}{suffix}"
-        view, text = PRINT if "--gcode" in arguments else FIBRE, page.bench.text
+        view, part = PRINT if "--gcode" in arguments else FIBRE, page.bench.opened
         self.run = ChildRun(
             arguments,
             page.bench.folder,
-            lambda state: page.act(self._heed, state, folder, view, text),
+            lambda state: page.act(self._heed, state, folder, view, part),
             float(self.minutes.value),
         )
         self._tell(self.run.state)
 
-    def _heed(self, state: RunState, folder: Path, view: str, text: str) -> None:
+    def _heed(self, state: RunState, folder: Path, view: str, part: Opened | None) -> None:
         self._tell(state)
-        if state.written:
-            self.results, self._ran = read_results(folder), text
-            self._old.visible = text != self.page.bench.text
+        if state.written and part is not self.page.bench.opened:
+            where = folder.relative_to(self.page.bench.folder)
+            self.page.say(f"the run of the part before has ended: its results are in {where}")
+        elif state.written:
+            self.results = read_results(folder)
             self._show_results()
+            self._show_age()
             self.page.show_view(view)
         elif not state.running:
             self.page.say("" if state.stopped == "stopped" else state.complaint)
@@ -181,7 +185,7 @@ class CompareTab:
             case.options, case.visible = options, len(names) > 1
             self.case.put(case.value)
         self.direct.visible = not self._running and len(self._ticked()) == 1
-        self._old.visible = self.results is not None and self._ran != bench.text
+        self._show_age()
         try:
             command = shlex.join(["ccfem", *self._arguments()])
         except InputError:
@@ -189,6 +193,10 @@ class CompareTab:
         self._command.content = (
             f'<p class="ccfem">In a terminal: <code>{escaped(command)}</code></p>'
         )
+
+    def _show_age(self) -> None:
+        ran = None if self.results is None else self.results.part_file
+        self._old.visible = ran is not None and not self.page.bench.is_of(ran)
 
     def _show_results(self) -> None:
         assert self.results is not None

@@ -238,7 +238,7 @@ class Page(Tabbed):
         self._faces, self._drawn, self._listing = {}, [], listing
         for mesh in face_meshes(listing):
             name = f"/body/face_{mesh.number}"
-            handle = draw_mesh(scene, name, mesh.points, mesh.triangles, _FACE, side="double")
+            handle = draw_mesh(scene, name, mesh.points, mesh.triangles, _FACE)
             handle.on_click(self.on(self.loads.choose, mesh.number, False))
             handle.on_click(modifier="shift")(self.on(self.loads.choose, mesh.number, True))
             self._faces[mesh.number] = handle

@@ -18,6 +18,8 @@ from ccfem.workbench.guard import escaped
 from ccfem.workbench.tab import Field, Tabbed
 
 _STANDARD, _WRITTEN = "standard", "as the part file has it"
+_LARGE = 1e15
+"""Beyond what numbers can be shown digit by digit."""
 _SPARSE = ("density", "skins", "fibre_skins")
 """What a solid part has nothing of."""
 
@@ -65,8 +67,9 @@ class Row:
             return gui.add_text(self.label, self.default, hint=self.hint)
         if isinstance(self.default, tuple):
             return gui.add_vector2(self.label, self.default, step=self.step)
+        # Of a whole number, too: viser would take 3.5 for 35.
         bounds = {"min": self.least, "step": self.step, "hint": self.hint or None}
-        return gui.add_number(self.label, self.default, **bounds)
+        return gui.add_number(self.label, float(self.default), **bounds)
 
     def shown(self, value: Any) -> Any:
         """Value of the field for that of the part file; None where the field cannot show it."""
@@ -78,8 +81,24 @@ class Row:
         if isinstance(self.default, tuple):
             numbers = isinstance(value, list) and all(isinstance(x, int | float) for x in value)
             return tuple(map(float, value)) if numbers and len(value) == 2 else None
-        kind = type(self.default)
-        return kind(value) if isinstance(value, int | float) and kind(value) == value else None
+        if not isinstance(value, int | float) or not abs(value) < _LARGE:
+            return None
+        whole = float(value).is_integer()
+        return float(value) if whole or isinstance(self.default, float) else None
+
+    def written(self, value: Any) -> Any:
+        """Value of the part file for that of the field.
+
+        Raises
+        ------
+        InputError
+            For a part of a whole number.
+        """
+        if type(self.default) is not int:
+            return self.write(value)
+        if not float(value).is_integer():
+            raise InputError(f"{self.label} must be a whole number; got {value:g}: round it")
+        return int(value)
 
 
 def _rows() -> dict[str, tuple[Row, ...]]:
@@ -104,7 +123,7 @@ def _rows() -> dict[str, tuple[Row, ...]]:
             Row(("bed", "centre"), "Centre, mm", _middle_of_bed(Machine()), write=list),
             Row(("bed", "copies"), "Copies", "1", hint=number,
                 read=lambda given: str(given) if isinstance(given, int | str) else None,
-                write=lambda text: int(text) if text.isdecimal() else text),
+                write=lambda text: int(text) if text.isdecimal() else text or None),
         ),
     }  # fmt: skip
 
@@ -155,7 +174,7 @@ class PrintTab:
                 f"the part file gives its layers by {other[0]}: change it there, or take it out"
             )
         usual = len(row.keys) > 1 and row.always and value == self._default(row)
-        self.page.edit(valued(row.keys, None if usual else row.write(value)), row.label)
+        self.page.edit(valued(row.keys, None if usual else row.written(value)), row.label)
 
     def _default(self, row: Row) -> Any:
         """Return what is so without the value; the place is the middle of the machine's bed."""

@@ -157,3 +157,18 @@ def test_what_cannot_be_changed_is_said():
 
     with pytest.raises(InputError, match="change it in an editor"):
         edited(TEXT, change)
+
+
+@pytest.mark.parametrize("given", ["3", '"x"', "[1]", "[[]]", "true"])
+def test_a_list_in_the_place_of_a_table_is_said_and_left_alone(plate, given):
+    with pytest.raises(InputError, match="change it in an editor"):
+        patch_of(f"patches = {given}", plate, [1])
+    with pytest.raises(InputError, match="change it in an editor"):
+        edited(f"loads = {given}", appended(("loads", "end"), {"kind": "gravity"}))
+
+
+def test_tables_within_a_line_take_one_more(plate):
+    text = 'patches = {end = {rule = "face", number = 1}}  # mine\n'
+    text, name = patch_of(text, plate, holes_of(plate, 6.0))
+    assert tomllib.loads(text)["patches"].keys() == {"end", name}
+    assert "# mine" in text

@@ -181,3 +181,30 @@ def test_files_outside_the_folder_are_refused(tmp_path):
     with pytest.raises(InputError, match="lies outside"):
         check_files(BY_HAND.replace("bar.vtu", "link.vtu"), tmp_path, [tmp_path])
     check_files(BY_HAND, tmp_path, [tmp_path])
+
+
+def test_a_file_that_is_uploaded_replaces_no_other(bench):
+    assert bench.upload("b.stl", b"one") == "results/uploads/b.stl"
+    assert bench.upload("b.stl", b"one") == "results/uploads/b.stl"
+    assert bench.upload("b.stl", b"two") == "results/uploads/b-2.stl"
+    assert (bench.results / "uploads/b.stl").read_bytes() == b"one"
+
+
+def test_what_is_offered_is_as_the_folder_is_now(bench):
+    (bench.folder / "link.toml").symlink_to("nowhere.toml")
+    (bench.folder / "other.toml").write_text("a = 1")
+    assert bench.offered() == ["bar.vtu", "bar.toml"]
+    (bench.folder / "other.toml").write_text(BY_HAND)
+    assert bench.offered() == ["bar.vtu", "bar.toml", "other.toml"]
+
+
+def test_a_run_is_of_the_text_that_it_has_read(bench):
+    bench.open("bar.toml")
+    assert bench.is_of(BY_HAND)
+    bench.edit(valued(("layers",), 3))
+    ran = bench.part_file().read_text()
+    assert bench.is_of(ran)
+    bench.edit(valued(("layers",), 4))
+    assert not bench.is_of(ran)
+    bench.step(-1)
+    assert bench.is_of(ran)

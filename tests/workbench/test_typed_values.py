@@ -230,6 +230,21 @@ def test_a_value_that_is_refused_or_undone_is_shown_no_more(page, visit):
     assert page.bench.content["heights"] == [1.0]
 
 
+def test_a_whole_number_is_whole_and_no_copies_are_one(page, visit):
+    layers, copies = page.prints.field("layers"), page.prints.field("bed", "copies")
+    visit.type(layers, 3.5)
+    visit.settle()
+    assert "Layers of fibre must be a whole number; got 3.5" in page.message.content
+    assert visit.shown(layers) == 12
+    for text, wanted in (("4", {"copies": 4}), ("", None), ("2x3", {"copies": "2x3"})):
+        visit.type(copies, text)
+        visit.settle()
+        assert page.bench.content.get("bed") == wanted
+    page.act(page.bench.edit, "layers = inf\n" + HELD).result()
+    page.act(page.show).result()
+    assert "layers = inf" in page.prints._said.content
+
+
 def test_plastic_and_bed_are_set_beside_what_the_page_cannot_show(page, visit):
     by_hand = """
 [plastic]

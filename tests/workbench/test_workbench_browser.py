@@ -150,6 +150,16 @@ def test_what_is_typed_in_one_moment_all_arrives(work):
     view.settle()
     assert loads.vector.value[0] == 70.5
     assert loads.case.value == "pull"
+    # With a comma, too; and what is left empty is as it was before.
+    force = view.tab.get_by_label("Force, N", exact=True).first
+    for keys, wanted in (("80,25", 80.25), ("", 80.25)):
+        force.press("Control+a")
+        force.press("Delete")
+        force.press_sequentially(keys)
+        force.press("Tab")
+        view.settle()
+        assert loads.vector.value[0] == wanted
+        assert force.input_value() == "80.25"
 
 
 def test_an_arrow_is_dragged_and_undone(work):
@@ -209,6 +219,8 @@ def test_a_run_is_stopped_found_again_and_shown(work):
     assert not (bench.results / "bar").exists()
     # A page that is closed leaves the run going; opened again it shows it.
     view.button("Compare")
+    wait(view, lambda: compare.run.state.step != "starting")
+    work.page.act(work.page.edit, valued(("layers",), 3)).result()
     view.tab.goto("about:blank")
     view.tab.goto(work.page.link.partition("?")[0])
     again = work.first
@@ -223,10 +235,8 @@ def test_a_run_is_stopped_found_again_and_shown(work):
     again.tab.get_by_text("Layer 0, at 1.00 mm").wait_for(timeout=5000)
     drawn = np.asarray(again.page.server.scene.get_handle_by_name("/fibre_0_fibre").points)
     assert 1.0 == pytest.approx(drawn[..., 2].min()) == pytest.approx(drawn[..., 2].max())
-    # What is changed afterwards is said beside what was computed before.
+    # What was changed meanwhile is said beside what was computed of the part before.
     old = again.tab.get_by_text("These results are of the part before it was changed.")
-    assert not old.is_visible()
-    work.page.act(work.page.edit, valued(("layers",), 3)).result()
     old.wait_for(timeout=5000)
     again.button("Undo")
     old.wait_for(state="hidden", timeout=5000)

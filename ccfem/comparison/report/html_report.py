@@ -130,7 +130,7 @@ def report_html(
     left_out = record["left_out"]
     charts: dict[str, Any] = {"curve": [], "fronts": [], "spreads": []}
     data: dict[str, Any] = {"part": None, "layers": {"stacks": []}, "charts": charts}
-    data["print"] = {"runs": []}
+    data |= {"print": {"runs": []}, "part_file": part_file}
     headline = headline_table(comparison.ranking, comparison.wanted, several)
     data["table"] = dataclasses.asdict(headline.first)
     with spared("view of the part", left_out):

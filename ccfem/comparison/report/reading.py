@@ -100,6 +100,11 @@ class RunResults:
         return Table(tuple(Head(**head) for head in tree["heads"]), tuple(rows))
 
     @property
+    def part_file(self) -> str:
+        """Text of the part file when it was run; empty where there was none."""
+        return str(self.views.get("part_file", ""))
+
+    @property
     def names(self) -> list[str]:
         """Strategies whose paths can be shown, the best first."""
         return [str(run["name"]) for run in self._stack["runs"]]
