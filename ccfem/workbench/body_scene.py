@@ -14,7 +14,6 @@ from ccfem.body.mesh.face_rules import Faces, Holes
 from ccfem.body.mesh.patches import unit_vector
 from ccfem.body.mesh.smooth_faces import Face
 from ccfem.cases.inspection import Check
-from ccfem.cases.inspection.face_choice import holes_on
 from ccfem.cases.part_tables import rules_of
 from ccfem.comparison.plot.symbols import spread
 from ccfem.printing.bed_layout import bed_of
@@ -111,12 +110,13 @@ class PatchPlace:
         areas = np.linalg.norm(self._across, axis=1)
         return np.asarray(areas @ self.corners.mean(axis=1) / max(float(areas.sum()), 1e-300))
 
-    def spots(self, count: int) -> tuple[FloatArray, FloatArray]:
-        """Up to some places (m, 3), mm, spread over the patch, and outward unit normals there."""
+    def marks(self, count: int, length: float) -> FloatArray:
+        """Up to some arrows (m, 2, 3), mm, of a length that point at places all over the patch."""
         middles, normals = self.corners.mean(axis=1), self._across
         rows = spread(middles, count)
-        sizes = np.linalg.norm(normals[rows], axis=1)
-        return middles[rows], normals[rows] / np.maximum(sizes, 1e-300)[:, None]
+        sizes = np.maximum(np.linalg.norm(normals[rows], axis=1), 1e-300)
+        away = length * normals[rows] / sizes[:, None]
+        return np.stack([middles[rows] + away, middles[rows]], axis=1)
 
 
 def patch_places(
@@ -138,12 +138,7 @@ def patch_places(
     tables = content.get("patches")
     for name, rule in rules_of(tables if isinstance(tables, Mapping) else {}, Mistakes()).items():
         try:
-            if isinstance(rule, Faces):
-                numbers = rule.numbers_on(listing)
-            elif isinstance(rule, Holes):
-                numbers = tuple(holes_on(listing, rule))
-            else:
-                continue
+            numbers = rule.numbers_on(listing) if isinstance(rule, Faces | Holes) else ()
         except InputError:  # the check says so
             continue
         rows = [listing.face(number).facets for number in numbers]
@@ -153,35 +148,7 @@ def patch_places(
     return places
 
 
-# Symbols, and the direction of an arrow that is dragged.
-
-
-def cones(tips: FloatArray, outward: FloatArray, size: float) -> tuple[FloatArray, IntArray]:
-    """Cones that stand on a surface with their tips, as points and triangles.
-
-    Parameters
-    ----------
-    tips, outward : (m, 3) arrays
-        Tips, mm, and unit vectors from there to the middles of the bases.
-    size : float, mm
-        Height.
-    """
-    count, sides = len(tips), 8
-    helper = np.eye(3)[np.argmin(np.abs(outward), axis=1)]
-    first = np.cross(outward, helper)
-    first /= np.maximum(np.linalg.norm(first, axis=1), 1e-300)[:, None]
-    second = np.cross(outward, first)
-    turn = 2.0 * np.pi * np.arange(sides) / sides
-    ring = (tips + size * outward)[:, None] + 0.4 * size * (
-        np.cos(turn)[:, None] * first[:, None] + np.sin(turn)[:, None] * second[:, None]
-    )
-    points = np.concatenate([tips[:, None], (tips + size * outward)[:, None], ring], axis=1)
-    a, b = 2 + np.arange(sides), 2 + (np.arange(sides) + 1) % sides
-    side = np.stack([np.zeros(sides, dtype=int), b, a], axis=1)
-    base = np.stack([np.ones(sides, dtype=int), a, b], axis=1)
-    one = np.concatenate([side, base])
-    triangles = (np.arange(count) * (sides + 2))[:, None, None] + one
-    return points.reshape(-1, 3), triangles.reshape(-1, 3)
+# The direction of an arrow that is dragged.
 
 
 def snapped(direction: FloatArray) -> FloatArray:

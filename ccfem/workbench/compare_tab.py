@@ -11,9 +11,9 @@ import numpy as np
 from ccfem import strategies as strategy_modules
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.errors import InputError
-from ccfem.comparison.plot.colours import LINK, OUTLINE, rgb, scale
+from ccfem.comparison.plot.colours import LINK, OUTLINE, gradient, rgb, scale
 from ccfem.comparison.report.print_view import BESIDE, COLOURS, FILLS, KINDS, MOVES
-from ccfem.comparison.report.reading import Pieces, PrintLayer, RunResults, read_results
+from ccfem.comparison.report.report_views import PrintLayer, RunResults, read_results
 from ccfem.comparison.request import STRATEGIES
 from ccfem.workbench.bench import Opened
 from ccfem.workbench.child_run import ChildRun, RunState
@@ -152,7 +152,7 @@ class CompareTab:
 
     def _tell(self, state: RunState) -> None:
         self.start.visible, self.ending.visible = not state.running, state.running
-        self.direct.visible = not state.running and len(self._ticked()) == 1
+        self._show_direct()
         self.bar.visible, self.bar.value = state.running, 100.0 * state.share
         said = f"{100.0 * state.share:.0f} %: {state.step}" if state.running else state.complaint
         self._said.content = f'<p class="ccfem" role="status">{escaped(said)}</p>' if said else ""
@@ -184,7 +184,7 @@ class CompareTab:
         if case.options != options:
             case.options, case.visible = options, len(names) > 1
             self.case.put(case.value)
-        self.direct.visible = not self._running and len(self._ticked()) == 1
+        self._show_direct()
         self._show_age()
         try:
             command = shlex.join(["ccfem", *self._arguments()])
@@ -193,6 +193,9 @@ class CompareTab:
         self._command.content = (
             f'<p class="ccfem">In a terminal: <code>{escaped(command)}</code></p>'
         )
+
+    def _show_direct(self) -> None:
+        self.direct.visible = not self._running and len(self._ticked()) == 1
 
     def _show_age(self) -> None:
         ran = None if self.results is None else self.results.part_file
@@ -203,11 +206,10 @@ class CompareTab:
         names, table = self.results.names, self.results.table.html("strategy")
         self._table.content = f'<div class="ccfem wide ranked" tabindex="0">{table}</div>'
         self._table.visible = True
-        files = [name for name in self.results.record["files"] if self._is_taken(name)]
         items = "".join(
             f'<li><a href="/files/{escaped(name)}" target="_blank" rel="noopener">{escaped(name)}'
             "</a></li>"
-            for name in sorted(files, key=lambda name: name != "report.html")
+            for name in self._taken
         )
         where = self.results.folder.relative_to(self.page.bench.folder)
         self._links.content = (
@@ -221,16 +223,18 @@ class CompareTab:
             self.right.put(names[1] if names[1:] else _NO_ONE)
             self.layer.max = max(len(self.results.layers) - 1, 1)
             self.layer.value = self.results.first
-            self.prints.visible = not any(name.endswith(".gcode") for name in files)
+            self.prints.visible = not any(name.endswith(".gcode") for name in self._taken)
 
-    def _is_taken(self, name: str) -> bool:
-        return name in _TAKEN or name.endswith(_SUFFIXES)
+    @property
+    def _taken(self) -> list[str]:
+        """Files of the results that can be taken away, the report first."""
+        names = [] if self.results is None else self.results.record["files"]
+        taken = [name for name in names if name in _TAKEN or name.endswith(_SUFFIXES)]
+        return sorted(taken, key=lambda name: name != "report.html")
 
     def served(self, name: str) -> Served | None:
         """Serve a file of the results; None where it is none of them."""
-        if self.results is None or not self._is_taken(name):
-            return None
-        if name not in self.results.record["files"]:
+        if self.results is None or name not in self._taken:
             return None
         path = self.results.folder / name
         if path.is_symlink() or not path.is_file():
@@ -289,7 +293,7 @@ class CompareTab:
         matt = trimesh.visual.material.PBRMaterial(metallicFactor=0.0, roughnessFactor=1.0)
         mesh = trimesh.Trimesh(surface.points, surface.triangles, process=False)
         mesh.visual = trimesh.visual.TextureVisuals(material=matt)
-        colours = _linear(scale("size")(np.clip(surface.share, 0.0, 1.0))[:, :3])
+        colours = _linear(_shades(surface.share))
         mesh.visual.vertex_attributes["color"] = np.insert(colours, 3, 255, axis=1)
         scene, low, high = self.page.server.scene, surface.points.min(0), surface.points.max(0)
         above = (*(0.5 * (low + high))[:2], high[2] + 0.1 * np.ptp(surface.points))
@@ -365,7 +369,10 @@ class CompareTab:
         drawn: list[Any] = []
         for k, name in enumerate(names):
             pieces = results.pieces(name, place)
-            shades = np.repeat(self._colours(pieces)[:, None], 2, axis=1)
+            colours = np.where(
+                pieces.link[:, None], np.array(rgb(LINK)) / 255.0, _shades(pieces.share)
+            )
+            shades = np.repeat(_linear(colours)[:, None], 2, axis=1)
             rim, width = rgb(OUTLINE), _LINE * results.width
             if len(rims):
                 drawn.append(draw_lines(scene, f"/fibre_{k}_rim", rims + k * step, rim))
@@ -392,21 +399,17 @@ class CompareTab:
             f"<li><b>{escaped(name)}</b> {escaped(results.caption(name, place))}</li>"
             for name in names
         )
-        ends = ", ".join(f"rgb{_share(share)}" for share in np.linspace(0.0, 1.0, 5))
         self._layer_said.content = (
             f'<div class="ccfem"><p>Layer {layer["index"]}, {escaped(layer["where"])}</p>'
-            f"<ul>{said}</ul><div class='bar' style='background: linear-gradient(90deg, {ends})'>"
-            f"</div><p class='ends'><span>0 N</span><span>{results.most_force:.3g} N in the fibre"
+            f"<ul>{said}</ul><div class='bar' style='background: {gradient('size')}'></div>"
+            f"<p class='ends'><span>0 N</span><span>{results.most_force:.3g} N in the fibre"
             "</span></p></div>"
         )
 
-    def _colours(self, pieces: Pieces) -> Any:
-        """Colours (s, 3) of pieces of fibre, bytes."""
-        assert self.results is not None
-        share = np.nan_to_num(pieces.force / self.results.most_force)
-        colours = np.asarray(scale("size")(np.clip(share, 0.0, 1.0))[:, :3])
-        colours[pieces.link] = np.array(rgb(LINK)) / 255.0
-        return _linear(colours)
+
+def _shades(share: FloatArray) -> FloatArray:
+    """Colours (n, 3) of shares of the largest value."""
+    return np.asarray(scale("size")(np.clip(share, 0.0, 1.0))[:, :3])
 
 
 def _linear(colours: FloatArray) -> Any:
@@ -414,7 +417,3 @@ def _linear(colours: FloatArray) -> Any:
     low = colours <= 0.04045
     linear = np.where(low, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
     return np.round(255.0 * linear).astype(np.uint8)
-
-
-def _share(share: float) -> tuple[int, ...]:
-    return tuple(round(255.0 * float(c)) for c in scale("size")(share)[:3])

@@ -19,11 +19,11 @@ class FileTab:
             self.files = gui.add_dropdown("In this folder", (_NOTHING, *files))
             self.cases = gui.add_dropdown("Cases of ccfem", (_NOTHING, *cases))
             for choice in (self.files, self.cases):
-                choice.on_update(page.on_value(self._open, choice))
+                choice.on_update(page.on(self._open, choice, value=True))
             upload = gui.add_upload_button(
                 "Upload a body or a part file", hint="STEP, STL, mesh or TOML, up to 200 MB."
             )
-            upload.on_upload(page.on_value(self._upload))
+            upload.on_upload(page.on(self._upload, value=True))
         self._said = gui.add_html("")
 
     def _open(self, choice: Any, name: str) -> None:
@@ -32,8 +32,7 @@ class FileTab:
             self.page.open(name)
 
     def _upload(self, file: Any) -> None:
-        name, content = file.name, file.content
-        self.page.open(self.page.bench.upload(name, content))
+        self.page.open(self.page.bench.upload(file.name, file.content))
 
     def served(self) -> Served | None:
         """Serve the part file, to be saved."""
@@ -52,7 +51,7 @@ class FileTab:
         if bench.opened is None:
             self._said.content = ""
             return
-        command = f"ccfem check {bench.part_argument()}" if bench.opened else ""
+        command = f"ccfem check {bench.part_argument()}"
         self._said.content = (
             f'<div class="ccfem"><p><a href="/files/part.toml" download>Download the part file</a>'
             f"</p><p>In a terminal: <code>{escaped(command)}</code></p>"

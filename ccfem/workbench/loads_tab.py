@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -91,11 +92,11 @@ class LoadsTab:
         self._faces = gui.add_dropdown(
             "Face", [_NO_FACE], hint="Or click it in the picture; with Shift one more."
         )
-        self._faces.on_update(page.on_value(self._choose))
+        self._faces.on_update(page.on(self._choose, value=True))
         more = gui.add_button_group("Choose", ["Same radius", "Same plane", "None"])
-        more.on_click(page.on_value(self._choose_more))
+        more.on_click(page.on(self._choose_more, value=True))
         holds = gui.add_button_group("Support", ["Hold", "Roll"])
-        holds.on_click(page.on_value(self._support))
+        holds.on_click(page.on(self._support, value=True))
         with gui.add_folder("Load"):
             self.kind = Field(page, gui.add_dropdown("Kind", list(_KINDS)), self._show_kind)
             self.vector = Field(page, gui.add_vector3("Force, N", (0.0, 0.0, _FORCE), step=1.0))
@@ -266,13 +267,13 @@ class LoadsTab:
         page, gui = self.page, self.page.server.gui
         field, folder = None, gui.add_folder(entry.title)
         with folder:
-            if isinstance(entry.amount, tuple):
-                unit = _UNITS.get(str(entry.table.get("kind")), "")
-                vector = gui.add_vector3(f"Vector{unit}", entry.amount, step=1.0)
-                field = Field(page, vector, lambda value: self._change(name, "vector", value))
-            elif entry.amount is not None:
-                number = gui.add_number("Pressure, MPa", entry.amount, step=0.1)
-                field = Field(page, number, lambda value: self._change(name, "magnitude", value))
+            if entry.amount is not None:
+                label, key, step, add = "Pressure, MPa", "magnitude", 0.1, gui.add_number
+                if isinstance(entry.amount, tuple):
+                    label = f"Vector{_UNITS.get(str(entry.table.get('kind')), '')}"
+                    key, step, add = "vector", 1.0, gui.add_vector3
+                handle = add(label, entry.amount, step=step)
+                field = Field(page, handle, partial(self._change, name, key))
             remove = gui.add_button("Remove", color="gray", hint=entry.title)
             remove.on_click(page.on(self._remove, name, folder))
         return folder, field

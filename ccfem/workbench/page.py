@@ -25,7 +25,6 @@ from ccfem.workbench.body_scene import (
     borders,
     box_edges,
     boxes,
-    cones,
     face_meshes,
     patch_places,
     snapped,
@@ -38,7 +37,7 @@ from ccfem.workbench.guard import Guard, Served, escaped, limit_uploads
 from ccfem.workbench.loads_tab import LoadsTab, Name, vector_of
 from ccfem.workbench.newest import Newest
 from ccfem.workbench.print_tab import PrintTab
-from ccfem.workbench.tab import MATT, PART, VIEWS, Tabbed, draw_lines, draw_mesh
+from ccfem.workbench.tab import MATT, PART, VIEWS, Tabbed, draw_arrows, draw_lines
 
 _FACE, _CHOSEN = (203, 210, 216), (245, 190, 65)
 _HELD, _LOADED, _BOTH = (120, 168, 214), (226, 142, 120), (170, 140, 190)
@@ -140,12 +139,12 @@ class Page(Tabbed):
         self.heading = gui.add_html("")
         self.message = gui.add_html("", visible=False)
         undoing = gui.add_button_group("History", ["Undo", "Redo"])
-        undoing.on_click(self.on_value(lambda how: self.step(-1 if how == "Undo" else 1)))
+        undoing.on_click(self.on(lambda how: self.step(-1 if how == "Undo" else 1), value=True))
         for label, key, steps in (("Undo", "Z", -1), ("Redo", "Y", 1)):
             command = gui.add_command(label, hotkey=key, modifier="cmd/ctrl")
             command.on_trigger(self.on(self.step, steps))
         self.view = gui.add_button_group("View", VIEWS)
-        self.view.on_click(self.on_value(self.show_view))
+        self.view.on_click(self.on(self.show_view, value=True))
         tabs = gui.add_tab_group()
         with tabs.add_tab("Loads"):
             self.loads = LoadsTab(self)
@@ -238,7 +237,8 @@ class Page(Tabbed):
         self._faces, self._drawn, self._listing = {}, [], listing
         for mesh in face_meshes(listing):
             name = f"/body/face_{mesh.number}"
-            handle = draw_mesh(scene, name, mesh.points, mesh.triangles, _FACE)
+            points, triangles = mesh.points.astype(np.float32), mesh.triangles.astype(np.uint32)
+            handle = scene.add_mesh_simple(name, points, triangles, color=_FACE, **MATT)
             handle.on_click(self.on(self.loads.choose, mesh.number, False))
             handle.on_click(modifier="shift")(self.on(self.loads.choose, mesh.number, True))
             self._faces[mesh.number] = handle
@@ -286,9 +286,8 @@ class Page(Tabbed):
             name, support = f"/body/symbol_{k}", entry.keys[0] == "supports"
             force = vector_of(entry.table)
             if support or force is None:
-                tips, outward = place.spots(_MARKS)
-                colour, shapes = _SUPPORT if support else _LOAD, cones(tips, outward, 0.035 * size)
-                self._drawn.append(draw_mesh(scene, name, *shapes, colour, flat_shading=True))
+                marks, colour = place.marks(_MARKS, 0.035 * size), _SUPPORT if support else _LOAD
+                self._drawn.append(draw_arrows(scene, name, marks, colour, 0.035 * size, 0.4))
             elif np.any(force):
                 ends, presses = arrow_outside(place.centre, force, 0.22 * size, corners)
                 turned = partial(self._turn_force, called, presses)
@@ -318,14 +317,7 @@ class Page(Tabbed):
     ) -> list[Any]:
         """Arrow with its words, and a ball at its free end to drag it by, about a place."""
         scene, long = self.server.scene, float(np.linalg.norm(ends[1] - ends[0]))
-        drawn = scene.add_arrows(
-            name,
-            ends[None].astype(np.float32),
-            colour,
-            shaft_radius=0.03 * long,
-            head_radius=0.09 * long,
-            head_length=0.22 * long,
-        )
+        drawn = draw_arrows(scene, name, ends[None], colour, 0.22 * long, 0.41)
         free = ends[0 if presses else 1]
         label = scene.add_label(
             f"{name}_said",

@@ -149,7 +149,7 @@ class PrintTab:
         with gui.add_folder("Fibre in regions alone", expand_by_default=False):
             self.within = Field(page, gui.add_number("Within, mm", 6.0, min=0.1, step=0.5))
             near = gui.add_button_group("Fibre", ["Near faces", "In a box", "Everywhere"])
-            near.on_click(page.on_value(self._regions))
+            near.on_click(page.on(self._regions, value=True))
         self._fibre_said = gui.add_html("")
         for title, those in rows.items():
             with gui.add_folder(title, expand_by_default=False):
@@ -217,7 +217,9 @@ class PrintTab:
             self.field("plastic", key).handle.visible &= not solid
         profile = self.field("machine", "profile").value
         about = machine_about(profile) if profile in machine_names() else ""
-        fibre = _fibre_lies(self.page.bench.content.get("fibre"))
+        case = None if self.page.checked is None else self.page.checked.case
+        where = None if case is None else case.fibre
+        fibre = "Fibre lies everywhere." if where is None else f"Fibre lies {where.about()}."
         kept = f"As the part file has it: {hidden}" if hidden else ""
         for handle, said in ((self._about, about), (self._fibre_said, fibre), (self._said, kept)):
             handle.content = f'<p class="ccfem">{escaped(said)}</p>' if said else ""
@@ -239,20 +241,6 @@ class PrintTab:
 
 def _middle_of_bed(machine: Machine) -> tuple[float, ...]:
     return tuple(0.5 * size for size in machine.gcode.bed[:2])
-
-
-def _fibre_lies(fibre: object) -> str:
-    if not fibre:
-        return "Fibre lies everywhere."
-    regions = fibre.get("regions") if isinstance(fibre, Mapping) and len(fibre) == 1 else None
-    words = []
-    for region in regions if isinstance(regions, list) else ():
-        near = isinstance(region, Mapping) and region.keys() == {"rule", "patch", "within"}
-        box = isinstance(region, Mapping) and region.keys() == {"rule", "lower", "upper"}
-        words.append(f"near {region['patch']}" if near else "in a box" if box else "")
-    if not all(words) or not words:
-        return "Fibre lies where the part file says."
-    return f"Fibre lies {' and '.join(words)}."
 
 
 def _turn_of(value: object) -> float | None:

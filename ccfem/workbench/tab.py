@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError, SolveError
 from ccfem.cases.inspection import Check
 from ccfem.cases.part_editing import Change
@@ -63,21 +63,17 @@ class Tabbed:
         except Exception as error:  # one act's fault ends no other
             self.say(f"{type(error).__name__}: {error}")
 
-    def on(self, what: Callable[..., None], *arguments: Any) -> Callable[[Any], Any]:
-        """Return a callback of viser that does something; it is not called for values set here."""
+    def on(
+        self, what: Callable[..., None], *arguments: Any, value: bool = False
+    ) -> Callable[[Any], Any]:
+        """Return a callback of viser that does something, with `value` to what came of a click.
+
+        It is not called for values that are set here.
+        """
 
         async def heed(event: Any) -> None:
             if event.client_id is not None:
-                self.act(what, *arguments)
-
-        return heed
-
-    def on_value(self, what: Callable[..., None], *arguments: Any) -> Callable[[Any], Any]:
-        """Return a callback as `on` does, that passes on what was clicked or uploaded."""
-
-        async def heed(event: Any) -> None:
-            if event.client_id is not None:
-                self.act(what, *arguments, event.target.value)
+                self.act(what, *arguments, *([event.target.value] if value else []))
 
         return heed
 
@@ -214,12 +210,18 @@ MATT = {"cast_shadow": False, "receive_shadow": False}
 """How everything is drawn: without shadows, which take most of the time."""
 
 
-def draw_mesh(
-    scene: Any, name: str, points: FloatArray, triangles: IntArray, colour: Any, **more: Any
+def draw_arrows(
+    scene: Any, name: str, ends: FloatArray, colour: Any, head: float, slender: float
 ) -> Any:
-    """Draw triangles; points in mm. Returns the handle of viser."""
-    where, which = points.astype(np.float32), triangles.astype(np.uint32)
-    return scene.add_mesh_simple(name, where, which, color=colour, **more, **MATT)
+    """Draw arrows (s, 2, 3), mm, from tail to tip: length of a head, and its radius over that."""
+    return scene.add_arrows(
+        name,
+        ends.astype(np.float32),
+        colour,
+        shaft_radius=0.33 * slender * head,
+        head_radius=slender * head,
+        head_length=head,
+    )
 
 
 def draw_lines(

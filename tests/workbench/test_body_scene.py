@@ -13,7 +13,6 @@ from ccfem.workbench.body_scene import (
     borders,
     box_edges,
     boxes,
-    cones,
     face_meshes,
     snapped,
     stretched,
@@ -60,15 +59,10 @@ def square(height, normal):
     return PatchPlace((corners if normal > 0 else corners[:, ::-1]) + [0, 0, height])
 
 
-def test_cones_touch_the_surface_with_their_tips():
-    tips, outward = square(5.0, 1.0).spots(2)
-    points, triangles = cones(tips, outward, 1.0)
-    assert points[:, 2].min() == 5.0
-    assert points[:, 2].max() == 6.0
-    a, b, c = np.moveaxis(points[triangles] - points.mean(axis=0), 1, 0)
-    octagon = 8 * 0.5 * 0.4**2 * np.sin(np.pi / 4)
-    volume = np.einsum("ij,ij->", np.cross(a, b), c) / 6.0
-    assert volume == pytest.approx(2 * octagon / 3.0)  # positive: outward
+def test_marks_touch_the_surface_with_their_tips():
+    marks = square(5.0, 1.0).marks(2, 1.5)
+    np.testing.assert_allclose(marks[:, 1] - marks[:, 0], [[0, 0, -1.5]] * 2)
+    assert {tuple(tip) for tip in marks[:, 1].round(3)} == {(1.333, 0.667, 5), (0.667, 1.333, 5)}
 
 
 @pytest.mark.parametrize("angle", [0.0, 5.9, 6.1, 45.0])

@@ -6,6 +6,7 @@ import sys
 import threading
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from ccfem.workbench.child_run import ChildRun, RunState
@@ -79,6 +80,26 @@ def test_a_stopped_run_leaves_no_process(tmp_path, monkeypatch, manner):
     assert not alive(child)
     assert run.state.complaint == "stopped"
     assert run.state.code in (-signal.SIGTERM, -signal.SIGKILL)
+
+
+@pytest.mark.skipif(
+    not os.environ.get("CCFEM_SLOW"), reason="takes a minute: set CCFEM_SLOW=1 to run it"
+)
+def test_a_run_is_stopped_at_ten_moments(tmp_path):
+    """Whatever it does then, reading to writing: nothing is left of it, and no results."""
+    for share in np.linspace(0.0, 0.95, 10):
+        reached = threading.Event()
+
+        def changed(state, share=share, reached=reached):
+            if state.share >= share:
+                reached.set()
+
+        run = ChildRun(["compare", "bar", "--strategies", "zigzag"], tmp_path, changed)
+        assert reached.wait(120.0)
+        run.stop()
+        assert not alive(run._process.pid)
+        assert run.state.complaint == "stopped"
+        assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="process groups are of Unix")

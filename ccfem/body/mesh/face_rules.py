@@ -191,6 +191,11 @@ class Holes:
             )
         return mesh.boundary[np.sort(np.concatenate([face.facets for face in chosen]))]
 
+    def numbers_on(self, body: BodyFaces) -> tuple[int, ...]:
+        """Numbers of such walls on a body, ascending."""
+        pairs = zip(body.numbers, body.faces, strict=True)
+        return tuple(number for number, face in pairs if self.walls([face]))
+
     def walls(self, faces: Iterable[Face]) -> list[Face]:
         """Return those of some faces that are such walls."""
         return [face for face in faces if _is_hole(face) and self._fits(face)]

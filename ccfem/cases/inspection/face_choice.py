@@ -23,14 +23,7 @@ def like_holes(listing: BodyFaces, number: int) -> list[int]:
     face = listing.face(number)
     if face.kind != "cylinder" or not face.hollow:
         return [number]
-    return holes_on(listing, Holes(float(f"{face.radius:.3g}")))
-
-
-def holes_on(listing: BodyFaces, rule: Holes) -> list[int]:
-    """Numbers of the walls that a rule for holes chooses."""
-    chosen = {id(wall) for wall in rule.walls(listing.faces)}
-    pairs = zip(listing.numbers, listing.faces, strict=True)
-    return sorted(number for number, face in pairs if id(face) in chosen)
+    return list(Holes(float(f"{face.radius:.3g}")).numbers_on(listing))
 
 
 def coplanar(listing: BodyFaces, number: int) -> list[int]:

@@ -59,6 +59,11 @@ def rgb(colour: str) -> tuple[int, int, int]:
     return red, green, blue
 
 
+def gradient(name: str) -> str:
+    """Return a scale from left to right, as CSS."""
+    return f"linear-gradient(90deg, {', '.join(_SCALES[name])})"
+
+
 def scale(name: str) -> Any:
     """Colour map of matplotlib.
 

@@ -9,7 +9,7 @@ import pytest
 from ccfem.comparison.report import print_view
 from ccfem.comparison.report.packing import pack, unpack
 from ccfem.comparison.report.print_view import KINDS, print_views
-from ccfem.comparison.report.reading import RunResults
+from ccfem.comparison.report.report_views import RunResults
 from ccfem.comparison.runs import Run
 from ccfem.machine import Machine
 from ccfem.paths.toolpaths import MATRIX, Toolpaths

@@ -26,14 +26,14 @@ class Pieces:
     Attributes
     ----------
     ends : (s, 2, 3) array, mm
-    force : (s,) array, N
-        Tension in each; NaN where it is not known.
+    share : (s,) array in [0, 1]
+        Force in each over `RunResults.most_force`; 0 where it is not known.
     link : (s,) bool array
         Whether a piece only joins strands.
     """
 
     ends: FloatArray
-    force: FloatArray
+    share: FloatArray
     link: BoolArray
 
 
@@ -163,10 +163,10 @@ class RunResults:
         last[np.asarray(laid["offsets"], dtype=int)[1:] - 1] = True
         start = np.flatnonzero(~last)
         force = np.asarray(laid["force"], dtype=float)
-        force = np.where(force == _NOT_KNOWN, np.nan, force / 254.0 * self.most_force)
+        share = np.where(force == _NOT_KNOWN, 0.0, force / 254.0)
         link = np.zeros(len(points)) if laid["link"] is None else np.asarray(laid["link"])
         ends = np.stack([points[start], points[np.minimum(start + 1, len(points) - 1)]], axis=1)
-        return Pieces(ends.reshape(-1, 2, 3), force[start], link[start] > 0)
+        return Pieces(ends.reshape(-1, 2, 3), share[start], link[start] > 0)
 
     def caption(self, name: str, layer: int) -> str:
         """Words of the report below a layer of a strategy."""
