@@ -20,10 +20,10 @@ from ccfem.machine import machine_table, updated
 from ccfem.paths.planning import plan
 from ccfem.paths.toolpaths import MATRIX, Toolpaths
 from ccfem.printing.bed_layout import AS_IT_STANDS, BedLayout
-from ccfem.printing.copies import arranged
 from ccfem.printing.export.gcode import gcode
 from ccfem.printing.print_plan import PrintPlan, plan_print
 from ccfem.printing.support.overhang import overhang
+from ccfem.printing.together import arranged
 from ccfem.slicing.layers.layer import Layer, plane_frame
 from ccfem.strategies import create
 
@@ -79,7 +79,7 @@ def job_of(
     planned = time.process_time()
     hangs = overhang(mesh, case.build, machine) is not None
     printed = plan_print(paths, layers, mesh, machine, hangs, layout.spin, case.plastic)
-    printed = arranged(printed, layout, machine)
+    printed = arranged([printed], [layout], machine)
     text = gcode(printed, machine)
     written = time.process_time()
     copies = on_bed(paths, mesh, case.build, machine.gcode.bed, layout, printed)
