@@ -43,7 +43,7 @@ _AHEAD = np.radians((-45.0, 0.0, 45.0))
 """Places on a wall, from the force on, ahead of which it is looked at whether it is filled."""
 _IDLE = 1e-3
 """Share of the load of the part below which a hole is not loaded across its axis."""
-_AHEAD = 0.7
+_STRAIGHT = 0.7
 """Least cosine between the force and the middle of the round end of a slot that takes it."""
 _ROUND = 0.02
 """Share of its area by which a wall goes all round, and along one axis: as for round walls."""
@@ -160,7 +160,8 @@ def _holes(stress: StressField, forces: FloatArray, size: float) -> Iterator[_Ho
         # At the rim the nodes are also those of other patches: their supports are not the pin.
         outer = forces * (name in loaded) + stress.reactions * (name in held)
         for whole in given_faces(mesh.points, facets, _pieces(facets)):
-            piece, face = facets[whole.facets], whole
+            face: Face | None = whole
+            piece = facets[whole.facets]
             force = outer[np.unique(mesh.facet_nodes(piece))].sum(axis=0)
             axis, hollow = whole.direction, whole.hollow and whole.turn >= _HALF
             if whole.kind != "cylinder":
@@ -194,7 +195,7 @@ def _end_ahead(mesh: TetMesh, facets: IntArray, force: FloatArray) -> tuple[Face
         (face,) = given_faces(mesh.points, end, [np.arange(len(end))])
         area, normal = mesh.facet_areas(end)
         ahead = -(area @ normal) @ force
-        straight = ahead >= _AHEAD * np.linalg.norm(area @ normal) * np.linalg.norm(force)
+        straight = ahead >= _STRAIGHT * np.linalg.norm(area @ normal) * np.linalg.norm(force)
         if face.kind == "cylinder" and face.hollow and face.turn >= _HALF and straight:
             return face, end
     return None, facets
