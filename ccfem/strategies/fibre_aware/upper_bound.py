@@ -555,7 +555,7 @@ class DensityAscent:
         total = weight.sum(axis=1)
         # The length grows with the factor, at a slope that falls where a cell becomes full.
         full = self.most / np.maximum(total, 1e-300)
-        order = np.argsort(full)
+        order = np.argsort(full, kind="stable")
         room, volume = (self.volume * self.most)[order], (self.volume * total)[order]
         filled = np.cumsum(room) - room
         slope = np.cumsum(volume[::-1])[::-1]
