@@ -6,7 +6,7 @@
 * It holds before it is cut: `Machine.held_length` lies without a fold behind its start, and as much
   before its cut, a tail before its end. The head may begin at either end.
 * Of the area of a strand, its length times a fibre width, no more than a twentieth lies outside the
-  part. Links do not count as outside: those are laid on pads and cut off.
+  part. Links do not count where they are wholly outside: those are laid on pads and cut off.
 """
 
 from collections.abc import Mapping, Sequence
@@ -142,7 +142,8 @@ def _looked_at(
     def one(some: Toolpaths, on: Sequence[Layer]) -> _Strands:
         parts = strand_parts(some, machine, on, shared=with_parts)
         line, length, first = parts.beads.line, parts.beads.length, parts.beads.first
-        away = np.where(parts.link, 0.0, 1.0 - parts.inside)
+        # A link is cut off where it is outside, not where it lies along the border.
+        away = np.where(parts.link & (parts.inside <= 0.0), 0.0, 1.0 - parts.inside)
         area = np.bincount(line, length, len(some))
         share = np.bincount(line, length * away, len(some)) / np.maximum(area, 1e-300)
         place = np.zeros((len(some), 3))
