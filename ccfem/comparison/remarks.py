@@ -314,8 +314,9 @@ def bound_remark(tested: Sequence[Run], bound: UpperBound) -> str:
 
 
 def why_above(run: Run, share: float) -> str:
-    """Say why a run lies above a bound: strands that cross, if that is enough of its fibre.
+    """Say why a run lies above a bound: strands that cross, if those are enough, or the cells.
 
+    Bounds are those of linear cells, which bend too little: coarse quadratic ones may exceed them.
     Fibre on other fibre of its direction, and outside the part, carries nothing in the test.
 
     Parameters
@@ -327,4 +328,9 @@ def why_above(run: Run, share: float) -> str:
     if across >= share:
         return f"{across:.1%} of its fibre lies across other fibre, which the bound leaves out"
     some = f"only {across:.1%} of its fibre lies" if across >= 0.0005 else "none of its fibre lies"
+    if run.tested is not None and run.tested.bracket.tension.solution.mesh.order == 2:
+        return (
+            f"{some} across other fibre, but the bound is that of linear cells, the test that of "
+            "quadratic ones: trust neither number before shorter edges bring them together"
+        )
     return f"{some} across other fibre, so the cause is not known: trust neither number"
