@@ -83,8 +83,7 @@ def test_a_surface_of_another_program_follows_the_wall_that_it_ends_at(body):
     assert shapely.distance(ends, middle).max() == pytest.approx(RADIUS, abs=0.02)
 
 
-@pytest.mark.parametrize("size", [3.0, 6.0])
-def test_an_oval_hole_of_a_cad_file_is_printed_within_five_hundredths(tmp_path, size):
+def test_an_oval_hole_of_a_cad_file_is_printed_within_five_hundredths(tmp_path):
     """By a size of 12 edges a turn, as on round walls, the chords were up to 0.2 mm off."""
     gmsh = pytest.importorskip("gmsh")
     gmsh.initialize(interruptible=False)
@@ -98,7 +97,7 @@ def test_an_oval_hole_of_a_cad_file_is_printed_within_five_hundredths(tmp_path, 
     gmsh.finalize()
     turn = np.linspace(0.0, 2.0 * np.pi, 10_000)
     true = shapely.LinearRing(np.column_stack([20 + 9 * np.cos(turn), 18 + 5 * np.sin(turn)]))
-    (layer,) = Planar(count=1).cut(mesh_cad(path, size)[0])
+    (layer,) = Planar(count=1).cut(mesh_cad(path, 6.0)[0])
     (hole,) = layer.plane.polygon.interiors
     assert shapely.hausdorff_distance(hole.segmentize(0.2), true) < 0.05
 
