@@ -5,6 +5,7 @@ its comments, which must then read as these values.
 """
 
 import copy
+import re
 import tomllib
 from collections.abc import Callable, Collection, Mapping, Sequence
 from os.path import relpath
@@ -16,6 +17,7 @@ from tomlkit.items import AoT, InlineTable
 
 from ccfem.base.errors import InputError
 from ccfem.base.toml import toml_of
+from ccfem.body.files.deck import check_included
 from ccfem.body.mesh.face_places import BodyFaces
 from ccfem.cases.inspection.face_choice import face_rule, patch_name
 
@@ -23,6 +25,9 @@ Keys = Sequence[str | int]
 """Where a value stands: names of tables, and places in lists."""
 Change = Callable[[Any], None]
 """Changes a content in place: a dict, or a document of tomlkit."""
+
+_HEAVY = re.compile(r">\s*([^<>]+?):/")
+"""File of the numbers of an XDMF mesh, in front of their place in it."""
 
 
 def content_of(text: str) -> dict[str, Any]:
@@ -169,6 +174,61 @@ def files_in(content: Mapping[str, Any]) -> dict[tuple[str | int, ...], str]:
         if isinstance(region, Mapping):
             named["fibre", "regions", k, "file"] = region.get("file")
     return {keys: name for keys, name in named.items() if isinstance(name, str)}
+
+
+def check_files(text: str, home: Path, allowed: Sequence[Path]) -> None:
+    """Refuse a part file that has a file read outside the folders that are allowed.
+
+    Parameters
+    ----------
+    home : Path
+        Folder that its paths are relative to.
+    allowed : sequence of Path
+        The first is where the part is run: the folder of layers is relative to that.
+
+    Raises
+    ------
+    InputError
+    """
+    content = content_of(text)
+    for name in files_in(content).values():
+        check_body(home / name, allowed)
+    slicing = content.get("slicing")
+    layers = slicing.get("folder") if isinstance(slicing, Mapping) else None
+    if isinstance(layers, str):
+        check_inside(allowed[0] / layers, allowed)
+
+
+def check_body(path: Path, allowed: Sequence[Path]) -> None:
+    """Refuse a file outside the folders that are allowed, and one that has others read there."""
+    real = check_inside(path, allowed)
+    if not real.is_file():
+        return
+    if real.suffix.lower() == ".inp":
+        check_included(real, lambda other: check_inside(other, allowed))
+    elif real.suffix.lower() == ".xdmf":
+        for name in _HEAVY.findall(real.read_text(encoding="utf-8", errors="replace")):
+            check_inside(real.parent / name, allowed)
+
+
+def check_inside(path: Path, allowed: Sequence[Path]) -> Path:
+    """Return a path with its links followed where it lies in one of the folders.
+
+    Raises
+    ------
+    InputError
+        Where it does not.
+    """
+    try:
+        real = path.resolve()
+    except (OSError, ValueError, RuntimeError):
+        raise InputError(f"{str(path)!r} is no path: correct it") from None
+    if not any(real.is_relative_to(folder.resolve()) for folder in allowed):
+        raise InputError(
+            f"{path} lies outside {', '.join(map(str, allowed))}: start ccfem open in a folder "
+            "that holds it"
+        )
+    return real
 
 
 def rebased(text: str, home: Path, to: Path) -> str:

@@ -7,7 +7,7 @@ Nothing is read outside the folder where the workbench was started, and nothing 
 import functools
 import os
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,17 @@ from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE
 from ccfem.body.meshing.cad import is_cad
 from ccfem.cases.inspection import Check, check, faces
 from ccfem.cases.inspection.beginning import empty_part
-from ccfem.cases.part_editing import Change, content_of, edited, files_in, rebased, valued
+from ccfem.cases.part_editing import (
+    Change,
+    check_body,
+    check_files,
+    check_inside,
+    content_of,
+    edited,
+    files_in,
+    rebased,
+    valued,
+)
 from ccfem.cases.part_file import faces_of_content, part_case
 from ccfem.cases.part_writing import part_text
 from ccfem.cases.reading import create_case, named_cases
@@ -159,7 +169,7 @@ class Bench:
             listing = self._faces(text, path.parent)
             opened = Opened(path.stem, path.parent, path, text)
         elif _is_body(path):
-            existing_file(path, "the body")
+            check_body(existing_file(path, "the body"), [self.folder])
             listing = faces(path)
             text = empty_part(shown, listing)
             stem = re.sub(r"[^\w-]+", "_", path.stem) or "part"
@@ -307,42 +317,6 @@ class Bench:
             return None, (("mistake", str(error)),)
         lines = checked.faults | {"warning": checked.warnings, "known": checked.facts}
         return checked, tuple((kind, line) for kind, those in lines.items() for line in those)
-
-
-def check_files(text: str, home: Path, allowed: Collection[Path]) -> None:
-    """Refuse a part file that names a file outside the folders that are allowed.
-
-    Parameters
-    ----------
-    home : Path
-        Folder that its paths are relative to.
-
-    Raises
-    ------
-    InputError
-    """
-    for name in files_in(content_of(text)).values():
-        check_inside(home / name, allowed)
-
-
-def check_inside(path: Path, allowed: Collection[Path]) -> Path:
-    """Return a path with its links followed where it lies in one of the folders.
-
-    Raises
-    ------
-    InputError
-        Where it does not.
-    """
-    try:
-        real = path.resolve()
-    except (OSError, ValueError, RuntimeError):
-        raise InputError(f"{str(path)!r} is no path: correct it") from None
-    if not any(real.is_relative_to(folder.resolve()) for folder in allowed):
-        raise InputError(
-            f"{path} lies outside {', '.join(map(str, allowed))}: start ccfem open in a folder "
-            "that holds it"
-        )
-    return real
 
 
 def _is_body(path: Path) -> bool:

@@ -8,9 +8,9 @@ import pytest
 from ccfem.base.errors import InputError
 from ccfem.body.files import write_mesh
 from ccfem.body.mesh.box import box_mesh
-from ccfem.cases.part_editing import appended, edited, patch_of, valued
+from ccfem.cases.part_editing import appended, check_files, edited, patch_of, valued
 from ccfem.cases.part_file import read_part
-from ccfem.workbench.bench import Bench, History, check_files
+from ccfem.workbench.bench import Bench, History
 
 BY_HAND = """\
 # A bar, by hand.
@@ -181,6 +181,25 @@ def test_files_outside_the_folder_are_refused(tmp_path):
     with pytest.raises(InputError, match="lies outside"):
         check_files(BY_HAND.replace("bar.vtu", "link.vtu"), tmp_path, [tmp_path])
     check_files(BY_HAND, tmp_path, [tmp_path])
+    layers = '\n[slicing]\nmethod = "surfaces"\nfolder = "../layers"\n'
+    with pytest.raises(InputError, match="lies outside"):
+        check_files(BY_HAND + layers, tmp_path, [tmp_path])
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("bar.inp", "*NODE, INPUT=../nodes.txt\n"),
+        ("bar.inp", "*HEADING\nbar\n*Include, input = /etc/passwd\n"),
+        ("bar.xdmf", "<DataItem Format='HDF'>\n ../mesh.h5:/Mesh/points </DataItem>"),
+    ],
+)
+def test_what_a_body_has_read_lies_in_the_folder_too(bench, name, text):
+    (bench.folder / name).write_text(text)
+    with pytest.raises(InputError, match="lies outside"):
+        bench.open(name)
+    with pytest.raises(InputError, match="lies outside"):
+        check_files(BY_HAND.replace("bar.vtu", name), bench.folder, [bench.folder])
 
 
 def test_a_file_that_is_uploaded_replaces_no_other(bench):

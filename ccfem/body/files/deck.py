@@ -9,7 +9,7 @@ elements in other ways is refused, and everything else is kept as it stands, in 
 
 import re
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -51,11 +51,15 @@ class Block:
 
 
 def _lines(
-    path: Path, folder: Path, above: tuple[Path, ...] = ()
+    path: Path,
+    folder: Path,
+    above: tuple[Path, ...] = (),
+    before: Callable[[Path], object] = lambda other: None,
 ) -> Iterator[tuple[str, Path, int]]:
     """Whole headings and data lines with file and number, those of other files included.
 
-    As Abaqus and CalculiX do, files are looked for in the folder of the deck.
+    As Abaqus and CalculiX do, files are looked for in the folder of the deck. `before` is called
+    with each file before that is read.
     """
     text = path.read_text(encoding="utf-8-sig", errors="replace")
     heading = ""
@@ -76,10 +80,17 @@ def _lines(
         if keyword == "INCLUDE" or (keyword in _READ and "INPUT" in parameters):
             name = parameters.get("INPUT", "").replace("\\", "/")
             where = f"{path}, line {number}"
+            before(folder / name)
             other = existing_file(folder / name, f"{where}: the file of *{keyword}")
             if other in (path, *above) or not other.is_file():
                 raise InputError(f"{where}: {other} includes itself, or is no file: take it out")
-            yield from _lines(other, folder, (path, *above))
+            yield from _lines(other, folder, (path, *above), before)
+
+
+def check_included(deck: Path, check: Callable[[Path], object]) -> None:
+    """Have each file that a deck includes checked, before it is read."""
+    for _ in _lines(deck, deck.parent, before=check):
+        pass
 
 
 def _heading(line: str) -> tuple[str, dict[str, str]]:
