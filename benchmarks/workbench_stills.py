@@ -73,8 +73,6 @@ def main(folder: Path = FOLDER) -> None:
         still("fibre")
         page.act(page.show_view, "Deformed")
         still("deformed")
-        page.act(page.show_view, "Stress")
-        still("stress")
         tab.get_by_role("button", name="G-code of this strategy").click()
         tab.wait_for_timeout(500)
         page.compare.run.wait()
