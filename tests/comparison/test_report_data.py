@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,12 +12,15 @@ from ccfem.comparison.citations import METHODS, bibtex, cited, methods_of, sente
 from ccfem.comparison.report import charts
 from ccfem.comparison.report.html_report import _coarser
 from ccfem.comparison.report.layer_view import (
+    DrawnPaths,
     _nearest,
     _paths,
     angle_on_layer,
     drawn_paths,
     in_layer,
 )
+from ccfem.comparison.report.packing import Rounded, pack, unpack
+from ccfem.comparison.report.report_views import RunResults
 from ccfem.comparison.runs import Run
 from ccfem.judging.evaluation.strand_rules import BrokenRule, StrandVerdict
 from ccfem.paths.toolpaths import Toolpaths
@@ -146,3 +150,34 @@ def test_a_curved_layer_is_drawn_as_rolled_off():
     steps = np.linalg.norm(np.diff(plane, axis=0), axis=1)
     assert steps.sum() == pytest.approx(2.4 * radius, rel=0.02)
     assert np.linalg.norm(plane[-1] - plane[0]) == pytest.approx(steps.sum(), rel=1e-3)
+
+
+def test_strands_of_a_curved_layer_are_read_back_where_they_lie():
+    """Two strands round a cylinder of radius 25, the second of unknown force, from a report."""
+    radius, turn = 25.0, np.linspace(-1.2, 1.2, 20)
+    points = np.concatenate(
+        [np.column_stack([radius * np.sin(turn), np.full(20, y), radius * np.cos(turn)])
+         for y in (10.0, 50.0)]
+    )  # fmt: skip
+    angle = (LAYER.points[:, 0] - 40.0) / radius
+    bent = np.column_stack([radius * np.sin(angle), LAYER.points[:, 1], radius * np.cos(angle)])
+    curved = replace(LAYER, points=bent, flat=None)
+    force = np.where(points[:, 1] < 30.0, 30.0, np.nan)
+    offsets, none = np.array([0, 20, 40]), np.zeros(40, dtype=bool)
+    drawn = DrawnPaths(points, offsets, np.zeros(2), none, force, none[:2], np.zeros(40))
+    nodal = np.zeros((len(LAYER.points), 3, 3))
+    stress = LayerStress(LAYER, nodal[LAYER.triangles[:, 0]], nodal)
+    laid = _paths(drawn, curved, stress, {"force": 60.0, "angle": 90.0, "curvature": 1.0})
+    (loop,) = LAYER.loops
+    rim = bent[np.append(loop, loop[:1])]
+    view = {"space": Rounded(rim, 0.01), "rim_offsets": np.array([0, len(rim)])}
+    stack = {"layers": [view], "runs": [{"name": "rings", "layers": [laid]}], "first": 0}
+    views = {"layers": {"stacks": [stack], "scales": {"force": 60.0}, "width": 1.0}}
+    results = RunResults(Path(), {}, unpack(pack(views)))
+    pieces = results.pieces("rings", 0)
+    assert pieces.ends.shape == (38, 2, 3)
+    np.testing.assert_allclose(np.hypot(*pieces.ends[..., [0, 2]].T), radius, atol=0.02)
+    lengths = np.linalg.norm(pieces.ends[:, 1] - pieces.ends[:, 0], axis=1)
+    assert lengths.sum() == pytest.approx(2 * 2.4 * radius, rel=1e-3)
+    np.testing.assert_allclose(pieces.share, np.repeat([0.5, 0.0], 19))
+    np.testing.assert_allclose(np.hypot(*results.rims(0)[..., [0, 2]].T), radius, atol=0.02)
