@@ -149,8 +149,8 @@ def beside(
 ) -> Iterator[Callable[[], Result]]:
     """Work in another process while the block runs, with what waits for the result.
 
-    Until it is done, one processor less is left for other work of this process. Where no second one
-    is left, the work is done here when its result is asked for.
+    Until it is done, one processor less is left for other work of this process. Where there is no
+    room for it (`has_room_beside`), the work is done here when its result is asked for.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def beside(
     shared : sequence, optional
         As of `in_processes`.
     """
-    if _left() < 2 or not _may_fork() or _ELSEWHERE.get() is not None:
+    if not has_room_beside():
         yield work
         return
     forks = _Forks(work, [()], shared, 1)
@@ -169,6 +169,11 @@ def beside(
     finally:
         _besides.remove(forks)
         forks.end()
+
+
+def has_room_beside() -> bool:
+    """Whether a second processor is left here, and work is not shared out elsewhere."""
+    return _left() > 1 and _may_fork() and _ELSEWHERE.get() is None
 
 
 def _left() -> int:

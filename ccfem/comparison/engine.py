@@ -307,9 +307,10 @@ class _Early:
     bounds: dict[float, UpperBound] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
 
-    def judged(self, run: Run, part: Part) -> Run:
-        """Take a planned run as far as its virtual test."""
-        return judged(run, part, self.request.print_plans, self.basis.tests)
+    @property
+    def judged(self) -> Callable[[Run, Part], Run]:
+        """What takes a planned run as far as its virtual test."""
+        return partial(judged, prints=self.request.print_plans, tests=self.basis.tests)
 
     def on(self, part: Part, wanted: Wanted) -> Ahead:
         """Judge runs on a part in another process, and bound what any of their length reach."""

@@ -9,7 +9,7 @@ from itertools import count
 from typing import Any
 
 from ccfem.base.errors import InputError, SolveError
-from ccfem.base.parallel import give_back, in_processes
+from ccfem.base.parallel import give_back, has_room_beside, in_processes
 from ccfem.base.progress import Progress
 from ccfem.comparison.runs import Run, Tested
 from ccfem.comparison.tested_cases import in_all_cases
@@ -324,7 +324,7 @@ def all_planned(runs: Sequence[Run], plan: Callable[[Run], Run], ahead: Ahead) -
     late = {run.name for run in runs if isinstance(run.strategy, LengthStrategy)}
     done = {run.name: plan(run) for run in runs if run.name not in late}
     first = list(done.values())[:_AHEAD]
-    if late and first:
+    if late and first and has_room_beside():
         with ahead(first) as judged_ahead:
             done |= {run.name: plan(run) for run in runs if run.name in late}
             done |= {run.name: run for run in judged_ahead()}

@@ -9,7 +9,7 @@ import pytest
 
 from ccfem.base.arrays import is_shared, read_only, shared_rows
 from ccfem.base.errors import InputError
-from ccfem.base.parallel import beside, in_processes, in_threads, processors
+from ccfem.base.parallel import beside, done_elsewhere, in_processes, in_threads, processors
 
 
 @pytest.fixture
@@ -151,6 +151,11 @@ def test_work_is_done_beside_other_work_on_the_processor_that_is_left(two, tmp_p
         go.touch()
         assert result() != os.getpid()
         assert os.getpid() not in in_processes(lambda _: os.getpid(), [0, 1])
+
+
+def test_nothing_is_done_beside_work_that_is_shared_out(two):
+    with done_elsewhere(lambda work, arguments: None), beside(os.getpid) as here:
+        assert here() == os.getpid()
 
 
 def test_an_error_beside_other_work_is_raised_where_its_result_is_asked_for(two):
