@@ -24,7 +24,7 @@ from ccfem.judging.virtual_testing import Specimen, virtual_test
 from ccfem.judging.virtual_testing.strands import carrying_strands
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning import plan
-from ccfem.slicing.slicers import Planar
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
 
 __all__ = ["PARTS", "rows"]
@@ -65,9 +65,9 @@ def rows(name: str, pictures: Path | None, strategies: Iterable[str] = ()) -> li
     found = [f"| **{name}** |" + 7 * " |"]
     for title in strategies or STRATEGIES:
         kind, parameters = STRATEGIES[title]
-        strategy, before = create(kind, parameters), process_time()
-        most = {strategy.amount.parameter: strategy.amount.most, **dict(strategy.amount.beyond)}
-        strategy = replace(strategy, **most)
+        amount, before = create(kind).amount, process_time()
+        most = {amount.parameter: amount.most, **dict(amount.beyond)}
+        strategy = create(kind, {**parameters, **most})
         paths = plan(strategy, layers, stress, machine)
         seconds = process_time() - before
         total = evaluate(paths, layers, stress, machine).total
