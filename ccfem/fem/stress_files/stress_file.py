@@ -162,6 +162,13 @@ def _on_mesh(data: StressData, mesh: TetMesh, path: Path) -> tuple[FloatArray, F
         nodal, cell = _by_number(data, mesh, corners, path)
     else:
         assert data.corners is not None
+        named = np.concatenate([block.reshape(-1) for block in data.corners])
+        wrong = (named < 0) | (named >= len(data.points))
+        if wrong.any():
+            raise InputError(
+                f"{path}: a cell names point {named[wrong][0]}, and there are 0 to "
+                f"{len(data.points) - 1}: write the file again"
+            )
         node = _nodes(data.points, mesh, corners, path)
         if data.nodal is not None:
             nodal = np.where(node[:, None] >= 0, data.nodal[node], np.nan)

@@ -5,6 +5,7 @@ import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import meshio
 import numpy as np
@@ -15,6 +16,7 @@ from benchmarks.fuzz.mutants import frd
 from ccfem.base.errors import InputError
 from ccfem.base.tensor import to_voigt
 from ccfem.body.files import read_mesh
+from ccfem.body.files.formats import vtu
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
@@ -428,6 +430,16 @@ def test_spoiled_results_are_one_line(tmp_path, results, old, new, said):
     with pytest.raises(InputError, match=said) as refused:
         read_stress(tmp_path / "part.frd", results[1])
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("number", [99, -1])
+def test_a_cell_of_points_that_are_not_there_is_one_line(tmp_path, box, number):
+    cells = box.cells.copy()
+    cells[3, 1] = number
+    spoiled = SimpleNamespace(points=box.points, cells=cells, order=1, patches={}, axes={})
+    vtu.write(spoiled, tmp_path / "part.vtu", cell={"stress": np.ones((len(cells), 9))})
+    with pytest.raises(InputError, match=rf"a cell names point {number}, and there are 0 to"):
+        read_stress(tmp_path / "part.vtu", box, "MPa")
 
 
 def steps(text, *headings):
