@@ -66,7 +66,7 @@ class Tested:
     joints : tuple of PinnedJoint
         Holes that pins press on, the weakest first; none where a strength is unknown.
     pins_not_judged : str
-        In which holes pins press where the wall is not round; empty without any.
+        In which holes pins press where the wall is no cylinder; empty without any.
     scatter : RatioScatter, optional
         Of the stiffness ratio in tension only.
     """

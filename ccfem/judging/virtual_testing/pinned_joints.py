@@ -133,12 +133,12 @@ def pinned_joints(
 
 
 def pins_not_judged(stress: StressField, forces: FloatArray, size: float) -> str:
-    """Say in which holes pins press where the wall is not round; empty without any."""
+    """Say in which holes pins press where the wall is no cylinder; empty without any."""
     names = dict.fromkeys(h.patch for h in _holes(stress, forces, size) if h.face is None)
     if not names:
         return ""
     listed = ", ".join(f"'{name}'" for name in names)
-    return f"pins are not judged in {listed}: loaded where the wall of the hole is not round"
+    return f"pins are not judged in {listed}: loaded where the wall of the hole is no cylinder"
 
 
 class _Hole(NamedTuple):

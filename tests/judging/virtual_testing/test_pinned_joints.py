@@ -109,7 +109,7 @@ def test_a_pin_in_the_end_of_a_slot_is_judged_and_one_on_its_side_is_named():
     loads = {"up": (Force("slot", (0.0, 100.0, 0.0)),)}
     problem = Problem(mesh, MATERIAL, (Support("root"),), loads, order=1)
     said = about_pins(solve(problem)["up"])
-    assert said == "pins are not judged in 'slot': loaded where the wall of the hole is not round"
+    assert said == "pins are not judged in 'slot': loaded where the wall of the hole is no cylinder"
 
 
 def test_a_held_hole_is_judged_by_its_reaction_and_an_idle_one_is_not():
