@@ -21,8 +21,8 @@ from ccfem.body.files.surface import is_surface
 from ccfem.body.mesh.face_places import BodyFaces
 from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE
 from ccfem.body.meshing.cad import is_cad
-from ccfem.cases.inspection import Check, check, faces
-from ccfem.cases.inspection.beginning import empty_part
+from ccfem.cases.inspection import Check, check
+from ccfem.cases.inspection.beginning import empty_part, faces_in_mm
 from ccfem.cases.part_editing import (
     Change,
     check_body,
@@ -170,8 +170,8 @@ class Bench:
             opened = Opened(path.stem, path.parent, path, text)
         elif _is_body(path):
             check_body(existing_file(path, "the body"), [self.folder])
-            listing = faces(path)
-            text = empty_part(shown, listing)
+            listing, doubt = faces_in_mm(path)
+            text = empty_part(shown, listing, doubt)
             stem = re.sub(r"[^\w-]+", "_", path.stem) or "part"
             opened = Opened(stem, self.folder, None, text)
         else:

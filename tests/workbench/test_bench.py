@@ -3,10 +3,12 @@
 import shutil
 import tomllib
 
+import numpy as np
 import pytest
 
 from ccfem.base.errors import InputError
 from ccfem.body.files import write_mesh
+from ccfem.body.files.surface import write_stl
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.part_editing import appended, check_files, edited, patch_of, valued
 from ccfem.cases.part_file import read_part
@@ -227,3 +229,16 @@ def test_a_run_is_of_the_text_that_it_has_read(bench):
     assert not bench.is_of(ran)
     bench.step(-1)
     assert bench.is_of(ran)
+
+
+def test_a_body_in_metres_is_opened_in_millimetres(bench):
+    """A plate of 60 x 20 x 4 mm whose file has metres, its walls turned inside out."""
+    mesh = box_mesh((0.06, 0.02, 0.004), (1, 1, 1))
+    write_stl(bench.folder / "small.stl", mesh.points, mesh.boundary[:, ::-1])
+    bench.open("small.stl")
+    assert bench.content["scale"] == 1000
+    assert bench.listing.size == pytest.approx(np.sqrt(60.0**2 + 20.0**2 + 4.0**2))
+    assert 1.0 < bench.content["edge_length"] < 4.0
+    corners = bench.listing.points[bench.listing.triangles]
+    volume = np.einsum("ij,ij->", np.cross(corners[:, 0], corners[:, 1]), corners[:, 2]) / 6.0
+    assert volume == pytest.approx(60.0 * 20.0 * 4.0)  # outward, as they are drawn

@@ -74,10 +74,7 @@ def new_part(
         with whole_file(out) as temporary:
             temporary.write_text(_of_deck(body, read(body).problem.loads), "utf-8")
         return out
-    listing = faces_of(body)
-    doubt = listing.doubt
-    if doubt:
-        listing = faces_of(body, scale=1000.0)
+    listing, doubt = faces_in_mm(body)
     edge = usual_edge_length(listing)
     held, pulled, pull = _ends(listing, edge)
     with whole_file(out) as temporary:
@@ -144,11 +141,18 @@ def _refuse_present(out: Path, force: bool) -> None:
         raise InputError(f"{out} is there already: name another file (--out), or --force")
 
 
-def empty_part(body: Path, listing: BodyFaces) -> str:
+def faces_in_mm(body: Path) -> tuple[BodyFaces, str]:
+    """Faces of a body, times 1000 where its lengths look like metres, and what is said of that."""
+    listing = faces_of(body)
+    doubt = listing.doubt
+    return faces_of(body, scale=1000.0) if doubt else listing, doubt
+
+
+def empty_part(body: Path, listing: BodyFaces, doubt: str = "") -> str:
     """Text of a part file for a body on which nothing is held and nothing loaded yet."""
     edge = usual_edge_length(listing) if is_surface(body) or is_cad(body) else None
     head = "# Made with ccfem open. Lengths in mm, forces in N, stresses in MPa."
-    lines = [head, "", *_body_lines(body, edge, listing.doubt), 'material = "pla"', ""]
+    lines = [head, "", *_body_lines(body, edge, doubt), 'material = "pla"', ""]
     return "\n".join(lines)
 
 
