@@ -1,13 +1,16 @@
 """Opening the workbench from Python: the link it shows, and one line where viser is missing."""
 
+import ast
 import socket
 import sys
 import urllib.request
+from pathlib import Path
 
 import pytest
 
 import ccfem
 from ccfem.base.errors import InputError
+from ccfem.workbench import opening
 
 
 def test_without_viser_one_line_names_the_extra(monkeypatch, tmp_path):
@@ -47,3 +50,24 @@ def test_nothing_is_open_at_first(tmp_path):
         assert "Tensile bar" in page.heading.content
     finally:
         workbench.close()
+
+
+def code_lines(text):
+    """Lines of code: without blank ones, comments and docstrings."""
+    words = [
+        line
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+        for line in range(node.lineno, node.end_lineno + 1)
+    ]
+    lines = enumerate(text.splitlines(), 1)
+    return sum(k not in words and line.strip()[:1] not in ("", "#") for k, line in lines)
+
+
+def test_the_skin_is_thin():
+    folder = Path(opening.__file__).parent
+    assert code_lines('"""Words."""\n\n# more\nx = 1\ny = (\n    2)\n') == 3
+    assert sum(code_lines(path.read_text("utf-8")) for path in folder.glob("*.py")) < 2000
+    head = (folder / "head.html").read_text("utf-8")
+    script = head.partition("<script>")[2].partition("</script>")[0]
+    assert 10 < len(script.splitlines()) < 100
