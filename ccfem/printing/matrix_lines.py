@@ -13,7 +13,7 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.infill_lines import border_joints, gyroid_lines, parallel_lines
 from ccfem.geometry.offsets import inset, offset_rings
-from ccfem.geometry.polylines import along_line, is_closed, points_along
+from ccfem.geometry.polylines import along_line, between, is_closed, points_along
 from ccfem.geometry.shapes import Region, bands, open_lines, strings
 from ccfem.machine.machine import Machine
 from ccfem.paths.linking.joining import Joined, Joint, join
@@ -27,6 +27,8 @@ _DIRECTED = 0.1
 _OVERLAP = 0.25
 """Overlap of the ends of zigzag and infill with what lies round them, in line widths. Our
 choice."""
+_OFF = 2e-3
+"""Ends of a way between lines of infill, mm, on which it may touch what they end on."""
 _EVEN, _ROUNDS = 2e-3, 3
 """Share by which the density of infill may be off in the mean of all layers, and how often its
 spacing is changed for that."""
@@ -101,7 +103,7 @@ def matrix_fills(
     def filled(section: Region, sparse: Region, angle: float, phase: float) -> MatrixFill:
         solid = section if sparse.is_empty else shapely.difference(section, sparse)
         lines, widths = _solid_lines(section, solid, float(np.radians(angle)), plastic, machine)
-        infill = _joined_infill(sparse, phase, spacing, plastic, machine)
+        infill = _joined_infill(sparse, phase, spacing, lines, plastic, machine)
         drawn = [_begun(on_bed(line), plastic.seam, width) for line in lines]
         return MatrixFill(
             shapely.transform(section, on_bed),
@@ -188,13 +190,30 @@ def _even_spacing(
 
 
 def _joined_infill(
-    sparse: Region, phase: float, spacing: float, plastic: Plastic, machine: Machine
+    sparse: Region,
+    phase: float,
+    spacing: float,
+    solid: Sequence[FloatArray],
+    plastic: Plastic,
+    machine: Machine,
 ) -> Joined:
-    """Lines of sparse infill, joined where the way along the wall is sooner gone than over it."""
+    """Lines of sparse infill, joined where the way along the wall is sooner gone than over it.
+
+    None of the ways meets a solid line, as those of a skin beside the infill.
+    """
     lines, profile = _infill_lines(sparse, phase, spacing, plastic, machine), machine.gcode
     lift = profile.lift / profile.lift_speed + profile.retract / profile.retract_speed
     joints = border_joints(lines, _up_to_walls(sparse, machine), 2.0 * lift * machine.travel_speed)
-    return join(lines, [Joint(*joint, marked=True) for joint in joints])
+    if not joints:
+        return join(lines, [])
+    ends = [end for line in lines for end in (line[0], line[-1])]
+    ways = [np.concatenate([ends[a][None], way, ends[b][None]]) for a, b, way in joints]
+    along = [along_line(way)[-1] for way in ways]
+    inner = [between(way, _OFF, far - _OFF) for way, far in zip(ways, along, strict=True)]
+    tree = shapely.STRtree(strings(solid))
+    met, _ = tree.query(strings(inner), predicate="dwithin", distance=0.5 * _OFF)
+    free = np.setdiff1d(np.arange(len(joints)), met)
+    return join(lines, [Joint(*joints[k], marked=True) for k in free.tolist()])
 
 
 def _up_to_walls(sparse: Region, machine: Machine) -> Region:
