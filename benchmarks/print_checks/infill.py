@@ -147,7 +147,7 @@ class Regions:
 
 
 def regions_of(job: Job, plastic: Plastic) -> list[Regions]:
-    """Find the regions of all layers of matrix again, for a part of one outer shape."""
+    """Find the regions of all layers of matrix again."""
     machine, lines = job.machine, Lines.of(job.done)
     width, pixel = machine.matrix_width, _PIXEL * machine.matrix_width
     mine = lines.lays & lines.in_part & ~lines.beside_part
@@ -157,11 +157,13 @@ def regions_of(job: Job, plastic: Plastic) -> list[Regions]:
     lower = np.concatenate([[0.0], tops[:-1]])
     levels = np.union1d(np.append(0.0, tops), fibre)
     bottoms = levels[np.searchsorted(levels, tops) - 1]
-    masks, low = [], np.array(job.section(0.5 * tops[0]).bounds[:2]) - 2.0
-    for bottom, top in zip(bottoms, tops, strict=True):
-        section = job.section(0.5 * (bottom + top))
-        count = np.ceil((np.array(section.bounds[2:]) + 2.0 - low) / pixel).astype(int)
-        x, y = (low[k] + (np.arange(count[k]) + 0.5) * pixel for k in (0, 1))
+    sections = [job.section(0.5 * (low + high)) for low, high in zip(bottoms, tops, strict=True)]
+    bounds = shapely.bounds(sections)
+    low, high = np.nanmin(bounds[:, :2], axis=0) - 2.0, np.nanmax(bounds[:, 2:], axis=0) + 2.0
+    count = np.ceil((high - low) / pixel).astype(int)
+    x, y = (low[k] + (np.arange(count[k]) + 0.5) * pixel for k in (0, 1))
+    masks = []
+    for section in sections:
         shapely.prepare(section)
         masks.append(shapely.contains_xy(section, *np.meshgrid(x, y, indexing="ij")))
     found, n = [], plastic.skins
