@@ -336,7 +336,9 @@ def main() -> int:
             )
             checks = [check for check in CHECKS if check.__name__ not in ("volume", "air")]
             found = {check.__name__: check(job, job.done) for check in checks}
-            off = {"solid": (solid, 0.01), "sparse": (sparse, 0.01), "time": (clock, 0.03)}
+            off = {"solid": (solid, 0.01), "time": (clock, 0.03)}
+            # With layers of fibre close to each other a part stays solid.
+            off |= {"sparse": (sparse, 0.01)} if any(one.areas[1] for one in regions) else {}
             found |= {k: [f"{x:.1%}"] for k, (x, most) in off.items() if abs(x - 1.0) > most}
             said += [f"{name}, {machine}, {k}: {v[0]} ({len(v)})" for k, v in found.items() if v]
             if given.pictures is not None:

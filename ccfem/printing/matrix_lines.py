@@ -212,8 +212,10 @@ def _joined_infill(
     inner = [between(way, _OFF, far - _OFF) for way, far in zip(ways, along, strict=True)]
     tree = shapely.STRtree(strings(solid))
     met, _ = tree.query(strings(inner), predicate="dwithin", distance=0.5 * _OFF)
-    free = np.setdiff1d(np.arange(len(joints)), met)
-    return join(lines, [Joint(*joints[k], marked=True) for k in free.tolist()])
+    off = np.ones(len(joints), dtype=bool)
+    off[met] = False
+    free = [joint for joint, kept in zip(joints, off.tolist(), strict=True) if kept]
+    return join(lines, [Joint(a, b, way, marked=True) for a, b, way in free])
 
 
 def _up_to_walls(sparse: Region, machine: Machine) -> Region:
