@@ -60,6 +60,11 @@ def pytest_configure():
     gc.disable()
 
 
+def pytest_collection_modifyitems(items):
+    """Begin with the browser's tests, each module of which keeps one process busy for long."""
+    items.sort(key=lambda item: "browser" not in item.nodeid)
+
+
 def pytest_collection_finish():
     """Keep what is imported out of every later search for garbage: it stays to the end.
 

@@ -19,7 +19,7 @@ import pytest
 import ccfem
 from ccfem.base.errors import InputError
 from ccfem.cases.part_file import read_part
-from ccfem.comparison import engine, request
+from ccfem.comparison import bounds, engine, request, stages
 from ccfem.strategies import named
 
 ROOT = Path(__file__).parents[1]
@@ -58,12 +58,15 @@ def test_the_flow_is_drawn_as_it_is(capsys):
     space: dict = {}
     exec(compile(second, "flow.md", "exec"), space)
     assert len(space["comparison"].runs) == 1
-    for name in ("solved", "Solved.cut", "Request", "Comparison", "planned", "evaluated"):
-        assert name in page
-        assert operator.attrgetter(name)(engine)
-    for name in ("with_print", "with_test", "upper_bound"):
-        assert name in page
-        assert callable(getattr(engine, name))
+    steps = {
+        engine: ("solved", "Solved.cut", "Request", "Comparison", "planned", "judged", "bounds_of"),
+        stages: ("evaluated", "with_print", "with_test"),
+        bounds: ("upper_bound",),
+    }
+    for module, names in steps.items():
+        for name in names:
+            assert name in page
+            assert operator.attrgetter(name)(module)
     drawn = set(re.findall(r"`(\w+)`", page.partition("| `amount` |")[2].partition("|")[0]))
     known = {kind.__name__ for kind in typing.get_args(request.Amount)}
     assert drawn == known

@@ -577,7 +577,7 @@ def test_above_the_bound_of_linear_cells_quadratic_ones_are_named():
         bracket = SimpleNamespace(tension=SimpleNamespace(solution=solution))
         return SimpleNamespace(evaluation=None, tested=SimpleNamespace(bracket=bracket))
 
-    assert "the bound is that of linear cells and the test that of quadratic" in why_above(
+    assert "the bound is that of linear cells, the test that of quadratic ones" in why_above(
         run(2), 0.1
     )
     assert why_above(run(1), 0.1).endswith("so the cause is not known: trust neither number")
