@@ -34,9 +34,13 @@ def _open(
     ] = True,
 ) -> None:
     """Open the workbench in a browser: set up a part by clicks, check, compare, take away."""
+    from ccfem.cli.stopping import Stopped, end
     from ccfem.workbench.opening import serve
 
-    serve(what, port, browser)
+    try:
+        serve(what, port, browser)
+    except Stopped:
+        end()  # a thread of the page may be at work on a body, and would be waited for
 
 
 def _new(

@@ -8,7 +8,7 @@ import os
 import signal
 import sys
 from types import FrameType, TracebackType
-from typing import Any
+from typing import Any, NoReturn
 
 _HEEDED = [
     each
@@ -37,6 +37,11 @@ def say(number: int) -> int:
     return 128 + number
 
 
+def end() -> NoReturn:
+    """End a process that is stopped, whatever its threads do."""
+    _end(_asked or signal.SIGINT, None)
+
+
 def end_at_once() -> None:
     """Let signals end the process where it stands, from now on."""
     for signal_number in _HEEDED:
@@ -51,7 +56,7 @@ def unwind() -> None:
     sys.excepthook = _uncaught
 
 
-def _end(number: int, frame: FrameType | None) -> None:
+def _end(number: int, frame: FrameType | None) -> NoReturn:
     # The module may not be imported yet, or only in part: then it has made no folder.
     remove = getattr(sys.modules.get("ccfem.base.folder"), "remove_private_folders", None)
     if remove is not None:
