@@ -44,6 +44,7 @@ from ccfem.fem.elasticity.support_kinds import (
     PointSpring,
     RigidPatch,
     Spring,
+    TiedPatch,
 )
 from ccfem.fem.elasticity.zone import averaged_mises
 from ccfem.fem.materials import Material
@@ -61,6 +62,8 @@ _RIGID = 0.02
 """Deformation over displacement below which a part moves nearly as a rigid body."""
 _BALANCE = 1e-4
 """Force and moment that reactions may leave, over the sum of the forces: as `contact` allows."""
+_COARSER = 1.2
+"""Width of facets over that of the facets they are tied to from which there is a remark."""
 _ROUNDING = 1e-12
 """The same over the sizes that cancel in the equations: stiffness of a cell times displacement."""
 _NONE = 1e-9
@@ -132,6 +135,8 @@ def _about_support(support: AnySupport, problem: Problem) -> list[str]:
     if isinstance(support, Foundation):
         return [BED.about(f"stiffness of {where}", value)
                 for value in {support.normal, support.tangential}]  # fmt: skip
+    if isinstance(support, TiedPatch):
+        return [_about_tie(support, problem.mesh)]
     lines = [_about_motion(where, getattr(support, "value", 0.0), problem)]
     if isinstance(support, RigidPatch) and max(map(abs, support.angle)) > _DEGREES:
         lines.append(
@@ -139,6 +144,18 @@ def _about_support(support: AnySupport, problem: Problem) -> list[str]:
             f"here: beyond {_DEGREES:g} degrees take the stress for a rough guess, or turn it less"
         )
     return lines
+
+
+def _about_tie(support: TiedPatch, mesh: TetMesh) -> str:
+    """Say that the coarser of two tied patches follows the finer one."""
+    own, other = (float(mesh.facet_areas(mesh.patch(name))[0].mean()) for name in support.patches)
+    if own <= _COARSER**2 * other:
+        return ""
+    return (
+        f"'{support.patch}', whose facets are {np.sqrt(own / other):.2g} times as wide, is tied to "
+        f"the finer '{support.to}', and nodes of that between those tied are left out, which makes "
+        f"the joint too soft: tie '{support.to}' to '{support.patch}'"
+    )
 
 
 def _about_motion(where: str, motion: float | tuple[float, ...], problem: Problem) -> str:

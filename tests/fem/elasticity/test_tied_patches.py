@@ -164,3 +164,14 @@ def test_a_patch_is_not_tied_to_itself():
         TiedPatch("near", "near")
     with pytest.raises(InputError, match="within of the tied patch 'near'"):
         TiedPatch("near", "far", -1.0)
+
+
+def test_a_coarser_patch_that_follows_a_finer_one_is_named():
+    """The finer face of the other bar bends between the nodes that are tied: too soft."""
+    mesh = two_bars()
+    moved = {}
+    for joint in (JOINT, TiedPatch("far", "near")):
+        tip, field = pulled(mesh, (0.0, 0.0, 20.0), (Support("foot"), joint))
+        said = [line for line in field.findings if "tie 'near' to 'far'" in line]
+        moved[len(said)] = tip[2]
+    assert moved[1] > moved[0]
