@@ -30,8 +30,7 @@ from benchmarks.print_checks.parts import Part, job_of
 from benchmarks.print_checks.planned_parts import part_file
 from benchmarks.print_checks.printer import Run
 from benchmarks.studies import own_parts
-from ccfem.cases import create_case
-from ccfem.cases.part_file import read_part
+from ccfem.cases import read
 from ccfem.fem.elasticity import solve
 from ccfem.machine import machine_names
 from ccfem.paths.plastic import Plastic
@@ -105,9 +104,7 @@ def part_of(name: str, plastic: Plastic) -> Part:
         texts = {"box": BOX, "hook": HOOK}
         if name in texts:
             file.write_text(texts[name], encoding="utf-8")
-        elif name != "loop":
-            file = Path(part_file(name, Path(folder)))
-        case = create_case(name) if name == "loop" else read_part(file)
+        case = read(str(file) if name in texts else part_file(name, Path(folder)))
     case = replace(case, slicing=Planar(count=6), plastic=plastic)
     stress = solve(case.printed_problem())
     return Part(case, name, stress[case.problem.cases[0]])

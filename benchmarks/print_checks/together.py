@@ -12,9 +12,12 @@ import copy
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
+import shapely
+from shapely.affinity import translate
 
 from benchmarks.print_checks.all_checks import CHECKS
 from benchmarks.print_checks.estimators import estimate
@@ -67,8 +70,7 @@ def jobs_of(whole: Job, alone: Mapping[str, Job]) -> list[Job]:
     jobs = []
     for standing in whole.plan.standing:
         job = copy.copy(alone[standing.name])
-        shift = job.plan.paths.points[:, :2].min(axis=0) - standing.low
-        job.done = seen(whole.done, standing, shift)
+        job.done = seen(whole.done, standing, _shift(standing, alone))
         jobs.append(job)
     return jobs
 
@@ -106,7 +108,21 @@ def file_of(
     plans, layouts = [job.plan for job in alone.values()], [BedLayout(copies=(k,)) for k in copies]
     plan = arranged(plans, layouts, first, [*alone])
     text = gcode(plan, first)
-    return Job(machine, first, plan, text, [], lambda _: None, lambda _: 0.0, 0.0), alone
+
+    def section(z: float) -> shapely.Geometry:
+        return shapely.union_all(
+            [
+                translate(alone[standing.name].section(z), *-_shift(standing, alone))
+                for standing in plan.standing
+            ]
+        )
+
+    return Job(machine, first, plan, text, [], cache(section), lambda _: 0.0, 0.0), alone
+
+
+def _shift(standing: Standing, alone: Mapping[str, Job]) -> np.ndarray:
+    """Shift (2,), mm, of a part in a file to where it is planned alone."""
+    return alone[standing.name].plan.paths.points[:, :2].min(axis=0) - standing.low
 
 
 def row(whole: Job, alone: Mapping[str, Job], plastic: Plastic) -> list[str]:
