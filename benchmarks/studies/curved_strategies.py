@@ -21,7 +21,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
-from benchmarks.studies.table import print_table
+from benchmarks.studies.table import with_strategies
 from ccfem.base.errors import InputError
 from ccfem.cases import create_case
 from ccfem.fem.elasticity import StressField, solve
@@ -124,12 +124,7 @@ def _draw(file: Path, planned: Planned, layers: tuple[Layer, ...]) -> None:
 
 def main(arguments: list[str]) -> None:
     """Print the table."""
-    strategies: list[str] = []
-    if "--strategies" in arguments:
-        at = arguments.index("--strategies")
-        strategies = arguments[at + 1].split(",")
-        arguments = arguments[:at] + arguments[at + 2 :]
-    print_table(arguments, _COLUMNS, PARTS, lambda part, at: rows(part, at, strategies))
+    with_strategies(arguments, _COLUMNS, PARTS, rows)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from time import process_time
 from typing import Any
 
 from benchmarks.studies import confirmed_gain, stripes_among_plans
-from benchmarks.studies.table import print_table
+from benchmarks.studies.table import with_strategies
 from ccfem.cases import create_case
 from ccfem.fem.elasticity import Problem, StressField, solve
 from ccfem.judging.evaluation import evaluate
@@ -86,12 +86,7 @@ def rows(name: str, pictures: Path | None, strategies: Iterable[str] = ()) -> li
 
 def main(arguments: list[str]) -> None:
     """Print the table."""
-    strategies: list[str] = []
-    if "--strategies" in arguments:
-        at = arguments.index("--strategies")
-        strategies = arguments[at + 1].split(",")
-        arguments = arguments[:at] + arguments[at + 2 :]
-    print_table(arguments, _COLUMNS, PARTS, lambda part, at: rows(part, at, strategies))
+    with_strategies(arguments, _COLUMNS, PARTS, rows)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-__all__ = ["print_table"]
+__all__ = ["print_table", "with_strategies"]
 
 
 def print_table(
@@ -35,3 +35,26 @@ def print_table(
     print("|" + (heads.count("|") + 1) * "---|")
     for name in arguments or names:
         print("\n".join(rows(name, pictures)), flush=True)
+
+
+def with_strategies(
+    arguments: list[str],
+    heads: str,
+    names: Iterable[str],
+    rows: Callable[[str, Path | None, list[str]], list[str]],
+) -> None:
+    """Print a table of some parts and, with ``--strategies A,B``, of some strategies alone.
+
+    Parameters
+    ----------
+    arguments, heads, names
+        As of `print_table`.
+    rows : callable
+        Called with the names of strategies, too; with none for all.
+    """
+    strategies: list[str] = []
+    if "--strategies" in arguments:
+        at = arguments.index("--strategies")
+        strategies = arguments[at + 1].split(",")
+        arguments = arguments[:at] + arguments[at + 2 :]
+    print_table(arguments, heads, names, lambda part, folder: rows(part, folder, strategies))
