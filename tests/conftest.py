@@ -81,3 +81,12 @@ def meshes_of_tests(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("CCFEM_CACHE", str(tmp_path_factory.mktemp("meshes")))
         yield
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """Address of a Dask scheduler with one worker of two threads, in this process."""
+    distributed = pytest.importorskip("distributed")
+    options = {"processes": False, "threads_per_worker": 2, "dashboard_address": None}
+    with distributed.LocalCluster(n_workers=1, **options) as local:
+        yield local.scheduler_address

@@ -11,14 +11,6 @@ from ccfem.base.errors import InputError
 from ccfem.base.parallel import in_processes
 
 
-@pytest.fixture(scope="module")
-def cluster():
-    distributed = pytest.importorskip("distributed")
-    options = {"processes": False, "threads_per_worker": 2, "dashboard_address": None}
-    with distributed.LocalCluster(n_workers=1, **options) as local:
-        yield local.scheduler_address
-
-
 def test_workers_do_what_processes_do_in_order_and_keep_arrays_read_only(cluster):
     factor, here = read_only(np.arange(3.0)), threading.current_thread().name
 

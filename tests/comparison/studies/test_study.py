@@ -94,14 +94,6 @@ def disturbed(tmp_path_factory):
     return result, before, told
 
 
-@pytest.fixture(scope="module")
-def cluster():
-    distributed = pytest.importorskip("distributed")
-    options = {"processes": False, "threads_per_worker": 2, "dashboard_address": None}
-    with distributed.LocalCluster(n_workers=1, **options) as found:
-        yield found.scheduler_address
-
-
 def test_a_killed_study_goes_on_where_it_was(disturbed):
     result, before, told = disturbed
     assert before >= 1
