@@ -32,9 +32,14 @@ def bounds_of(
 ) -> dict[float, UpperBound]:
     """Bound what any paths can reach, by the length of fibre in all, mm.
 
-    None if no run of the wanted length was tested, for supports that hold in one sense only, and
-    where slicings are compared. Slicings that differ in the number of flat
-    layers alone, as those of several lengths do, are bounded on the most layers.
+    Empty if no run of the wanted length was tested, for supports that hold in one sense only, and
+    where slicings are compared. Slicings that differ in the number of flat layers alone, as those
+    of several lengths do, are bounded on the most layers.
+
+    Parameters
+    ----------
+    known : mapping of length, mm, to UpperBound
+        Bounds that need not be computed again.
     """
     equal = [run for run in runs if run.tested is not None and not off_length(run, wanted)]
     several_lengths = isinstance(request.amount, Spread)
@@ -53,12 +58,12 @@ def bounds_of(
     lengths = [length for length in lengths if length not in known]
     with timed(seconds, "bound"):
         about = (part.machine, strand)
-        found = in_processes(
+        results = in_processes(
             lambda length: upper_bound(cases, part.layers, length, *about), lengths
         )
         for length in lengths:
             tell(f"bounding what any paths of {1e-3 * length:.3g} m could reach{of}")
-            bounds[length] = next(found)
+            bounds[length] = next(results)
     return bounds
 
 
