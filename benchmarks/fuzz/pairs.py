@@ -35,7 +35,7 @@ from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.machine import Machine
 from ccfem.slicing.layers.level_surfaces import level_surfaces
 from ccfem.slicing.layers.slicer import Slicer
-from ccfem.slicing.slicers import LoadOriented, Spatial, Surfaces, named
+from ccfem.slicing.slicers import LoadOriented, Spatial, Strands, Surfaces, named
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import named as strategies
 
@@ -70,7 +70,23 @@ def _up(points: FloatArray) -> FloatArray:
 
 
 def write_surfaces(folder: Path) -> None:
-    """Write the curved middle of the link, and a scrap of it of about 5 x 4 mm, as OBJ files."""
+    """Write files of layers, and those of strands into a folder within.
+
+    The layers are the curved middle of the link and a scrap of it of about 5 x 4 mm, the strands
+    rows along it, 3 mm apart, on two layers.
+    """
+    (folder / "strands").mkdir()
+    along = np.linspace(1.0, 59.0, 30)
+    for number, height in enumerate((1.6, 2.2)):
+        rows = [
+            np.column_stack([along, np.full(30, y), np.full(30, height)])
+            for y in np.arange(2.0, 24.0, 3.0)
+        ]
+        bent = np.concatenate([row + _up(row) for row in rows])
+        vertices = [f"v {x!r} {y!r} {z!r}" for x, y, z in bent.tolist()]
+        starts = range(1, len(bent), 30)
+        lines = [f"l {k} {k + 1}" for start in starts for k in range(start, start + 29)]
+        (folder / "strands" / f"{number}.obj").write_text("\n".join(vertices + lines) + "\n")
     mesh = bent_link().problem.mesh
     flat = (mesh.points - _up(mesh.points))[:, 2]
     (layer,) = level_surfaces(mesh, flat, np.array([2.2]), 0.5, 0.6, 5.0).layers
@@ -91,6 +107,7 @@ def slicings(folder: Path) -> dict[str, Slicer]:
         "spatial": Spatial(count=2),
         "load_oriented": LoadOriented(thickness=3.0, thinnest=2.0, thickest=5.0),
         "surfaces": Surfaces(str(folder)),
+        "strands": Strands(str(folder / "strands")),
     }
     missing = set(named()) - {name.partition(",")[0].split()[0] for name in made}
     if missing:

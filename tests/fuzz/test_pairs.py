@@ -25,6 +25,7 @@ def test_layers_on_which_strategies_lay_nothing(made, slicing, tmp_path):
 
 
 def test_all_slicings_in_one_report(made, tmp_path):
-    few = {name: made[name] for name in ("planar along x", "spatial", "surfaces")}
+    few = {name: made[name] for name in ("planar along x", "spatial", "surfaces", "strands")}
     found = see(few, ["concentric", "winding"], 150.0, False, tmp_path, strand=None)
-    assert {"concentric on surfaces", "winding on spatial"} <= {r.name for r in found.succeeded}
+    wanted = {"concentric on surfaces", "concentric on strands", "winding on spatial"}
+    assert wanted <= {run.name for run in found.succeeded}

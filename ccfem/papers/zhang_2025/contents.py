@@ -29,7 +29,6 @@ from ccfem.papers.zhang_2025.authors import (
     DATA,
     authors_folder,
     authors_strands,
-    rebuilt_layers,
     strands_on,
 )
 from ccfem.papers.zhang_2025.measures import SHORTEST, WIDTH, angles_to_axes, measured
@@ -38,6 +37,7 @@ from ccfem.paths.planning.given_paths import GivenPaths
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.spatial import Spatial
+from ccfem.slicing.slicers.strands import Strands
 from ccfem.strategies import create
 
 EXPECTED = Path(__file__).with_name("expected.toml")
@@ -65,9 +65,6 @@ ROWS = (AUTHORS, LONG, *OURS, SPARSE)
 SLICINGS = {"spatial": 0.0, "spatial, hole_weight 10": 10.0}
 """Weight of layers square to the axes of holes, within two widths of them."""
 
-_THICKNESS = 0.6
-"""Of their layers, mm: the median distance of their strands from those of the next layer."""
-
 
 @dataclass(frozen=True)
 class Study:
@@ -90,7 +87,7 @@ class Study:
     def layers(self) -> tuple[Layer, ...]:
         """Layers of the authors, rebuilt."""
         self.progress("rebuilding the authors' layers", 0.0)
-        return rebuilt_layers(authors_mesh(), self.published, _THICKNESS)
+        return Strands(str(authors_folder()))(self.stress, BUILD, MACHINE)
 
     @cached_property
     def _specimen(self) -> Specimen:

@@ -4,21 +4,19 @@ A table is CSV with the columns x, y, z, path, layer, one row a point.
 """
 
 import csv
-import re
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
-from ccfem.base.whole import existing_file, text_of
+from ccfem.base.whole import text_of
+from ccfem.body.files.strand_files import check_near, holds_strands, read_strand_files
 from ccfem.geometry.polylines import pack
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.printing.export.waypoints import (
     CLOSED,
     LARGEST_NUMBER,
-    check_near,
     close_rings,
     read_waypoints,
 )
@@ -51,7 +49,7 @@ def read_paths(path: str | Path, frame: FloatArray, named: str | None = None) ->
     if named is not None and named not in FRAMES:
         raise InputError(f"paths are in the frame 'mesh' or 'tool'; got '{named}': name one")
     path = Path(path)
-    table, strands = path.suffix.lower() == ".csv", _holds_strands(path)
+    table, strands = path.suffix.lower() == ".csv", holds_strands(path)
     tool = (named or ("mesh" if table or strands else "tool")) == "tool"
     axes = frame if tool else np.eye(3)
     if strands:
@@ -166,136 +164,22 @@ def _toolpaths(values: FloatArray, axes: FloatArray, normal: FloatArray, name: s
     )
 
 
-# Strands on curved layers, a file a layer, as published by Fang et al. 2024 and Zhang et al. 2025.
-
-
-_STRANDS = (".obj", ".txt")
-_JUMP = 3.0
-"""Distance, mm, between two rows of a table of numbers from which the strand ends: rows are 0.7 to
-1.1 mm apart, and pieces are tens of millimetres from each other."""
-_APART = 1e-4
-"""Distance, mm, of two points that are one: files round to six digits."""
-
-
-def _holds_strands(path: Path) -> bool:
-    """Whether a folder or a file holds strands: OBJ lines, or rows of numbers alone."""
-    if path.is_dir() or path.suffix.lower() == ".obj":
-        return True
-    if path.suffix.lower() != ".txt" or not path.is_file():
-        return False
-    with path.open(encoding="utf-8-sig", errors="replace") as lines:
-        first = next((line for line in lines if line.strip()), "")
-    return re.match(r"\s*[-+.\d]", first) is not None
-
-
 def read_strands(path: str | Path, axes: FloatArray, normal: FloatArray) -> Toolpaths:
-    """Read strands from a file of a layer, or from all such files (.obj, .txt) of a folder.
+    """Read strands of a layer from a file, or of all layers from a folder (`read_strand_files`).
 
     Parameters
     ----------
-    path : str or Path
-        An OBJ file has points and lines of two points, which are chained where their ends are the
-        same. Any other has a row a point: x, y, z in mm, further numbers are not read; a strand
-        ends where two rows are more than 3 mm apart. Files of a folder are layers in the order of
-        the numbers in their names.
     axes, normal
         As in `read_path_table`. Which layer a strand lies on is found by its place.
-
-    Raises
-    ------
-    InputError
-        For a folder without such files, and what does not read.
     """
-    path = Path(path)
-    if not path.is_dir():
-        files = [existing_file(path, "path file")]
-    else:
-        files = [file for file in path.iterdir() if file.suffix.lower() in _STRANDS]
-        files.sort(key=lambda file: (*map(int, re.findall(r"\d+", file.stem)[:1]), file.name))
-    if not files:
-        raise InputError(f"{path} holds no files of strands (.obj, .txt): check its name")
-    lines, layers = [], []
-    for k, file in enumerate(files):
-        strands = (_chained if file.suffix.lower() == ".obj" else _rows)(file)
-        lines += strands
-        layers += [k] * len(strands)
+    of_layers = read_strand_files(path)
+    lines = [line for layer in of_layers for line in layer]
     if not lines:
         return Toolpaths.empty()
+    layers = np.repeat(np.arange(len(of_layers)), [len(layer) for layer in of_layers])
     check_near(np.concatenate(lines), str(path))
     closed = close_rings(lines)
     points, offsets = pack(lines)
     normals = np.broadcast_to(normal, points.shape)
     kind = np.full(len(lines), FIBRE)
-    return Toolpaths(points @ axes, normals, offsets, np.array(layers), kind, np.array(closed))
-
-
-def _rows(path: Path) -> list[FloatArray]:
-    """Strands (k, 3) of a file of rows of numbers."""
-    points = []
-    for number, line in enumerate(text_of(path, "path file").splitlines(), 1):
-        try:
-            if line.strip():
-                points.append([float(word) for word in line.split()[:3]])
-                if len(points[-1]) < 3 or not np.isfinite(points[-1]).all():
-                    raise ValueError
-        except ValueError:
-            raise InputError(
-                f"{path}, line {number}: expected x, y and z, mm; got '{line[:40]}': repair the "
-                "file"
-            ) from None
-    places = np.array(points, dtype=np.float64).reshape(-1, 3)
-    if len(places):
-        check_near(places, str(path))
-    ends = np.flatnonzero(np.linalg.norm(np.diff(places, axis=0), axis=1) > _JUMP) + 1
-    return [strand for strand in np.split(places, ends) if len(strand) > 1]
-
-
-def _chained(path: Path) -> list[FloatArray]:
-    """Strands (k, 3) of the two-point lines of an OBJ file, cut where more than two meet."""
-    points, pairs = [], []
-    for number, line in enumerate(text_of(path, "path file").splitlines(), 1):
-        word, *rest = line.split()[:4] or [""]
-        try:
-            if word == "v":
-                x, y, z = map(float, rest)
-                points.append((x, y, z))
-            elif word == "l":
-                numbers = [int(item.partition("/")[0]) for item in line.split()[1:]]
-                pairs += list(pairwise(numbers))
-        except ValueError:
-            raise InputError(
-                f"{path}, line {number}: expected 'v x y z' or 'l a b'; got '{line[:40]}': repair "
-                "the file"
-            ) from None
-    places = np.array(points, dtype=np.float64).reshape(-1, 3)
-    ends = np.array(pairs, dtype=object).reshape(-1, 2)
-    known = all(0 < end <= len(places) for end in ends.reshape(-1))
-    if not len(ends) or not known or not np.isfinite(places).all():
-        raise InputError(
-            f"{path} has no lines, or they name points that it has not: export strands as lines of "
-            "two points (v, l)"
-        )
-    check_near(places, str(path))
-    _, first, same = np.unique(
-        np.round(places / _APART), axis=0, return_index=True, return_inverse=True
-    )
-    edges = np.unique(np.sort(same.reshape(-1)[ends.astype(np.int64) - 1], axis=1), axis=0)
-    edges = edges[edges[:, 0] != edges[:, 1]]
-    beside: dict[int, list[int]] = {}
-    for a, b in edges.tolist():
-        beside.setdefault(a, []).append(b)
-        beside.setdefault(b, []).append(a)
-    strands, left = [], {tuple(edge) for edge in edges.tolist()}
-    # First from ends and branches, then round what is closed.
-    starts = [node for node, others in beside.items() if len(others) != 2]
-    for start in (*starts, *beside):
-        for following in beside[start]:
-            strand, node = [start], following
-            while (min(strand[-1], node), max(strand[-1], node)) in left:
-                left.remove((min(strand[-1], node), max(strand[-1], node)))
-                strand.append(node)
-                if len(beside[node]) == 2 and node != start:
-                    node = sum(beside[node]) - strand[-2]
-            if len(strand) > 1:
-                strands.append(places[first[strand]])
-    return strands
+    return Toolpaths(points @ axes, normals, offsets, layers, kind, np.array(closed))

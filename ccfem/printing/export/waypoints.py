@@ -15,6 +15,7 @@ import numpy as np
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
 from ccfem.base.whole import text_of, whole_file
+from ccfem.body.files.strand_files import check_near
 from ccfem.geometry.polylines import pack
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
@@ -23,8 +24,6 @@ CLOSED = 1e-3
 """Largest distance, mm, between the ends of a closed path: the files round to 6 digits."""
 LARGEST_NUMBER = 1e15
 """Of paths and layers: larger ones are not told apart from their neighbours."""
-_FARTHEST = 1e5
-"""Coordinate, mm, beyond which a unit is wrong."""
 _MARK = ";Layer_CCF:"
 _PATTERN = ";Turns back by design: "
 
@@ -71,22 +70,6 @@ def pattern_of(path: str | Path) -> str:
         return ""
     first, *_ = text_of(path, "paths").splitlines() or [""]
     return first.removeprefix(_PATTERN).strip() if first.startswith(_PATTERN) else ""
-
-
-def check_near(points: FloatArray, name: str) -> None:
-    """Raise on points (n, 3) of paths that no printer reaches.
-
-    Raises
-    ------
-    InputError
-        The message begins with `name`.
-    """
-    farthest = float(np.abs(points).max())
-    if farthest > _FARTHEST:
-        raise InputError(
-            f"{name}: the points of paths must lie within {_FARTHEST:g} mm; got a coordinate of "
-            f"{farthest:.3g} mm: repair the file, or give it in mm"
-        )
 
 
 def _parse(text: str, name: str) -> tuple[list[FloatArray], list[int]]:

@@ -1,5 +1,6 @@
 """Layers made by another program, one surface a file."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,9 @@ from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.level_cut import chain
 from ccfem.slicing.layers.level_surfaces import along_walls
 from ccfem.slicing.layers.slicer import Vector
+
+Sheet = tuple[FloatArray, IntArray]
+"""Points (n, 3), mm, and triangles (t, 3) of a layer of another program."""
 
 
 @dataclass(frozen=True)
@@ -39,11 +43,36 @@ class Surfaces:
         check_fields(self, "thickness", "tolerance", above=0.0, unit="mm")
 
     def __call__(self, stress: PartStress, build: Vector, machine: Machine) -> tuple[Layer, ...]:
-        """Read the layers; the stress has no influence."""
+        """Read the layers, whichever side of their triangles is up; the stress does not matter."""
+        sheets = facing_up([read_layer(file) for file in layer_files(self.folder)], build)
         return tuple(
-            layer_from_surface(stress.mesh, *read_layer(file), k, self.thickness, self.tolerance)
-            for k, file in enumerate(layer_files(self.folder))
+            layer_from_surface(stress.mesh, *sheet, k, self.thickness, self.tolerance)
+            for k, sheet in enumerate(sheets)
         )
+
+
+def facing_up(sheets: Sequence[Sheet], build: Vector) -> list[Sheet]:
+    """Turn over the sheets of a stack whose triangles face the bed.
+
+    Parameters
+    ----------
+    sheets : sequence of (points, triangles)
+        In the order in which they are printed, each consistently oriented.
+    build : tuple of 3 floats
+        What a sheet that is alone faces; others face the next one.
+    """
+    turned = []
+    for k, (points, triangles) in enumerate(sheets):
+        if len(sheets) == 1:
+            upward = np.broadcast_to(np.asarray(build, dtype=np.float64), points.shape)
+        else:
+            last = k == len(sheets) - 1
+            other = nearest_on_triangles(*sheets[k - 1 if last else k + 1], points).points
+            upward = points - other if last else other - points
+        a, b, c = np.moveaxis(points[triangles], 1, 0)
+        rise = np.einsum("td,td->", np.cross(b - a, c - a), upward[triangles].sum(axis=1))
+        turned.append((points, triangles if rise >= 0.0 else triangles[:, ::-1]))
+    return turned
 
 
 # A layer from a surface made by another program.

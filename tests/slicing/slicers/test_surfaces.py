@@ -49,6 +49,23 @@ def test_layers_come_in_the_order_of_their_numbers_with_stress_and_patches(tmp_p
     np.testing.assert_allclose(found.nodal[:, 0, 0], low.points @ [1.0, 2.0, 3.0], atol=1e-9)
 
 
+def test_layers_face_the_next_one_whichever_way_their_triangles_turn(tmp_path):
+    """As those of Fang et al. 2024, whose triangles face the bed and whose waypoints do not."""
+    write(tmp_path, "1.obj")
+    write(tmp_path, "2.obj", 1.0)
+    turned = []
+    for line in (tmp_path / "1.obj").read_text().splitlines():
+        word, *rest = line.split()
+        turned.append(" ".join([word, *(rest[::-1] if word == "f" else rest)]))
+    (tmp_path / "1.obj").write_text("\n".join(turned))
+    slicer = create("surfaces", {"folder": str(tmp_path)})
+    assert all(layer.normals[:, 2].min() > 0.9 for layer in slicer(stress(), UP, Machine()))
+    # A layer that is alone faces along the build direction.
+    (tmp_path / "2.obj").unlink()
+    (alone,) = slicer(stress(), UP, Machine())
+    assert alone.normals[:, 2].min() > 0.9
+
+
 def test_folders_and_files_that_are_none_are_one_line(tmp_path):
     slicer = create("surfaces", {"folder": str(tmp_path)})
     with pytest.raises(InputError, match=r"no \.obj file in the folder"):
