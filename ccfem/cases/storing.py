@@ -63,7 +63,7 @@ def _mesh_entry(path: Path, mesh: TetMesh, element_size: float) -> str:
     write_mesh(mesh, path)
     what = f"{len(mesh.cells)} linear tetrahedra, {len(mesh.points)} nodes"
     if mesh.patches:
-        what += f", patches {', '.join(sorted(mesh.patches))}"
+        what += f", patches {mesh.patch_list}"
     return _entry(path, what, f"element_size = {element_size}")
 
 

@@ -29,4 +29,4 @@ def mesh_file(body: Path, size: float, out: Path, scale: float, mesher: Any) -> 
     doubt = in_metres(mesh.points)
     if doubt:
         print(f"warning: {doubt}")
-    print(f"{out}: {len(mesh.cells):,} cells, patches {', '.join(sorted(mesh.patches)) or 'none'}")
+    print(f"{out}: {len(mesh.cells):,} cells, patches {mesh.patch_list}")

@@ -232,7 +232,7 @@ def _say(optimised: "Optimised", files: Sequence[Path]) -> None:
     for line in optimised.remarks:
         print(f"note: {line}")
     print(
-        f"{part}: {len(mesh.cells):,} cells, patches {', '.join(sorted(mesh.patches))}; "
+        f"{part}: {len(mesh.cells):,} cells, patches {mesh.patch_list}; "
         f"picture {picture}, history {history}"
     )
     print(f"try: ccfem plan {part} --strategy svt")

@@ -1,5 +1,6 @@
 """Tetrahedral meshes with named patches."""
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -32,6 +33,10 @@ from ccfem.geometry.facets import facet_keys, paired, positions, signed_volumes,
 # What meshes in space and in the plane share: nodes, cells, their facets, and named patches.
 
 
+_MANY = 12
+"""Names of patches that a message lists."""
+_PARTS = re.compile(r"(\d+)").split
+"""Words and numbers of a name, in turn."""
 _NONE: Mapping[str, FloatArray] = MappingProxyType({})
 
 
@@ -84,8 +89,18 @@ class CellMesh(ABC):
         size = " x ".join(f"{side:.4g}" for side in np.ptp(self.bounds, axis=0))
         return (
             f"{type(self).__name__}: {len(self.points):,} nodes, {len(self.cells):,} cells of "
-            f"{self.cells.shape[1]}, {size} mm, patches {', '.join(sorted(self.patches)) or 'none'}"
+            f"{self.cells.shape[1]}, {size} mm, patches {self.patch_list}"
         )
+
+    @property
+    def patch_list(self) -> str:
+        """Names of the patches for messages: face_2 before face_10, and at most a dozen."""
+        names = sorted(
+            self.patches, key=lambda name: [int(w) if w.isdecimal() else w for w in _PARTS(name)]
+        )
+        if len(names) > _MANY:
+            names[_MANY - 1 :] = [f"... {names[-1]} ({len(names)} in all)"]
+        return ", ".join(names) or "none"
 
     @property
     @abstractmethod

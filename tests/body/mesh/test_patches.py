@@ -1,4 +1,5 @@
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ from hypothesis import given, settings, strategies as st
 
 from ccfem.base.errors import InputError
 from ccfem.body.files import read_mesh
-from ccfem.body.mesh import TetMesh
+from ccfem.body.mesh import TetMesh, box_mesh
 from ccfem.body.mesh.patches import (
     Box,
     Cylinder,
@@ -218,3 +219,12 @@ def test_holes_of_the_published_loop(top, tolerance):
     found = {frozenset(f) for f in rule(mesh).tolist()}
     assert len(expected) > 50
     assert found == expected
+
+
+def test_messages_list_patches_by_number_and_not_by_the_hundred():
+    mesh = box_mesh((1.0, 1.0, 1.0), (1, 1, 1))
+    few = replace(mesh, patches={f"face_{k}": mesh.boundary[:1] for k in (10, 9, 2)})
+    assert few.patch_list == "face_2, face_9, face_10"
+    many = replace(mesh, patches={f"face_{k}": mesh.boundary[:1] for k in range(1, 106)})
+    assert many.patch_list.endswith("face_10, face_11, ... face_105 (105 in all)")
+    assert replace(mesh, patches={}).patch_list == "none"
