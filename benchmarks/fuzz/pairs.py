@@ -35,7 +35,7 @@ from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.machine import Machine
 from ccfem.slicing.layers.level_surfaces import level_surfaces
 from ccfem.slicing.layers.slicer import Slicer
-from ccfem.slicing.slicers import LoadOriented, Spatial, Strands, Surfaces, named
+from ccfem.slicing.slicers import LoadOriented, Spatial, Surfaces, ThroughStrands, named
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import named as strategies
 
@@ -107,7 +107,7 @@ def slicings(folder: Path) -> dict[str, Slicer]:
         "spatial": Spatial(count=2),
         "load_oriented": LoadOriented(thickness=3.0, thinnest=2.0, thickest=5.0),
         "surfaces": Surfaces(str(folder)),
-        "strands": Strands(str(folder / "strands")),
+        "through_strands": ThroughStrands(str(folder / "strands")),
     }
     missing = set(named()) - {name.partition(",")[0].split()[0] for name in made}
     if missing:

@@ -26,7 +26,7 @@ METHODS: dict[str, tuple[str, ...]] = {
     "load_oriented": ("kipping_2023",),
     "planar": (),
     "spatial": ("fang_2024",),
-    "strands": (),
+    "through_strands": (),
     "surfaces": (),
     "amg": ("vanek_1996",),
     "two-level": ("vanek_1996",),

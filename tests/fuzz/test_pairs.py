@@ -25,7 +25,9 @@ def test_layers_on_which_strategies_lay_nothing(made, slicing, tmp_path):
 
 
 def test_all_slicings_in_one_report(made, tmp_path):
-    few = {name: made[name] for name in ("planar along x", "spatial", "surfaces", "strands")}
+    few = {
+        name: made[name] for name in ("planar along x", "spatial", "surfaces", "through_strands")
+    }
     found = see(few, ["concentric", "winding"], 150.0, False, tmp_path, strand=None)
-    wanted = {"concentric on surfaces", "concentric on strands", "winding on spatial"}
+    wanted = {"concentric on surfaces", "concentric on through_strands", "winding on spatial"}
     assert wanted <= {run.name for run in found.succeeded}

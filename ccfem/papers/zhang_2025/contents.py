@@ -37,7 +37,7 @@ from ccfem.paths.planning.given_paths import GivenPaths
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.spatial import Spatial
-from ccfem.slicing.slicers.strands import Strands
+from ccfem.slicing.slicers.through_strands import ThroughStrands
 from ccfem.strategies import create
 
 EXPECTED = Path(__file__).with_name("expected.toml")
@@ -87,7 +87,7 @@ class Study:
     def layers(self) -> tuple[Layer, ...]:
         """Layers of the authors, rebuilt."""
         self.progress("rebuilding the authors' layers", 0.0)
-        return Strands(str(authors_folder()))(self.stress, BUILD, MACHINE)
+        return ThroughStrands(str(authors_folder()))(self.stress, BUILD, MACHINE)
 
     @cached_property
     def _specimen(self) -> Specimen:

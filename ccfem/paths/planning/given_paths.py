@@ -90,7 +90,7 @@ class GivenPaths:
                 f"{self.source or 'given paths'}: path {worst} spans {high[worst] - low[worst]:.3g}"
                 " mm along the build direction, so it lies in no flat layer: give flat paths, in "
                 "the frame that they are in, or the slicing of their curved layers, which "
-                "strands:folder=FOLDER rebuilds from them"
+                "through_strands:folder=FOLDER rebuilds from them"
             )
         return np.asarray(0.5 * (low + high))
 

@@ -51,7 +51,9 @@ def write(folder, number, height, pitch=1.1):
 
 
 def rebuilt(folder, **parameters):
-    return create("strands", {"folder": str(folder), **parameters})(unloaded(MESH), UP, Machine())
+    return create("through_strands", {"folder": str(folder), **parameters})(
+        unloaded(MESH), UP, Machine()
+    )
 
 
 def test_layers_are_rebuilt_from_the_strands_on_them(tmp_path):
@@ -107,14 +109,14 @@ def test_strands_without_layers_are_judged_on_their_own(tmp_path):
     for number, height in enumerate((4.0, 4.5, 5.0)):
         write(tmp_path, number, height)
     paths = read_paths(tmp_path, np.eye(3))
-    with pytest.raises(InputError, match=r"in no flat layer: .*strands:folder=FOLDER"):
+    with pytest.raises(InputError, match=r"in no flat layer: .*through_strands:folder=FOLDER"):
         GivenPaths(paths).heights(np.array(UP))
     pull = Force("x_max", (300.0, 0.0, 0.0))
     problem = Problem(MESH, isotropic(3500.0, 0.35), (Support("x_min"),), {"pull": (pull,)})
     (run,) = ccfem.compare(
         ccfem.Case("bar", "", problem, machine=Machine(minimum_length=20.0)),
         {"theirs": GivenPaths(paths)},
-        layers=f"strands:folder={tmp_path}",
+        layers=f"through_strands:folder={tmp_path}",
     ).runs
     assert run.toolpaths.layer.tolist() == paths.layer.tolist()
     # Thirty strands, each of the length of its parabola from 0.5 to 23.5 mm.
@@ -132,7 +134,7 @@ def test_published_layers_are_rebuilt_from_published_strands(tmp_path):
     data = Path(os.environ["CCFEM_FANG2024"]) / "TBracket"
     for number in (30, 31, 32):
         shutil.copy(data / "toolpath" / f"{number}.txt", tmp_path)
-    layers = create("strands", {"folder": str(tmp_path)})(
+    layers = create("through_strands", {"folder": str(tmp_path)})(
         unloaded(authors_mesh()), (0.0, 1.0, 0.0), Machine()
     )
     # Files of strands have the number of their layer, counted from 1.

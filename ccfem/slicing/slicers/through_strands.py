@@ -30,7 +30,7 @@ _LONE = 0.1
 
 
 @dataclass(frozen=True)
-class Strands:
+class ThroughStrands:
     """Curved layers rebuilt from strands: a file a layer, ordered by the numbers in their names.
 
     At each node of the mesh near strands the distance from a plane is taken that is fitted to the
