@@ -5,6 +5,7 @@ imported when the first value is asked to show itself.
 """
 
 import importlib
+import re
 from typing import Any, Protocol, cast
 
 
@@ -64,3 +65,12 @@ class Shown:
 
     def _repr_html_(self) -> str:
         return _drawing().page(self)
+
+
+_RUNS_OF_DIGITS = re.compile(r"(\d+)")
+
+
+def by_number(text: str) -> list[int | str]:
+    """Key that sorts words with numbers as people do: layer_2 before layer_10."""
+    parts = _RUNS_OF_DIGITS.split(text)
+    return [int(part) if k % 2 else part for k, part in enumerate(parts)]

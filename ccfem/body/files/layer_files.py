@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.display import by_number
 from ccfem.base.errors import InputError
 
 
@@ -17,7 +18,7 @@ def layer_files(folder: str | os.PathLike[str]) -> tuple[Path, ...]:
     InputError
         When there is none.
     """
-    files = sorted(Path(folder).glob("*.obj"), key=_number)
+    files = sorted(Path(folder).glob("*.obj"), key=lambda file: by_number(file.stem))
     if not files:
         raise InputError(
             f"no .obj file in the folder '{folder}': give the folder of the layers, one surface a "
@@ -43,8 +44,3 @@ def read_layer(path: Path) -> tuple[FloatArray, IntArray]:
     if not len(corners) or corners.min() < 0 or corners.max() >= len(vertices):
         raise InputError(f"{path} has no triangles, or they name points that it has not")
     return vertices, corners
-
-
-def _number(path: Path) -> tuple[int, str]:
-    digits = "".join(c for c in path.stem if c.isdecimal())
-    return int(digits or 0), path.stem

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
+from ccfem.base.display import by_number
 from ccfem.base.errors import InputError
 from ccfem.base.whole import existing_file, text_of
 
@@ -39,7 +40,7 @@ def holds_strands(path: Path) -> bool:
 def read_strand_files(path: str | Path) -> list[list[FloatArray]]:
     """Strands (k, 3), mm, of each layer: of a file, or of all such files (.obj, .txt) of a folder.
 
-    Files of a folder are layers in the order of the first numbers in their names.
+    Files of a folder are layers in the order of the numbers in their names.
 
     Raises
     ------
@@ -51,7 +52,7 @@ def read_strand_files(path: str | Path) -> list[list[FloatArray]]:
         files = [existing_file(path, "path file")]
     else:
         files = [file for file in path.iterdir() if file.suffix.lower() in _SUFFIXES]
-        files.sort(key=lambda file: (*map(int, re.findall(r"\d+", file.stem)[:1]), file.name))
+        files.sort(key=lambda file: by_number(file.name))
     if not files:
         raise InputError(f"{path} holds no files of strands (.obj, .txt): check its name")
     return [(_chained if file.suffix.lower() == ".obj" else _rows)(file) for file in files]

@@ -1,6 +1,5 @@
 """Tetrahedral meshes with named patches."""
 
-import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -12,7 +11,7 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray, IntArray, freeze, read_only
 from ccfem.base.checks import check_known
-from ccfem.base.display import Shown
+from ccfem.base.display import Shown, by_number
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.curved_cells import (
     CELL_POINTS,
@@ -35,8 +34,6 @@ from ccfem.geometry.facets import facet_keys, paired, positions, signed_volumes,
 
 _MANY = 12
 """Names of patches that a message lists."""
-_PARTS = re.compile(r"(\d+)").split
-"""Words and numbers of a name, in turn."""
 _NONE: Mapping[str, FloatArray] = MappingProxyType({})
 
 
@@ -95,9 +92,7 @@ class CellMesh(ABC):
     @property
     def patch_list(self) -> str:
         """Names of the patches for messages: face_2 before face_10, and at most a dozen."""
-        names = sorted(
-            self.patches, key=lambda name: [int(w) if w.isdecimal() else w for w in _PARTS(name)]
-        )
+        names = sorted(self.patches, key=by_number)
         if len(names) > _MANY:
             names[_MANY - 1 :] = [f"... {names[-1]} ({len(names)} in all)"]
         return ", ".join(names) or "none"

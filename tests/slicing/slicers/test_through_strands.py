@@ -96,6 +96,14 @@ def test_a_stack_that_is_printed_downwards_faces_down(tmp_path):
     assert all(layer.normals[:, 2].max() < -0.9 for layer in rebuilt(tmp_path, thickness=0.5))
 
 
+def test_files_without_a_number_come_last(tmp_path):
+    for number, height in ((10, 4.5), (9, 4.0), (11, 5.0)):
+        write(tmp_path, number, height)
+    (tmp_path / "11_C11_M_0.obj").rename(tmp_path / "top.obj")
+    heights = [layer.points[:, 2].mean() for layer in rebuilt(tmp_path)]
+    np.testing.assert_allclose(np.diff(heights), 0.5, atol=0.02)
+
+
 def test_strands_that_tell_no_layers_are_one_line(tmp_path):
     write(tmp_path, 1, 4.0)
     with pytest.raises(InputError, match=r"two or more, .* got 1: name the folder of all"):
