@@ -28,7 +28,11 @@ def layer_files(folder: str | os.PathLike[str]) -> tuple[Path, ...]:
 
 
 def read_layer(path: Path) -> tuple[FloatArray, IntArray]:
-    """Points (n, 3), mm, and triangles (t, 3) of an OBJ file of triangles."""
+    """Points (n, 3), mm, and triangles (t, 3) of an OBJ file of triangles.
+
+    Points that are the same are one, as where each triangle has its own; triangles of fewer than
+    three points are left out.
+    """
     points, triangles = [], []
     try:
         for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
@@ -36,11 +40,17 @@ def read_layer(path: Path) -> tuple[FloatArray, IntArray]:
             if words[:1] == ["v"]:
                 points.append([float(word) for word in words[1:4]])
             elif words[:1] == ["f"]:
-                triangles.append([int(word.split("/")[0]) for word in words[1:]])
+                a, b, c = (int(word.split("/")[0]) for word in words[1:])
+                triangles.append((a, b, c))
         vertices = np.array(points, dtype=np.float64).reshape(-1, 3)
         corners = np.array(triangles, dtype=np.int64).reshape(-1, 3) - 1
     except (ValueError, IndexError, OverflowError):
         raise InputError(f"{path} is no OBJ file of triangles: export it again") from None
     if not len(corners) or corners.min() < 0 or corners.max() >= len(vertices):
         raise InputError(f"{path} has no triangles, or they name points that it has not")
-    return vertices, corners
+    if not np.isfinite(vertices).all():
+        raise InputError(f"{path} has points that are not finite: repair the file")
+    _, first, same = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
+    corners = first[same.reshape(-1)][corners]
+    apart = np.diff(np.sort(corners, axis=1), axis=1) > 0
+    return vertices, corners[apart.all(axis=1)]

@@ -16,6 +16,7 @@ from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.geometry.polylines import pack, resample
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.level_surfaces import clean
 from ccfem.slicing.layers.slicer import Vector
 from ccfem.slicing.slicers.surfaces import Sheet, facing_up, layer_from_surface
 
@@ -27,6 +28,8 @@ _WIDE = 1.5
 """Distance, mm, at which a point has lost two thirds of its weight."""
 _LONE = 0.1
 """Spread of points, mm, below which the plane turns towards the neighbouring layers instead."""
+_SHORTEST, _SAG = 0.25, 0.01
+"""Edge of a layer, mm, and how far its border may move, mm, where shorter ones are collapsed."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +112,10 @@ def _sheet(mesh: TetMesh, clouds: list[FloatArray], k: int, reach: float) -> She
             f"no strand of layer {k} lies in the part: are they in mm, and in the frame of the "
             "mesh?"
         )
-    used, triangles = np.unique(triangles[kept], return_inverse=True)
+    # Slivers where the surface passes close by nodes of the mesh.
+    triangles, free = triangles[kept], np.zeros(len(points), dtype=np.bool_)
+    triangles, _ = clean(points, triangles, np.arange(len(triangles)), free, _SHORTEST, _SAG)
+    used, triangles = np.unique(triangles, return_inverse=True)
     return points[used], triangles.reshape(-1, 3)
 
 

@@ -66,6 +66,21 @@ def test_layers_face_the_next_one_whichever_way_their_triangles_turn(tmp_path):
     assert alone.normals[:, 2].min() > 0.9
 
 
+def test_points_that_each_triangle_has_of_its_own_are_one(tmp_path):
+    write(tmp_path, "1.obj")
+    slicer = create("surfaces", {"folder": str(tmp_path)})
+    (whole,) = slicer(stress(), UP, Machine())
+    apart = whole.points[whole.triangles].reshape(-1, 3)
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in apart.tolist()]
+    lines += [f"f {k} {k + 1} {k + 2}" for k in range(1, len(apart), 3)]
+    lines.append("f 1 1 2")  # no triangle at all
+    (tmp_path / "1.obj").write_text("\n".join(lines))
+    (layer,) = slicer(stress(), UP, Machine())
+    assert len(layer.points) == len(whole.points)
+    assert len(layer.loops) == 1
+    assert layer.areas.sum() == pytest.approx(whole.areas.sum())
+
+
 def test_folders_and_files_that_are_none_are_one_line(tmp_path):
     slicer = create("surfaces", {"folder": str(tmp_path)})
     with pytest.raises(InputError, match=r"no \.obj file in the folder"):
@@ -75,6 +90,13 @@ def test_folders_and_files_that_are_none_are_one_line(tmp_path):
         slicer(stress(), UP, Machine())
     (tmp_path / "1.obj").write_text("v 1 2\nf 1 2 3\n")
     with pytest.raises(InputError, match="is no OBJ file of triangles"):
+        slicer(stress(), UP, Machine())
+    corners = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+    (tmp_path / "1.obj").write_text(corners + 3 * "f 1 2 3 4\n")
+    with pytest.raises(InputError, match="is no OBJ file of triangles"):
+        slicer(stress(), UP, Machine())
+    (tmp_path / "1.obj").write_text(corners.replace("v 1 1 0", "v 1 nan 0") + "f 1 2 3\n")
+    with pytest.raises(InputError, match="points that are not finite"):
         slicer(stress(), UP, Machine())
     (tmp_path / "1.obj").write_text("v 1 2 3\nf 1 2 3\n")
     with pytest.raises(InputError, match="has no triangles, or they name points"):

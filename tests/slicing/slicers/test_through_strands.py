@@ -100,8 +100,9 @@ def test_files_without_a_number_come_last(tmp_path):
     for number, height in ((10, 4.5), (9, 4.0), (11, 5.0)):
         write(tmp_path, number, height)
     (tmp_path / "11_C11_M_0.obj").rename(tmp_path / "top.obj")
-    heights = [layer.points[:, 2].mean() for layer in rebuilt(tmp_path)]
-    np.testing.assert_allclose(np.diff(heights), 0.5, atol=0.02)
+    for layer, height in zip(rebuilt(tmp_path), (4.0, 4.5, 5.0), strict=True):
+        away = layer.points[:, 2] - sheet(layer.points[:, 0], height)
+        assert np.abs(away).max() < 0.05
 
 
 def test_strands_that_tell_no_layers_are_one_line(tmp_path):
