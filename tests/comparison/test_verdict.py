@@ -160,7 +160,7 @@ def check(comparison):
 
 @pytest.fixture(scope="module", params=["bar", "open_hole", "loop", "m_shape"])
 def compared(request):
-    size = {"bar": 4.0, "open_hole": 4.0, "loop": 6.0, "m_shape": 6.0}[request.param]
+    size = {"bar": 5.0, "open_hole": 6.0, "loop": 8.0, "m_shape": 8.0}[request.param]
     case = ccfem.read(request.param, element_size=size)
     strategies = ["isocurve", "concentric", "zigzag", "contour_zigzag"]
     return ccfem.compare(case, strategies, layers=2, curve=False)

@@ -156,8 +156,8 @@ class Cheat:
 
 
 PARTS: dict[str, tuple[float, tuple[str, ...]]] = {
-    "bar": (5.0, tuple(CHEATS)),
-    "loop": (10.0, ("bundles", "micro_waves", "on_the_border", "fan", "outside")),
+    "bar": (7.0, tuple(CHEATS)),
+    "loop": (14.0, ("bundles", "micro_waves", "on_the_border", "fan", "outside")),
 }
 """Parts, with their element sizes; on the round one those cheats that lie otherwise there."""
 

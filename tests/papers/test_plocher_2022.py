@@ -26,7 +26,7 @@ from ccfem.paths.raster.patterns import INFILL
 
 @pytest.fixture(scope="module")
 def case():
-    return run_case(five_holes(bead=1.2))
+    return run_case(five_holes(bead=1.6))
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def test_order_of_the_patterns(case):
 
 def test_sum_of_densities_is_the_energy_over_the_volume_of_a_cell(case):
     for name in case.patterns:
-        expected = case.value(name, "energy_C") / 1.2**2
+        expected = case.value(name, "energy_C") / 1.6**2
         assert case.value(name, "density_sum_C") == pytest.approx(expected)
 
 
@@ -70,7 +70,7 @@ def test_pixels_and_polylines_agree(case, raster):
 def test_what_pixels_do_to_length_and_sinuosity(case, raster):
     # Inside the shells, rows step by a bead and diagonals by sqrt 2; the shells are the same.
     shells = {}
-    for name, step in (("grid 0", 1.2), ("grid 45", 1.2 * np.sqrt(2.0))):
+    for name, step in (("grid 0", 1.6), ("grid 45", 1.6 * np.sqrt(2.0))):
         steps = []
         for plan in raster.patterns[name].raster:
             inside = plan.regions.domain == INFILL

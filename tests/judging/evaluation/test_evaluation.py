@@ -267,7 +267,7 @@ def test_order_direction_and_subdivision_do_not_matter(part, lines, seed):
     assert_same(first, second, coverage=1e-4)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(lines=generic_lines(), seed=st.integers(0, 10**6))
 def test_turning_and_moving_part_and_paths_changes_nothing(part, lines, seed):
     turn = Rotation.random(rng=seed).as_matrix()

@@ -92,7 +92,7 @@ def planned(two_bends):
     """Plans of 500 mm a layer for both cases."""
     cases, layers = two_bends
     strategies = {
-        "stream": StreamFunction(evaluations=10, phases=1),
+        "stream": StreamFunction(evaluations=5, phases=1),
         "isocurve": Isocurve(),
         "pruned": Pruned(of="zigzag"),
         "zigzag": Zigzag(),
@@ -118,7 +118,7 @@ def test_planned_together_the_worst_case_is_better_than_planned_for_one(planned,
     for name, one in planned.items():
         worst[name] = virtual_tests(one.toolpaths, cases).ratios
     for field in cases.fields:
-        strategy = StreamFunction(evaluations=10, phases=1)
+        strategy = StreamFunction(evaluations=5, phases=1)
         alone = plan_to_length(strategy, layers, field, MACHINE, 500.0)
         best.append(virtual_tests(alone.toolpaths, cases).ratios)
     single = np.diag(best)
