@@ -95,10 +95,11 @@ for where, (machine, field, layer) in parts.items():
             continue
         paths = plan(strategy, (layer,), field, machine)
         laid[where, name] = paths
-        indices[where, name] = evaluate(paths, (layer,), field, machine).total
+        if where == "optimised":
+            indices[name] = evaluate(paths, (layer,), field, machine).total
         rates[where, name] = 100.0 * matching_rate(paths, [stress_on(layer, field)], step=0.9)
 
-svt = indices["optimised", "svt"]
+svt = indices["svt"]
 print(f"{svt['fibre_length'] / 1000.0:.2f} m in {svt['paths']:.0f} path")
 print(f"{svt['print_time']:.0f} s, {100.0 * svt['coverage']:.1f} % covered")
 print(f"links: {svt['link_outside']:.0f} mm outside, {svt['link_inside']:.0f} mm inside")
@@ -135,7 +136,7 @@ stiffness = {}
 for name in strategies:
     lines = plane_paths(laid["optimised", name], layer).in_part
     fibre = Toolpaths.from_plane(np.split(lines.points, lines.offsets[1:-1]), layer)
-    strand = Strand(RHO / indices["optimised", name]["overfill"])
+    strand = Strand(RHO / indices[name]["overfill"])
     bonded = virtual_test(fibre, field, strand, BONDED, span=())
     stiffness[name] = bonded.stiffness / bonded.unreinforced_stiffness
 print("stiffness over that without fibre:", {k: round(v, 2) for k, v in stiffness.items()})

@@ -20,7 +20,7 @@ from ccfem.strategies.pruned import Pruned
 def test_pruned_fibre_beats_the_same_length_planned_outright(name: str) -> None:
     case = create_case("loop", element_size=4.0)
     field = solve(case.problem)["pull"]
-    layers = Planar(count=2).cut(field.mesh, case.build)
+    layers = Planar(count=1).cut(field.mesh, case.build)
     specimen = Specimen.of(field)
     strategy = Pruned(of=name, coverage=0.3, overfill=1.5)
     pruned = plan(strategy, layers, field, case.machine)
