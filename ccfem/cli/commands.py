@@ -454,14 +454,8 @@ def compare(
         parameters = parameters_by_strategy(set_ or ())
         cut = layers_of(layers, heights, slicing)
         several = None if slicings is None else slicings_of(slicings)
-        given = foreign_stress(
-            stress,
-            refine,
-            unit=stress_unit,
-            array=stress_array,
-            step=stress_step,
-            components=stress_components,
-        )
+        how = (stress_unit, stress_array, stress_step, stress_components)
+        given = foreign_stress(stress, refine, *how)
         if drawings is not None and slicings is not None:
             raise InputError("--drawings works with one slicing only; got --slicings: drop one")
         bed = bed_table_of(turn)
@@ -542,14 +536,8 @@ def plan(
 
         parameters = parameters_by_strategy(set_ or (), strategy)
         cut = layers_of(layers, heights, slicing)
-        given = foreign_stress(
-            stress,
-            refine,
-            unit=stress_unit,
-            array=stress_array,
-            step=stress_step,
-            components=stress_components,
-        )
+        how = (stress_unit, stress_array, stress_step, stress_components)
+        given = foreign_stress(stress, refine, *how)
         if not gcode and not (centre is None and copies is None):
             raise InputError("--centre and --copies place a print on the bed: add --gcode")
         if cell and not gcode:

@@ -144,16 +144,14 @@ def slicings_of(text: str) -> tuple[str, ...]:
     return split(text)
 
 
-def foreign_stress(path: Path | None, refine: bool, **how: Any) -> Any:
+def foreign_stress(path: Path | None, refine: bool, *values: Any) -> Any:
     """Stress of another program to plan on; None for the part's own.
 
-    Parameters
-    ----------
-    **how : str, int or None
-        Unit, array and step: see `ccfem.comparison.request.ForeignStress`.
+    Values are those of its unit, array, step and components, each of which may be None.
     """
     from ccfem.comparison.request import ForeignStress
 
+    how = dict(zip(("unit", "array", "step", "components"), values, strict=True))
     if path is None:
         for name, value in how.items():
             if value is not None:

@@ -87,26 +87,6 @@ def axis_values(
     return linear, np.degrees(np.column_stack([tilt, spin]))
 
 
-def head_pose(
-    kinematics: Kinematics, linear: FloatArray, turning: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Tips and directions in the frame of the part for values of the axes (forward kinematics).
-
-    Parameters and results are those of `axis_values`, the other way round.
-    """
-    tilt, spin = np.radians(turning).T
-    up = np.tile([0.0, 0.0, 1.0], (len(linear), 1))
-    if kinematics.kind == "table_table":
-        centre = np.array(kinematics.centre)
-        place = _about_z(_about_x(linear - centre, -tilt), -spin) + centre
-        return place, _about_z(_about_x(up, -tilt), -spin)
-    if kinematics.kind == "head_head":
-        sine = np.sin(tilt)
-        normal = np.column_stack([sine * np.cos(spin), sine * np.sin(spin), np.cos(tilt)])
-        return linear - kinematics.pivot * (normal - up), normal
-    return linear, up
-
-
 def _about_x(points: FloatArray, angle: FloatArray) -> FloatArray:
     x, y, z = points.T
     cosine, sine = np.cos(angle), np.sin(angle)

@@ -515,11 +515,12 @@ _SPREAD = np.exp(-0.5 * (np.arange(-8, 9) / 2.0) ** 2)
 """Gaussian, a millimetre in standard deviation, over which the movement fades out."""
 
 
-def limit_bends(curve: FloatArray, largest: float, smoothing: float = 0.5) -> FloatArray:
+def limit_bends(curve: FloatArray, largest: float) -> FloatArray:
     """Smooth a closed curve where its curvature is above a limit.
 
     Points there move against the fourth differences of the curve. This reduces bends and, unlike
-    second differences, hardly shortens the curve.
+    second differences, hardly shortens the curve. A Gaussian filter of half a millimetre in
+    standard deviation is applied first, since crossings with triangle edges are unevenly spaced.
 
     Parameters
     ----------
@@ -527,9 +528,6 @@ def limit_bends(curve: FloatArray, largest: float, smoothing: float = 0.5) -> Fl
         Its last point is its first.
     largest : float, 1/mm
         Curvature.
-    smoothing : float, mm, default 0.5
-        Standard deviation of a Gaussian filter applied first, since crossings with triangle edges
-        are unevenly spaced.
 
     Returns
     -------
@@ -539,9 +537,7 @@ def limit_bends(curve: FloatArray, largest: float, smoothing: float = 0.5) -> Fl
     points, _ = resample(curve, np.array([0, len(curve)]), _STEP)
     if len(points) < 12:
         return points
-    points = points[:-1]
-    if smoothing > 0.0:
-        points = gaussian_filter1d(points, smoothing / _STEP, axis=0, mode="wrap")
+    points = gaussian_filter1d(points[:-1], 0.5 / _STEP, axis=0, mode="wrap")
     points = _straightened(np.ascontiguousarray(points), largest, _SPREAD / _SPREAD.sum(), _ROUNDS)
     return np.vstack([points, points[:1]])
 

@@ -33,24 +33,13 @@ class FrontPoint(NamedTuple):
     label: str = ""
 
 
-def front_figure(
-    panels: Mapping[str, Sequence[FrontPoint]], across: str, up: str, columns: int = 3
-) -> "Figure":
-    """Draw fronts, a panel each.
-
-    Parameters
-    ----------
-    panels : mapping of heading to points
-    across, up : str
-        What the axes are.
-    columns : int
-        Panels side by side.
-    """
+def front_figure(panels: Mapping[str, Sequence[FrontPoint]], across: str, up: str) -> "Figure":
+    """Draw fronts, a panel each with its heading, three side by side; axes are what is named."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-    wide = max(min(columns, len(panels)), 1)
+    wide = max(min(3, len(panels)), 1)
     tall = -(-max(len(panels), 1) // wide)
     width, height = 4.4 * wide, 3.4 * tall + 0.5
     figure = Figure(figsize=(width, height), dpi=100.0)

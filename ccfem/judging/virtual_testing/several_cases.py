@@ -131,16 +131,13 @@ def virtual_tests(
 def cases_failure(
     tested: CasesTest,
     strand: Strand | None = None,
-    matrix_strength: float | None = None,
     layers: Sequence[Layer] | None = None,
 ) -> CasesFailure:
     """Find the case in which a part fails at the least multiple of its load.
 
     Parameters and errors as in `first_failure`.
     """
-    failures = tuple(
-        first_failure(failure, strand, matrix_strength, layers) for failure in tested.tests
-    )
+    failures = tuple(first_failure(test, strand, layers=layers) for test in tested.tests)
     factors = tuple(
         failure.load / test.force for failure, test in zip(failures, tested.tests, strict=True)
     )

@@ -172,7 +172,7 @@ def oriented_problem(problem: Problem, strands: Strands, fibre: Material, area: 
 
 
 def oriented_ratio(
-    strands: Strands, part: StressField, fibre: Material, area: float, backend: str = "auto"
+    strands: Strands, part: StressField, fibre: Material, area: float
 ) -> tuple[float, StressField]:
     """Stiffness with smeared fibres over that of the part without, and the solution.
 
@@ -184,13 +184,11 @@ def oriented_ratio(
         The part without fibres.
     area : float, mm^2
         Cross-section of a strand.
-    backend : str
-        Solver.
     """
     smeared = oriented_problem(part.problem, strands, fibre, area)
     smeared = replace(smeared, loads={part.case: smeared.loads[part.case]})
-    after = solve(smeared, backend)[part.case]
-    specimen = Specimen.of(part, backend)
+    after = solve(smeared)[part.case]
+    specimen = Specimen.of(part)
     before = specimen.stiffness(part.displacement, part.strain_energy)
     return specimen.stiffness(after.displacement, after.strain_energy) / before, after
 

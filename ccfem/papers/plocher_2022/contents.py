@@ -442,9 +442,9 @@ def result_table(case: CaseStudy) -> str:
     return table(["index", *case.patterns], rows)
 
 
-def prototype_table(raster: Mapping[str, CaseStudy], path: Path = PROTOTYPE) -> str:
+def prototype_table(raster: Mapping[str, CaseStudy]) -> str:
     """Tabulate the indices of paths of pixels, and behind each that of a prototype."""
-    with path.open("rb") as file:
+    with PROTOTYPE.open("rb") as file:
         theirs = tomllib.load(file)
     rows = []
     for name, case in raster.items():

@@ -362,16 +362,15 @@ def mixed_stiffness(
     maps: Sequence[FibreMap],
     long: FloatArray,
     short: FloatArray,
-    limit: float = LONG,
 ) -> FloatArray:
     """Reduced stiffness (L, m, 3, 3), MPa, of cells by the length of the path in them.
 
-    Paths longer than `limit`, mm, are of the material `long` (continuous fibre), the others and
+    Paths longer than 40 mm are of the material `long` (continuous fibre), the others and
     cells without a path of `short` (Plocher et al. 2022, figures 4 and 14).
     """
     layers = []
     for layer_paths, fibre in zip(paths, maps, strict=True):
-        is_long = np.append(layer_paths.lengths > limit, False)[fibre.path]
+        is_long = np.append(layer_paths.lengths > LONG, False)[fibre.path]
         layers.append(np.where(is_long[:, None, None], long, short))
     return np.stack(layers)
 

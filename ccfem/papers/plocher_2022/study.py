@@ -128,12 +128,11 @@ def machine_of(plate: Plate) -> Machine:
 
 
 def run_study(
-    cases: Sequence[str] = ("I", "II", "III"),
     patterns: Patterns = PATTERNS,
     known: Mapping[str, CaseStudy] | None = None,
     progress: Progress = silent,
 ) -> Mapping[str, CaseStudy]:
-    """Prepare the study, or a part of it: a case is run when it is asked for.
+    """Prepare the study: a case is run when it is asked for.
 
     Compiled code is loaded before any clock runs. `known` holds the same cases with other patterns:
     their benchmarks are taken over.
@@ -147,7 +146,7 @@ def run_study(
         return run_case(known[name].plate, patterns, known[name].benchmarks)
 
     what = "planning and judging case" if known is None else "pixels of case"
-    return WhenAsked(cases, compute, progress, what)
+    return WhenAsked(("I", "II", "III"), compute, progress, what)
 
 
 def _load(patterns: Patterns) -> None:

@@ -139,30 +139,20 @@ class PlateStudy:
     seconds: float
 
 
-def run_study(
-    plates: Sequence[str] = tuple(PLATES),
-    patterns: Sequence[str] = tuple(PATTERNS),
-    design: bool = True,
-    progress: Progress = silent,
-) -> Mapping[str, PlateStudy]:
-    """Prepare the study, or a part of it; patterns whose strategy is not there are left out.
+def run_study(progress: Progress = silent) -> Mapping[str, PlateStudy]:
+    """Prepare the study; patterns whose strategy is not there are left out.
 
-    A plate is run when it is asked for.
-
-    Parameters
-    ----------
-    design : bool, default True
-        Whether to optimise the plates again, beside the outlines that are stored.
+    A plate is run, and optimised again beside its stored outline, when it is asked for.
     """
     known = named()
-    chosen = [name for name in patterns if PATTERNS[name][0] in known]
+    chosen = [name for name, (strategy, *_) in PATTERNS.items() if strategy in known]
     ready = cache(lambda: run_plate("l_shape", chosen, element_size=6.0))
 
     def compute(name: str) -> PlateStudy:
         ready()  # compiled code is loaded before any clock runs
-        return run_plate(name, chosen, design)
+        return run_plate(name, chosen, design=True)
 
-    return WhenAsked(plates, compute, progress, "optimising, planning and judging")
+    return WhenAsked(tuple(PLATES), compute, progress, "optimising, planning and judging")
 
 
 def run_plate(
@@ -244,7 +234,7 @@ def _tested(paths: PlanePaths, specimen: Specimen, rho: float) -> dict[str, floa
     }
 
 
-def curvature_along(paths: PlanePaths, step: float = LEAST) -> tuple[FloatArray, FloatArray]:
+def curvature_along(paths: PlanePaths) -> tuple[FloatArray, FloatArray]:
     """Points (s, 2), mm, in equal steps, and the curvature there, (s,), 1/mm.
 
     ``2 sin(a / 2) / h`` with the turn a and the step h, which is at most ``2 / h``: the paper's
@@ -252,7 +242,7 @@ def curvature_along(paths: PlanePaths, step: float = LEAST) -> tuple[FloatArray,
     """
     if not len(paths):
         return np.zeros((0, 2)), np.zeros(0)
-    points, offsets = resample(paths.points, paths.offsets, step)
+    points, offsets = resample(paths.points, paths.offsets, LEAST)
     angle = turning_angles(points, offsets, paths.closed)
     count = np.diff(offsets)
     size = np.repeat(paths.lengths / np.maximum(count - 1, 1), count)

@@ -248,9 +248,9 @@ def _angles(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.asarray(np.abs(np.arctan2(cross, (a * b).sum(axis=1))))
 
 
-def _outward(line: FloatArray, side: int, reach: float = 1.0) -> FloatArray:
+def _outward(line: FloatArray, side: int) -> FloatArray:
     """Return the unit vector along which a line leaves its first or last (side 1) point."""
-    head = _head(line if side == 0 else line[::-1], reach)
+    head = _head(line if side == 0 else line[::-1], 1.0)
     step = head[0] - head[-1]
     return step / max(float(np.linalg.norm(step)), 1e-12)
 

@@ -269,15 +269,10 @@ def plan_to_lengths(
 
 
 def extremes(
-    strategy: Strategy,
-    layers: Sequence[Layer],
-    stress: PartStress,
-    machine: Machine,
-    known: Sequence[Planned] = (),
+    strategy: Strategy, layers: Sequence[Layer], stress: PartStress, machine: Machine
 ) -> tuple[Planned, Planned]:
     """Plan the least and the most that a strategy lays; parameters as in `plan_to_lengths`."""
     search = _Search(Dial(strategy), layers, stress, machine)
-    search.learn(known)
     most = max(search.whole(search.dial.end), *search.tried.values(), key=_length)
     return search.least_filled(), most
 

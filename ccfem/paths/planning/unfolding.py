@@ -92,9 +92,7 @@ def unfolded(joined: Joined, section: Region, machine: Machine, least: float) ->
     return result
 
 
-def unfolded_paths(
-    paths: Toolpaths, layer: Layer | None, machine: Machine, least: float | None = None
-) -> Toolpaths:
+def unfolded_paths(paths: Toolpaths, layer: Layer | None, machine: Machine) -> Toolpaths:
     """Fibre of one layer, led round its folds or cut there; on a curved layer it is only cut.
 
     Points of jags are left out first: where levels cross the corner of a triangle, or rings that of
@@ -104,10 +102,8 @@ def unfolded_paths(
     ----------
     layer : Layer or None
         None for paths that are final: they are only cut, and folds looked for without a margin.
-    least : float, mm, optional
-        Pieces of cut paths that are shorter are dropped; by default the machine's least length.
     """
-    least, radius = machine.shortest_strand if least is None else least, machine.minimum_radius
+    least, radius = machine.shortest_strand, machine.minimum_radius
     radius *= MARGIN if layer is not None else 1.0
     paths = _without_jags(paths, machine.fibre_width, least)
     bends = folds(paths.points, paths.offsets, paths.closed, radius, strict=True)

@@ -107,11 +107,9 @@ def gcode(plan: PrintPlan, machine: Machine, title: str = "") -> str:
     return gcode_of_moves(part_moves(plan, machine), plan, machine, title)
 
 
-def gcode_of_moves(
-    moves: Moves, plan: PrintPlan, machine: Machine, title: str = "", doubts: Sequence[str] = ()
-) -> str:
-    """G-code of moves that were made of a plan; title and doubts as of `gcode_head`."""
-    return "".join(gcode_pieces(moves, plan, machine, title, doubts))
+def gcode_of_moves(moves: Moves, plan: PrintPlan, machine: Machine, title: str = "") -> str:
+    """G-code of moves that were made of a plan; title as of `gcode_head`."""
+    return "".join(gcode_pieces(moves, plan, machine, title))
 
 
 def gcode_pieces(

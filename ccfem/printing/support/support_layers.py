@@ -81,7 +81,6 @@ def support_layers(
     step: float | None = None,
     angle: float | None = None,
     lift: float | None = None,
-    size: float | None = None,
 ) -> SupportLayers:
     """Lay support below a part, in layers that continue its own.
 
@@ -108,8 +107,6 @@ def support_layers(
     lift : float, mm, optional
         Height of the lowest point of the part above the bed: by default 0 for flat layers, and for
         curved ones 10 layers, in which they become flat, or as many more as that takes.
-    size : float, mm, optional
-        Of the cells, as in `column_mesh`.
 
     Raises
     ------
@@ -135,7 +132,7 @@ def support_layers(
     angle = (_CARRIED if flat else 0.0) if angle is None else angle
     lifts = [_LIFT * nominal * _HIGHER**k for k in range(_TIMES + 1)] if not flat else [0.0]
     for height in lifts if lift is None else [lift]:
-        columns = column_mesh(mesh, build, angle, height, size)
+        columns = column_mesh(mesh, build, angle, height)
         origin = float(levels[0]) - 0.5 * step
         field_below = support_field(columns, field, step / nominal, step, origin, _INVERTED)
         if field_below.inverted <= _INVERTED:

@@ -230,7 +230,7 @@ def _refined(
 _SWEEPS = 20
 
 
-def straighten(points: FloatArray, path: EdgePath, keep: float, sweeps: int = _SWEEPS) -> EdgePath:
+def straighten(points: FloatArray, path: EdgePath, keep: float) -> EdgePath:
     """Move the crossings of a curve along their edges so that it gets shorter.
 
     Each crossing in turn moves to where the straight line between its neighbours crosses its edge,
@@ -243,7 +243,7 @@ def straighten(points: FloatArray, path: EdgePath, keep: float, sweeps: int = _S
         Least share of an edge between a crossing and either end.
     """
     share = path.share.copy()
-    _sweep(seen_only(points), path.start, path.end, path.edges, share, keep, sweeps)
+    _sweep(seen_only(points), path.start, path.end, path.edges, share, keep, _SWEEPS)
     return replace(path, share=share)
 
 
