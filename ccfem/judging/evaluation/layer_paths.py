@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ccfem.base.arrays import BoolArray, FloatArray, IntArray, RowBuffer
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, RowBuffer, read_only
 from ccfem.fem.elasticity import PartStress
 from ccfem.fem.materials import Material
 from ccfem.geometry.polylines import lengths, merge_repeated, starts_segment
@@ -152,6 +152,14 @@ def pool(parts: Iterable[Samples]) -> Samples:
     for part in parts:
         pooled.add(part)
     return pooled.samples()
+
+
+class LayerSamples:
+    """Frozen dataclass of arrays, all of which are read-only: what an index takes of a layer."""
+
+    def __post_init__(self) -> None:
+        for name, values in vars(self).items():
+            object.__setattr__(self, name, read_only(values))
 
 
 class Pool:

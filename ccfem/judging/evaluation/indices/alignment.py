@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray, read_only
+from ccfem.base.arrays import FloatArray
 from ccfem.base.tensor import in_plane, largest_in_plane
 from ccfem.geometry.locate import locate
 from ccfem.geometry.polylines import sample_midpoints
-from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, PlanePaths
+from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, LayerSamples, PlanePaths
 from ccfem.judging.evaluation.sensitivity import acute
 from ccfem.slicing.layers.layer import LayerStress
 
@@ -92,7 +92,7 @@ _ROUNDING = 1e-3
 
 
 @dataclass(frozen=True)
-class AlignmentSamples:
+class AlignmentSamples(LayerSamples):
     """Samples along the fibre inside the part, (s,) each.
 
     Attributes
@@ -111,10 +111,6 @@ class AlignmentSamples:
     largest: FloatArray
     smallest: FloatArray
     along: FloatArray
-
-    def __post_init__(self) -> None:
-        for name, values in vars(self).items():
-            object.__setattr__(self, name, read_only(values))
 
 
 def sample_alignment(paths: PlanePaths, stress: LayerStress, step: float) -> AlignmentSamples:

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ccfem.base.arrays import FloatArray, read_only
+from ccfem.base.arrays import FloatArray
 from ccfem.geometry.polylines import arc_lengths, curvature_samples, inner_points, turning_angles
-from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, PlanePaths
+from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, LayerSamples, PlanePaths
 from ccfem.machine.machine import Machine
 
 PLACE = 30
@@ -69,7 +69,7 @@ COLUMNS = (
 
 
 @dataclass(frozen=True)
-class CurvatureSamples:
+class CurvatureSamples(LayerSamples):
     """Curvature along the fibre of a layer.
 
     Attributes
@@ -88,10 +88,6 @@ class CurvatureSamples:
     native: FloatArray
     turns: FloatArray
     length: FloatArray
-
-    def __post_init__(self) -> None:
-        for name, values in vars(self).items():
-            object.__setattr__(self, name, read_only(values))
 
 
 def sample_curvature(paths: PlanePaths, step: float) -> CurvatureSamples:

@@ -4,11 +4,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.base.arrays import BoolArray, FloatArray, read_only
+from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.geometry.cones import earlier_in_cones
 from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.geometry.polylines import merge_repeated, sample_midpoints
-from ccfem.judging.evaluation.layer_paths import COARSE, Basis, Column, LayerPaths, Printed
+from ccfem.judging.evaluation.layer_paths import (
+    COARSE,
+    Basis,
+    Column,
+    LayerPaths,
+    LayerSamples,
+    Printed,
+)
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
@@ -49,7 +56,7 @@ COLUMNS = (
 
 
 @dataclass(frozen=True)
-class HeadSamples:
+class HeadSamples(LayerSamples):
     """Samples of the fibre of a layer.
 
     Attributes
@@ -62,10 +69,6 @@ class HeadSamples:
     length: FloatArray
     tilt: FloatArray
     hits: BoolArray
-
-    def __post_init__(self) -> None:
-        for name, values in vars(self).items():
-            object.__setattr__(self, name, read_only(values))
 
 
 def sample_head(

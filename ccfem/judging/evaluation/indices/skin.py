@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.base.arrays import BoolArray, FloatArray, read_only
+from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.body.mesh import TetMesh
 from ccfem.geometry.locate import locate, nearest_on_triangles
 from ccfem.geometry.polylines import merge_repeated, sample_midpoints
 from ccfem.geometry.shapes import INSIDE, section_places
-from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths
+from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, LayerSamples
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
@@ -37,7 +37,7 @@ COLUMNS = (
 
 
 @dataclass(frozen=True)
-class SkinSamples:
+class SkinSamples(LayerSamples):
     """Samples of the fibre of a layer.
 
     Attributes
@@ -48,10 +48,6 @@ class SkinSamples:
 
     length: FloatArray
     stands_out: BoolArray
-
-    def __post_init__(self) -> None:
-        for name, values in vars(self).items():
-            object.__setattr__(self, name, read_only(values))
 
 
 def sample_skin(fibre: Toolpaths, layer: Layer, mesh: TetMesh, machine: Machine) -> SkinSamples:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ccfem.base.arrays import FloatArray, IntArray, read_only
+from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.locate import locate, nearest_on_triangles
 from ccfem.geometry.polylines import (
@@ -14,7 +14,7 @@ from ccfem.geometry.polylines import (
     merge_repeated,
     sample_midpoints,
 )
-from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths
+from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, LayerSamples
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.principal_lines.critical import strongest_stress
@@ -87,7 +87,7 @@ COLUMNS = (
 
 
 @dataclass(frozen=True)
-class SpaceSamples:
+class SpaceSamples(LayerSamples):
     """Samples of a layer.
 
     Attributes
@@ -113,10 +113,6 @@ class SpaceSamples:
     thickness: FloatArray
     across: FloatArray
     tension: FloatArray
-
-    def __post_init__(self) -> None:
-        for name, values in vars(self).items():
-            object.__setattr__(self, name, read_only(values))
 
 
 def sample_space(fibre: Toolpaths, layer: Layer, stress: PartStress, step: float) -> SpaceSamples:

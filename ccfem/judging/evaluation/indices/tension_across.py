@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray, read_only
+from ccfem.base.arrays import FloatArray
 from ccfem.fem.elasticity import PartStress
-from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths
+from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, LayerSamples
 from ccfem.slicing.layers.layer import Layer
 
 PLACE = 150
@@ -67,7 +67,7 @@ COLUMNS = (
 
 
 @dataclass(frozen=True)
-class TensionSamples:
+class TensionSamples(LayerSamples):
     """Samples of a layer.
 
     Attributes
@@ -93,10 +93,6 @@ class TensionSamples:
     least: FloatArray
     angle: FloatArray
     angle_flat: FloatArray
-
-    def __post_init__(self) -> None:
-        for name, values in vars(self).items():
-            object.__setattr__(self, name, read_only(values))
 
 
 def sample_tension(layer: Layer, stress: PartStress, build: FloatArray) -> TensionSamples:
