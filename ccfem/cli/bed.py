@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import prod
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -96,27 +96,17 @@ def bed(
     where = out or Path("results") / "bed"
 
     def ask() -> "list[Request]":
-        columns = (
-            _for_each("--strategy", strategy or ["stream_function"], parts),
-            _for_each("--layers", layers, parts),
-            _for_each("--turn", turn, parts),
-            _for_each("--centre", centre, parts),
-        )
-        many = _for_each("--copies", copies, parts)
-        wanted: dict[tuple[Any, ...], list[str | None]] = {}
-        for part, *about, number in zip(parts, *columns, many, strict=True):
-            wanted.setdefault((part, *about), []).append(number)
+        given = (strategy or ["stream_function"], layers, turn, centre, copies)
         parameters = parameters_by_strategy(set_ or ())
         requests = []
-        for (part, chosen, count, about_z, place), numbers in wanted.items():
-            turns = None if about_z is None else [about_z]
-            table = bed_table_of(turns, place, _together(numbers))
-            case = load(part, None, False, machine, set_machine, None, table, set_plastic)
-            own = {name: given for name, given in parameters.items() if name == chosen}
+        for part, number in _counted(parts, *given).items():
+            table = bed_table_of(part.turn and [part.turn], part.centre, number)
+            case = load(part.case, None, False, machine, set_machine, None, table, set_plastic)
+            own = {name: values for name, values in parameters.items() if name == part.strategy}
             request = Request.of(
                 case,
-                named_strategies(case, (chosen,), own),
-                count,
+                named_strategies(case, (part.strategy,), own),
+                part.layers,
                 natural=True,
                 strand=DEFAULT_STRAND if virtual_test is not False else None,
                 backend=backend,
@@ -141,12 +131,27 @@ def bed(
         raise typer.Exit(max(codes))
 
 
-Given = TypeVar("Given")
+class _Part(NamedTuple):
+    """What is said of a part; parts of which the same is said are copies of one."""
+
+    case: str
+    strategy: str
+    layers: int | None
+    turn: str | None
+    centre: str | None
 
 
-def _for_each(
-    option: str, given: Sequence[Given] | None, parts: Sequence[str]
-) -> Sequence[Given | None]:
+def _counted(parts: Sequence[str], *given: Sequence[Any] | None) -> dict[_Part, str | None]:
+    """Parts in their order, and how many of each; given are strategies and so on, and copies."""
+    options = ("--strategy", "--layers", "--turn", "--centre", "--copies")
+    columns = [_for_each(*named, parts) for named in zip(options, given, strict=True)]
+    numbers: dict[_Part, list[str | None]] = {}
+    for *about, number in zip(parts, *columns, strict=True):
+        numbers.setdefault(_Part(*about), []).append(number)
+    return {part: _together(several) for part, several in numbers.items()}
+
+
+def _for_each(option: str, given: Sequence[Any] | None, parts: Sequence[str]) -> Sequence[Any]:
     """Values of an option for each part: one for all, or as many as there are parts."""
     if not given:
         return [None] * len(parts)
