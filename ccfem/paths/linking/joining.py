@@ -15,7 +15,6 @@ from ccfem.paths.linking.possible_links import (
     CLOSING_TURN,
     Link,
     cut_back,
-    free_links,
     possible_links,
     shortened,
 )
@@ -147,13 +146,12 @@ def link_ends(
     ]
     links = [links[k] for k in sorted(range(len(links)), key=keys.__getitem__)]
     needed, apart = enough if radius > 0.0 else np.inf, CLEARANCE * width
-    return _accept(list(lines), links, section, apart, needed, radius > 0.0, one_by_one)
+    return _accept(list(lines), links, apart, needed, radius > 0.0, one_by_one)
 
 
 def _accept(
     lines: list[FloatArray],
     links: list[Link],
-    section: Region,
     clearance: float,
     enough: float,
     mark: bool,
@@ -164,7 +162,6 @@ def _accept(
         return join(lines, [])
     paths = strings([link.path for link in links])
     owners = np.array([[link.first // 2, link.second // 2] for link in links])
-    free = free_links(lines, paths, owners, section, clearance)
     taken: set[int] = set()
     accepted: list[Any] = []
     joints = []
@@ -208,11 +205,11 @@ def _accept(
 
     # Links with corners come last, first those between two paths that are too short. A smooth link
     # needs no second try: whatever blocked it is still there.
-    rounds = [(k, 0) for k in np.flatnonzero(free).tolist()]
+    rounds = [(k, 0) for k in range(len(links))]
     if mark:
         rounds += [(k, 1) for k, _ in rounds if not links[k].smooth]
     at_end: dict[int, list[int]] = {}
-    for k in np.flatnonzero(free).tolist() if one_by_one else ():
+    for k in range(len(links)) if one_by_one else ():
         for end in (links[k].first, links[k].second):
             at_end.setdefault(end, []).append(k)
     for k, most_long in rounds:

@@ -66,8 +66,9 @@ def possible_links(
 ) -> list[Link]:
     """Find links between near ends: straight, along the boundary, and smooth if there is a radius.
 
-    Parameters as in `ccfem.paths.linking.joining.link_ends`. Free space is not checked yet. With a
-    radius there are no links at which a strand would fold (`ccfem.paths.folds`).
+    Parameters as in `ccfem.paths.linking.joining.link_ends`. Links lie inside the section and
+    `CLEARANCE` widths away from all strands but their own. With a radius there are none at which a
+    strand would fold (`ccfem.paths.folds`).
     """
     opened = [k for k, line in enumerate(lines) if not is_closed(line)]
     if not opened or limit <= 0.0:
@@ -82,12 +83,33 @@ def possible_links(
         )
     if radius > 0.0:
         links += smooth_links(lines, ends, limit, width, radius)
-        links = _without_folds(lines, links, radius)
-    return links
+    links = _free(lines, links, section, CLEARANCE * width)
+    return _without_folds(lines, links, radius) if radius > 0.0 else links
+
+
+def _free(
+    lines: Sequence[FloatArray], links: list[Link], section: Region, clearance: float
+) -> list[Link]:
+    """Links inside the section and clear of all strands except their own."""
+    if not links:
+        return []
+    paths = strings([link.path for link in links])
+    # The link between two ends on one edge of the border lies on it: rounding must not matter.
+    grown = shapely.buffer(section, _ON_BORDER)
+    shapely.prepare(grown)
+    free = shapely.covers(grown, paths)
+    tree = shapely.STRtree(strings(lines))
+    link, strand = tree.query(paths[free], predicate="dwithin", distance=clearance)
+    link = np.flatnonzero(free)[link]
+    owners = np.array([[link.first // 2, link.second // 2] for link in links])
+    free[link[(owners[link] != strand[:, None]).all(axis=1)]] = False
+    return [links[k] for k in np.flatnonzero(free).tolist()]
 
 
 def _without_folds(lines: Sequence[FloatArray], links: list[Link], radius: float) -> list[Link]:
     """Links in which the joined strand does not fold, nor where it enters and leaves them."""
+    if not links:
+        return []
     heads: dict[tuple[int, bytes], FloatArray] = {}
 
     def head(end: int, place: FloatArray) -> FloatArray:
@@ -105,21 +127,6 @@ def _without_folds(lines: Sequence[FloatArray], links: list[Link], radius: float
     open_ = np.zeros(len(links), dtype=bool)
     counts = folds(*pack(joined), open_, MARGIN * radius, strict=True).counts
     return [link for link, count in zip(links, counts.tolist(), strict=True) if not count]
-
-
-def free_links(
-    lines: Sequence[FloatArray], paths: Any, owners: Any, section: Region, clearance: float
-) -> Any:
-    """Mask (l,) of links inside the section and clear of all strands except their own."""
-    # The link between two ends on one edge of the border lies on it: rounding must not matter.
-    grown = shapely.buffer(section, _ON_BORDER)
-    shapely.prepare(grown)
-    free = shapely.covers(grown, paths)
-    tree = shapely.STRtree(strings(lines))
-    link, strand = tree.query(paths[free], predicate="dwithin", distance=clearance)
-    link = np.flatnonzero(free)[link]
-    free[link[(owners[link] != strand[:, None]).all(axis=1)]] = False
-    return free
 
 
 def cut_back(line: FloatArray, link: Link, k: int) -> FloatArray:

@@ -24,7 +24,6 @@ from ccfem.paths.linking.possible_links import (
     Link,
     cut_back,
     cut_start,
-    free_links,
     possible_links,
     shortened,
 )
@@ -78,13 +77,7 @@ def link_by_worth(
         Share of the lines, those worth least, that sets the price of length.
     """
     possible = possible_links(lines, section, limit, width, radius=radius)
-    order = sorted(possible, key=lambda x: (not x.smooth, round(x.cost, 6), x.first, x.second))
-    if not order:
-        return join(lines, [])
-    paths = strings([link.path for link in order])
-    owners = np.array([[link.first // 2, link.second // 2] for link in order])
-    free = np.flatnonzero(free_links(list(lines), paths, owners, section, CLEARANCE * width))
-    links = [order[k] for k in free]
+    links = sorted(possible, key=lambda x: (not x.smooth, round(x.cost, 6), x.first, x.second))
     if not links:
         return join(lines, [])
     along = worth([*lines, *(link.path for link in links)])
