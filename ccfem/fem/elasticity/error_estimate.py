@@ -9,13 +9,13 @@ square: 10 % here is 1 % of the work of the load.
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, seen_only
 from ccfem.body.mesh import TetMesh
-from ccfem.body.mesh.curved_cells import gradients_at
 from ccfem.fem.elasticity.assembly import cell_gradients
-from ccfem.fem.elasticity.recovery import times, voigt_strain
+from ccfem.fem.elasticity.recovery import slopes_at, times, voigt_strain
 
 
 @dataclass(frozen=True)
@@ -81,149 +81,48 @@ def estimate_error(
         Number from 0 of the material of each cell. Between materials the stress may jump, so that
         each is recovered by itself.
     """
-    stiffness = seen_only(stiffness).reshape(-1, 6, 6)
-    m = len(mesh.cells)
-    ease = seen_only(np.zeros((1, 4, 6)) if free is None else free)
-    gradients, edges = cell_gradients(mesh), np.asarray(TetMesh.edges)
-    arguments = (mesh.cells, gradients, seen_only(displacement), stiffness, ease, edges)
+    stiffness = np.asarray(stiffness).reshape(-1, 6, 6)
+    ease = np.zeros((1, 4, 6)) if free is None else free
     samples = SAMPLES[mesh.order]
-    stress = np.empty((m, len(samples), 6))
-    _stress_at(*arguments, samples, stress)
-    _curved_stress(mesh, displacement, stiffness, ease, samples, stress)
+    stress = _stress_at(mesh, displacement, stiffness, ease, samples)
     patches = stress_patches(mesh, stress, np.trace(stiffness, axis1=1, axis2=2), region)
-    corner = stress
-    if mesh.order == 2:
-        # Linear in a cell, so the values at its corners determine it.
-        corner = np.empty((m, 4, 6))
-        _stress_at(*arguments, np.eye(4), corner)
-        _curved_stress(mesh, displacement, stiffness, ease, np.eye(4), corner)
     compliance = np.linalg.inv(stiffness)
-    error, energy = np.empty(m), np.empty(m)
-    compare = _compare_linear if mesh.order == 1 else _compare_quadratic
-    corners = seen_only(mesh.corners)
-    polynomials = (patches.of_corner, patches.centre, patches.size, patches.coefficients)
-    cells = (mesh.points, corners, mesh.volumes, edges)
-    compare(*cells, polynomials, corner, compliance, (error, energy))
+    if mesh.order == 1:
+        difference = patches.coefficients[patches.of_corner, 0] - stress
+        error = mesh.volumes * _linear_energy(difference, compliance)
+        energy = mesh.volumes * (stress @ compliance * stress).sum(axis=(1, 2))
+    else:
+        # Linear in a cell, so the values at its corners determine it.
+        corner = _stress_at(mesh, displacement, stiffness, ease, np.eye(4))
+        error = np.empty(len(mesh.cells))
+        polynomials = (patches.of_corner, patches.centre, patches.size, patches.coefficients)
+        cells = (mesh.points, seen_only(mesh.corners), mesh.volumes, np.asarray(TetMesh.edges))
+        _compare_quadratic(*cells, polynomials, corner, compliance, error)
+        energy = mesh.volumes * _linear_energy(corner, compliance)
     held = (ease @ stiffness * ease).sum(axis=2).mean(axis=1)
     if error.sum() + energy.sum() <= _FREELY * (mesh.volumes * held).sum():
-        error, energy = np.zeros(m), np.zeros(m)
+        error, energy = np.zeros_like(error), np.zeros_like(energy)
     return ErrorEstimate(error, energy)
 
 
-@njit(cache=True)
 def _stress_at(
-    cells: IntArray,
-    gradients: FloatArray,
-    u: FloatArray,
-    stiffness: FloatArray,
-    free: FloatArray,
-    edges: IntArray,
-    at: FloatArray,
-    result: FloatArray,
-) -> None:
-    """Stress, Voigt, of each cell at barycentric coordinates."""
-    slope, strain = np.empty((3, 3)), np.empty(6)
-    for cell in range(len(cells)):
-        g = gradients[cell]
-        c = stiffness[cell if len(stiffness) > 1 else 0]
-        ease = free[cell if len(free) > 1 else 0]
-        for q in range(len(at)):
-            for p in range(3):
-                slope[p, 0], slope[p, 1], slope[p, 2] = 0.0, 0.0, 0.0
-            for a in range(cells.shape[1]):
-                node = cells[cell, a]
-                # Gradient of the shape function: L, L (2 L - 1), or 4 L_i L_j in the middle of a
-                # side.
-                if cells.shape[1] == 4:
-                    x, y, z = g[a, 0], g[a, 1], g[a, 2]
-                elif a < 4:
-                    w = 4.0 * at[q, a] - 1.0
-                    x, y, z = w * g[a, 0], w * g[a, 1], w * g[a, 2]
-                else:
-                    i, j = edges[a - 4, 0], edges[a - 4, 1]
-                    v, w = 4.0 * at[q, j], 4.0 * at[q, i]
-                    x = v * g[i, 0] + w * g[j, 0]
-                    y = v * g[i, 1] + w * g[j, 1]
-                    z = v * g[i, 2] + w * g[j, 2]
-                for p in range(3):
-                    slope[p, 0] += u[node, p] * x
-                    slope[p, 1] += u[node, p] * y
-                    slope[p, 2] += u[node, p] * z
-            strain[0], strain[1], strain[2] = slope[0, 0], slope[1, 1], slope[2, 2]
-            strain[3] = slope[1, 2] + slope[2, 1]
-            strain[4] = slope[0, 2] + slope[2, 0]
-            strain[5] = slope[0, 1] + slope[1, 0]
-            for a in range(4):
-                for i in range(6):
-                    strain[i] -= at[q, a] * ease[a, i]
-            for i in range(6):
-                total = 0.0
-                for j in range(6):
-                    total += c[i, j] * strain[j]
-                result[cell, q, i] = total
-
-
-def _curved_stress(
-    mesh: TetMesh,
-    displacement: FloatArray,
-    stiffness: FloatArray,
-    free: FloatArray,
-    at: FloatArray,
-    result: FloatArray,
-) -> None:
-    """Put the stress of the cells with curved sides in place of that of their straight ones."""
-    rows = mesh.curved
-    if not len(rows):
-        return
-    nodes, u = mesh.points[mesh.cells[rows]], displacement[mesh.cells[rows]]
-    law = stiffness[rows] if len(stiffness) > 1 else stiffness[0]
-    ease = free[rows] if len(free) > 1 else free
+    mesh: TetMesh, displacement: FloatArray, stiffness: FloatArray, free: FloatArray, at: FloatArray
+) -> FloatArray:
+    """Stress (m, q, 6), Voigt, of each cell at barycentric coordinates (q, 4)."""
+    gradients, nodal = cell_gradients(mesh), np.swapaxes(displacement[mesh.cells], 1, 2)
+    law = stiffness if len(stiffness) > 1 else stiffness[0]
+    stress = np.empty((len(mesh.cells), len(at), 6))
     for q, place in enumerate(at):
-        gradient = np.swapaxes(u, 1, 2) @ gradients_at(nodes, place)
-        result[rows, q] = times(law, voigt_strain(gradient) - place @ ease)
+        slopes = gradients if mesh.order == 1 else slopes_at(mesh, gradients, place)
+        stress[:, q] = times(law, voigt_strain(nodal @ slopes) - place @ free)
+    return stress
 
 
-@njit(cache=True)
-def _linear_energy(values: FloatArray, s: FloatArray) -> float:
-    """Mean of ``v . S v`` over a cell for a field that is linear in it, from its corner values."""
-    total, sums = 0.0, np.zeros(6)
-    for a in range(4):
-        for i in range(6):
-            sums[i] += values[a, i]
-            for j in range(6):
-                total += values[a, i] * s[i, j] * values[a, j]
-    for i in range(6):
-        for j in range(6):
-            total += sums[i] * s[i, j] * sums[j]
-    return total / 20.0
-
-
-@njit(cache=True)
-def _compare_linear(
-    points: FloatArray,
-    corners: IntArray,
-    volumes: FloatArray,
-    edges: IntArray,
-    polynomials: tuple[IntArray, FloatArray, FloatArray, FloatArray],
-    stress: FloatArray,
-    compliance: FloatArray,
-    result: tuple[FloatArray, FloatArray],
-) -> None:
-    """Energies of the difference from the recovered stress, and of the stress of the cells."""
-    (of_corner, _, _, coefficients), (error, energy) = polynomials, result
-    difference = np.empty((4, 6))
-    for cell in range(len(corners)):
-        s = compliance[cell if len(compliance) > 1 else 0]
-        for a in range(4):
-            for i in range(6):
-                recovered = coefficients[of_corner[cell, a], 0, i]
-                difference[a, i] = recovered - stress[cell, 0, i]
-        error[cell] = volumes[cell] * _linear_energy(difference, s)
-        total = 0.0
-        for i in range(6):
-            for j in range(6):
-                total += stress[cell, 0, i] * s[i, j] * stress[cell, 0, j]
-        energy[cell] = volumes[cell] * total
+def _linear_energy(values: FloatArray, compliance: FloatArray) -> FloatArray:
+    """Mean (m,) of ``v . S v`` over cells of fields linear in them, by corners (m, 4, 6)."""
+    total = values.sum(axis=1, keepdims=True)
+    single, double = ((part @ compliance * part).sum(axis=(1, 2)) for part in (values, total))
+    return np.asarray((single + double) / 20.0)
 
 
 @njit(cache=True)
@@ -235,14 +134,14 @@ def _compare_quadratic(
     polynomials: tuple[IntArray, FloatArray, FloatArray, FloatArray],
     stress: FloatArray,
     compliance: FloatArray,
-    result: tuple[FloatArray, FloatArray],
+    error: FloatArray,
 ) -> None:
-    """Do the same for quadratic cells: ten nodes determine the difference, which is quadratic.
+    """Energies of the difference from the recovered stress, which is quadratic: by its ten nodes.
 
     The integrals of the products of the shape functions are those of the quadratic tetrahedron,
     over the volume: 6, 1, -4, -6, 32, 16 and 8 over 420.
     """
-    (of_corner, centre, size, coefficients), (error, energy) = polynomials, result
+    of_corner, centre, size, coefficients = polynomials
     difference, image = np.empty((10, 6)), np.empty((10, 6))
     p = np.empty(10)
     for cell in range(len(corners)):
@@ -287,7 +186,6 @@ def _compare_quadratic(
                 for i in range(6):
                     total += w / 420.0 * difference[a, i] * image[b, i]
         error[cell] = volumes[cell] * total
-        energy[cell] = volumes[cell] * _linear_energy(stress[cell], s)
 
 
 # Stress fitted by polynomials on patches of cells: more accurate than the stress of the cells.
@@ -373,23 +271,13 @@ def stress_patches(
     return Patches(of_corner, mesh.points[nodes], size, coefficients)
 
 
-@njit(cache=True)
 def _cells_round(of_corner: IntArray, groups: int) -> tuple[IntArray, IntArray]:
     """Cells that have each polynomial at a corner: their starts, and the cells."""
-    start = np.zeros(groups + 1, np.int64)
-    for cell in range(len(of_corner)):
-        for a in range(4):
-            start[of_corner[cell, a]] += 1
-    total = 0
-    for group in range(groups + 1):
-        total, start[group] = total + start[group], total + start[group]
-    cells = np.empty(total, np.int64)
-    for cell in range(len(of_corner) - 1, -1, -1):
-        for a in range(4):
-            group = of_corner[cell, a]
-            start[group] -= 1
-            cells[start[group]] = cell
-    return start, cells
+    count = len(of_corner)
+    present = np.ones(4 * count, dtype=bool)
+    rows = sp.csr_array((present, of_corner.ravel(), 4 * np.arange(count + 1)), (count, groups))
+    columns = rows.tocsc()
+    return columns.indptr.astype(np.int64), columns.indices.astype(np.int64)
 
 
 @njit(cache=True)

@@ -41,7 +41,7 @@ def shape_gradients(gradients: FloatArray, at: FloatArray, edges: IntArray) -> F
     return np.concatenate([corner, middle], axis=1)
 
 
-def _gradients(mesh: TetMesh, gradients: FloatArray, at: FloatArray) -> FloatArray:
+def slopes_at(mesh: TetMesh, gradients: FloatArray, at: FloatArray) -> FloatArray:
     """Gradients (m, 10, 3) of the shape functions of all cells, those with curved sides too."""
     result = shape_gradients(gradients, at, mesh.edges)
     result[mesh.curved] = gradients_at(mesh.points[mesh.cells[mesh.curved]], at)
@@ -52,7 +52,7 @@ def cell_strain(mesh: TetMesh, displacement: FloatArray) -> FloatArray:
     """Voigt strain (m, 6) with engineering shear, at the centroid of each cell."""
     gradients = cell_gradients(mesh)
     if mesh.order == 2:
-        gradients = _gradients(mesh, gradients, np.full(4, 0.25))
+        gradients = slopes_at(mesh, gradients, np.full(4, 0.25))
     return voigt_strain(displacement[mesh.cells].transpose(0, 2, 1) @ gradients)
 
 
@@ -62,7 +62,7 @@ def strain_at_nodes(mesh: TetMesh, displacement: FloatArray) -> FloatArray:
         return np.repeat(cell_strain(mesh, displacement)[:, None], 4, axis=1)
     gradients = cell_gradients(mesh)
     u = displacement[mesh.cells].transpose(0, 2, 1)
-    at_nodes = [voigt_strain(u @ _gradients(mesh, gradients, at)) for at in NODES]
+    at_nodes = [voigt_strain(u @ slopes_at(mesh, gradients, at)) for at in NODES]
     return np.stack(at_nodes, axis=1)
 
 

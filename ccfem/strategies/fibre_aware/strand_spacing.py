@@ -184,7 +184,7 @@ def spacing(
     _, near = tree.query(_lifted(lines.start, lines.layer), k=_NEAREST)
     depth = np.full(len(lines.path), inset)
     if not come_in:
-        depth = np.minimum(_depths(lines.start, near, border, normals), inset)
+        depth = np.minimum(_from_border(lines.start, near, border, normals)[0], inset)
     return Spacing(lines, width, depth, border, normals, tree, lines.roughness, radius)
 
 
@@ -237,40 +237,31 @@ def _too_near(
     return column, value, missing
 
 
-@njit(cache=True)
 def _from_border(
-    x: float, y: float, near: IntArray, border: FloatArray, inward: FloatArray
-) -> tuple[float, float, float]:  # pragma: no cover
-    """Signed depth of a point in the section, and the unit vector that leads farther in."""
-    best, gx, gy, nx, ny = np.inf, 0.0, 0.0, 0.0, 0.0
-    for b in near:
-        ex, ey = border[b, 1, 0] - border[b, 0, 0], border[b, 1, 1] - border[b, 0, 1]
-        rx, ry = x - border[b, 0, 0], y - border[b, 0, 1]
-        s = min(max((rx * ex + ry * ey) / (ex * ex + ey * ey), 0.0), 1.0)
-        hx, hy = rx - s * ex, ry - s * ey
-        if hx * hx + hy * hy < best:
-            best, gx, gy = hx * hx + hy * hy, hx, hy
-            side = 0 if s == 0.0 else (2 if s == 1.0 else 1)
-            nx, ny = inward[b, side, 0], inward[b, side, 1]
-    distance = np.sqrt(best)
-    if distance < 1e-9:
-        size = max(np.sqrt(nx * nx + ny * ny), 1e-9)
-        return 0.0, nx / size, ny / size
-    sign = 1.0 if gx * nx + gy * ny >= 0.0 else -1.0
-    return sign * distance, sign * gx / distance, sign * gy / distance
-
-
-@njit(cache=True)
-def _depths(
     points: FloatArray, near: IntArray, border: FloatArray, inward: FloatArray
-) -> FloatArray:  # pragma: no cover
-    depth = np.empty(len(points))
-    for p in range(len(points)):
-        depth[p], _, _ = _from_border(points[p, 0], points[p, 1], near[p], border, inward)
-    return depth
+) -> tuple[FloatArray, FloatArray]:
+    """Signed depth (n,) of points in the section, and unit vectors (n, 2) that lead farther in."""
+    # The nearest of the pieces (n, k) near each point.
+    begin = border[near, 0]
+    (ex, ey), (rx, ry) = (
+        np.moveaxis(vector, 2, 0) for vector in (border[near, 1] - begin, points[:, None] - begin)
+    )
+    s = np.minimum(np.maximum((rx * ex + ry * ey) / (ex * ex + ey * ey), 0.0), 1.0)
+    hx, hy = rx - s * ex, ry - s * ey
+    square = hx * hx + hy * hy
+    row, nearest = np.arange(len(points)), square.argmin(axis=1)
+    s, hx, hy, square = (one[row, nearest] for one in (s, hx, hy, square))
+    side = np.where(s == 0.0, 0, np.where(s == 1.0, 2, 1))
+    nx, ny = inward[near[row, nearest], side].T
+    distance = np.sqrt(square)
+    # Points on the border have no depth, and take the vector of their piece.
+    on = distance < 1e-9
+    sign = np.where(hx * nx + hy * ny >= 0.0, 1.0, -1.0)
+    size = np.where(on, np.maximum(np.sqrt(nx * nx + ny * ny), 1e-9), distance)
+    inside = [np.where(on, n, sign * h) / size for n, h in ((nx, hx), (ny, hy))]
+    return np.where(on, 0.0, sign * distance), np.column_stack(inside)
 
 
-@njit(cache=True)
 def _outside(
     points: FloatArray,
     near: IntArray,
@@ -278,47 +269,32 @@ def _outside(
     inward: FloatArray,
     inset: FloatArray,
     normals: FloatArray,
-) -> tuple[FloatArray, FloatArray]:  # pragma: no cover
+) -> tuple[FloatArray, FloatArray]:
     """How far in a unit slide leads, and how much farther in points should be; 0 if they are in."""
-    off, missing = np.zeros(len(points)), np.zeros(len(points))
-    for p in range(len(points)):
-        depth, x, y = _from_border(points[p, 0], points[p, 1], near[p], border, inward)
-        across = x * normals[p, 0] + y * normals[p, 1]
-        if depth < inset[p] and abs(across) > _FACING:
-            off[p], missing[p] = across, inset[p] - depth
-    return off, missing
+    depth, farther = _from_border(points, near, border, inward)
+    across = farther[:, 0] * normals[:, 0] + farther[:, 1] * normals[:, 1]
+    out = (depth < inset) & (np.abs(across) > _FACING)
+    return np.where(out, across, 0.0), np.where(out, inset - depth, 0.0)
 
 
-@njit(cache=True)
 def _too_bent(
     points: FloatArray, normals: FloatArray, path: IntArray, radius: float
-) -> tuple[IntArray, FloatArray, FloatArray]:  # pragma: no cover
+) -> tuple[IntArray, FloatArray, FloatArray]:
     """Bends that are too tight: their three points, the effect of slides, and what is missing."""
-    count = 0
-    for write in range(2):
-        if write:
-            column, value = np.zeros((count, 3), np.int64), np.zeros((count, 3))
-            missing = np.zeros(count)
-            count = 0
-        for p in range(_CHORD, len(points) - _CHORD):
-            a, c = p - _CHORD, p + _CHORD
-            if path[a] != path[c]:
-                continue
-            ax, ay = points[p, 0] - points[a, 0], points[p, 1] - points[a, 1]
-            cx, cy = points[c, 0] - points[p, 0], points[c, 1] - points[p, 1]
-            into, out = np.sqrt(ax * ax + ay * ay), np.sqrt(cx * cx + cy * cy)
-            if into < 1e-9 or out < 1e-9:
-                continue
-            x, y = cx / out - ax / into, cy / out - ay / into
-            turn, step = np.sqrt(x * x + y * y), 0.5 * (into + out)
-            if turn * radius <= step or turn > _SHARPEST:
-                continue
-            if write:
-                x, y = step * x / turn, step * y / turn
-                column[count, 0], column[count, 1], column[count, 2] = a, p, c
-                value[count, 0] = (x * normals[a, 0] + y * normals[a, 1]) / into
-                value[count, 1] = -(x * normals[p, 0] + y * normals[p, 1]) * (1 / into + 1 / out)
-                value[count, 2] = (x * normals[c, 0] + y * normals[c, 1]) / out
-                missing[count] = step * (step / radius - turn)
-            count += 1
-    return column, value, missing
+    begin = np.flatnonzero(path[: -2 * _CHORD] == path[2 * _CHORD :])
+    column = begin[:, None] + _CHORD * np.arange(3)
+    (ax, cx), (ay, cy) = (np.diff(values[column], axis=1).T for values in points.T)
+    into, out = np.sqrt(ax * ax + ay * ay), np.sqrt(cx * cx + cy * cy)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x, y = cx / out - ax / into, cy / out - ay / into
+    turn, step = np.sqrt(x * x + y * y), 0.5 * (into + out)
+    long = (into >= 1e-9) & (out >= 1e-9)
+    bent = np.flatnonzero(long & (turn * radius > step) & (turn <= _SHARPEST))
+    column, x, y, into, out, turn, step = (
+        one[bent] for one in (column, x, y, into, out, turn, step)
+    )
+    x, y = step * x / turn, step * y / turn
+    along = x[:, None] * normals[column, 0] + y[:, None] * normals[column, 1]
+    a, b, c = along.T
+    value = np.column_stack([a / into, -b * (1.0 / into + 1.0 / out), c / out])
+    return column, value, step * (step / radius - turn)
