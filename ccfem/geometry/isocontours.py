@@ -80,7 +80,9 @@ def isocontours(
     low = np.ceil(np.minimum(scaled[ends[:, 0]], scaled[ends[:, 1]])).astype(np.int64)
     high = np.floor(np.maximum(scaled[ends[:, 0]], scaled[ends[:, 1]])).astype(np.int64)
     start = np.concatenate([[0], np.cumsum(np.maximum(high - low + 1, 0))])
-    edge, level, weights = _crossings(scaled, ends, low, start)
+    edge, nth = repeated(np.diff(start))
+    level, (before, after) = low[edge] + nth, scaled[ends[edge]].T
+    weights = (level - before) / (after - before)
     line, offsets = chained(_links(of_triangle, low, high, start))
     order = np.argsort(level[line[offsets[:-1]]], kind="stable")
     sizes = np.diff(offsets)[order]
@@ -96,22 +98,6 @@ def triangle_edges(triangles: IntArray) -> tuple[IntArray, IntArray]:
     """Return unique edges (e, 2) and the edges (t, 3) opposite to the corners of each triangle."""
     edges, edge = unique_edges(triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2))
     return edges, edge.reshape(-1, 3)
-
-
-@njit(cache=True, nogil=True)
-def _crossings(
-    scaled: FloatArray, edges: IntArray, low: IntArray, start: IntArray
-) -> tuple[IntArray, IntArray, FloatArray]:
-    edge = np.empty(start[-1], np.int64)
-    level = np.empty(start[-1], np.int64)
-    weights = np.empty(start[-1])
-    for e in range(len(edges)):
-        a, b = edges[e, 0], edges[e, 1]
-        for k in range(start[e], start[e + 1]):
-            edge[k] = e
-            level[k] = low[e] + k - start[e]
-            weights[k] = (level[k] - scaled[a]) / (scaled[b] - scaled[a])
-    return edge, level, weights
 
 
 @njit(cache=True, nogil=True)

@@ -7,6 +7,7 @@ The few with a side on a round wall get the difference from their straight ones,
 """
 
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -58,43 +59,20 @@ class Pattern:
 def pattern(mesh: CellMesh) -> Pattern:
     """Find the pattern of the stiffness matrix of a mesh."""
     n = len(mesh.points)
-    order = _grouped(_lowest_nodes(mesh.cells), np.zeros(n + 1, dtype=np.int32))
+    order, _ = grouped(reduce(np.minimum, mesh.cells.T), n)
     cells = mesh.cells[order].astype(np.int32)
-    start: Any = np.zeros(n + 1, dtype=np.int32)
-    touching = _grouped(cells, start)
+    touching, start = grouped(cells, n)
     indptr: Any = np.zeros(n + 1, dtype=np.int32)
     indices = _node_neighbours(cells, start, touching, indptr)
     return Pattern(indptr, indices, order, start, touching)
 
 
-@njit(cache=True)
-def _lowest_nodes(cells: IntArray) -> Int32Array:  # pragma: no cover
-    """Lowest node (m, 1) of each cell."""
-    result = np.empty((len(cells), 1), np.int32)
-    for i in range(len(cells)):
-        least = cells[i, 0]
-        for a in range(1, cells.shape[1]):
-            least = min(least, cells[i, a])
-        result[i, 0] = least
-    return result
-
-
-@njit(cache=True)
-def _grouped(values: Int32Array, start: Int32Array) -> Int32Array:  # pragma: no cover
-    """Entries of (m, q) values, by value; `start` becomes the first entry of each value."""
-    for i in range(values.shape[0]):
-        for a in range(values.shape[1]):
-            start[values[i, a] + 1] += 1
-    for k in range(1, start.size):
-        start[k] += start[k - 1]
-    result = np.empty(values.size, np.int32)
-    place = start[:-1].copy()
-    for i in range(values.shape[0]):
-        for a in range(values.shape[1]):
-            v = values[i, a]
-            result[place[v]] = i * values.shape[1] + a
-            place[v] += 1
-    return result
+def grouped(values: IntArray, count: int) -> tuple[Int32Array, Int32Array]:
+    """Entries of (m, q) values below `count`, by value, and the first entry of each value."""
+    size = values.size
+    rows = (np.ones(size, dtype=bool), values.ravel(), np.arange(size + 1, dtype=np.int32))
+    by_value = sp.csr_array(rows, (size, count)).tocsc()
+    return by_value.indices, by_value.indptr
 
 
 @njit(cache=True)

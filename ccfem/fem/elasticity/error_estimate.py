@@ -9,12 +9,11 @@ square: 10 % here is 1 % of the work of the load.
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, seen_only
 from ccfem.body.mesh import TetMesh
-from ccfem.fem.elasticity.assembly import cell_gradients
+from ccfem.fem.elasticity.assembly import cell_gradients, grouped
 from ccfem.fem.elasticity.recovery import slopes_at, times, voigt_strain
 
 
@@ -259,25 +258,16 @@ def stress_patches(
         pairs, of_corner = np.unique(mesh.corners * kinds + kind[:, None], return_inverse=True)
         nodes = pairs // kinds
     of_corner = seen_only(of_corner.reshape(-1, 4))
-    start, cells = _cells_round(of_corner, len(nodes))
+    entries, start = grouped(of_corner, len(nodes))
     at = SAMPLES[mesh.order]
     terms = 4 if mesh.order == 1 else 10
     size = np.zeros(len(nodes))
     coefficients = np.zeros((len(nodes), terms, 6))
-    groups = (of_corner, nodes, start, cells)
+    groups = (of_corner, nodes, start.astype(np.int64), entries.astype(np.int64) // 4)
     settings = (_LEAST[mesh.order], _RIDGE)
     result = (size, coefficients)
     _fit(mesh.points, seen_only(mesh.corners), groups, at, stress, *settings, result)
     return Patches(of_corner, mesh.points[nodes], size, coefficients)
-
-
-def _cells_round(of_corner: IntArray, groups: int) -> tuple[IntArray, IntArray]:
-    """Cells that have each polynomial at a corner: their starts, and the cells."""
-    count = len(of_corner)
-    present = np.ones(4 * count, dtype=bool)
-    rows = sp.csr_array((present, of_corner.ravel(), 4 * np.arange(count + 1)), (count, groups))
-    columns = rows.tocsc()
-    return columns.indptr.astype(np.int64), columns.indices.astype(np.int64)
 
 
 @njit(cache=True)

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
-from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.body.mesh import TetMesh
@@ -65,66 +64,41 @@ def cut_at_zero(mesh: TetMesh, signed: FloatArray, among: IntArray | None = None
     return Cut(points, np.stack([a, b], axis=1), weights, triangles, cell)
 
 
-@njit(cache=True)
+_SIDES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
+"""Corners of a cell at the ends of its sides."""
+
+
 def _cut_cells(
     cells: IntArray, signed: FloatArray, points: FloatArray
 ) -> tuple[IntArray, IntArray]:
     """Triangles (t, 3) of mesh-edge keys, and the row of `cells` that each comes from."""
-    n = len(points)
-    where = np.empty((4, 3))
-    lines = np.empty((2 * len(cells), 3), np.int64)
-    source = np.empty(2 * len(cells), np.int64)
-    count = 0
-    key = np.empty(4, np.int64)
-    for row in range(len(cells)):
-        corners = 0
-        below = 0
-        above = 0
-        for i in range(4):
-            p = cells[row, i]
-            if signed[p] == 0.0:
-                key[corners] = p * n + p
-                corners += 1
-            elif signed[p] < 0.0:
-                below += 1
-            else:
-                above += 1
-        # A face in the plane belongs only to the cell above it.
-        if corners == 3 and above == 0:
-            continue
-        if corners == 4 or corners + below * above < 3:
-            continue
-        on = corners
-        for i in range(4):
-            for j in range(i + 1, 4):
-                p, q = cells[row, i], cells[row, j]
-                if signed[p] * signed[q] < 0.0:
-                    key[corners] = min(p, q) * n + max(p, q)
-                    w = signed[p] / (signed[p] - signed[q])
-                    for d in range(3):
-                        where[corners, d] = (1.0 - w) * points[p, d] + w * points[q, d]
-                    corners += 1
-        if corners == 3:
-            for i in range(3):
-                lines[count, i] = key[i]
-            source[count] = row
-            count += 1
-        elif on == 0:
-            # Four crossings in the order (i, j) of a 2-2 split: 0-1-3-2 is the cyclic order. The
-            # quad is split along its shorter diagonal [Chen et al. 2021, section 5].
-            one, other = 0.0, 0.0
-            for d in range(3):
-                one += (where[0, d] - where[3, d]) ** 2
-                other += (where[1, d] - where[2, d]) ** 2
-            if one <= other:
-                a, b, c, d = key[0], key[1], key[3], key[2]
-            else:
-                a, b, c, d = key[1], key[3], key[2], key[0]
-            lines[count, 0], lines[count, 1], lines[count, 2] = a, b, c
-            lines[count + 1, 0], lines[count + 1, 1], lines[count + 1, 2] = a, c, d
-            source[count] = source[count + 1] = row
-            count += 2
-    return lines[:count], source[:count]
+    value = signed[cells]
+    on, above = (value == 0.0).sum(axis=1), (value > 0.0).sum(axis=1)
+    # A face in the plane belongs only to the cell above it.
+    cut = (on + (4 - on - above) * above >= 3) & (on < 4) & ((on < 3) | (above > 0))
+    row = np.flatnonzero(cut)
+    cells, value = cells[row], value[row]
+    # Corners of the section: three, or four where two nodes are above and two below.
+    p, q = np.moveaxis(cells[:, _SIDES], 2, 0)
+    low, high = np.moveaxis(value[:, _SIDES], 2, 0)
+    number = len(points)
+    keys = np.hstack([cells * number + cells, np.minimum(p, q) * number + np.maximum(p, q)])
+    met = np.hstack([value == 0.0, low * high < 0.0])
+    keys = np.take_along_axis(keys, np.argsort(~met, axis=1, kind="stable")[:, :4], axis=1)
+    four = np.flatnonzero(met.sum(axis=1) == 4)
+    # Crossings in the order of the sides of a 2-2 split: 0-1-3-2 is the cyclic order. The quad is
+    # split along its shorter diagonal [Chen et al. 2021, section 5].
+    p, q, low, high = (one[four][low[four] * high[four] < 0.0] for one in (p, q, low, high))
+    share = (low / (low - high))[:, None]
+    places = ((1.0 - share) * points[p] + share * points[q]).reshape(-1, 4, 3)
+    one, other = (((places[:, a] - places[:, b]) ** 2).sum(axis=1) for a, b in ((0, 3), (1, 2)))
+    around = np.where((one <= other)[:, None], [0, 1, 3, 2], [1, 3, 2, 0])
+    around = np.take_along_axis(keys[four], around, axis=1)
+    triangles = np.stack([keys[:, :3], keys[:, :3]], axis=1)
+    triangles[four] = around[:, [[0, 1, 2], [0, 2, 3]]]
+    twice = np.zeros((len(row), 2), dtype=bool)
+    twice[:, 0] = twice[four, 1] = True
+    return triangles[twice], np.repeat(row, twice.sum(axis=1))
 
 
 def _drop_repeated(triangles: IntArray, cell: IntArray) -> tuple[IntArray, IntArray]:
