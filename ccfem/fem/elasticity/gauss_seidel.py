@@ -21,32 +21,9 @@ _SINGULAR = 1e-12
 """Share of the largest eigenvalue of a block below which one counts as zero."""
 
 
-@njit(cache=True)
-def _halve(
-    indptr: Int32Array,
-    indices: Int32Array,
-    data: FloatArray,
-    start: Int32Array,
-    column: Int32Array,
-    low: FloatArray,
-    diagonal: FloatArray,
-) -> None:
-    """Pick the blocks below the diagonal and on it."""
-    d, place = data.shape[1], 0
-    for i in range(indptr.size - 1):
-        for s in range(indptr[i], indptr[i + 1]):
-            j = indices[s]
-            if j < i:
-                column[place] = j
-                for p in range(d):
-                    for q in range(d):
-                        low[place, p, q] = data[s, p, q]
-                place += 1
-            elif j == i:
-                for p in range(d):
-                    for q in range(d):
-                        diagonal[i, p, q] = data[s, p, q]
-        start[i + 1] = place
+def rows_of(matrix: sp.bsr_array) -> Int32Array:
+    """Row of each block."""
+    return np.repeat(np.arange(len(matrix.indptr) - 1, dtype=np.int32), np.diff(matrix.indptr))
 
 
 @njit(cache=True, fastmath=_CONTRACT)
@@ -142,15 +119,13 @@ class GaussSeidel:
     """
 
     def __init__(self, matrix: sp.bsr_array, single: bool = False, singular: bool = False) -> None:
-        n, d = len(matrix.indptr) - 1, matrix.data.shape[1]
-        count = (len(matrix.indices) - n) // 2
-        start = np.zeros(n + 1, dtype=np.uint32)
-        column = np.empty(count, dtype=np.uint32)
-        low = np.empty((count, d, d), dtype=np.float32 if single else np.float64)
-        diagonal = np.empty((n, d, d))
-        indptr = matrix.indptr.astype(np.int32, copy=False)
-        indices = matrix.indices.astype(np.int32, copy=False)
-        _halve(indptr, indices, matrix.data, start, column, low, diagonal)
+        # The blocks below the diagonal, and those on it.
+        row, column, count = rows_of(matrix), matrix.indices, len(matrix.indptr) - 1
+        below, diagonal = column < row, matrix.data[column == row]
+        in_rows = np.bincount(row[below], minlength=count)
+        start = np.concatenate([[0], np.cumsum(in_rows)]).astype(np.uint32)
+        column = column[below].astype(np.uint32)
+        low = matrix.data[below].astype(np.float32 if single else np.float64, copy=False)
         nothing = np.einsum("npp->np", diagonal) == 0.0
         np.einsum("npp->np", diagonal)[nothing] = 1.0
         self.inverse: FloatArray = (
@@ -159,7 +134,7 @@ class GaussSeidel:
             else np.linalg.inv(diagonal)
         )
         self._arguments: tuple[Any, ...] = (start, column, low, self.inverse)
-        self._sweep = _three if d == 3 else _six
+        self._sweep = _three if low.shape[1] == 3 else _six
 
     def forward(self, rhs: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Sweep forward from zero: the approximation (d n,) and the residual (d n,) it leaves."""

@@ -9,7 +9,7 @@ from numba import njit
 from ccfem.base.arrays import Float32Array, FloatArray, Int32Array, IntArray
 from ccfem.fem.elasticity.conjugate_gradient import highest_eigenvalue
 from ccfem.fem.elasticity.direct import Apply
-from ccfem.fem.elasticity.gauss_seidel import GaussSeidel
+from ccfem.fem.elasticity.gauss_seidel import GaussSeidel, rows_of
 
 # Aggregates of nodes, and the rigid motions of each: the coarse space of smoothed aggregation.
 #
@@ -51,7 +51,7 @@ def aggregates(matrix: sp.bsr_array, near_kernel: FloatArray, strength: float) -
         Size of a block, over the geometric mean of the sizes of its diagonal blocks, above which it
         is a strong connection.
     """
-    start, column = _strong(matrix.indptr, matrix.indices, matrix.data, strength)
+    start, column = _strong(matrix, strength)
     of_node, count = _grouped(start, column)
     motions = np.zeros(near_kernel.shape)
     coarse = np.zeros((count, 6, 6))
@@ -59,37 +59,18 @@ def aggregates(matrix: sp.bsr_array, near_kernel: FloatArray, strength: float) -
     return Aggregates(of_node, motions, coarse)
 
 
-@njit(cache=True)
-def _strong(
-    indptr: Int32Array, indices: Int32Array, data: FloatArray, strength: float
-) -> tuple[Int32Array, Int32Array]:
+def _strong(matrix: sp.bsr_array, strength: float) -> tuple[Int32Array, Int32Array]:
     """Strong connections of each node with others."""
-    n, d = indptr.size - 1, data.shape[1]
+    indices, data = matrix.indices, matrix.data
+    row = rows_of(matrix)
     # Squared size of the blocks. Strong: above the strength times the mean of both diagonals.
-    size, diagonal = np.empty(indices.size), np.zeros(n)
-    for i in range(n):
-        for s in range(indptr[i], indptr[i + 1]):
-            total = 0.0
-            for p in range(d):
-                for q in range(d):
-                    total += data[s, p, q] * data[s, p, q]
-            size[s] = total
-            if indices[s] == i:
-                diagonal[i] = total
-    start, column = np.zeros(n + 1, np.int32), np.empty(indices.size, np.int32)
-    place = 0
-    for i in range(n):
-        for s in range(indptr[i], indptr[i + 1]):
-            j = indices[s]
-            if (
-                j != i
-                and size[s] * size[s] >= strength**4 * diagonal[i] * diagonal[j]
-                and size[s] > 0.0
-            ):
-                column[place] = j
-                place += 1
-        start[i + 1] = place
-    return start, column[:place].copy()
+    size = np.einsum("spq,spq->s", data, data)
+    diagonal = np.zeros(len(matrix.indptr) - 1)
+    diagonal[row[indices == row]] = size[indices == row]
+    least = strength**4 * diagonal[row] * diagonal[indices]
+    strong = (indices != row) & (size * size >= least) & (size > 0.0)
+    start = np.concatenate([[0], np.cumsum(np.bincount(row[strong], minlength=len(diagonal)))])
+    return start.astype(np.int32), indices[strong]
 
 
 @njit(cache=True)
@@ -251,7 +232,7 @@ def galerkin(matrix: sp.bsr_array, prolong: Prolongation) -> sp.bsr_array:
     matrix : bsr_array (d n, d n) with d x d blocks
     """
     rows, count = _Rows(matrix.indptr, matrix.indices, matrix.data), prolong.groups
-    indptr, indices = _met(rows.indptr, rows.indices, prolong.indptr, prolong.indices, count)
+    indptr, indices = _met(matrix, prolong)
     coarse = _Rows(indptr, indices, np.zeros((len(indices), 6, 6)))
     _project(rows, prolong, coarse)
     _reflect(*coarse)
@@ -388,54 +369,19 @@ def _add(a: FloatArray, b: FloatArray, total: FloatArray) -> None:
         total[p, 3], total[p, 4], total[p, 5] = x, y, z
 
 
-@njit(cache=True)
-def _met(
-    indptr: Int32Array, indices: Int32Array, start: Int32Array, column: Int32Array, count: int
-) -> tuple[Int32Array, Int32Array]:
+def _met(matrix: sp.bsr_array, prolong: Prolongation) -> tuple[Int32Array, Int32Array]:
     """Pattern of ``P^T A P``, ascending in its rows."""
-    n = indptr.size - 1
-    first = np.zeros(count + 1, np.int32)
-    for k in column:
-        first[k + 1] += 1
-    for k in range(1, count + 1):
-        first[k] += first[k - 1]
-    # Nodes of each group: the transpose of the pattern of P.
-    nodes, place = np.empty(column.size, np.int32), first[:-1].copy()
-    for i in range(n):
-        for s in range(start[i], start[i + 1]):
-            nodes[place[column[s]]] = i
-            place[column[s]] += 1
-    seen, mark = np.full(count, -1, np.int32), np.full(n, -1, np.int32)
-    result, own = np.empty(32 * count, np.int32), np.zeros(count + 1, np.int32)
-    last = 0
-    for k in range(count):
-        if last + count > result.size:
-            more = np.empty(2 * result.size + count, np.int32)
-            for t in range(last):
-                more[t] = result[t]
-            result = more
-        # A group meets the groups of all neighbours of its nodes.
-        for e in range(first[k], first[k + 1]):
-            i = nodes[e]
-            for s in range(indptr[i], indptr[i + 1]):
-                j = indices[s]
-                if mark[j] == k:
-                    continue
-                mark[j] = k
-                for t in range(start[j], start[j + 1]):
-                    if seen[column[t]] != k:
-                        seen[column[t]] = k
-                        result[last] = column[t]
-                        last += 1
-        # Few a row, found nearly in order: sorted by insertion.
-        for t in range(own[k] + 1, last):
-            value, e = result[t], t
-            while e > own[k] and result[e - 1] > value:
-                result[e] = result[e - 1]
-                e -= 1
-            result[e] = value
-        own[k + 1] = last
-    return own, result[:last].copy()
+    count = len(matrix.indptr) - 1
+    nodes, groups = (
+        sp.csr_array((np.ones(len(indices), dtype=bool), indices, indptr), (count, columns))
+        for indptr, indices, columns in (
+            (matrix.indptr, matrix.indices, count),
+            (prolong.indptr, prolong.indices, prolong.groups),
+        )
+    )
+    met = groups.T.tocsr() @ (nodes @ groups)
+    met.sort_indices()
+    return met.indptr, met.indices
 
 
 @njit(cache=True, fastmath=_CONTRACT)
