@@ -8,7 +8,6 @@ The few with a side on a round wall get the difference from their straight ones,
 
 from dataclasses import dataclass
 from functools import reduce
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -45,11 +44,11 @@ class Pattern:
         is the number of nodes of a cell.
     """
 
-    indptr: IntArray
-    indices: IntArray
-    order: IntArray
-    start: IntArray
-    touching: IntArray
+    indptr: Int32Array
+    indices: Int32Array
+    order: Int32Array
+    start: Int32Array
+    touching: Int32Array
 
     def __post_init__(self) -> None:
         freeze(self, indptr=np.int32, indices=np.int32)
@@ -62,51 +61,21 @@ def pattern(mesh: CellMesh) -> Pattern:
     order, _ = grouped(reduce(np.minimum, mesh.cells.T), n)
     cells = mesh.cells[order].astype(np.int32)
     touching, start = grouped(cells, n)
-    indptr: Any = np.zeros(n + 1, dtype=np.int32)
-    indices = _node_neighbours(cells, start, touching, indptr)
-    return Pattern(indptr, indices, order, start, touching)
+    # Nodes that share a cell with each node: those of the cells round it.
+    (m, q), present = cells.shape, np.ones(cells.size, dtype=bool)
+    cells_round = sp.csr_array((present, touching // q, start), (n, m))
+    of_cells = sp.csr_array((present, cells.ravel(), q * np.arange(m + 1)), (m, n))
+    met = cells_round @ of_cells
+    met.sort_indices()
+    return Pattern(met.indptr, met.indices, order, start, touching)
 
 
-def grouped(values: IntArray, count: int) -> tuple[Int32Array, Int32Array]:
+def grouped(values: IntArray | Int32Array, count: int) -> tuple[Int32Array, Int32Array]:
     """Entries of (m, q) values below `count`, by value, and the first entry of each value."""
     size = values.size
     rows = (np.ones(size, dtype=bool), values.ravel(), np.arange(size + 1, dtype=np.int32))
     by_value = sp.csr_array(rows, (size, count)).tocsc()
     return by_value.indices, by_value.indptr
-
-
-@njit(cache=True)
-def _node_neighbours(
-    cells: Int32Array, start: Int32Array, touching: Int32Array, indptr: Int32Array
-) -> Int32Array:  # pragma: no cover
-    """Nodes that share a cell with each node, ascending; `indptr` becomes where each begins."""
-    q = cells.shape[1]
-    seen = np.full(start.size - 1, -1, np.int32)
-    result = np.empty(16 * start.size, np.int32)
-    for i in range(start.size - 1):
-        first = indptr[i]
-        last = first
-        if first + q * (start[i + 1] - start[i]) > result.size:
-            more = np.empty(2 * result.size + q * (start[i + 1] - start[i]), np.int32)
-            for k in range(first):
-                more[k] = result[k]
-            result = more
-        for e in range(start[i], start[i + 1]):
-            cell = touching[e] // q
-            for b in range(q):
-                j = cells[cell, b]
-                if seen[j] == i:
-                    continue
-                seen[j] = i
-                # Sorted by insertion: few neighbours, which come nearly in order.
-                k = last
-                while k > first and result[k - 1] > j:
-                    result[k] = result[k - 1]
-                    k -= 1
-                result[k] = j
-                last += 1
-        indptr[i + 1] = last
-    return result[: indptr[-1]].copy()
 
 
 def cell_gradients(mesh: TetMesh) -> FloatArray:

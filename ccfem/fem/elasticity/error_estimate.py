@@ -85,7 +85,7 @@ def estimate_error(
     samples = SAMPLES[mesh.order]
     stress = _stress_at(mesh, displacement, stiffness, ease, samples)
     patches = stress_patches(mesh, stress, np.trace(stiffness, axis1=1, axis2=2), region)
-    compliance = np.linalg.inv(stiffness)
+    compliance = np.asarray(np.linalg.inv(stiffness), dtype=np.float64)
     if mesh.order == 1:
         difference = patches.coefficients[patches.of_corner, 0] - stress
         error = mesh.volumes * _linear_energy(difference, compliance)

@@ -290,9 +290,8 @@ def _too_bent(
     turn, step = np.sqrt(x * x + y * y), 0.5 * (into + out)
     long = (into >= 1e-9) & (out >= 1e-9)
     bent = np.flatnonzero(long & (turn * radius > step) & (turn <= _SHARPEST))
-    column, x, y, into, out, turn, step = (
-        one[bent] for one in (column, x, y, into, out, turn, step)
-    )
+    column = column[bent]
+    x, y, into, out, turn, step = (one[bent] for one in (x, y, into, out, turn, step))
     x, y = step * x / turn, step * y / turn
     along = x[:, None] * normals[column, 0] + y[:, None] * normals[column, 1]
     a, b, c = along.T
