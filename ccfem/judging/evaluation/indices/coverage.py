@@ -249,8 +249,8 @@ def coverage_indices(samples: CoverageSamples, sampled: float = 1.0) -> dict[str
 
 def sample(paths: LayerPaths) -> CoverageSamples:
     """Take the samples of one layer."""
-    width, mesh = paths.machine.fibre_width, paths.stress.mesh
-    longest = np.sort(np.ptp(mesh.points[mesh.corners].reshape(-1, 3), axis=0))[1:]
+    width = paths.machine.fibre_width
+    longest = np.sort(np.ptp(paths.stress.mesh.bounds, axis=0))[1:]
     share = min(1.0, _MOST * (0.2 * width) ** 2 / float(longest.prod()))
     return sample_coverage(paths.plane, paths.layer_stress, width, share)
 

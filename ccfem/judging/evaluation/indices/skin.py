@@ -68,8 +68,9 @@ def sample_skin(fibre: Toolpaths, layer: Layer, mesh: TetMesh, machine: Machine)
         return SkinSamples(np.zeros(0), np.zeros(0, dtype=bool))
     normal, beside = _over(layer, middle)
     reach = (0.5 - _TOLERANCE) * machine.strand_height * normal
-    inside = _in_part(mesh, np.concatenate([middle - reach, middle + reach]))
-    out = ~inside.reshape(2, -1).all(axis=0)
+    beyond = np.concatenate([middle - reach, middle + reach])
+    cell, _ = locate(mesh.points, mesh.corners, beyond)
+    out = (cell < 0).reshape(2, -1).any(axis=0)
     return SkinSamples(length, out & ~beside)
 
 
@@ -86,15 +87,6 @@ def _over(layer: Layer, points: FloatArray) -> tuple[FloatArray, BoolArray]:
     along = points - nearest.points
     along = along - np.einsum("sd,sd->s", along, normal)[:, None] * normal
     return normal, np.linalg.norm(along, axis=1) > 0.5 * nearest.distance + 1e-6
-
-
-def _in_part(mesh: TetMesh, points: FloatArray) -> BoolArray:
-    """Whether points (s, 3) lie in the part."""
-    ends = mesh.points[mesh.corners]
-    low, high = points.min(axis=0), points.max(axis=0)
-    near = ((ends.min(axis=1) <= high) & (ends.max(axis=1) >= low)).all(axis=1)
-    cell, _ = locate(mesh.points, mesh.corners[near], points)
-    return np.asarray(cell >= 0)
 
 
 def skin_indices(samples: SkinSamples) -> dict[str, float]:
