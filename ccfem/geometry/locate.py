@@ -135,7 +135,7 @@ def locate(
     if not len(near):
         return triangle, weights
     corners, low, high = corners[near], low[near], high[near]
-    origins, gradients, heights = _barycentric_maps(corners)
+    origins, gradients, heights = barycentric_maps(corners)
     # First without reach, which needs the fewest candidates; then only what was not found.
     for margin in (0.0, reach) if reach > 0.0 else (0.0,):
         left = np.flatnonzero(triangle < 0)
@@ -151,7 +151,7 @@ def locate(
     return triangle, weights
 
 
-def _barycentric_maps(corners: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def barycentric_maps(corners: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """First corner, gradients of the barycentric coordinates and heights of each simplex.
 
     Flat simplices get zero gradients and heights, so that no point is ever inside them.

@@ -9,6 +9,7 @@ import shapely
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.tensor import in_plane
 from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.geometry.surfaces_in_cells import areas_in_cells
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer, curved_layers
@@ -19,9 +20,6 @@ _ALIKE = 0.8
 """Share of the stress common to all heights above which all layers get one field."""
 
 _MOST_GROUPS = 6
-
-_OFF_FACETS = 1e-9
-"""Distance from a layer at which the cells above and below it are cut, in heights of the part."""
 
 _EQUAL = 1e-6
 """Distance, mm, up to which two sections are equal: paths drawn on one are those of the other."""
@@ -47,40 +45,12 @@ def fibre_capacity(part: SmearedPart, layers: Sequence[Layer], machine: Machine)
 
 
 def room_for_fibre(part: SmearedPart, layers: Sequence[Layer], machine: Machine) -> FloatArray:
-    """Density of fibre (m,), mm/mm^3, at one strand a width on every layer that cuts a cell.
-
-    The section of a cell at a height is its volume times the B-spline on the heights of its corners
-    (Curry and Schoenberg 1966). The cells on both sides of facets in a layer share their area; one
-    at a boundary has all of it. Curved layers give what `fibre_capacity` does.
-    """
-    if curved_layers(layers):
-        return fibre_capacity(part, layers, machine)
-    mesh, volume = part.mesh, part.mesh.volumes
-    level = mesh.points @ part.frame[2]
-    corners, border = np.sort(level[mesh.corners], axis=1), level[mesh.boundary]
-    off, (areas, _) = _OFF_FACETS * np.ptp(corners), mesh.facet_areas(mesh.boundary)
-    sections = np.zeros(len(corners))
-    for height in (layer.plane.height for layer in layers):
-        for near in (height - off, height + off):
-            cut = np.flatnonzero((corners[:, 0] < near) & (near < corners[:, 3]))
-            sections[cut] += 0.5 * volume[cut] * _spline(corners[cut], near)
-        flat = np.flatnonzero((np.abs(border - height) <= off).all(axis=1))
-        sections += np.bincount(mesh.boundary_cells[flat], 0.5 * areas[flat], len(sections))
-    return sections / (machine.fibre_width * volume)
-
-
-def _spline(knots: FloatArray, at: float) -> FloatArray:
-    """Quadratic B-splines of integral 1 on four ascending knots each, (k, 4), at one place, (k,).
-
-    Each has the place between its first and its last knot.
-    """
-    a, b, c, d = (knots - at).T
-    # Each of its three pieces is a parabola; two of them divide by nothing where knots meet.
-    with np.errstate(divide="ignore", invalid="ignore"):
-        first, last = a * a / ((b - a) * (c - a)), d * d / ((d - b) * (d - c))
-        inner = (a * c / (a - c) + b * d / (b - d)) / (c - b)
-    piece = np.where(b >= 0.0, first, np.where(c < 0.0, last, inner))
-    return np.asarray(3.0 * piece / (d - a))
+    """Density of fibre (m,), mm/mm^3, at one strand a width on every layer that cuts a cell."""
+    mesh = part.mesh
+    sections = areas_in_cells(
+        mesh.points, mesh.corners, mesh.across, (layer.points[layer.triangles] for layer in layers)
+    )
+    return sections / (machine.fibre_width * mesh.volumes)
 
 
 def _upwards(layers: Sequence[Layer]) -> IntArray:
