@@ -58,8 +58,9 @@ _SHARP = 1e-3
 """That length where nothing is averaged: a vertex turns on the spot."""
 _SURELY = 0.999
 """Share of the angle up to which the turns of vertices in a window may add up without a fold."""
-_STRAIGHT = 1e-6
-"""Turn, radians, up to which a point lies on a straight piece: it then decides nothing."""
+_STRAIGHT = 2e-4
+"""Distance, mm, up to which points lie on a straight piece and decide nothing: more than that by
+which coordinates move that are rounded to 1e-4 mm, as in files."""
 
 
 _NONE = (np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
@@ -250,9 +251,17 @@ def _fold_stretches(
     strict: bool,
 ) -> tuple[IntArray, FloatArray, FloatArray]:
     """Polyline, start and stop, mm, of every fold of polylines that begin at `begin` (K,), mm."""
-    line, position, tangent, step = _tangents(
-        points, offsets, closed, window, (_SHARP if strict else _SPREAD) * window
-    )
+    along = arc_lengths(points, offsets)
+    if not strict:
+        kept = _off_straight_pieces(points, offsets)
+        points, along = points[kept], along[kept]
+        offsets = np.searchsorted(kept, offsets)
+    spread = (_SHARP if strict else _SPREAD) * window
+    line, position, tangent, step = _tangents(points, offsets, closed, window, spread)
+    # Places are those of the polyline as it was given; found on one axis for all lines.
+    base, short = np.cumsum(size + 1.0) - (size + 1.0), arc_lengths(points, offsets)
+    axis = short + np.repeat(base, np.diff(offsets))
+    position = position + np.interp(position + base[line], axis, along - short)
     # From each sample the nearest one ahead to which the tangent turns by more than the angle.
     samples = np.bincount(line, minlength=len(size))
     ahead = np.zeros(len(line), dtype=np.int64)
@@ -315,16 +324,24 @@ def _begun_alike(
     return points, begin
 
 
-def _without_straight_points(points: FloatArray, offsets: IntArray) -> tuple[FloatArray, IntArray]:
-    """Polylines without repeated points and without those at which they do not turn."""
-    points, offsets, _ = merge_repeated(points, offsets)
-    step = np.diff(points, axis=0)
-    step /= np.maximum(np.linalg.norm(step, axis=1), 1e-300)[:, None]
-    keep = np.ones(len(points), dtype=bool)
-    keep[1:-1] = np.linalg.norm(np.diff(step, axis=0), axis=1) > _STRAIGHT
+def _off_straight_pieces(points: FloatArray, offsets: IntArray) -> IntArray:
+    """Points of polylines that are not within straight pieces, in their order."""
+    ends = np.zeros(len(points), dtype=bool)
     some = np.diff(offsets) > 0
-    keep[offsets[:-1][some]] = keep[offsets[1:][some] - 1] = True
-    return points[keep], np.concatenate([[0], np.cumsum(keep)])[offsets]
+    ends[offsets[:-1][some]] = ends[offsets[1:][some] - 1] = True
+    kept, passes = np.arange(len(points)), 0
+    # Every second point goes that lies on the chord of its neighbours, until none does.
+    while passes < 2:
+        middle = np.arange(1 + passes % 2, len(kept) - 1, 2)
+        start, here, stop = (points[kept[middle + k]] for k in (-1, 0, 1))
+        way, chord = here - start, stop - start
+        square = np.maximum(np.einsum("ij,ij->i", chord, chord), 1e-300)
+        share = np.clip(np.einsum("ij,ij->i", way, chord) / square, 0.0, 1.0)
+        straight = np.linalg.norm(way - share[:, None] * chord, axis=1) < _STRAIGHT
+        straight &= ~ends[kept[middle]]
+        kept = np.delete(kept, middle[straight])
+        passes = 0 if straight.any() else passes + 1
+    return kept
 
 
 def _tangents(
@@ -347,7 +364,7 @@ def _tangents(
     step : (K,) array, mm
         Length of the steps of each polyline.
     """
-    points, offsets = _without_straight_points(points, offsets)
+    points, offsets, _ = merge_repeated(points, offsets)
     size, along = lengths(points, offsets), arc_lengths(points, offsets)
     parts = np.maximum(1, np.round(size / _spacing(window))).astype(np.int64)
     parts[size == 0.0] = 0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ccfem.geometry.even_steps import even_steps
-from ccfem.geometry.polylines import pack, resample
+from ccfem.geometry.polylines import pack, resample, subdivide
 from ccfem.paths.folds import WINDOW, Folds, folds
 
 RADIUS = 3.85
@@ -174,6 +174,19 @@ def test_points_on_straight_pieces_change_nothing():
     more = [*bent[:2], (20.1, 0.16), *bent[2:3], (20.4, 1.6), *bent[3:]]
     one, other = of(bent), of(more)
     np.testing.assert_allclose([other.start, other.stop], [one.start, one.stop], atol=1e-9)
+
+
+@pytest.mark.parametrize("step", [0.1, 0.6])
+def test_rounded_points_on_straight_pieces_change_nothing(step):
+    """Rows 1 mm apart, with many points, as files hold them: in coordinates rounded to 1e-4 mm."""
+    ends = [(x, float(y)) for y in range(20) for x in ((0.0, 40.0) if y % 2 else (40.0, 0.0))]
+    slant = np.array([[np.cos(0.4), np.sin(0.4)], [-np.sin(0.4), np.cos(0.4)]])
+    rows = np.array(ends) @ slant
+    rounded = np.round(subdivide(rows, np.array([0, len(rows)]), step)[0], 4)
+    one, other = of(rows), of(rounded)
+    assert one.counts == other.counts == 19
+    assert other.folded[0] == pytest.approx(one.folded[0], abs=1e-3)
+    np.testing.assert_allclose(other.places, one.places, atol=1e-3)
 
 
 @pytest.mark.parametrize("begin", [1, 57, 58, 131])
