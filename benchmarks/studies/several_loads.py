@@ -1,6 +1,6 @@
 """Fibre for several load cases at once: three parts, each planned alone and together.
 
-    python -m benchmarks.studies.several_loads [PART ...] [--pictures DIR]
+    python -m benchmarks.studies.several_loads [PART ...] [--strategies A,B,..] [--pictures DIR]
 
 Each part is planned by `stream_function` for every load case alone and for all at once, at equal
 length, and tested under every case. The share of the best single plan, worst case, is held against
@@ -10,13 +10,13 @@ First failure is the least multiple of any case's load; plans for strength make 
 
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.studies.table import print_table
+from benchmarks.studies.table import with_strategies
 from ccfem.cases import create_case
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.stress_field import WeightedCases
@@ -40,8 +40,10 @@ PARTS = {
 """Cases with their parameters."""
 
 
-def compared(name: str, parameters: Mapping[str, object], pictures: Path | None) -> list[str]:
-    """Rows of the table for one part."""
+def compared(
+    name: str, parameters: Mapping[str, object], pictures: Path | None, chosen: Sequence[str] = ()
+) -> list[str]:
+    """Rows of the table for one part; of plans for all cases those chosen, by default all."""
     case = create_case(name, **parameters)
     cases = WeightedCases.of(solve(case.problem))
     if len(cases) > 2:
@@ -63,7 +65,8 @@ def compared(name: str, parameters: Mapping[str, object], pictures: Path | None)
     }
     for strength in STRENGTHS:
         together[f"stream_function, strength {strength:g}"] = replace(strategy, strength=strength)
-    for what, one in together.items():
+    for what in chosen or together:
+        one = together[what]
         started = time.process_time()
         planned = plan_cases(one, layers, cases, machine, wanted)
         spent[f"for all, {what}"] = time.process_time() - started
@@ -98,10 +101,10 @@ def main(arguments: list[str]) -> None:
         "| time"
     )
 
-    def rows(name: str, pictures: Path | None) -> list[str]:
-        return compared(*PARTS[name], pictures)
+    def rows(name: str, pictures: Path | None, chosen: Sequence[str]) -> list[str]:
+        return compared(*PARTS[name], pictures, chosen)
 
-    print_table(arguments, f"part | planned | {heads}", PARTS, rows)
+    with_strategies(arguments, f"part | planned | {heads}", PARTS, rows)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ compliance of the part with the fibre that its isocurves lay.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any, ClassVar, Literal, Protocol, TypeVar
 
 import numpy as np
@@ -34,7 +35,7 @@ from ccfem.strategies.fibre_aware.heights import (
     middle_layers,
     nearest_layer,
 )
-from ccfem.strategies.fibre_aware.judges import Goal
+from ccfem.strategies.fibre_aware.judges import POWERS, Goal
 from ccfem.strategies.fibre_aware.layer_axes import frames_in_cells
 from ccfem.strategies.fibre_aware.plain_plans import plain_plans
 from ccfem.strategies.fibre_aware.shortening import TIGHT_SHARES
@@ -47,18 +48,22 @@ from ccfem.strategies.fibre_aware.stream_design import (
     StreamDesign,
     StreamModel,
     StreamProblem,
+    design,
     designed_in_steps,
 )
 from ccfem.strategies.fibre_aware.stream_paths import Extraction, refined
 from ccfem.strategies.fibre_aware.stream_start import plane_axes, start_fields
 from ccfem.strategies.fibre_aware.strength_design import design_for_strength
-from ccfem.strategies.fibre_aware.upper_bound import measures
+from ccfem.strategies.fibre_aware.upper_bound import WORST, measures
 
 _ROUNDS = 3
 """Virtual tests that decide what to cut."""
 
 _CASES_OVERFILL = 1.15
 """Least overfill for several load cases: their tests then have more fibre to choose from."""
+
+_GO_ON = 0.5
+"""Evaluations of the design that counts several cases as tests do, over those of the first one."""
 
 _PLAIN_INSET = 0.5
 """Distance of plain plans from the border, in strand widths: none are tested above it."""
@@ -269,7 +274,13 @@ class StreamFunction:
             drawn = self.extraction(problem.model, tuple(design.fields), strained, machine, layers)
             return drawn.candidates(layers, fields_of, in_all)
 
-        tried = candidates(designed)
+        designs = [designed]
+        if len(cases) > 1 and self.objective == WORST:
+            # Go on from there with the cases counted as tests count them.
+            counted = replace(problem, power=POWERS[WORST])
+            more = int(np.ceil(_GO_ON * self.evaluations))
+            designs.append(design(counted, designed.fields.ravel(), more))
+        tried = [list(chain(*some)) for some in zip(*map(candidates, designs), strict=True)]
         if self.strength:
             fields, solutions = designed.fields.ravel(), designed.objective.solution
             how = (self.strength, self.evaluations)
@@ -344,8 +355,8 @@ class StreamFunction:
         def start(posed: StreamProblem) -> FloatArray:
             return start_fields(posed, cases.fields, chosen, self.cap, self.tilt)
 
-        design = designed_in_steps(problem, start, self.evaluations, self.coverage)
-        return problem, group, design
+        found = designed_in_steps(problem, start, self.evaluations, self.coverage)
+        return problem, group, found
 
     def _model(
         self, parts: Sequence[SmearedPart], layers: Sequence[Layer], machine: Machine

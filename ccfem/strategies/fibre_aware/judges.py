@@ -21,7 +21,8 @@ from ccfem.strategies.fibre_aware.strain_worth import StrainWorth
 from ccfem.strategies.fibre_aware.strength_value import Worth, layer_normal
 from ccfem.strategies.fibre_aware.upper_bound import LEAST, OBJECTIVES, SUM, WORST
 
-_POWERS = {WORST: 20.0, SUM: 1.0, LEAST: 20.0}
+POWERS = {WORST: 20.0, SUM: 1.0, LEAST: 20.0}
+"""Power of ``bound / ratio`` in the sum over the cases, for each objective."""
 
 _TOLERANCE = 1e-4
 """Relative residual of the tests; the error of the stiffness is of its square."""
@@ -76,7 +77,7 @@ class Goal:
     def counts(self, ratios: FloatArray) -> FloatArray:
         """How much each case counts at stiffness ratios (n,): (n,), the sum is 1."""
         terms = self.bounds / np.asarray(ratios)
-        counts = self.weights * (terms / terms.max()) ** _POWERS[self.objective]
+        counts = self.weights * (terms / terms.max()) ** POWERS[self.objective]
         return np.asarray(counts / counts.sum())
 
     def merit(self, ratios: FloatArray) -> float:
@@ -84,7 +85,7 @@ class Goal:
 
         With the objectives "worst" and "least" it is close to the value of the worst case.
         """
-        power, shares = _POWERS[self.objective], self.weights / self.weights.sum()
+        power, shares = POWERS[self.objective], self.weights / self.weights.sum()
         return float(shares @ (self.bounds / np.asarray(ratios)) ** power) ** (-1.0 / power)
 
 

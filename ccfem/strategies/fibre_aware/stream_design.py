@@ -93,7 +93,8 @@ class FieldBends:
 
 
 DESIGN_POWERS = {WORST: 4.0, SUM: 1.0, LEAST: 4.0}
-"""Power of ``bound / ratio`` in the sum over the cases, for each objective."""
+"""Power of ``bound / ratio`` in the sum over the cases, for each objective: lower than in tests,
+where a design begins, since the worst case alone would lead it."""
 
 DENSEST = 0.975
 """Strands a width that should not be exceeded."""

@@ -14,6 +14,7 @@ from ccfem.paths.toolpaths import Toolpaths
 from ccfem.strategies.fibre_aware.judges import Goal
 from ccfem.strategies.fibre_aware.plan_cases import plan_by_layers, plan_cases
 from ccfem.strategies.fibre_aware.prune import prune
+from ccfem.strategies.fibre_aware.stream_design import design
 from ccfem.strategies.isocurve import Isocurve
 from ccfem.strategies.pruned import Pruned
 from ccfem.strategies.stream_function import StreamFunction
@@ -127,6 +128,26 @@ def test_planned_together_the_worst_case_is_better_than_planned_for_one(planned,
     assert together > (worst["zigzag"] / single).min()
     # What follows the stress is not left out: layers by case serve both.
     assert (worst["isocurve"] / single).min() > min((each / single).min() for each in best)
+
+
+def test_the_design_goes_on_with_the_cases_counted_as_tests_count_them(two_bends, monkeypatch):
+    cases, layers = two_bends
+
+    class DesignedError(Exception):
+        """Ends the plan: what follows takes longer and is tested above."""
+
+    def spy(problem, start, evaluations):
+        raise DesignedError(problem, problem.evaluate(start), design(problem, start, evaluations))
+
+    monkeypatch.setattr("ccfem.strategies.stream_function.design", spy)
+    with pytest.raises(DesignedError) as planned:
+        plan_cases(StreamFunction(evaluations=10, inset=0.6), layers, cases, MACHINE, 500.0)
+    problem, begun, found = planned.value.args
+    begun_shares, shares = (one.ratio / problem.bounds for one in (begun, found.objective))
+    assert shares.min() > begun_shares.min()
+    goal = Goal(specimens(cases), problem.weights, problem.bounds)
+    counts = problem.worth(begun.ratio)[1]
+    np.testing.assert_allclose(counts, goal.counts(begun.ratio), rtol=1e-9)
 
 
 def test_layers_by_case_are_those_planned_for_the_case(two_bends):
