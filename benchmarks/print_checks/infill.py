@@ -1,34 +1,35 @@
 """Walls, skins and infill of printed files: volume by region, bridges, and what lies outside.
 
 Run ``python -m benchmarks.print_checks.infill [PART,...] [MACHINE,...] [--infill gyroid]
-[--turned] [--pictures FOLDER]``. Two walls, three skins, 20 % of infill, fibre in six layers, where
+[--turned] [--out FOLDER]``. Two walls, three skins, 20 % of infill, fibre in six layers, where
 something hangs over on support; turned by 37 degrees and in two copies with ``--turned``. The
 regions are found again here, on pixels of VTK's sections of the part: walls by distance transform,
 skins by what the layers above and below cover. The file is followed by a printer on paper
-(`printer`). The columns: volume of matrix and fibre over the room for it, in what is solid and in
-what is sparse; the longest bridge, mm, that a line makes, of infill and of skins on it; the share
-of the matrix laid on nothing, bridges included; how far a line's edge reaches beyond the border,
-mm; the time in the file over that of the moves in it; time and mass. Below stand what is off: a
-volume by more than 1 %, the time by more than 3 %, and the other checks of a printed file.
+(`printer`). The columns are those of `Row`. Below stands what is off: a volume by more than 1 %,
+the time by more than 3 %, a wall that is cut, and the other checks of a printed file. The folder
+gets the table (``infill.csv``, ``infill.md``) and a picture of each file.
 """
 
 import argparse
+import csv
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
+from hashlib import blake2b
 from pathlib import Path
 
 import numpy as np
 import shapely
-from scipy import ndimage
 
 from benchmarks.print_checks.all_checks import CHECKS
 from benchmarks.print_checks.height_map import sampled
 from benchmarks.print_checks.job import FILAMENT, PART, Job, Lines
+from benchmarks.print_checks.motion import in_air
 from benchmarks.print_checks.parts import Part, job_of
 from benchmarks.print_checks.planned_parts import part_file
 from benchmarks.print_checks.printer import Run
+from benchmarks.print_checks.strand_checks import strands_of
 from benchmarks.studies import own_parts
 from ccfem.cases import read
 from ccfem.fem.elasticity import solve
@@ -45,6 +46,8 @@ _PIXEL = 0.25
 """Side of a pixel, in line widths: walls are whole numbers of pixels."""
 _ANCHOR, _SLIVER = 2.0, 0.2
 """Reach of skins beyond what they cover, and width of what needs none, in line widths."""
+_SAME = 1e-3
+"""Area, mm^2, by which sections that are one may differ."""
 _STRAIGHT_ON = 0.7
 """Cosine of the turn at a corner, where a line is held by the turn before it."""
 
@@ -160,30 +163,49 @@ def regions_of(job: Job, plastic: Plastic) -> list[Regions]:
     count = np.ceil((high - low) / pixel).astype(int)
     x, y = (low[k] + (np.arange(count[k]) + 0.5) * pixel for k in (0, 1))
     masks = []
-    for section in sections:
+    for k, section in enumerate(sections):
+        if k and shapely.area(shapely.symmetric_difference(section, sections[k - 1])) < _SAME:
+            masks.append(masks[-1])
+            continue
         shapely.prepare(section)
         masks.append(shapely.contains_xy(section, *np.meshgrid(x, y, indexing="ij")))
+
+    def beyond_border(mask: np.ndarray, distance: float) -> np.ndarray:
+        return _deep(mask, pixel, distance) > distance
+
+    known: dict[bytes, np.ndarray] = {}
     found, n = [], plastic.skins
     reach = (plastic.fibre_skins - 0.5) * machine.highest_matrix(0.0)
     for k, inside in enumerate(masks):
         window = masks[k - n : k + n + 1] if n <= k < len(masks) - n else []
         bare = inside & ~(np.logical_and.reduce(window) if window else np.zeros_like(inside))
         sliver = 0.5 * _SLIVER * width
-        skin = _deep(bare, pixel) > sliver
-        sparse = _deep(inside, pixel) > plastic.walls * width
-        sparse &= _deep(~skin, pixel) > _ANCHOR * width + sliver
         near = (fibre - machine.strand_height - tops[k] < reach) & (bottoms[k] - fibre < reach)
-        sparse &= not near.any()
-        sparse &= _deep(~(_deep(sparse, pixel) > width), pixel) <= width
+        sparse = np.zeros_like(inside)
+        if not near.any():
+            key = blake2b(np.packbits([inside, bare]).tobytes()).digest()
+            if key not in known:  # layers of one section are one
+                known[key] = beyond_border(inside, plastic.walls * width)
+                skin = beyond_border(bare, sliver)
+                known[key] &= beyond_border(~skin, _ANCHOR * width + sliver)
+                known[key] &= ~beyond_border(~beyond_border(known[key], width), width)
+            sparse = known[key]
         found.append(Regions(tops[k], tops[k] - lower[k], inside, sparse, low, pixel))
     return found
 
 
-def _deep(mask: np.ndarray, pixel: float) -> np.ndarray:
-    """Distance of the pixels of a mask from its border, mm; 0 outside, large without a border."""
-    if mask.all():
-        return np.full(mask.shape, 1e9)
-    return np.asarray((ndimage.distance_transform_edt(mask) - 0.5 * mask) * pixel)
+def _deep(mask: np.ndarray, pixel: float, most: float) -> np.ndarray:
+    """Distance of the pixels of a mask from its border, mm, as far as `most`; 0 outside."""
+    reach, inside, far = int(np.ceil(most / pixel)) + 2, mask.copy(), mask.astype(np.int16)
+    for k in range(1, reach):
+        inside[k:] &= mask[:-k]
+        inside[:-k] &= mask[k:]
+        far += inside
+    nearest = (square := far**2).copy()
+    for k in range(1, reach):
+        np.minimum(nearest[:, k:], square[:, :-k] + np.int16(k**2), out=nearest[:, k:])
+        np.minimum(nearest[:, :-k], square[:, k:] + np.int16(k**2), out=nearest[:, :-k])
+    return np.asarray((np.sqrt(nearest) - 0.5 * mask) * pixel)
 
 
 def volumes(job: Job, regions: list[Regions], density: float) -> tuple[float, float]:
@@ -233,7 +255,7 @@ def bridges(job: Job, regions: list[Regions]) -> tuple[float, float, float]:
                 longest[kind] = max(longest[kind], float(way[run].sum()))
         laid = np.zeros(region.inside.shape, dtype=bool)
         laid[at] = True
-        below = _deep(~laid, region.pixel) <= 0.5 * width
+        below = _deep(~laid, region.pixel, width) <= 0.5 * width
     return longest[0], longest[1], free / max(total, 1e-12)
 
 
@@ -298,6 +320,140 @@ def seconds(run: Run, most: float, deviation: float) -> float:
     return total + float((taken + np.maximum(lines.length[rows] - ramp, 0.0) / peak).sum())
 
 
+@dataclass(frozen=True)
+class Row:
+    """What a printer makes of a file.
+
+    Attributes
+    ----------
+    solid, sparse : float, %
+        Volume of matrix and fibre over the room for it, in what is solid and in what is sparse.
+    bridge, skin : float, mm
+        Longest way of a line over nothing, of infill and of skins on it.
+    free : float, %
+        Share of the matrix that lies on nothing, bridges included.
+    air : float, %
+        Share of the matrix of walls and skins that neither lies on anything nor bridges infill.
+    cut : float, mm
+        Length of borders of layers without a wall along them, and of walls where fibre lies.
+    beyond : float, mm
+        How far the edge of a line reaches beyond the border.
+    clock : float, %
+        Time in the file over that of the moves in it.
+    support : float, cm^3
+        Plastic of columns of support.
+    strands : int
+        Strands of the fibre.
+    minutes, grams, megabytes : float
+        Time, mass of matrix, and size of the file.
+    """
+
+    part: str
+    machine: str
+    solid: float
+    sparse: float
+    bridge: float
+    skin: float
+    free: float
+    air: float
+    cut: float
+    beyond: float
+    clock: float
+    support: float
+    strands: int
+    minutes: float
+    grams: float
+    megabytes: float
+
+    @property
+    def words(self) -> list[str]:
+        """Its values as they are shown."""
+        return [f"{x:.5g}" if isinstance(x, float) else str(x) for x in asdict(self).values()]
+
+
+def row_of(job: Job, part: str, regions: list[Regions], plastic: Plastic) -> Row:
+    """Measure a file."""
+    solid, sparse = volumes(job, regions, plastic.density)
+    infill, skin, free = bridges(job, regions)
+    head, lines = job.done.head, Lines.of(job.done)
+    waits = head["of it waiting for tools to heat, first heating left out"].split()[0]
+    process, whole = job.machine.process, float(head["TIME"])
+    moving = seconds(job.done, process.acceleration, process.junction)
+    props = lines.lays & (lines.kind == "Support material")
+    return Row(
+        part,
+        job.name,
+        100.0 * solid,
+        100.0 * sparse,
+        infill,
+        skin,
+        100.0 * free,
+        100.0 * in_air(job.machine, job.done, lambda z, at: _over_infill(regions, z, at)),
+        cut_walls(job, regions),
+        beyond(job, regions),
+        100.0 * (whole - float(waits)) / moving,
+        1e-3 * FILAMENT * float(lines.fed[props].sum()),
+        len(strands_of(job.done)),
+        whole / 60.0,
+        float(head["filament used [g]"].split(",")[0]),
+        1e-6 * len(job.text.encode()),
+    )
+
+
+def _over_infill(regions: list[Regions], z: float, places: np.ndarray) -> np.ndarray:
+    """Whether places (k, 3) of lines with this top lie over infill, which they bridge."""
+    below = [region for region in regions if region.top < z - 1e-6]
+    return below[-1].sparse[below[-1].pixels(places[:, :2])] if below else places[:, 0] > np.inf
+
+
+def cut_walls(job: Job, regions: list[Regions]) -> float:
+    """Length of borders of layers of matrix without a wall along them, and of walls in fibre, mm.
+
+    Where a section is narrower than a line there is no wall; a wall is in fibre where its top lies
+    between top and bottom of a strand that crosses it.
+    """
+    lines, width = Lines.of(job.done), job.machine.matrix_width
+    height, laid = lines.end[:, 2].round(3), lines.lays & lines.in_part & ~lines.beside_part
+    strokes = shapely.linestrings(np.stack([lines.start, lines.end], axis=1)[:, :, :2])
+    walls, strands = laid & (lines.kind == PART[0]), laid & (lines.tool == 1)
+    missing, lower = 0.0, 0.0
+    for region in regions:
+        section = job.section(0.5 * (lower + region.top))
+        lower = region.top
+        wide = shapely.buffer(shapely.buffer(section, -0.5 * width), 0.5 * width)
+        border = shapely.segmentize(shapely.intersection(section.boundary, wide.buffer(0.01)), 0.5)
+        mine = shapely.STRtree(strokes[walls & (height == region.top)])
+        pieces = _steps(border)
+        near = mine.query(shapely.centroid(pieces), predicate="dwithin", distance=width)[0]
+        missing += float(shapely.length(np.delete(pieces, np.unique(near))).sum())
+    for z in np.unique(height[strands]).tolist():
+        inside = (height > z - job.machine.strand_height + 1e-3) & (height <= z)
+        mine = strokes[walls & inside]
+        fibre = shapely.union_all(strokes[strands & (height == z)])
+        missing += float(shapely.length(mine[shapely.intersects(mine, fibre)]).sum())
+    return missing
+
+
+def _steps(lines: shapely.Geometry) -> np.ndarray:
+    """All straight steps of lines."""
+    points, line = shapely.get_coordinates(shapely.get_parts(lines), return_index=True)
+    steps = np.stack([points[:-1], points[1:]], axis=1)[line[1:] == line[:-1]]
+    return np.asarray(shapely.linestrings(steps))
+
+
+def off(job: Job, row: Row, regions: list[Regions]) -> list[str]:
+    """Find what is wrong with a file, a line a check."""
+    checks = [check for check in CHECKS if check.__name__ not in ("volume", "air")]
+    found = {check.__name__: check(job, job.done) for check in checks}
+    limits = {"solid": (row.solid - 100.0, 1.0), "clock": (row.clock - 100.0, 3.0)}
+    limits |= {"air": (row.air, 0.5), "cut": (row.cut, 0.0)}
+    # With layers of fibre close to each other a part stays solid.
+    if any(one.areas[1] for one in regions):
+        limits["sparse"] = (row.sparse - 100.0, 1.0)
+    found |= {k: [f"off by {x:.3g}"] for k, (x, most) in limits.items() if abs(x) > most}
+    return [f"{row.part}, {row.machine}, {k}: {v[0]} ({len(v)})" for k, v in found.items() if v]
+
+
 def main() -> int:
     """Print the table; the number of findings."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -305,44 +461,36 @@ def main() -> int:
     parser.add_argument("machines", nargs="?", default=",".join(machine_names()))
     parser.add_argument("--turned", action="store_true")
     parser.add_argument("--infill", default="gyroid")
-    parser.add_argument("--pictures", type=Path)
+    parser.add_argument("--out", type=Path)
     given = parser.parse_args()
     plastic = Plastic(given.infill, 0.2, 2, 3)
-    print(
-        "part     machine            solid  sparse  bridge  skin   free  beyond    time  minutes"
-        "  grams"
-    )
+    titles = list(Row.__dataclass_fields__)
+    print(f"| {' | '.join(titles)} |\n{len(titles) * '|---'}|")
     said: list[str] = []
+    rows: list[Row] = []
     for name in given.parts.split(","):
         part = part_of(name, plastic)
         for machine in given.machines.split(","):
             job, _ = job_of(part, machine, TURNED if given.turned else AS_IT_STANDS)
             regions = regions_of(job, plastic)
-            solid, sparse = volumes(job, regions, plastic.density)
-            infill, skin, free = bridges(job, regions)
-            head, over = job.done.head, beyond(job, regions)
-            grams = float(head["filament used [g]"].split(",")[0])
-            waits = head["of it waiting for tools to heat, first heating left out"].split()[0]
-            process, whole = job.machine.process, float(head["TIME"])
-            moving = seconds(job.done, process.acceleration, process.junction)
-            clock = (whole - float(waits)) / moving
-            print(
-                f"{name:8} {machine:17} {solid:6.1%} {sparse:7.1%} {infill:7.1f} {skin:5.1f} "
-                f"{free:6.1%} {over:7.3f} {clock:7.1%} {whole / 60:8.0f} {grams:6.1f}",
-                flush=True,
-            )
-            checks = [check for check in CHECKS if check.__name__ not in ("volume", "air")]
-            found = {check.__name__: check(job, job.done) for check in checks}
-            off = {"solid": (solid, 0.01), "time": (clock, 0.03)}
-            # With layers of fibre close to each other a part stays solid.
-            off |= {"sparse": (sparse, 0.01)} if any(one.areas[1] for one in regions) else {}
-            found |= {k: [f"{x:.1%}"] for k, (x, most) in off.items() if abs(x - 1.0) > most}
-            said += [f"{name}, {machine}, {k}: {v[0]} ({len(v)})" for k, v in found.items() if v]
-            if given.pictures is not None:
-                kind = f"{given.infill}{'_turned' if given.turned else ''}"
-                _draw(job, regions, given.pictures / f"{name}_{machine}_{kind}.png")
-    print("\n".join(said))
+            rows.append(row_of(job, name, regions, plastic))
+            print(f"| {' | '.join(rows[-1].words)} |", flush=True)
+            said += off(job, rows[-1], regions)
+            if given.out is not None:
+                _draw(job, regions, given.out / f"{name}_{machine}.png")
+    print("\n".join(["", *said]))
+    if given.out is not None:
+        _write(rows, titles, said, given.out)
     return len(said)
+
+
+def _write(rows: list[Row], titles: list[str], said: list[str], folder: Path) -> None:
+    """Write the table for programs and for people."""
+    with (folder / "infill.csv").open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file).writerows([titles, *(row.words for row in rows)])
+    table = [titles, len(titles) * ["---"], *(row.words for row in rows)]
+    lines = [f"| {' | '.join(words)} |" for words in table] + ["", *(f"- {one}" for one in said)]
+    (folder / "infill.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def _draw(job: Job, regions: list[Regions], file: Path) -> None:

@@ -1,6 +1,6 @@
 """Checks of how nozzles move: speeds, travel, what lies below fibre, the bed."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import shapely
@@ -16,6 +16,7 @@ __all__ = ["air", "arc", "bed", "beneath", "free_fibre", "in_air", "speeds", "su
 STRAIGHT, CURVED = 8.0, 3.0
 """Longest span over nothing, mm, of a strand that turns by less than 10 degrees, and of others."""
 _TURN = 10.0
+Spanned = Callable[[float, np.ndarray], np.ndarray]
 
 
 def arc(steps: list[Step]) -> np.ndarray:
@@ -219,11 +220,16 @@ def bed(job: Job, run: Run) -> list[str]:
     return [] if inside else [f"nozzles reach {low} to {high}"]
 
 
-def in_air(machine: Machine, run: Run) -> float:
+def in_air(machine: Machine, run: Run, spanned: Spanned | None = None) -> float:
     """Share of the part's matrix, by volume, that is laid with nothing near below it.
 
     A line is held by what is as high as the layer of matrix below its own, within the height of its
     layer to its sides.
+
+    Parameters
+    ----------
+    spanned : callable, optional
+        Of the top of a line and places (k, 3) on it: which of them are bridged, and not in air.
     """
     lines, area = Lines.of(run), HeightMap(machine.gcode.bed)
     matrix = lines.lays & (lines.tool == 0) & np.isin(lines.kind, PART[:2])
@@ -234,6 +240,8 @@ def in_air(machine: Machine, run: Run) -> float:
         if len(mine):
             place, move = sampled(lines.start[mine], lines.end[mine])
             held = area.highest(place, z - level) >= level - 0.05
+            if spanned is not None:
+                held |= spanned(z, place)
             level = z
             share = np.bincount(move, ~held) / np.bincount(move)
             free += float(share @ lines.fed[mine])

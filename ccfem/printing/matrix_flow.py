@@ -121,7 +121,9 @@ def with_flow(
     inside = shapely.length(shapely.intersection(strings(strands), section))
     room = section.area * (height + below) - float(inside @ np.asarray(sections))
     if sparse is not None and sparse.any():
-        ends = _laid_lines(paths.select(sparse))
+        ends, solid = _laid_lines(paths.select(sparse)), shapely.force_2d(section)
+        shapely.prepare(solid)
+        ends = ends[shapely.intersects(ends, solid)]  # the ends of lines: few of their steps
         overlap = float(shapely.length(shapely.intersection(ends, section)).sum())
         room -= machine.matrix_width * (height + below) * overlap
     scale = room / (machine.matrix_width * (share * long)[scaled].sum())
