@@ -25,7 +25,7 @@ from ccfem.printing.print_plan import plan_print
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
 
-PARTS = ("loop:12", "open_hole:4", "plate:3:6")
+PARTS = ("loop:12", "open_hole:4", "plate:8:16")
 LAYERS = 240
 FILES: dict[str, dict[str, object]] = {
     "plain": {},

@@ -13,8 +13,9 @@ from ccfem.printing.moves import LAY, Arcs, Moves
 
 _LONGER = 1e-3
 """Share by which an arc may be longer than the moves that it replaces."""
-_LEAST = 3
-"""Moves that an arc replaces at least: it is written in the space of two."""
+_LEAST, _COMPACT = 3, 2
+"""Moves that an arc replaces at least, as it is written in the space of two; in a compact file,
+where it is written in less."""
 _SPEEDS = 1e-2
 """Share by which the speeds of these moves may differ: the arc has the least of them."""
 _LARGEST = 1000.0
@@ -29,7 +30,7 @@ def with_arcs(moves: Moves, machine: Machine) -> Moves:
     An arc begins and ends where the chain does, and is nowhere farther from it than
     `GcodeProfile.arc_tolerance`. It replaces level moves that lay the same line of matrix or fibre,
     at one speed to a hundredth, and is at most 0.1 % longer than they are. From each move on it is
-    made as long as it can be.
+    made as long as it can be. In a compact file a straight line may be such an arc, of no angle.
     """
     starts = moves.start[:, :2]
     laying = (moves.event == LAY) & (moves.place[:, 2] == moves.start[:, 2])
@@ -43,7 +44,7 @@ def with_arcs(moves: Moves, machine: Machine) -> Moves:
     last = np.flatnonzero(laying & ~ends)
     arcs_of_chains: list[tuple[int, int, float, float, float]] = []
     for begin, end in zip(chain.tolist(), last.tolist(), strict=True):
-        if end - begin + 1 < _LEAST:
+        if end == begin:
             continue
         rows = slice(begin, end + 1)
         points = np.concatenate([starts[begin : begin + 1], moves.place[rows, :2]])
@@ -66,8 +67,8 @@ def _fed_along(moves: Moves, arcs: Arcs) -> Moves:
         arcs.first.tolist(), arcs.last.tolist(), arcs.centre, arcs.sweep.tolist(), strict=True
     ):
         rows = slice(first, last + 1)
-        radius = float(np.linalg.norm(starts[first] - centre))
-        longer = radius * abs(sweep) / float(length[rows].sum())
+        way = np.linalg.norm(starts[first] - (centre if sweep else moves.place[last, :2]))
+        longer = float(way) * (abs(sweep) or 1.0) / float(length[rows].sum())
         feed[rows] *= longer
         beside[rows] *= longer
         speed[rows] = speed[rows].min()
@@ -87,27 +88,30 @@ def _chain_arcs(
 ) -> list[_ChainArc]:
     """Arcs in a chain of moves between points (n, 2), each as long as it can be."""
     count, fed = len(speeds), np.append(0.0, np.cumsum(feed))
-    window = np.arange(count - _LEAST + 1)[:, None]
-    firsts = points[window + np.arange(_LEAST + 1)], speeds[window + np.arange(_LEAST)]
-    starts = np.flatnonzero(_fitted(*firsts, profile.arc_tolerance)[0])
+    least = _COMPACT if profile.compact else _LEAST
+    if count < least:
+        return []
+    window = np.arange(count - least + 1)[:, None]
+    firsts = points[window + np.arange(least + 1)], speeds[window + np.arange(least)]
+    starts = np.flatnonzero(_fitted(*firsts, profile)[0])
 
     def fitted(first: int, moves: int) -> _ChainArc | None:
         """Arc of so many moves from one on; None where they are on none."""
         if first + moves > count or fed[first + moves] - fed[first] > profile.longest_feed:
             return None
         span = points[None, first : first + moves + 1], speeds[None, first : first + moves]
-        good, circles = _fitted(*span, profile.arc_tolerance)
+        good, circles = _fitted(*span, profile)
         x, y, sweep = circles[0].tolist()
         return _ChainArc(first, first + moves - 1, (x, y, sweep)) if good[0] else None
 
     arcs: list[_ChainArc] = []
     free = 0
     for start in starts.tolist():
-        arc = fitted(start, _LEAST) if start >= free else None
+        arc = fitted(start, least) if start >= free else None
         if arc is None:
             continue
         # Twice as many moves as long as they fit, then by halves between the last two numbers.
-        fit, most = _LEAST, 2 * _LEAST
+        fit, most = least, 2 * least
         while (longer := fitted(start, most)) is not None:
             arc, fit, most = longer, most, 2 * most
         while most - fit > 1:
@@ -122,7 +126,7 @@ def _chain_arcs(
 
 
 def _fitted(
-    points: FloatArray, speeds: FloatArray, tolerance: float
+    points: FloatArray, speeds: FloatArray, profile: GcodeProfile
 ) -> tuple[BoolArray, FloatArray]:
     """Circles through the first and last of rows of points (m, k, 2), nearest to those between.
 
@@ -131,8 +135,9 @@ def _fitted(
     good : (m,) bool array
         Whether the arc may stand for the moves between the points.
     circles : (m, 3) array
-        Centre and angle.
+        Centre and angle; zeros for a straight line.
     """
+    tolerance = profile.arc_tolerance
     first, last = points[:, 0], points[:, -1]
     chord = last - first
     size = np.linalg.norm(chord, axis=1)
@@ -159,5 +164,10 @@ def _fitted(
     good = (np.maximum(*apart) <= tolerance) & (radius <= _LARGEST) & (size > 1e-3)
     good &= (np.sign(turn) == np.sign(sweep)[:, None]).all(axis=1) & (np.abs(sweep) <= _SWEEP)
     good &= np.abs(radius * np.abs(sweep) / np.maximum(length, 1e-9) - 1.0) <= _LONGER
+    circles = np.column_stack([centre, sweep])
+    if profile.compact:
+        straight = (np.abs(v).max(axis=1) <= tolerance) & (length <= (1.0 + _LONGER) * size)
+        straight &= (np.diff(u, axis=1) > 0.0).all(axis=1)
+        good, circles[straight] = good | straight, 0.0
     good &= speeds.max(axis=1) <= (1.0 + _SPEEDS) * speeds.min(axis=1)
-    return good, np.column_stack([centre, sweep])
+    return good, circles

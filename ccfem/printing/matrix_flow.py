@@ -28,7 +28,7 @@ _PIECE = 2.0
 """Longest piece, mm, over which the height is constant."""
 _STEP = 0.05
 """Steps in which the height changes along a line, over that of the layer."""
-_MISPLACED = 1.0
+_MISPLACED = 2.0
 """Matrix that a compact file lays elsewhere along a line, at most, in mm of a line as high as its
 layer. Our choice."""
 _STRETCH = 1e3

@@ -45,7 +45,7 @@ class Arcs:
     centre : (k, 2) array, mm
         Rounded to 0.001 mm.
     sweep : (k,) array, radians
-        Angle that it passes, counter-clockwise from above.
+        Angle that it passes, counter-clockwise from above; 0 for a straight line.
     """
 
     first: IntArray

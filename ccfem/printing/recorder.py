@@ -34,7 +34,7 @@ _LEVEL = 0.1
 
 def feed_digits(machine: Machine) -> int:
     """Decimals of what is fed, mm."""
-    return 4 if machine.gcode.compact else 5
+    return 3 if machine.gcode.compact else 5
 
 
 class Steps(NamedTuple):

@@ -162,6 +162,20 @@ def test_what_is_not_round_stays_straight():
         assert with_arcs(moves_of(line), MACHINE).arcs is None
 
 
+def test_a_compact_file_goes_straight_where_that_is_near_enough():
+    """Waves of 0.009 mm are one line to 0.02, not in a plain file; those of 0.1 mm are none."""
+    x = np.linspace(0.0, 40.0, 81)
+    compact = updated(MACHINE, {"gcode": {"compact": True}})
+    wave = np.column_stack([x, 0.009 * np.sin(x)])
+    moves = with_arcs(moves_of(wave), compact)
+    assert moves.arcs.sweep.tolist() == [0.0]
+    assert (moves.arcs.first[0], moves.arcs.last[0]) == (1, 80)
+    assert moves.feed.sum() == pytest.approx(0.05 * 40.0, rel=1e-5)
+    assert (with_arcs(moves_of(wave * [1.0, 11.0]), compact).arcs.sweep != 0.0).any()
+    found = with_arcs(moves_of(wave), MACHINE).arcs
+    assert found is None or (found.sweep != 0.0).all()
+
+
 def test_arcs_turn_with_the_line_and_end_where_it_is_laid_otherwise():
     half = ring(10.0, 120)[:61]
     wave = np.concatenate([half, [-20.0, 0.0] + np.array([1, -1]) * half[1:]])

@@ -9,6 +9,7 @@ from ccfem.printing.export.gcode import _shorter
 from ccfem.printing.matrix_flow import _MISPLACED, _evened
 
 COMPACT = {"gcode": {"compact": True}}
+ROUND = {"gcode": {"compact": True, "arcs": True, "arc_tolerance": 0.05}}
 
 
 def laid(job):
@@ -22,10 +23,13 @@ def laid(job):
     return [np.bincount(at, values, len(tops)) for values in (matrix, fibre)]
 
 
-@pytest.mark.parametrize("machine", ["marlin_two_tools", "aura_like"])
-def test_a_compact_file_lays_the_same(small_part, machine):
-    plain, compact = small_part(machine), small_part(machine, COMPACT)
-    assert len(compact.text) < 0.75 * len(plain.text)
+@pytest.mark.parametrize(
+    ("machine", "values", "size"),
+    [("marlin_two_tools", COMPACT, 0.75), ("aura_like", COMPACT, 0.75), ("klipper", ROUND, 0.5)],
+)
+def test_a_compact_file_lays_the_same(small_part, machine, values, size):
+    plain, compact = small_part(machine), small_part(machine, values)
+    assert len(compact.text) < size * len(plain.text)
     for mine, other in zip(laid(compact), laid(plain), strict=True):
         np.testing.assert_allclose(mine, other, rtol=1e-3)
     assert {check.__name__: check(compact, compact.done) for check in CHECKS} == {

@@ -251,8 +251,10 @@ def _centres(arcs: Arcs, moves: Moves, compact: bool) -> list[str]:
     words = f"I%.{COORDINATE_DIGITS}f J%.{COORDINATE_DIGITS}f"
     places = [words % (x, y) for x, y in off.tolist()]
     places = [_shorter(place) for place in places] if compact else places
-    commands = np.where(arcs.sweep > 0.0, "G3 {} ", "G2 {} ").tolist()
-    return [command + place for command, place in zip(commands, places, strict=True)]
+    return [
+        f"G{3 if sweep > 0.0 else 2} {{}} {place}" if sweep else "G1 {}"
+        for sweep, place in zip(arcs.sweep.tolist(), places, strict=True)
+    ]
 
 
 def _axes(moves: Moves, machine: Machine) -> FloatArray:
@@ -423,7 +425,8 @@ class _Lines:
         elif event == PATH_START:
             cut = value - self.machine.tail
             number = strand if strand >= 0 else "beside"
-            self.lines.append(f";CCFEM:strand={number} length={value:.3f} cut={cut:.3f}")
+            sizes = "" if self.profile.compact else f" length={value:.3f} cut={cut:.3f}"
+            self.lines.append(f";CCFEM:strand={number}{sizes}")
             self.fill("path_start", length=value)
         elif event == PATH_END:
             self.fill("path_end", length=value)
