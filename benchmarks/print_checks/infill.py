@@ -464,31 +464,32 @@ def main() -> int:
     parser.add_argument("--out", type=Path)
     given = parser.parse_args()
     plastic = Plastic(given.infill, 0.2, 2, 3)
-    titles = list(Row.__dataclass_fields__)
+    titles = [*Row.__dataclass_fields__, "off"]
     print(f"| {' | '.join(titles)} |\n{len(titles) * '|---'}|")
     said: list[str] = []
-    rows: list[Row] = []
+    table: list[list[str]] = []
     for name in given.parts.split(","):
         part = part_of(name, plastic)
         for machine in given.machines.split(","):
             job, _ = job_of(part, machine, TURNED if given.turned else AS_IT_STANDS)
             regions = regions_of(job, plastic)
-            rows.append(row_of(job, name, regions, plastic))
-            print(f"| {' | '.join(rows[-1].words)} |", flush=True)
-            said += off(job, rows[-1], regions)
+            row = row_of(job, name, regions, plastic)
+            wrong = off(job, row, regions)
+            said += wrong
+            table.append([*row.words, str(len(wrong))])
+            print(f"| {' | '.join(table[-1])} |", flush=True)
             if given.out is not None:
                 _draw(job, regions, given.out / f"{name}_{machine}.png")
+                _write([titles, *table], said, given.out)
     print("\n".join(["", *said]))
-    if given.out is not None:
-        _write(rows, titles, said, given.out)
     return len(said)
 
 
-def _write(rows: list[Row], titles: list[str], said: list[str], folder: Path) -> None:
+def _write(table: list[list[str]], said: list[str], folder: Path) -> None:
     """Write the table for programs and for people."""
     with (folder / "infill.csv").open("w", encoding="utf-8", newline="") as file:
-        csv.writer(file).writerows([titles, *(row.words for row in rows)])
-    table = [titles, len(titles) * ["---"], *(row.words for row in rows)]
+        csv.writer(file).writerows(table)
+    table = [table[0], len(table[0]) * ["---"], *table[1:]]
     lines = [f"| {' | '.join(words)} |" for words in table] + ["", *(f"- {one}" for one in said)]
     (folder / "infill.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 

@@ -18,7 +18,7 @@ from ccfem.fem.elasticity import solve
 from ccfem.fem.elasticity.stress_field import PartStress
 from ccfem.machine import machine_table, updated
 from ccfem.paths.planning import plan
-from ccfem.paths.toolpaths import MATRIX, Toolpaths
+from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.bed_layout import AS_IT_STANDS, BedLayout
 from ccfem.printing.export.gcode import gcode
 from ccfem.printing.print_plan import PrintPlan, plan_print
@@ -107,9 +107,9 @@ def on_bed(
     layout: BedLayout = AS_IT_STANDS,
     printed: PrintPlan | None = None,
 ) -> list[tuple[list[np.ndarray], Sections]]:
-    """Strands on the bed, and sections of the part there by height, of each copy in a row along X.
+    """Strands on the bed, and sections of the part there by height, of each copy.
 
-    The middle of all of them is that of the bed. How far they are apart is seen in the plan.
+    The middle of all of them is that of the bed. Where they stand about it is seen in the plan.
     """
     turn = np.radians(layout.spin)
     spin = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
@@ -118,16 +118,12 @@ def on_bed(
     corners = mesh.points[np.unique(mesh.corners)] @ frame.T
     low, high = corners.min(axis=0), corners.max(axis=0)
     middle = 0.5 * (low + high)[:2] - 0.5 * np.array(bed[:2])
-    apart = 0.0
+    places = np.zeros((1, 2))
     if printed is not None and layout.count > 1:
-        walls = printed.paths.select(printed.paths.closed & (printed.paths.kind == MATRIX))
-        lowest = [wall for wall, layer in zip(walls, walls.layer, strict=True) if not layer]
-        longest = max(np.ptp(wall[:, 0]) for wall in lowest)
-        outer = [wall[:, 0].min() for wall in lowest if np.ptp(wall[:, 0]) > longest - 2e-3]
-        apart = float(np.ptp(outer)) / (layout.count - 1)
-    places = apart * (np.arange(layout.count) - 0.5 * (layout.count - 1))
+        corners = np.array([one.low for one in printed.standing])
+        places = corners - 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     found = []
-    for place in places.tolist():
-        shift = np.append(middle - [place, 0.0], low[2])
+    for place in places:
+        shift = np.append(middle - place, low[2])
         found.append(([line @ frame.T - shift for line in paths], Sections(mesh, frame, shift)))
     return found

@@ -147,7 +147,7 @@ def support(
         f"{columns.standing:.5g} mm^2 of the part"
     )
     if out is not None:
-        paths = support_paths(support_stack, part.machine)
+        paths = support_paths(support_stack, part.machine, layers=stack)
         write_paths(paths, out)
         print(f"{out}: {len(paths)} paths of matrix, {paths.lengths.sum() / 1000.0:.4g} m")
 

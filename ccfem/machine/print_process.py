@@ -63,11 +63,11 @@ class Process:
     brim_loops : int
         Loops that touch the first layer.
     support_interface : int
-        Solid layers of pads, and of columns of support, right below what lies on them.
+        Solid layers of pads, and of support, right below what lies on them.
     support_gap : float, mm
-        Least height between columns of support and the part on them, in whole layers of matrix.
+        Least height between support and the part on it, in whole layers of matrix.
     support_clearance : float, mm
-        Distance of pads and columns of support to the walls of the part (Aura: 0.7).
+        Distance of pads and support to the walls of the part (Aura: 0.7).
     first_layer_height : float, mm
         Of matrix on the bed, where there is more room; 0 to make it as high as the others.
     first_layer_speed : float

@@ -72,7 +72,7 @@ def filled_layers(
     list of FilledLayer
         A layer of support stands just before the layer of the part at its level.
     """
-    props = None if support is None else support_paths(support, machine)
+    props = None if support is None else support_paths(support, machine, layers=layers)
     filled = []
     for number, layer in enumerate(layers):
         if support is not None and props is not None:

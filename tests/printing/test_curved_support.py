@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import shapely
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
@@ -17,7 +18,7 @@ from ccfem.machine import Kinematics, Machine, Process
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.curved_plan import curved_plan
 from ccfem.printing.export.gcode import gcode
-from ccfem.printing.support import support_layers
+from ccfem.printing.support import support_layers, support_paths
 from ccfem.slicing.layers.level_surfaces import level_surfaces
 from ccfem.slicing.layers.slicer import standing
 from ccfem.slicing.slicers import Planar
@@ -92,9 +93,12 @@ def test_support_is_printed_below_the_part_and_before_it(part, kind):
     place, fed = rows[:, :3], rows[:, 6]
     props = kinds == "Support material"
     own = np.isin(kinds, ["External perimeter", "Solid infill"])
-    # Amount: rings three widths apart fill a third of the space below; the part is full.
+    # Amount: rings three widths apart fill a third of the space below, but the two layers below
+    # the part all of theirs; the part is full.
     area = 0.25 * np.pi * 1.75**2
-    assert fed[props].sum() * area == pytest.approx(support.columns.volume / 3.0, rel=0.2)
+    full = 2.0 * STEP * 30.0 * 10.0
+    laid = (support.columns.volume + 2.0 * full) / 3.0
+    assert fed[props].sum() * area == pytest.approx(laid, rel=0.1)
     assert fed[own].sum() * area == pytest.approx(30.0 * 10.0 * 6.0, rel=0.03)
     # Nothing is laid below the bed, nothing of the part below its support.
     assert place[props][:, 2].min() > 0.3 * STEP
@@ -120,6 +124,36 @@ def test_support_is_printed_below_the_part_and_before_it(part, kind):
     assert kinds[np.flatnonzero(fed > 0.0)[0]] == "Wipe tower"
     heights = np.unique(place[kinds == "Wipe tower"][:, 2].round(3))
     assert np.diff(heights).max() < 1.5 * STEP
+
+
+def test_support_of_curved_layers_has_interface_gap_and_clearance(part):
+    """The underside of the arch is flat: so deep below it lies what is laid, and so full is it."""
+    mesh, layers, support = part
+    gap, clearance = 0.8, 2.0
+    process = Process(support_interface=3, support_gap=gap, support_clearance=clearance)
+    machine = Machine(kinematics=Kinematics("three_axes"), process=process)
+    text = gcode(curved_plan(Toolpaths.empty(), layers, mesh, machine, support=support), machine)
+    rows, kinds = moves(text)
+    lift = -support.columns.mesh.points[:, 2].min()
+    props = kinds == "Support material"
+    depth, volume = lift - rows[props, 2], 0.25 * np.pi * 1.75**2 * rows[props, 6]
+    assert depth.min() > gap - 2e-3
+    near = (depth < gap + 2.5 * STEP) & (depth > gap)
+    far = (depth > gap + 4.5 * STEP) & (depth < gap + 6.5 * STEP)
+    assert volume[near].sum() == pytest.approx(300.0 * 2.5 * STEP, rel=0.2)
+    assert volume[far].sum() == pytest.approx(300.0 * 2.0 * STEP / 3.0, rel=0.2)
+    # Seen from above, layers of the part lie beside those of the support at their level.
+    for asked, least, most in ((clearance, 1.0, 1.1), (0.0, 0.0, 1.0)):
+        machine = Machine(process=Process(support_clearance=asked))
+        paths = support_paths(support, machine, layers=layers)
+        apart = []
+        for number, before in enumerate(support.before.tolist()):
+            mine = shapely.MultiLineString([line[:, :2] for line in paths.on_layer(number)])
+            shapes = shapely.polygons(layers[before].points[layers[before].triangles][:, :, :2])
+            beside = shapely.union_all(shapes)
+            if len(paths.on_layer(number)) and not shapely.intersects(mine, beside):
+                apart.append(shapely.distance(mine, beside) - 0.5 * machine.matrix_width)
+        assert least * asked - 0.02 < min(apart) < most * asked + 0.5 * machine.matrix_width
 
 
 def test_support_below_flat_layers_is_refused_where_nothing_hangs_over():
