@@ -162,7 +162,7 @@ def regions_of(job: Job, plastic: Plastic) -> list[Regions]:
     low, high = np.nanmin(bounds[:, :2], axis=0) - 2.0, np.nanmax(bounds[:, 2:], axis=0) + 2.0
     count = np.ceil((high - low) / pixel).astype(int)
     x, y = (low[k] + (np.arange(count[k]) + 0.5) * pixel for k in (0, 1))
-    masks = []
+    masks: list[np.ndarray] = []
     for k, section in enumerate(sections):
         if k and shapely.area(shapely.symmetric_difference(section, sections[k - 1])) < _SAME:
             masks.append(masks[-1])

@@ -21,7 +21,7 @@ from ccfem.paths.planning import plan
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.bed_layout import AS_IT_STANDS, BedLayout
 from ccfem.printing.export.gcode import gcode
-from ccfem.printing.print_plan import PrintPlan, plan_print
+from ccfem.printing.print_plan import plan_print
 from ccfem.printing.support.overhang import overhang
 from ccfem.printing.together import arranged
 from ccfem.slicing.layers.layer import Layer, plane_frame
@@ -78,11 +78,13 @@ def job_of(
     paths = plan(strategy, layers, part.stress, machine)
     planned = time.process_time()
     hangs = overhang(mesh, case.build, machine) is not None
-    printed = plan_print(paths, layers, mesh, machine, hangs, layout.spin, case.plastic)
-    printed = arranged([printed], [layout], machine)
+    alone = plan_print(paths, layers, mesh, machine, hangs, layout.spin, case.plastic)
+    printed = arranged([alone], [layout], machine)
     text = gcode(printed, machine)
     written = time.process_time()
-    copies = on_bed(paths, mesh, case.build, machine.gcode.bed, layout, printed)
+    low = alone.paths.points[:, :2].min(axis=0)
+    places = [np.array(one.low) - low for one in printed.standing]
+    copies = on_bed(paths, mesh, case.build, machine.gcode.bed, layout.spin, places)
     job = Job(
         machine_name,
         machine,
@@ -104,24 +106,20 @@ def on_bed(
     mesh: TetMesh,
     build: Sequence[float],
     bed: Sequence[float],
-    layout: BedLayout = AS_IT_STANDS,
-    printed: PrintPlan | None = None,
+    spin: float,
+    places: Sequence[np.ndarray],
 ) -> list[tuple[list[np.ndarray], Sections]]:
     """Strands on the bed, and sections of the part there by height, of each copy.
 
-    The middle of all of them is that of the bed. Where they stand about it is seen in the plan.
+    Places (2,) are shifts of copies from where one stands in the middle of the bed.
     """
-    turn = np.radians(layout.spin)
-    spin = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    turn = np.radians(spin)
+    axes = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     frame = plane_frame(tuple(build)).copy()
-    frame[:2] = spin @ frame[:2]
+    frame[:2] = axes @ frame[:2]
     corners = mesh.points[np.unique(mesh.corners)] @ frame.T
     low, high = corners.min(axis=0), corners.max(axis=0)
     middle = 0.5 * (low + high)[:2] - 0.5 * np.array(bed[:2])
-    places = np.zeros((1, 2))
-    if printed is not None and layout.count > 1:
-        corners = np.array([one.low for one in printed.standing])
-        places = corners - 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     found = []
     for place in places:
         shift = np.append(middle - place, low[2])
