@@ -349,7 +349,7 @@ def _joined(
     of_layers: dict[str, Any] = {name: column.rows() for name, column in columns.items()}
     return PrintPlan(
         joined,
-        np.array([slab.upper - bottom for slab in slabs]).round(COORDINATE_DIGITS),
+        np.array([round(slab.upper - bottom, COORDINATE_DIGITS) for slab in slabs]),  # as lines are
         np.array([slab.upper - slab.lower for slab in slabs]),
         dropped=strands.dropped,
         outside=outside,

@@ -190,3 +190,12 @@ def test_walls_begin_at_their_seam(seam):
     for wall in walls:
         expected = wall[np.argmax(wall[:, 1 if seam == "behind" else 0])]
         np.testing.assert_allclose(wall[0], expected, atol=2e-3)
+
+
+def test_layers_end_where_their_lines_lie():
+    """Also where their height is half a micrometre more than whole ones, which rounds either way."""
+    mesh = box_mesh((70.0, 32.0, 6.0035), (7, 4, 2))
+    layers = Planar(heights=(3.0,)).cut(mesh)
+    plan = plan_print(Toolpaths.from_plane(LINES, layers[0]), layers, mesh, MACHINE)
+    z = plan.paths.points[plan.paths.offsets[:-1], 2]
+    np.testing.assert_array_equal(z, plan.top[plan.paths.layer])
