@@ -3,11 +3,11 @@
 Run ``python -m benchmarks.print_checks.infill [PART,...] [MACHINE,...] [--infill gyroid]
 [--turned] [--out FOLDER]``. Two walls, three skins, 20 % of infill, fibre in six layers, where
 something hangs over on support; turned by 37 degrees and in two copies with ``--turned``. The
-regions are found again here, on pixels of VTK's sections of the part: walls by distance transform,
-skins by what the layers above and below cover. The file is followed by a printer on paper
-(`printer`). The columns are those of `Row`. Below stands what is off: a volume by more than 1 %,
-the time by more than 3 %, a wall that is cut, and the other checks of a printed file. The folder
-gets the table (``infill.csv``, ``infill.md``) and a picture of each file.
+regions are found again here, on pixels of VTK's sections of the part: walls by the distance from
+their border, skins by what the layers above and below cover. The file is followed by a printer on
+paper (`printer`). The columns are those of `Row`. Below stands what is off: a volume by more than
+1 %, the time by more than 3 %, a wall that is cut, and the other checks of a printed file. The
+folder gets the table (``infill.csv``, ``infill.md``) and a picture of each file.
 """
 
 import argparse
@@ -163,18 +163,24 @@ def regions_of(job: Job, plastic: Plastic) -> list[Regions]:
     count = np.ceil((high - low) / pixel).astype(int)
     x, y = (low[k] + (np.arange(count[k]) + 0.5) * pixel for k in (0, 1))
     masks: list[np.ndarray] = []
+    deep: list[np.ndarray] = []
     for k, section in enumerate(sections):
         if k and shapely.area(shapely.symmetric_difference(section, sections[k - 1])) < _SAME:
             masks.append(masks[-1])
+            deep.append(deep[-1])
             continue
-        shapely.prepare(section)
-        masks.append(shapely.contains_xy(section, *np.meshgrid(x, y, indexing="ij")))
+        for found, shape in (
+            (masks, section),
+            (deep, shapely.buffer(section, -plastic.walls * width, quad_segs=32)),
+        ):
+            shapely.prepare(shape)
+            found.append(shapely.contains_xy(shape, *np.meshgrid(x, y, indexing="ij")))
 
     def beyond_border(mask: np.ndarray, distance: float) -> np.ndarray:
         return _deep(mask, pixel, distance) > distance
 
     known: dict[bytes, np.ndarray] = {}
-    found, n = [], plastic.skins
+    regions, n = [], plastic.skins
     reach = (plastic.fibre_skins - 0.5) * machine.highest_matrix(0.0)
     for k, inside in enumerate(masks):
         window = masks[k - n : k + n + 1] if n <= k < len(masks) - n else []
@@ -185,13 +191,12 @@ def regions_of(job: Job, plastic: Plastic) -> list[Regions]:
         if not near.any():
             key = blake2b(np.packbits([inside, bare]).tobytes()).digest()
             if key not in known:  # layers of one section are one
-                known[key] = beyond_border(inside, plastic.walls * width)
                 skin = beyond_border(bare, sliver)
-                known[key] &= beyond_border(~skin, _ANCHOR * width + sliver)
+                known[key] = deep[k] & beyond_border(~skin, _ANCHOR * width + sliver)
                 known[key] &= ~beyond_border(~beyond_border(known[key], width), width)
             sparse = known[key]
-        found.append(Regions(tops[k], tops[k] - lower[k], inside, sparse, low, pixel))
-    return found
+        regions.append(Regions(tops[k], tops[k] - lower[k], inside, sparse, low, pixel))
+    return regions
 
 
 def _deep(mask: np.ndarray, pixel: float, most: float) -> np.ndarray:
