@@ -75,7 +75,7 @@ def main(parts: list[str]) -> None:
             each = {kind: (rows[1][kind] - rows[0][kind]) / more for kind in FILES}
             print(f"a layer more, kB: {', '.join(f'{k} {v / 1e3:.0f}' for k, v in each.items())}")
             whole = {k: rows[1][k] + (LAYERS - int(counts[1])) * v for k, v in each.items()}
-            said = ", ".join(f"{kind} {size / 1e6:.0f}" for kind, size in whole.items())
+            said = ", ".join(f"{kind} {size / 1e6:.1f}" for kind, size in whole.items())
             print(f"{LAYERS} layers, MB: {said}")
 
 

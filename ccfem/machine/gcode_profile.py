@@ -145,7 +145,7 @@ class GcodeProfile:
         axes has to know.
     arc_tolerance : float, mm
         Largest distance between an arc and the lines that it replaces; it is at most 0.1 % longer
-        than they are.
+        than they are. In a compact file, of straight lines too.
     compact : bool
         Whether the file says no more than the printer needs: no ends of zeros, no width and height
         of lines, flow of matrix over fibre and speed of strands in fewer steps
