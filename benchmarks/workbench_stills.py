@@ -5,19 +5,17 @@ Chromium (CCFEM_CHROMIUM, or ``chromium`` on the path).
 """
 
 import io
-import os
-import shutil
 import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
+from benchmarks.clicking import launched
 from benchmarks.studies.own_parts import l_bracket
 from ccfem.workbench.bench import Bench
 from ccfem.workbench.page import Page
 
 FOLDER = Path(__file__).parent.parent / "docs" / "pictures" / "workbench"
-_OPTIONS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 
 
 def main(folder: Path = FOLDER) -> None:
@@ -30,8 +28,7 @@ def main(folder: Path = FOLDER) -> None:
         bench = Bench(Path(work))
         bench.open("l_bracket.step")
         page = Page(bench)
-        path = os.environ.get("CCFEM_CHROMIUM") or shutil.which("chromium")
-        browser = program.chromium.launch(executable_path=path, args=_OPTIONS)
+        browser = launched(program)
         tab = browser.new_page(viewport={"width": 1180, "height": 760})
         tab.goto(page.link)
         tab.get_by_role("button", name="Close").click(timeout=60_000)

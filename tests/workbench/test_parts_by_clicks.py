@@ -4,8 +4,8 @@ import os
 
 import pytest
 from browsers import started
-from clicking import View
 
+from benchmarks.clicking import View
 from ccfem.workbench.bench import Bench
 
 

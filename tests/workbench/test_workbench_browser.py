@@ -11,8 +11,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from browsers import NAMELESS, started
-from clicking import View, pixel
 
+from benchmarks.clicking import View, pixel
 from ccfem.body.files.surface import write_stl
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.part_editing import valued

@@ -1,6 +1,28 @@
-"""Clicks of a person on the page of the workbench: on faces in space, and on what the panel has."""
+"""A browser that draws by software, and clicks of a person on the page of the workbench in it."""
+
+import os
+import shutil
+from typing import Any
 
 import numpy as np
+
+OPTIONS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+"""How Chromium is started."""
+
+
+def browser_path() -> str:
+    """Path of the Chromium of this machine; empty where there is none."""
+    names = ("chromium", "chromium-browser", "google-chrome")
+    found = [os.environ.get("CCFEM_CHROMIUM", ""), *(shutil.which(name) or "" for name in names)]
+    return next((path for path in found if path), "")
+
+
+def launched(program: Any) -> Any:
+    """Start it; ends the program where there is none."""
+    path = browser_path()
+    if not path:
+        raise SystemExit("there is no browser: install chromium, or name one by CCFEM_CHROMIUM")
+    return program.chromium.launch(executable_path=path, args=OPTIONS)
 
 
 def rotation(wxyz):
@@ -68,6 +90,7 @@ class View:
 
     @property
     def canvas_box(self):
+        """Place of the picture in the window."""
         return self.tab.locator("canvas").first.bounding_box()
 
     def settle(self):
@@ -94,9 +117,11 @@ class View:
         raise AssertionError(f"the click on face {number} at {at} was lost")
 
     def button(self, name):
+        """Press a button."""
         self.tab.get_by_role("button", name=name, exact=True).first.click()
         self.settle()
 
     def choose_tab(self, name):
+        """Show a tab."""
         self.tab.get_by_role("tab", name=name, exact=True).click()
         self.tab.wait_for_timeout(100)
