@@ -168,12 +168,16 @@ def _pick(view: View, name: str) -> None:
     for k in range(_CLICKS):
         number, at = seen[k % len(seen)]
         view.tab.mouse.click(*at)
-        view.tab.wait_for_timeout(600)
-        chosen, between = view.page.chosen, view.tab.evaluate("window.named - window.clicked")
-        if chosen == [number] and between > 0:
-            taken.append(between)
+        for _ in range(100):
+            view.tab.wait_for_timeout(50)
+            between = view.tab.evaluate("window.named - window.clicked")
+            if view.page.chosen == [number] and between > 0:
+                break
         else:
             lost += 1
+            continue
+        taken.append(between)
+        view.tab.wait_for_timeout(300)
     print(
         f"picks on {name}, {len(listing.triangles)} triangles, {len(seen)} faces in sight: median "
         f"{np.median(taken):.0f} ms of {len(taken)}, the slowest {max(taken):.0f} ms; {lost} lost"

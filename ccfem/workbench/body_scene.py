@@ -1,84 +1,24 @@
-"""What is drawn of a body before it is meshed: faces, borders, and symbols of what acts on them."""
+"""Symbols of what acts on a body, and of how it is printed, before it is meshed."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import shapely
 
-from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError, Mistakes
 from ccfem.body.mesh.face_places import BodyFaces
 from ccfem.body.mesh.face_rules import Faces, Holes
 from ccfem.body.mesh.patches import unit_vector
-from ccfem.body.mesh.smooth_faces import Face
 from ccfem.cases.inspection import Check
 from ccfem.cases.part_tables import rules_of
 from ccfem.comparison.plot.symbols import spread
 from ccfem.printing.bed_layout import bed_of
 from ccfem.slicing.layers.layer import plane_frame
 
-_MANY = 64
-"""Triangles from which on a plane is drawn by its outline."""
 _SNAP = np.cos(np.radians(6.0))
 """Cosine of the angle to an axis within which a dragged direction takes that axis."""
-
-
-@dataclass(frozen=True)
-class FaceMesh:
-    """A face as it is drawn: points (n, 3), mm, and triangles (t, 3) of them, outward."""
-
-    number: int
-    points: FloatArray
-    triangles: IntArray
-
-
-def face_meshes(listing: BodyFaces) -> list[FaceMesh]:
-    """Meshes of all faces; a plane of many triangles has only those that its outline needs."""
-    meshes = []
-    for number, face in zip(listing.numbers, listing.faces, strict=True):
-        used, triangles = np.unique(listing.triangles[face.facets], return_inverse=True)
-        points, triangles = listing.points[used], triangles.reshape(-1, 3)
-        fewer = None
-        if face.kind == "plane" and len(triangles) > _MANY:
-            fewer = _outlined(points, triangles, face)
-        meshes.append(FaceMesh(number, *(fewer or (points, triangles))))
-    return meshes
-
-
-def _outlined(
-    points: FloatArray, triangles: IntArray, face: Face
-) -> tuple[FloatArray, IntArray] | None:
-    """Fewest triangles of a plane; None where they do not cover it."""
-    across = np.eye(3)[np.argmin(np.abs(face.direction))]
-    first = np.cross(across, face.direction)
-    first /= np.linalg.norm(first)
-    frame = np.stack([first, np.cross(face.direction, first)])
-    plane = points @ frame.T
-    outline = shapely.build_area(shapely.multilinestrings(plane[_rim(triangles)]))
-    parts = shapely.get_parts(shapely.constrained_delaunay_triangles(outline))
-    corners = shapely.get_coordinates(shapely.orient_polygons(parts)).reshape(-1, 4, 2)[:, :3]
-    if abs(shapely.area(parts).sum() - face.area) > 1e-3 * face.area:
-        return None
-    unique, rows = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
-    height = float(np.mean(points @ face.direction))
-    return unique @ frame + height * face.direction, rows.reshape(-1, 3)
-
-
-def _rim(triangles: IntArray) -> IntArray:
-    """Edges (k, 2) that one triangle alone has."""
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    unique, count = np.unique(edges, axis=0, return_counts=True)
-    return np.asarray(unique[count == 1])
-
-
-def borders(listing: BodyFaces) -> FloatArray:
-    """Borders between faces, (k, 2, 3), mm."""
-    rims = [_rim(listing.triangles[face.facets]) for face in listing.faces]
-    if not rims:
-        return np.zeros((0, 2, 3))
-    return np.asarray(listing.points[np.unique(np.concatenate(rims), axis=0)])
 
 
 # Patches: which faces they are, or which triangles.

@@ -4,14 +4,14 @@ import inspect
 import mimetypes
 import shlex
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ccfem import strategies as strategy_modules
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.errors import InputError
-from ccfem.comparison.plot.colours import LINK, OUTLINE, gradient, rgb, scale
+from ccfem.comparison.plot.colours import OUTLINE, gradient, rgb
 from ccfem.comparison.report.print_view import BESIDE, COLOURS, FILLS, KINDS, MOVES
 from ccfem.comparison.report.report_views import PrintLayer, RunResults, read_results
 from ccfem.comparison.request import STRATEGIES
@@ -25,9 +25,12 @@ from ccfem.workbench.tab import (
     PRINT,
     STRESS,
     Field,
-    Tabbed,
     draw_lines,
+    linear,
 )
+
+if TYPE_CHECKING:
+    from ccfem.workbench.page import Page
 
 _NO_ONE, _FIRST, _ALL = "none", "the first", "all at once"
 _BESIDE = 1.25
@@ -41,7 +44,7 @@ _SUFFIXES = (".gcode", "_waypoints.txt", "_waypoints.csv", "_cell.csv", "_trim.c
 class CompareTab:
     """Runs in a process of their own, and what they found."""
 
-    def __init__(self, page: Tabbed) -> None:
+    def __init__(self, page: "Page") -> None:
         self.page, gui = page, page.server.gui
         self.run: ChildRun | None = None
         self.results: RunResults | None = None
@@ -293,8 +296,7 @@ class CompareTab:
         matt = trimesh.visual.material.PBRMaterial(metallicFactor=0.0, roughnessFactor=1.0)
         mesh = trimesh.Trimesh(surface.points, surface.triangles, process=False)
         mesh.visual = trimesh.visual.TextureVisuals(material=matt)
-        colours = _linear(_shades(surface.share))
-        mesh.visual.vertex_attributes["color"] = np.insert(colours, 3, 255, axis=1)
+        mesh.visual.vertex_attributes["color"] = np.insert(linear(surface.colours), 3, 255, axis=1)
         scene, low, high = self.page.server.scene, surface.points.min(0), surface.points.max(0)
         above = (*(0.5 * (low + high))[:2], high[2] + 0.1 * np.ptp(surface.points))
         self._handles = [
@@ -352,8 +354,7 @@ class CompareTab:
 
     def _lines(self, name: str, layer: PrintLayer, chosen: BoolArray) -> Any:
         """Pieces of a layer of the print, coloured by what they are."""
-        colours = _linear(np.array([rgb(colour) for colour in COLOURS]) / 255.0)
-        shades = np.repeat(colours[layer.kind[chosen]][:, None], 2, axis=1)
+        shades = linear(layer.colours[chosen])
         return draw_lines(self.page.server.scene, name, layer.ends[chosen], shades)
 
     def _draw(self) -> None:
@@ -369,11 +370,7 @@ class CompareTab:
         drawn: list[Any] = []
         for k, name in enumerate(names):
             pieces = results.pieces(name, place)
-            colours = np.where(
-                pieces.link[:, None], np.array(rgb(LINK)) / 255.0, _shades(pieces.share)
-            )
-            shades = np.repeat(_linear(colours)[:, None], 2, axis=1)
-            rim, width = rgb(OUTLINE), _LINE * results.width
+            rim, width, shades = rgb(OUTLINE), _LINE * results.width, linear(pieces.colours)
             if len(rims):
                 drawn.append(draw_lines(scene, f"/fibre_{k}_rim", rims + k * step, rim))
             if len(pieces.ends):
@@ -405,15 +402,3 @@ class CompareTab:
             f"<p class='ends'><span>0 N</span><span>{results.most_force:.3g} N in the fibre"
             "</span></p></div>"
         )
-
-
-def _shades(share: FloatArray) -> FloatArray:
-    """Colours (n, 3) of shares of the largest value."""
-    return np.asarray(scale("size")(np.clip(share, 0.0, 1.0))[:, :3])
-
-
-def _linear(colours: FloatArray) -> Any:
-    """Colours (n, 3) as bytes of linear light, which viser takes them for, encoding them itself."""
-    low = colours <= 0.04045
-    linear = np.where(low, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
-    return np.round(255.0 * linear).astype(np.uint8)

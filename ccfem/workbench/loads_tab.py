@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,10 @@ from ccfem.cases.inspection.face_choice import coplanar, like_holes
 from ccfem.cases.part_editing import appended, edited, patch_of, removed, valued
 from ccfem.workbench.body_scene import across
 from ccfem.workbench.guard import escaped
-from ccfem.workbench.tab import Field, Tabbed
+from ccfem.workbench.tab import Field
+
+if TYPE_CHECKING:
+    from ccfem.workbench.page import Page
 
 _NO_FACE = "choose a face"
 _LISTED = 200
@@ -86,7 +89,7 @@ def vector_of(table: Mapping[str, Any]) -> FloatArray | None:
 class LoadsTab:
     """Chosen faces, buttons for what acts on them, and a list of what does."""
 
-    def __init__(self, page: Tabbed) -> None:
+    def __init__(self, page: "Page") -> None:
         self.page, gui = page, page.server.gui
         self._said = gui.add_html("")
         self._faces = gui.add_dropdown(

@@ -1,109 +1,18 @@
-"""What the tabs of the page share: what they ask of it, its fields, and how things are drawn."""
+"""What the tabs of the page share: its fields, and how things are drawn."""
 
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
-from ccfem.base.errors import InputError, SolveError
-from ccfem.cases.inspection import Check
-from ccfem.cases.part_editing import Change
-from ccfem.workbench.bench import Bench
-from ccfem.workbench.guard import escaped, send_again
+from ccfem.workbench.guard import send_again
+
+if TYPE_CHECKING:
+    from ccfem.workbench.page import Page
 
 PART, STRESS, MOVED, FIBRE, PRINT = VIEWS = ("Part", "Stress", "Deformed", "Fibre", "Print")
 """What the page shows in space: the part to be set up, or what the last run says of it."""
-
-
-class Tabbed:
-    """The page, as its tabs see it: it does one thing after the other, and says what goes wrong.
-
-    Attributes
-    ----------
-    bench : Bench
-    server : viser.ViserServer
-    view : handle of viser
-        Which of `VIEWS` is shown.
-    message : handle of viser
-        A line at the top.
-    chosen : list of int
-        Numbers of the faces that are chosen.
-    checked : Check, optional
-        What the newest check knows of the part.
-    fields : list of Field
-    """
-
-    server: Any
-    view: Any
-    message: Any
-
-    def __init__(self, bench: Bench) -> None:
-        self.bench, self.chosen = bench, list[int]()
-        self.checked: Check | None = None
-        self.fields: list[Field] = []
-        self._acts = ThreadPoolExecutor(1, "page")
-
-    def act(self, what: Callable[..., None], *arguments: Any) -> "Future[None]":
-        """Do something when all before it is done; what goes wrong is said on the page."""
-        try:
-            return self._acts.submit(self._safely, what, *arguments)
-        except RuntimeError:  # the page is closed, or the program ends
-            ended: Future[None] = Future()
-            ended.cancel()
-            return ended
-
-    def _safely(self, what: Callable[..., None], *arguments: Any) -> None:
-        try:
-            with self.server.atomic():
-                what(*arguments)
-        except (InputError, SolveError, OSError) as error:
-            self.say(str(error))
-        except Exception as error:  # one act's fault ends no other
-            self.say(f"{type(error).__name__}: {error}")
-
-    def on(
-        self, what: Callable[..., None], *arguments: Any, value: bool = False
-    ) -> Callable[[Any], Any]:
-        """Return a callback of viser that does something, with `value` to what came of a click.
-
-        It is not called for values that are set here.
-        """
-
-        async def heed(event: Any) -> None:
-            if event.client_id is not None:
-                self.act(what, *arguments, *([event.target.value] if value else []))
-
-        return heed
-
-    def say(self, text: str) -> None:
-        """Show a line at the top; an empty one takes it away."""
-        self.message.content = f'<p class="ccfem message" role="alert">{escaped(text)}</p>'
-        self.message.visible = bool(text)
-
-    def edit(self, change: Change | str, field: str = "") -> None:
-        """Change the part file, and show it."""
-        self.bench.edit(change, field)
-        self.say("")
-        self.show()
-
-    def show(self) -> None:
-        """Show what the part file says."""
-        raise NotImplementedError
-
-    def paint(self) -> None:
-        """Colour the faces by what acts on them, and those that are chosen."""
-        raise NotImplementedError
-
-    def open(self, what: str) -> None:
-        """Open a part, and look at it."""
-        raise NotImplementedError
-
-    def show_view(self, view: str) -> None:
-        """Show the part to be set up, or what the last run says of it: one of `VIEWS`."""
-        raise NotImplementedError
-
 
 _DIGITS = 6
 """Decimal places of numbers: as few as their step has would make 70.5 that is typed 705."""
@@ -120,7 +29,7 @@ class Field:
 
     Parameters
     ----------
-    page : Tabbed
+    page : Page
     handle : handle of viser
     changed : callable, optional
         Takes each value that is typed. Where it raises, the field shows what it showed before.
@@ -134,7 +43,7 @@ class Field:
     """
 
     def __init__(
-        self, page: Tabbed, handle: Any, changed: Callable[[Any], object] | None = None
+        self, page: "Page", handle: Any, changed: Callable[[Any], object] | None = None
     ) -> None:
         self.page, self.handle, self._changed = page, handle, changed
         self.value = self._shown = self._before = handle.value
@@ -227,6 +136,18 @@ def draw_arrows(
 def draw_lines(
     scene: Any, name: str, ends: FloatArray, colour: Any, width: float = 1.5, unit: str = "screen"
 ) -> Any:
-    """Draw straight pieces (s, 2, 3), mm, some pixels wide or, by unit "world", some mm."""
+    """Draw straight pieces (s, 2, 3), mm, some pixels wide or, by unit "world", some mm.
+
+    They have one colour, or each its own, (s, 3).
+    """
     where = ends.astype(np.float32)
+    if isinstance(colour, np.ndarray):
+        colour = np.repeat(colour[:, None], 2, axis=1)
     return scene.add_line_segments(name, where, colour, thickness=width, thickness_units=unit)
+
+
+def linear(colours: FloatArray) -> Any:
+    """Colours (n, 3) as bytes of linear light, which viser takes them for, encoding them itself."""
+    low = colours <= 0.04045
+    light = np.where(low, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
+    return np.round(255.0 * light).astype(np.uint8)

@@ -2,54 +2,17 @@
 
 import numpy as np
 import pytest
-import shapely
 
-from ccfem.body.mesh.face_rules import numbered_faces
-from ccfem.body.meshing import extrude
 from ccfem.workbench.body_scene import (
     PatchPlace,
     across,
     bed_under,
-    borders,
     box_edges,
     boxes,
-    face_meshes,
     snapped,
     stretched,
     upward,
 )
-
-
-@pytest.fixture(scope="module")
-def plate():
-    """Faces of a plate 60 x 30 x 4 mm with a hole of radius 6 mm, its top of many triangles."""
-    outline = shapely.box(0, 0, 60, 30).difference(shapely.Point(40, 15).buffer(6, quad_segs=16))
-    return numbered_faces(extrude(outline, 4.0, 1.5))
-
-
-def areas_and_normals(points, triangles):
-    a, b, c = np.moveaxis(points[triangles], 1, 0)
-    across = 0.5 * np.cross(b - a, c - a)
-    return np.linalg.norm(across, axis=1).sum(), across.sum(axis=0)
-
-
-def test_faces_are_drawn_whole_and_planes_by_few_triangles(plate):
-    meshes = face_meshes(plate)
-    assert [mesh.number for mesh in meshes] == list(plate.numbers)
-    for mesh, face in zip(meshes, plate.faces, strict=True):
-        area, outward = areas_and_normals(mesh.points, mesh.triangles)
-        assert area == pytest.approx(face.area, rel=1e-6)
-        if face.kind == "plane":
-            np.testing.assert_allclose(outward, face.area * face.direction, atol=1e-6 * face.area)
-    top = max(zip(plate.faces, meshes, strict=True), key=lambda pair: pair[0].area)[1]
-    assert 5 * len(top.triangles) < len(plate.faces[0].facets)
-
-
-def test_borders_are_the_edges_of_the_plate(plate):
-    ends = borders(plate)
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()
-    circle = 2 * np.pi * 6
-    assert length == pytest.approx(2 * (60 + 30) * 2 + 4 * 4 + 2 * circle, rel=1e-3)
 
 
 def square(height, normal):

@@ -11,7 +11,9 @@ import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.errors import InputError
+from ccfem.comparison.plot.colours import LINK, rgb, scale
 from ccfem.comparison.report.packing import unpack
+from ccfem.comparison.report.print_view import COLOURS
 from ccfem.comparison.table import Cell, Head, Table
 
 _DATA = re.compile(r'<script type="application/octet-stream" id="data">([^<]*)</script>')
@@ -36,6 +38,11 @@ class Pieces:
     share: FloatArray
     link: BoolArray
 
+    @property
+    def colours(self) -> FloatArray:
+        """Colours (s, 3), 0 to 1, by force; links have their own."""
+        return np.where(self.link[:, None], np.array(rgb(LINK)) / 255.0, _shades(self.share))
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -56,6 +63,11 @@ class Surface:
     share: FloatArray
     said: str
 
+    @property
+    def colours(self) -> FloatArray:
+        """Colours (n, 3), 0 to 1, by value."""
+        return _shades(self.share)
+
 
 @dataclass(frozen=True)
 class PrintLayer:
@@ -73,6 +85,11 @@ class PrintLayer:
     said: str
     ends: FloatArray
     kind: IntArray
+
+    @property
+    def colours(self) -> FloatArray:
+        """Colours (s, 3), 0 to 1, by kind."""
+        return np.array([rgb(colour) for colour in COLOURS])[self.kind] / 255.0
 
 
 @dataclass(frozen=True)
@@ -189,6 +206,11 @@ class RunResults:
         offsets = np.asarray(view["rim_offsets"], dtype=int)
         inner = np.setdiff1d(np.arange(len(points)), offsets[1:] - 1)
         return np.stack([points[inner], points[inner + 1]], axis=1).reshape(-1, 2, 3)
+
+
+def _shades(share: FloatArray) -> FloatArray:
+    """Colours (n, 3), 0 to 1, of shares of the largest value."""
+    return np.asarray(scale("size")(np.clip(share, 0.0, 1.0))[:, :3])
 
 
 def _print_layer(view: dict[str, Any], count: int) -> PrintLayer:
