@@ -1,6 +1,7 @@
 """How long tasks report their progress."""
 
 import logging
+import re
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -81,6 +82,17 @@ def progress_bar(lines: bool = False) -> Iterator[Progress]:
             bar.update(task, description=escape(said), completed=share)
 
         yield tell
+
+
+_LINE = re.compile(r"ccfem: \d+ s, (\d+) %(?:, (about [^:]* left))?: (.*)")
+
+
+def step_of(line: str) -> tuple[float, str] | None:
+    """Share of the work and step that a line of `progress_bar` says; None of another line."""
+    said = _LINE.fullmatch(line.strip())
+    if said is None:
+        return None
+    return int(said[1]) / 100.0, f"{said[3]} ({said[2]})" if said[2] else said[3]
 
 
 def _line(text: str) -> None:

@@ -109,7 +109,10 @@ def support(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", metavar="PATHS.vtp", parser=path_of, help="Also write their paths here."
+            "--out",
+            metavar="PATHS.vtp|BODY.stl",
+            parser=path_of,
+            help="Also write their paths here, or the support as a body.",
         ),
     ] = None,
 ) -> None:
@@ -117,7 +120,8 @@ def support(
     import numpy as np
 
     from ccfem.base.checks import check_known
-    from ccfem.base.whole import check_writable
+    from ccfem.base.whole import check_writable, whole_file
+    from ccfem.body.files.surface import write_stl
     from ccfem.cli.run import layers_of, load
     from ccfem.fem.elasticity.solve import solve
     from ccfem.printing.export.vtk import write_paths
@@ -146,7 +150,11 @@ def support(
         f"{columns.contact:.5g} mm^2 of the part rest on it, it stands on "
         f"{columns.standing:.5g} mm^2 of the part"
     )
-    if out is not None:
+    if out is not None and out.suffix.lower() == ".stl":
+        with whole_file(out) as temporary:
+            write_stl(temporary, columns.mesh.points, columns.mesh.boundary[:, :3])
+        print(f"{out}: the support as a body of {len(columns.mesh.boundary)} triangles")
+    elif out is not None:
         paths = support_paths(support_stack, part.machine, layers=stack)
         write_paths(paths, out)
         print(f"{out}: {len(paths)} paths of matrix, {paths.lengths.sum() / 1000.0:.4g} m")

@@ -304,6 +304,18 @@ class Bench:
         """Name of the part, which the folder of its results has."""
         return str(self.content.get("name") or self.part_file().stem)
 
+    def other_part(self, name: str) -> str:
+        """Name of a part file that is printed beside this one, from the folder.
+
+        Raises
+        ------
+        InputError
+            Where it cannot be read, or lies elsewhere.
+        """
+        path = check_inside(self.folder / name, [self.folder])
+        check_files(text_of(path, "part file"), path.parent, [self.folder])
+        return path.relative_to(self.folder).as_posix()
+
     def check(self, text: str) -> tuple[Check | None, Said]:
         """Check a text as ``ccfem check`` does: what is known of it, and the lines to be said."""
         opened = self._there

@@ -15,7 +15,6 @@ from ccfem.cases.inspection import Check
 from ccfem.cases.part_tables import rules_of
 from ccfem.comparison.plot.symbols import spread
 from ccfem.printing.bed_layout import bed_of
-from ccfem.slicing.layers.layer import plane_frame
 
 _SNAP = np.cos(np.radians(6.0))
 """Cosine of the angle to an axis within which a dragged direction takes that axis."""
@@ -100,16 +99,6 @@ def snapped(direction: FloatArray) -> FloatArray:
     return np.asarray(unit)
 
 
-def across(axis: FloatArray, away: FloatArray) -> FloatArray:
-    """Return the unit vector (3,) across an axis along x, y or z that goes most along another."""
-    square = np.eye(3)[np.abs(axis) < 1e-6]
-    if not len(square):
-        square = plane_frame(axis.tolist())[:2]
-    along = square @ away
-    k = int(np.argmax(np.abs(along)))
-    return np.asarray(np.copysign(1.0, along[k]) * square[k])
-
-
 def upward(content: Mapping[str, Any]) -> FloatArray | None:
     """Build direction (3,) of a part file, turned as it says; None where it says nothing right."""
     try:
@@ -117,17 +106,6 @@ def upward(content: Mapping[str, Any]) -> FloatArray | None:
         return np.array(bed_of(build, content.get("bed", {}))[0])
     except InputError:  # the check says so
         return None
-
-
-def bed_under(points: FloatArray, up: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Rim (4, 2, 3) of a piece of the bed that a part stands on, and a corner (3,) of it, mm."""
-    frame = plane_frame(up.tolist())
-    low, high = (points @ frame.T).min(axis=0), (points @ frame.T).max(axis=0)
-    margin = 0.2 * float(np.max(high - low))
-    x, y = np.stack([low - margin, high + margin], axis=1)[:2]
-    plane = np.array([[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]])
-    corners = np.insert(plane, 2, low[2], axis=1) @ frame
-    return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1), corners[0]
 
 
 # Boxes that hold fibre, or none.
@@ -147,13 +125,6 @@ def boxes(content: Mapping[str, Any]) -> dict[int, FloatArray]:
             if corners.shape == (2, 3) and np.isfinite(corners).all():
                 those[k] = corners
     return those
-
-
-def box_edges(corners: FloatArray) -> FloatArray:
-    """Edges (12, 2, 3) of a box."""
-    places = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
-    pairs = [(a, b) for a in range(8) for b in range(a) if abs(places[a] - places[b]).sum() == 1]
-    return np.asarray(corners[places[np.array(pairs)], np.arange(3)])
 
 
 def stretched(corners: FloatArray, end: int, place: FloatArray, body: FloatArray) -> FloatArray:

@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -11,8 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-_STEP = re.compile(r"ccfem: (\d+) s, (\d+) %(?:, (about [^:]* left))?: (.*)")
-"""A line of progress (`ccfem.base.progress`)."""
+from ccfem.base.progress import step_of
+
 _PATIENCE = 5.0
 """Seconds in which a process that was asked to stop may put things in order."""
 _LEAST_MEMORY = 8e9
@@ -118,14 +117,13 @@ class ChildRun:
     def _follow(self) -> None:
         assert self._process.stdout is not None
         for line in self._process.stdout:
-            step = _STEP.fullmatch(line.strip())
+            step = step_of(line)
             if step is None:
                 lines = (*self.state.lines, line.rstrip())[-_KEPT:]
                 self.state = replace(self.state, lines=lines)
-                continue
-            said = f"{step[4]} ({step[3]})" if step[3] else step[4]
-            self.state = replace(self.state, share=int(step[2]) / 100.0, step=said)
-            self._changed(self.state)
+            else:
+                self.state = replace(self.state, share=step[0], step=step[1])
+                self._changed(self.state)
         code = self._process.wait()
         self.state = replace(self.state, code=code, share=1.0, step="")
         self._changed(self.state)

@@ -3,8 +3,10 @@
 import inspect
 import mimetypes
 import shlex
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +15,7 @@ from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.errors import InputError
 from ccfem.comparison.plot.colours import OUTLINE, gradient, rgb
 from ccfem.comparison.report.print_view import BESIDE, COLOURS, FILLS, KINDS, MOVES
-from ccfem.comparison.report.report_views import PrintLayer, RunResults, read_results
+from ccfem.comparison.report.report_views import PrintLayer, RunResults, read_results, read_solution
 from ccfem.comparison.request import STRATEGIES
 from ccfem.workbench.bench import Opened
 from ccfem.workbench.child_run import ChildRun, RunState
@@ -25,26 +27,26 @@ from ccfem.workbench.tab import (
     PRINT,
     STRESS,
     Field,
+    Tabbed,
     draw_lines,
     linear,
 )
 
-if TYPE_CHECKING:
-    from ccfem.workbench.page import Page
-
 _NO_ONE, _FIRST, _ALL = "none", "the first", "all at once"
+_PLAN, _BED = "G-code of the ticked strategy", "G-code of all parts in one file"
+_BODY = "Support as STL"
+Begun = tuple[list[str], str, str]
+"""What is run, where its results are, and the view that shows them."""
 _BESIDE = 1.25
 """Distance of two strategies side by side, in widths of the part."""
 _LINE = 0.6
 """Width of a drawn strand over the fibre width, so that neighbours stay apart."""
-_TAKEN = ("report.html", "results.csv", "results.json", "paths.vtp")
-_SUFFIXES = (".gcode", "_waypoints.txt", "_waypoints.csv", "_cell.csv", "_trim.csv")
 
 
 class CompareTab:
     """Runs in a process of their own, and what they found."""
 
-    def __init__(self, page: "Page") -> None:
+    def __init__(self, page: Tabbed) -> None:
         self.page, gui = page, page.server.gui
         self.run: ChildRun | None = None
         self.results: RunResults | None = None
@@ -58,10 +60,21 @@ class CompareTab:
         self.case = Field(page, case, lambda _: self.show())
         minutes = gui.add_number("Longest run, min", 120.0, min=0.1, step=10.0)
         self.minutes = Field(page, minutes)
-        self.start = gui.add_button("Compare", icon="player-play")
-        self.start.on_click(page.on(self._compare))
-        self.direct = gui.add_button("G-code of the ticked strategy", icon="printer", visible=False)
-        self.direct.on_click(page.on(lambda: self._plan(*self._ticked())))
+        self.support = Field(page, gui.add_checkbox("Print support", False), self._show_commands)
+        with gui.add_folder("With other parts on the bed", expand_by_default=False):
+            self.offered = gui.add_dropdown("Add a part", (_NO_ONE,))
+            self.offered.on_update(page.on(self._add_part, value=True))
+            self.others = Field(page, gui.add_text("Other parts", ""), self._show_commands)
+        self._begins: dict[str, Callable[[], Begun]] = {
+            "Solve": self._solve,
+            "Compare": self._compare,
+            _PLAN: lambda: self._plan(self._only()),
+            _BED: self._bed,
+            _BODY: self._support,
+        }
+        self.starts = {name: gui.add_button(name, icon="player-play") for name in self._begins}
+        for name, begin in self._begins.items():
+            self.starts[name].on_click(page.on(partial(self._begin, begin)))
         self.ending = gui.add_button("Stop", icon="player-stop", visible=False, color="red")
         self.ending.on_click(page.on(self.stop))
         self.bar = gui.add_progress_bar(0.0, visible=False)
@@ -85,9 +98,10 @@ class CompareTab:
                 field.on_update(page.on(self._show_print))
             self._layer_said = gui.add_html("")
             self.prints = gui.add_button("G-code of this strategy", icon="printer")
-            self.prints.on_click(page.on(lambda: self._plan(self.left.value)))
+            self.prints.on_click(page.on(self._begin, lambda: self._plan(self.left.value)))
         self._links = gui.add_html("")
         self._handles: list[Any] = []
+        self._more: dict[str, Path] = {}
         self.printed: list[PrintLayer] = []
 
     def _add_ticks(self, known: dict[str, Any]) -> None:
@@ -105,48 +119,88 @@ class CompareTab:
     def _ticked(self) -> list[str]:
         return [name for name, tick in self.ticks.items() if tick.value]
 
-    def _arguments(self) -> list[str]:
+    def _only(self) -> str:
+        """Return the one strategy that is ticked."""
         names = self._ticked()
-        if not names:
-            raise InputError("no strategy is ticked: tick one or more")
-        chosen = [] if set(names) == set(STRATEGIES) else ["--strategies", ",".join(names)]
-        return ["compare", self.page.bench.part_argument(), *chosen, *self._load_case()]
+        if len(names) != 1:
+            raise InputError("a plan is of one strategy: tick one alone")
+        return names[0]
 
     def _load_case(self) -> list[str]:
         if not self.case.handle.visible or self.case.value == _FIRST:
             return []
         return ["--load-case", "all" if self.case.value == _ALL else self.case.value]
 
-    def _compare(self) -> None:
-        self._begin(self._arguments())
+    # What each button runs, and the folder of its results, or the file.
 
-    def _plan(self, name: str) -> None:
-        part = self.page.bench.part_argument()
-        self._begin(["plan", part, "--strategy", name, "--gcode", *self._load_case()], f"-{name}")
+    def _solve(self) -> Begun:
+        if self.case.value == _ALL:
+            raise InputError("one load case is shown: choose one")
+        first = ["--load-case", self.case.handle.options[1]] if self.case.handle.visible else []
+        out = self._result("-solved.vtu")
+        return ["solve", self._part, "--out", out, *(self._load_case() or first)], out, STRESS
 
-    def _begin(self, arguments: list[str], suffix: str = "") -> None:
-        page = self.page
+    def _compare(self) -> Begun:
+        names = self._ticked()
+        if not names:
+            raise InputError("no strategy is ticked: tick one or more")
+        chosen = [] if set(names) == set(STRATEGIES) else ["--strategies", ",".join(names)]
+        return ["compare", self._part, *chosen, *self._load_case()], self._result(""), FIBRE
+
+    def _plan(self, name: str) -> Begun:
+        command = ["plan", self._part, "--strategy", name, "--gcode", *self._supported()]
+        return [*command, *self._load_case()], self._result(f"-{name}"), PRINT
+
+    def _bed(self) -> Begun:
+        parts = [self.page.bench.other_part(name) for name in self.others.value.split()]
+        chosen, out = ["--strategy", self._only(), *self._supported()], self._result("-bed")
+        return ["bed", self._part, *parts, *chosen, "--out", out], out, PRINT
+
+    def _support(self) -> Begun:
+        out = self._result("-support.stl")
+        return ["support", self._part, "--out", out], out, PART
+
+    @property
+    def _part(self) -> str:
+        return self.page.bench.part_argument()
+
+    def _supported(self) -> list[str]:
+        return ["--support"] if self.support.value else []
+
+    def _result(self, ending: str) -> str:
+        return f"results/{self.page.bench.name}{ending}"
+
+    def _add_part(self, name: str) -> None:
+        if name != _NO_ONE:
+            self.offered.value = _NO_ONE
+            self.others.put(f"{self.others.value} {shlex.quote(name)}".strip())
+            self._show_commands()
+
+    def _begin(self, begin: Callable[[], Begun]) -> None:
+        page, (arguments, out, view) = self.page, begin()
         if self._running:
             raise InputError("a run is going on: stop it first")
         page.say("")
         page.bench.part_file()
-        folder = page.bench.results / f"{page.bench.name}{suffix}"
-        view, part = PRINT if "--gcode" in arguments else FIBRE, page.bench.opened
+        part, text = page.bench.opened, page.bench.text
         self.run = ChildRun(
             arguments,
             page.bench.folder,
-            lambda state: page.act(self._heed, state, folder, view, part),
+            lambda state: page.act(self._heed, state, page.bench.folder / out, view, part, text),
             float(self.minutes.value),
         )
         self._tell(self.run.state)
 
-    def _heed(self, state: RunState, folder: Path, view: str, part: Opened | None) -> None:
+    def _heed(self, state: RunState, out: Path, view: str, part: Opened | None, text: str) -> None:
         self._tell(state)
         if state.written and part is not self.page.bench.opened:
-            where = folder.relative_to(self.page.bench.folder)
+            where = out.relative_to(self.page.bench.folder)
             self.page.say(f"the run of the part before has ended: its results are in {where}")
         elif state.written:
-            self.results = read_results(folder)
+            if out.suffix == ".stl":
+                self._more[out.name] = out
+            else:
+                self.results = read_solution(out, text) if out.suffix else read_results(out)
             self._show_results()
             self._show_age()
             self.page.show_view(view)
@@ -154,8 +208,8 @@ class CompareTab:
             self.page.say("" if state.stopped == "stopped" else state.complaint)
 
     def _tell(self, state: RunState) -> None:
-        self.start.visible, self.ending.visible = not state.running, state.running
-        self._show_direct()
+        self.ending.visible = state.running
+        self._show_starts()
         self.bar.visible, self.bar.value = state.running, 100.0 * state.share
         said = f"{100.0 * state.share:.0f} %: {state.step}" if state.running else state.complaint
         self._said.content = f'<p class="ccfem" role="status">{escaped(said)}</p>' if said else ""
@@ -167,7 +221,7 @@ class CompareTab:
 
     def forget(self) -> None:
         """Show no results: they are of another part."""
-        self.results = None
+        self.results, self._more = None, {}
         self._table.visible = self._found.visible = self._old.visible = False
         self._links.content = ""
         self.page.view.value = PART
@@ -187,40 +241,55 @@ class CompareTab:
         if case.options != options:
             case.options, case.visible = options, len(names) > 1
             self.case.put(case.value)
-        self._show_direct()
+        offered = (_NO_ONE, *(name for name in bench.offered() if name.endswith(".toml")))
+        if self.offered.options != offered:
+            self.offered.options = offered
         self._show_age()
-        try:
-            command = shlex.join(["ccfem", *self._arguments()])
-        except InputError:
-            command = "tick a strategy"
-        self._command.content = (
-            f'<p class="ccfem">In a terminal: <code>{escaped(command)}</code></p>'
-        )
+        self._show_commands()
 
-    def _show_direct(self) -> None:
-        self.direct.visible = not self._running and len(self._ticked()) == 1
+    def _show_commands(self, _: object = None) -> None:
+        """Show what can be run, and the commands that do the same."""
+        self._show_starts()
+        said = []
+        for name, begin in self._begins.items():
+            try:
+                command = shlex.join(["ccfem", *begin()[0]]) if self._offers(name) else ""
+            except InputError as error:
+                command = str(error)
+            said.append(f"<p>{name}: <code>{escaped(command)}</code></p>" if command else "")
+        self._command.content = f'<div class="ccfem"><h2>In a terminal</h2>{"".join(said)}</div>'
+
+    def _offers(self, name: str) -> bool:
+        only = len(self._ticked()) == 1
+        needs = {_PLAN: only, _BED: bool(self.others.value.strip()), _BODY: self.support.value}
+        return needs.get(name, True)
+
+    def _show_starts(self) -> None:
+        for name, button in self.starts.items():
+            button.visible = not self._running and self._offers(name)
 
     def _show_age(self) -> None:
         ran = None if self.results is None else self.results.part_file
         self._old.visible = ran is not None and not self.page.bench.is_of(ran)
 
     def _show_results(self) -> None:
-        assert self.results is not None
-        names, table = self.results.names, self.results.table.html("strategy")
-        self._table.content = f'<div class="ccfem wide ranked" tabindex="0">{table}</div>'
-        self._table.visible = True
         items = "".join(
             f'<li><a href="/files/{escaped(name)}" target="_blank" rel="noopener">{escaped(name)}'
             "</a></li>"
             for name in self._taken
         )
-        where = self.results.folder.relative_to(self.page.bench.folder)
+        where = self.page.bench.results.relative_to(self.page.bench.folder)
         self._links.content = (
             f'<div class="ccfem"><h2>Take away</h2><ul>{items}</ul><p>All of it is in '
             f"<code>{escaped(where)}</code>.</p></div>"
         )
-        self._found.visible = bool(names and self.results.layers)
-        if self._found.visible:
+        if self.results is None:
+            return
+        names, table = self.results.names, self.results.table
+        head = f'<div class="ccfem wide ranked" tabindex="0">{table.html("strategy")}</div>'
+        self._table.content, self._table.visible = head, bool(table.rows)
+        self._found.visible = bool(names)
+        if names:
             self.left.handle.options, self.right.handle.options = tuple(names), (_NO_ONE, *names)
             self.left.put(names[0])
             self.right.put(names[1] if names[1:] else _NO_ONE)
@@ -229,18 +298,14 @@ class CompareTab:
             self.prints.visible = not any(name.endswith(".gcode") for name in self._taken)
 
     @property
-    def _taken(self) -> list[str]:
-        """Files of the results that can be taken away, the report first."""
-        names = [] if self.results is None else self.results.record["files"]
-        taken = [name for name in names if name in _TAKEN or name.endswith(_SUFFIXES)]
-        return sorted(taken, key=lambda name: name != "report.html")
+    def _taken(self) -> dict[str, Path]:
+        """Files that can be taken away."""
+        return {**(self.results.files if self.results else {}), **self._more}
 
     def served(self, name: str) -> Served | None:
         """Serve a file of the results; None where it is none of them."""
-        if self.results is None or name not in self._taken:
-            return None
-        path = self.results.folder / name
-        if path.is_symlink() or not path.is_file():
+        path = self._taken.get(name)
+        if path is None or path.is_symlink() or not path.is_file():
             return None
         if name == "report.html":
             return Served(path.read_bytes(), "text/html; charset=utf-8")
@@ -257,6 +322,8 @@ class CompareTab:
             field.visible = view == PRINT
         if view == PART or self.results is None:
             return None
+        if view == FIBRE and not self.results.layers:
+            raise InputError("the last run has no layers of fibre to show: compare strategies")
         if view in (STRESS, MOVED):
             return self._draw_surface(view)
         if view == PRINT:

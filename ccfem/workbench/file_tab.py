@@ -1,12 +1,10 @@
 """The tab for the part file: its text, to be taken away, and other files to be opened."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ccfem.cases.reading import named_cases
 from ccfem.workbench.guard import Served, escaped
-
-if TYPE_CHECKING:
-    from ccfem.workbench.page import Page
+from ccfem.workbench.tab import Tabbed
 
 _NOTHING = "choose"
 
@@ -14,7 +12,7 @@ _NOTHING = "choose"
 class FileTab:
     """Text of the part file, and what can be opened in its place."""
 
-    def __init__(self, page: "Page") -> None:
+    def __init__(self, page: Tabbed) -> None:
         self.page, gui = page, page.server.gui
         with gui.add_folder("Open"):
             files, cases = page.bench.offered(), sorted(named_cases())

@@ -3,20 +3,16 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
-from ccfem.cases.inspection.face_choice import coplanar, like_holes
+from ccfem.cases.inspection.face_choice import coplanar, like_holes, proposed_load
 from ccfem.cases.part_editing import appended, edited, patch_of, removed, valued
-from ccfem.workbench.body_scene import across
 from ccfem.workbench.guard import escaped
-from ccfem.workbench.tab import Field
-
-if TYPE_CHECKING:
-    from ccfem.workbench.page import Page
+from ccfem.workbench.tab import Field, Tabbed
 
 _NO_FACE = "choose a face"
 _LISTED = 200
@@ -89,7 +85,7 @@ def vector_of(table: Mapping[str, Any]) -> FloatArray | None:
 class LoadsTab:
     """Chosen faces, buttons for what acts on them, and a list of what does."""
 
-    def __init__(self, page: "Page") -> None:
+    def __init__(self, page: Tabbed) -> None:
         self.page, gui = page, page.server.gui
         self._said = gui.add_html("")
         self._faces = gui.add_dropdown(
@@ -196,20 +192,14 @@ class LoadsTab:
 
     def propose(self) -> None:
         """Propose a load for faces that were just chosen, where nothing else was typed."""
-        listing = self.page.bench.listing
-        faces = [listing.face(number) for number in self.page.chosen]
-        if not faces:
+        if not self.page.chosen:
             return
-        along = faces[0].direction
-        bearing = all(face.kind == "cylinder" for face in faces)
-        if bearing:  # across its axis, away from the middle of the body
-            away = faces[0].centre - listing.points[np.unique(listing.triangles)].mean(axis=0)
-            along = across(along, away)
-        if bearing or [face.kind for face in faces] == ["plane"]:
+        kind, along = proposed_load(self.page.bench.listing, self.page.chosen)
+        if along is not None:
             x, y, z = (round(_FORCE * float(c), 2) + 0.0 for c in along)
             self.vector.propose((x, y, z))
         if self.kind.value in _BY_FACE:
-            self.kind.propose(_BY_FACE[bearing])
+            self.kind.propose(_BY_FACE[kind == "bearing"])
 
     # What acts.
 

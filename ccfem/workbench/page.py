@@ -8,23 +8,20 @@ import contextlib
 import io
 import threading
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
-from ccfem.base.errors import InputError, SolveError
+from ccfem.base.errors import InputError
 from ccfem.cases.inspection import Check
-from ccfem.cases.part_editing import Change, valued
+from ccfem.cases.part_editing import valued
 from ccfem.comparison.plot.face_meshes import borders, face_meshes
-from ccfem.comparison.plot.symbols import arrow_outside
+from ccfem.comparison.plot.symbols import arrow_outside, bed_under, box_edges
 from ccfem.workbench.bench import Bench, Said
 from ccfem.workbench.body_scene import (
     PatchPlace,
-    bed_under,
-    box_edges,
     boxes,
     patch_places,
     snapped,
@@ -37,7 +34,7 @@ from ccfem.workbench.guard import Guard, Served, escaped, limit_uploads
 from ccfem.workbench.loads_tab import LoadsTab, Name, vector_of
 from ccfem.workbench.newest import Newest
 from ccfem.workbench.print_tab import PrintTab
-from ccfem.workbench.tab import MATT, PART, VIEWS, Field, draw_arrows, draw_lines
+from ccfem.workbench.tab import MATT, PART, VIEWS, Tabbed, draw_arrows, draw_lines
 
 _FACE, _CHOSEN = (203, 210, 216), (245, 190, 65)
 _HELD, _LOADED, _BOTH = (120, 168, 214), (226, 142, 120), (170, 140, 190)
@@ -57,7 +54,7 @@ def lines_of(said: Said) -> str:
     return f"<ul>{items}</ul>" if items else ""
 
 
-class Page:
+class Page(Tabbed):
     """The page of a bench, served on this machine.
 
     Parameters
@@ -65,23 +62,12 @@ class Page:
     bench : Bench
     port : int
         0 for any that is free.
-
-    Attributes
-    ----------
-    chosen : list of int
-        Numbers of the faces that are chosen.
-    checked : Check, optional
-        What the newest check knows of the part.
-    fields : list of Field
     """
 
     def __init__(self, bench: Bench, port: int = 0) -> None:
         import viser
 
-        self.bench, self.chosen = bench, list[int]()
-        self.checked: Check | None = None
-        self.fields: list[Field] = []
-        self._acts = ThreadPoolExecutor(1, "page")
+        super().__init__(bench)
         self.guard = Guard(self._served)
         self._checked_text, self._said = "", Said()
         self._faces: dict[int, Any] = {}
@@ -109,49 +95,6 @@ class Page:
         self._acts.shutdown(wait=False, cancel_futures=True)
         with contextlib.redirect_stdout(io.StringIO()):
             self.server.stop()
-
-    def act(self, what: Callable[..., None], *arguments: Any) -> "Future[None]":
-        """Do something when all before it is done; what goes wrong is said on the page."""
-        try:
-            return self._acts.submit(self._safely, what, *arguments)
-        except RuntimeError:  # the page is closed, or the program ends
-            ended: Future[None] = Future()
-            ended.cancel()
-            return ended
-
-    def _safely(self, what: Callable[..., None], *arguments: Any) -> None:
-        try:
-            with self.server.atomic():
-                what(*arguments)
-        except (InputError, SolveError, OSError) as error:
-            self.say(str(error))
-        except Exception as error:  # one act's fault ends no other
-            self.say(f"{type(error).__name__}: {error}")
-
-    def on(
-        self, what: Callable[..., None], *arguments: Any, value: bool = False
-    ) -> Callable[[Any], Any]:
-        """Return a callback of viser that does something, with `value` to what came of a click.
-
-        It is not called for values that are set here.
-        """
-
-        async def heed(event: Any) -> None:
-            if event.client_id is not None:
-                self.act(what, *arguments, *([event.target.value] if value else []))
-
-        return heed
-
-    def say(self, text: str) -> None:
-        """Show a line at the top; an empty one takes it away."""
-        self.message.content = f'<p class="ccfem message" role="alert">{escaped(text)}</p>'
-        self.message.visible = bool(text)
-
-    def edit(self, change: Change | str, field: str = "") -> None:
-        """Change the part file, and show it."""
-        self.bench.edit(change, field)
-        self.say("")
-        self.show()
 
     def step(self, steps: int) -> None:
         """Undo or redo."""

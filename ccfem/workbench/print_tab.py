@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import partial
-from typing import TYPE_CHECKING, Any, get_args, get_type_hints
+from typing import Any, get_args, get_type_hints
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
@@ -15,10 +15,7 @@ from ccfem.machine.named_machines import machine_about, machine_names
 from ccfem.paths.plastic import Plastic
 from ccfem.printing.bed_layout import axis_and_angle
 from ccfem.workbench.guard import escaped
-from ccfem.workbench.tab import Field
-
-if TYPE_CHECKING:
-    from ccfem.workbench.page import Page
+from ccfem.workbench.tab import Field, Tabbed
 
 _STANDARD, _WRITTEN = "standard", "as the part file has it"
 _LARGE = 1e15
@@ -141,7 +138,7 @@ def _plastic_row(field: Any) -> Row:
 class PrintTab:
     """What differs from a standard print; a value that the page cannot show stays as it is."""
 
-    def __init__(self, page: "Page") -> None:
+    def __init__(self, page: Tabbed) -> None:
         self.page, gui = page, page.server.gui
         self.fields: dict[Row, Field] = {}
         rows = _rows()

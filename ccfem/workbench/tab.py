@@ -1,18 +1,99 @@
 """What the tabs of the page share: its fields, and how things are drawn."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
-from ccfem.workbench.guard import send_again
-
-if TYPE_CHECKING:
-    from ccfem.workbench.page import Page
+from ccfem.base.errors import InputError, SolveError
+from ccfem.cases.inspection import Check
+from ccfem.cases.part_editing import Change
+from ccfem.workbench.bench import Bench
+from ccfem.workbench.guard import escaped, send_again
 
 PART, STRESS, MOVED, FIBRE, PRINT = VIEWS = ("Part", "Stress", "Deformed", "Fibre", "Print")
 """What the page shows in space: the part to be set up, or what the last run says of it."""
+
+
+class Tabbed:
+    """The page, as its tabs see it: it does one thing after the other, and says what goes wrong.
+
+    Attributes
+    ----------
+    bench : Bench
+    server : viser.ViserServer
+    view, message : handles of viser
+        Which of `VIEWS` is shown, and a line at the top.
+    show, paint : callable
+        Show what the part file says, and colour the faces by what acts on them.
+    open, show_view : callable
+        Open a part; show it, or what the last run says of it, by one of `VIEWS`.
+    chosen : list of int
+        Numbers of the faces that are chosen.
+    checked : Check, optional
+        What the newest check knows of the part.
+    fields : list of Field
+    """
+
+    server: Any
+    view: Any
+    message: Any
+    show: Callable[[], None]
+    paint: Callable[[], None]
+    open: Callable[[str], None]
+    show_view: Callable[[str], None]
+
+    def __init__(self, bench: Bench) -> None:
+        self.bench, self.chosen = bench, list[int]()
+        self.checked: Check | None = None
+        self.fields: list[Field] = []
+        self._acts = ThreadPoolExecutor(1, "page")
+
+    def act(self, what: Callable[..., None], *arguments: Any) -> "Future[None]":
+        """Do something when all before it is done; what goes wrong is said on the page."""
+        try:
+            return self._acts.submit(self._safely, what, *arguments)
+        except RuntimeError:  # the page is closed, or the program ends
+            ended: Future[None] = Future()
+            ended.cancel()
+            return ended
+
+    def _safely(self, what: Callable[..., None], *arguments: Any) -> None:
+        try:
+            with self.server.atomic():
+                what(*arguments)
+        except (InputError, SolveError, OSError) as error:
+            self.say(str(error))
+        except Exception as error:  # one act's fault ends no other
+            self.say(f"{type(error).__name__}: {error}")
+
+    def on(
+        self, what: Callable[..., None], *arguments: Any, value: bool = False
+    ) -> Callable[[Any], Any]:
+        """Return a callback of viser that does something, with `value` to what came of a click.
+
+        It is not called for values that are set here.
+        """
+
+        async def heed(event: Any) -> None:
+            if event.client_id is not None:
+                self.act(what, *arguments, *([event.target.value] if value else []))
+
+        return heed
+
+    def say(self, text: str) -> None:
+        """Show a line at the top; an empty one takes it away."""
+        self.message.content = f'<p class="ccfem message" role="alert">{escaped(text)}</p>'
+        self.message.visible = bool(text)
+
+    def edit(self, change: Change | str, field: str = "") -> None:
+        """Change the part file, and show it."""
+        self.bench.edit(change, field)
+        self.say("")
+        self.show()
+
 
 _DIGITS = 6
 """Decimal places of numbers: as few as their step has would make 70.5 that is typed 705."""
@@ -29,7 +110,7 @@ class Field:
 
     Parameters
     ----------
-    page : Page
+    page : Tabbed
     handle : handle of viser
     changed : callable, optional
         Takes each value that is typed. Where it raises, the field shows what it showed before.
@@ -43,7 +124,7 @@ class Field:
     """
 
     def __init__(
-        self, page: "Page", handle: Any, changed: Callable[[Any], object] | None = None
+        self, page: Tabbed, handle: Any, changed: Callable[[Any], object] | None = None
     ) -> None:
         self.page, self.handle, self._changed = page, handle, changed
         self.value = self._shown = self._before = handle.value

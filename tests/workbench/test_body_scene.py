@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
+from ccfem.cases.inspection.face_choice import across
+from ccfem.comparison.plot.symbols import bed_under, box_edges
 from ccfem.workbench.body_scene import (
     PatchPlace,
-    across,
-    bed_under,
-    box_edges,
     boxes,
     snapped,
     stretched,

@@ -11,6 +11,7 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.face_places import BodyFaces
 from ccfem.body.mesh.face_rules import Faces, Holes
 from ccfem.body.mesh.smooth_faces import direction_text
+from ccfem.slicing.layers.layer import plane_frame
 
 _PARALLEL = np.cos(np.radians(5.0))
 """Cosine of the angle up to which planes face the same way."""
@@ -69,6 +70,29 @@ def face_rule(listing: BodyFaces, numbers: Collection[int]) -> dict[str, Any]:
 
 def _written(value: FloatArray | float | None) -> Any:
     return value if value is None or isinstance(value, float) else direction_value(value)
+
+
+def proposed_load(listing: BodyFaces, numbers: Collection[int]) -> tuple[str, FloatArray | None]:
+    """Kind and direction (3,) of the load that is the likeliest on faces.
+
+    Round walls bear a pin, across their axis and away from the middle of the body; a plane is
+    pulled along its normal. Of others no direction is known.
+    """
+    faces = [listing.face(number) for number in numbers]
+    if all(face.kind == "cylinder" for face in faces):
+        middle = listing.points[np.unique(listing.triangles)].mean(axis=0)
+        return "bearing", across(faces[0].direction, faces[0].centre - middle)
+    return "force", faces[0].direction if [face.kind for face in faces] == ["plane"] else None
+
+
+def across(axis: FloatArray, away: FloatArray) -> FloatArray:
+    """Return the unit vector (3,) across an axis along x, y or z that goes most along another."""
+    square = np.eye(3)[np.abs(axis) < 1e-6]
+    if not len(square):
+        square = plane_frame(axis.tolist())[:2]
+    along = square @ away
+    k = int(np.argmax(np.abs(along)))
+    return np.asarray(np.copysign(1.0, along[k]) * square[k])
 
 
 def direction_value(direction: FloatArray) -> Any:

@@ -1,8 +1,9 @@
-"""Where the symbols of loads and supports stand: spread over what is held, outside of the part."""
+"""Where symbols stand: of supports spread over what is held, of loads outside, the bed below."""
 
 import numpy as np
 
 from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.slicing.layers.layer import plane_frame
 
 
 def spread(points: FloatArray, count: int) -> IntArray:
@@ -52,3 +53,21 @@ def _way_out(start: FloatArray, along: FloatArray, body: FloatArray) -> float:
         far = np.einsum("ij,ij->i", c - a, turned) / scale
         met = (first >= 0.0) & (second >= 0.0) & (first + second <= 1.0) & (far > 0.0)
     return float(far[met].max(initial=0.0))
+
+
+def bed_under(points: FloatArray, up: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Rim (4, 2, 3) of a piece of the bed that a part stands on, and a corner (3,) of it, mm."""
+    frame = plane_frame(up.tolist())
+    low, high = (points @ frame.T).min(axis=0), (points @ frame.T).max(axis=0)
+    margin = 0.2 * float(np.max(high - low))
+    x, y = np.stack([low - margin, high + margin], axis=1)[:2]
+    plane = np.array([[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]])
+    corners = np.insert(plane, 2, low[2], axis=1) @ frame
+    return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1), corners[0]
+
+
+def box_edges(corners: FloatArray) -> FloatArray:
+    """Edges (12, 2, 3) of a box."""
+    places = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+    pairs = [(a, b) for a in range(8) for b in range(a) if abs(places[a] - places[b]).sum() == 1]
+    return np.asarray(corners[places[np.array(pairs)], np.arange(3)])

@@ -22,8 +22,9 @@ from ccfem.comparison.plot.colours import palette
 from ccfem.comparison.plot.part_picture import coloured, drawn_arrows, load_arrows, support_marks
 from ccfem.comparison.plot.values import image
 from ccfem.comparison.report.charts import curve_charts, fronts, spreads
+from ccfem.comparison.report.deformed_view import deformed
 from ccfem.comparison.report.layer_view import layer_views
-from ccfem.comparison.report.packing import Rounded, as_bytes, compressed, pack
+from ccfem.comparison.report.packing import Rounded, compressed, pack
 from ccfem.comparison.report.print_view import print_views
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.table import (
@@ -78,7 +79,7 @@ def bed_html(bed: BedPrint, record: Record, left_out: list[str]) -> str:
     """
     runs = bed.runs
     data: dict[str, Any] = {"part": None, "layers": {"stacks": []}, "print": {"runs": []}}
-    data["charts"] = {}
+    data |= {"charts": {}, "table": dataclasses.asdict(bed.table)}
     with spared("view of the print", left_out):
         data["print"] = print_views([bed])
     named = [replace(run, name=name) for name, run in runs.items()]
@@ -352,10 +353,6 @@ def _plotly() -> str:
 
 _FACETS = 16_000
 """Facets that are drawn; a part with more is drawn coarser."""
-_HIGH = 0.995
-"""Share of the surface's nodes whose stress lies within the scale of colours."""
-_SHOWN = 0.06
-"""Largest displacement that is drawn, over the size of the part, at the scale that is proposed."""
 
 
 def part_view(checked: Check, stress: StressField) -> dict[str, Any]:
@@ -396,22 +393,8 @@ def part_view(checked: Check, stress: StressField) -> dict[str, Any]:
     }
     if moved is not None:
         most = float(np.linalg.norm(stress.displacement, axis=1).max(initial=0.0))
-        view |= {
-            "moved": Rounded(moved[kept], max(most, 1e-300) / 2000.0),
-            "moved_size": as_bytes(np.linalg.norm(moved[kept], axis=1), most),
-            "most": most,
-            "scale": _round_scale(_SHOWN * size / most) if most > 0.0 else 1.0,
-        }
-        mises = von_mises(stress.nodal[used])
-        high = float(np.quantile(mises, _HIGH))
-        view |= {"stress": as_bytes(mises[kept], high), "most_stress": high}
+        view |= deformed(moved, most, von_mises(stress.nodal[used]), kept, size)
     return view
-
-
-def _round_scale(scale: float) -> float:
-    """Largest of 1, 2, 5 times a power of ten that is at most `scale`."""
-    power = 10.0 ** np.floor(np.log10(scale))
-    return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= scale * 1.0001))
 
 
 def _coarser(

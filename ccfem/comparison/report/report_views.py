@@ -11,12 +11,19 @@ import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.errors import InputError
+from ccfem.base.tensor import from_voigt, von_mises
+from ccfem.body.files.mesh_file import read_mesh
 from ccfem.comparison.plot.colours import LINK, rgb, scale
-from ccfem.comparison.report.packing import unpack
+from ccfem.comparison.report.deformed_view import deformed
+from ccfem.comparison.report.packing import Rounded, pack, unpack
 from ccfem.comparison.report.print_view import COLOURS
 from ccfem.comparison.table import Cell, Head, Table
+from ccfem.fem.stress_files.stress_arrays import COMPONENTS
+from ccfem.fem.stress_files.stress_file import VTK_COMPONENTS
 
 _DATA = re.compile(r'<script type="application/octet-stream" id="data">([^<]*)</script>')
+_TAKEN = ("report.html", "results.csv", "results.json", "paths.vtp", "parts.csv")
+_SUFFIXES = (".gcode", ".vtu", "_waypoints.txt", "_waypoints.csv", "_cell.csv", "_trim.csv")
 _NOT_KNOWN = 255
 """Byte of a value that is not known (`packing.as_bytes`)."""
 
@@ -123,8 +130,9 @@ class RunResults:
 
     @property
     def names(self) -> list[str]:
-        """Strategies whose paths can be shown, the best first."""
-        return [str(run["name"]) for run in self._stack["runs"]]
+        """Strategies whose paths can be shown, the best first, or else prints."""
+        runs = self._stack["runs"] or (self.views.get("print") or {}).get("runs", ())
+        return [str(run["name"]) for run in runs]
 
     @property
     def layers(self) -> list[dict[str, Any]]:
@@ -167,6 +175,12 @@ class RunResults:
         said = f"displacement, up to {most:.3g} mm, drawn {times:g} times as large"
         points = part["points"] + times * part["moved"]
         return Surface(points, triangles, np.asarray(part["moved_size"]) / 254.0, said)
+
+    @property
+    def files(self) -> dict[str, Path]:
+        """Files that can be taken away, by name, the report first."""
+        taken = [n for n in self.record["files"] if n in _TAKEN or n.endswith(_SUFFIXES)]
+        return {name: self.folder / name for name in sorted(taken, key=lambda n: n != _TAKEN[0])}
 
     def why_not(self, name: str) -> str:
         """Why the paths of a strategy cannot be printed; empty where they can."""
@@ -233,7 +247,7 @@ def _in_space(points: FloatArray, space: Any) -> FloatArray:
 
 
 def read_results(folder: Path) -> RunResults:
-    """Read the results of a comparison or a plan.
+    """Read the results of a comparison, a plan, or a print of several parts.
 
     Raises
     ------
@@ -241,9 +255,37 @@ def read_results(folder: Path) -> RunResults:
         Where the folder holds none.
     """
     try:
-        record = json.loads((folder / "results.json").read_text(encoding="utf-8"))
+        names = [name for name in ("results.json", "bed.json") if (folder / name).exists()]
+        record = json.loads((folder / (names or ["results.json"])[0]).read_text(encoding="utf-8"))
         page = (folder / "report.html").read_text(encoding="utf-8")
     except (OSError, ValueError) as error:
         raise InputError(f"{folder} holds no results that can be shown ({error})") from None
     data = _DATA.search(page)
+    record.setdefault("files", [path.name for path in sorted(folder.iterdir())])
     return RunResults(folder, record, unpack(data[1]) if data else {})
+
+
+def read_solution(file: Path, part_file: str = "") -> RunResults:
+    """Read what ``ccfem solve`` has written of one load case.
+
+    Raises
+    ------
+    InputError
+        Where the file holds no such thing.
+    """
+    import pyvista
+
+    try:
+        mesh, values = read_mesh(file), pyvista.read(file).point_data
+        used, triangles = np.unique(mesh.boundary[:, :3], return_inverse=True)
+        six = [VTK_COMPONENTS.index(component) for component in COMPONENTS]
+        mises = von_mises(from_voigt(np.asarray(values["stress"])[used][:, six]))
+        moved = np.asarray(values["displacement"])
+    except (KeyError, ValueError, IndexError) as error:
+        raise InputError(f"{file} holds no solution that can be shown ({error})") from None
+    points, most = mesh.points[used], float(np.linalg.norm(moved, axis=1).max())
+    size = float(np.linalg.norm(np.ptp(points, axis=0)))
+    part = {"points": Rounded(points, 1e-4 * size), "triangles": triangles.reshape(-1, 3)}
+    part |= deformed(moved[used], most, mises, np.arange(len(points)), size)
+    record = {"files": [file.name], "strategies": []}
+    return RunResults(file.parent, record, unpack(pack({"part": part, "part_file": part_file})))
