@@ -1,90 +1,17 @@
 """Symbols of what acts on a body, and of how it is printed, before it is meshed."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
-from ccfem.base.errors import InputError, Mistakes
-from ccfem.body.mesh.face_places import BodyFaces
-from ccfem.body.mesh.face_rules import Faces, Holes
+from ccfem.base.errors import InputError
 from ccfem.body.mesh.patches import unit_vector
-from ccfem.cases.inspection import Check
-from ccfem.cases.part_tables import rules_of
-from ccfem.comparison.plot.symbols import spread
 from ccfem.printing.bed_layout import bed_of
 
 _SNAP = np.cos(np.radians(6.0))
 """Cosine of the angle to an axis within which a dragged direction takes that axis."""
-
-
-# Patches: which faces they are, or which triangles.
-
-
-@dataclass(frozen=True)
-class PatchPlace:
-    """Where a patch lies.
-
-    Attributes
-    ----------
-    corners : (k, 3, 3) array, mm
-        Of its triangles.
-    numbers : tuple of int
-        Faces that it is made of; empty where it is none.
-    """
-
-    corners: FloatArray
-    numbers: tuple[int, ...] = ()
-
-    @property
-    def _across(self) -> FloatArray:
-        a, b, c = np.moveaxis(self.corners, 1, 0)
-        return np.asarray(0.5 * np.cross(b - a, c - a))
-
-    @property
-    def centre(self) -> FloatArray:
-        """Centre (3,) of the area, mm."""
-        areas = np.linalg.norm(self._across, axis=1)
-        return np.asarray(areas @ self.corners.mean(axis=1) / max(float(areas.sum()), 1e-300))
-
-    def marks(self, count: int, length: float) -> FloatArray:
-        """Up to some arrows (m, 2, 3), mm, of a length that point at places all over the patch."""
-        middles, normals = self.corners.mean(axis=1), self._across
-        rows = spread(middles, count)
-        sizes = np.maximum(np.linalg.norm(normals[rows], axis=1), 1e-300)
-        away = length * normals[rows] / sizes[:, None]
-        return np.stack([middles[rows] + away, middles[rows]], axis=1)
-
-
-def patch_places(
-    content: Mapping[str, Any], listing: BodyFaces, checked: Check | None
-) -> dict[str, PatchPlace]:
-    """Places of the patches of a part file, as far as they are known.
-
-    Those by rules for faces are known at once; others, and groups of a mesh file, when the part has
-    been checked.
-    """
-    places = {}
-    if checked is not None:
-        mesh = checked.case.problem.mesh
-        places = {
-            name: PatchPlace(mesh.points[facets[:, :3]])
-            for name, facets in mesh.patches.items()
-            if len(facets)
-        }
-    tables = content.get("patches")
-    for name, rule in rules_of(tables if isinstance(tables, Mapping) else {}, Mistakes()).items():
-        try:
-            numbers = rule.numbers_on(listing) if isinstance(rule, Faces | Holes) else ()
-        except InputError:  # the check says so
-            continue
-        rows = [listing.face(number).facets for number in numbers]
-        if rows:
-            corners = listing.points[listing.triangles[np.concatenate(rows)]]
-            places[name] = PatchPlace(corners, numbers)
-    return places
 
 
 # The direction of an arrow that is dragged.

@@ -152,9 +152,15 @@ class CompareTab:
         return [*command, *self._load_case()], self._result(f"-{name}"), PRINT
 
     def _bed(self) -> Begun:
-        parts = [self.page.bench.other_part(name) for name in self.others.value.split()]
+        parts = [self.page.bench.other_part(name) for name in self._others()]
         chosen, out = ["--strategy", self._only(), *self._supported()], self._result("-bed")
         return ["bed", self._part, *parts, *chosen, "--out", out], out, PRINT
+
+    def _others(self) -> list[str]:
+        try:
+            return shlex.split(self.others.value)
+        except ValueError as error:
+            raise InputError(f"other parts are names, apart by spaces; got {error}") from None
 
     def _support(self) -> Begun:
         out = self._result("-support.stl")

@@ -1,5 +1,6 @@
 """The tab for loads and supports: faces that are chosen, what may act on them, and what does."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -11,8 +12,9 @@ from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
 from ccfem.cases.inspection.face_choice import coplanar, like_holes, proposed_load
 from ccfem.cases.part_editing import appended, edited, patch_of, removed, valued
+from ccfem.workbench.bench import Said
 from ccfem.workbench.guard import escaped
-from ccfem.workbench.tab import Field, Tabbed
+from ccfem.workbench.tab import Field, Tabbed, lines_of
 
 _NO_FACE = "choose a face"
 _LISTED = 200
@@ -30,7 +32,7 @@ _FORCE = 100.0
 
 
 _SUPPORTS = {"held": "Hold", "sliding": "Roll"}
-_UNITS = {"force": ", N", "bearing": ", N", "point": ", N"}
+_UNITS = {"force": "N", "bearing": "N", "point": "N", "pressure": "MPa", "gravity": "m/s²"}
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,11 @@ class Entry:
     table: Mapping[str, Any]
 
     @property
+    def case(self) -> str:
+        """Tab that it stands in: its load case."""
+        return "Supports" if self.keys[0] == "supports" else str(self.keys[1])
+
+    @property
     def title(self) -> str:
         """One line."""
         patch = self.table.get("patch") or self.table.get("patches") or ""
@@ -57,6 +64,17 @@ class Entry:
             kind = str(self.table.get("kind", "held"))
             return f"{_SUPPORTS.get(kind, kind)}{on}"
         return f"{self.keys[1]}: {self.table.get('kind', 'load')}{on}"
+
+    @property
+    def key(self) -> str:
+        """Key of what can be typed, or dragged."""
+        by_kind = {"gravity": "acceleration", "pressure": "magnitude"}
+        return by_kind.get(str(self.table.get("kind")), "vector")
+
+    @property
+    def unit(self) -> str:
+        """Unit of that."""
+        return _UNITS.get(str(self.table.get("kind")), "")
 
     @property
     def amount(self) -> tuple[float, ...] | float | None:
@@ -75,8 +93,11 @@ Name = tuple[str, type, int]
 
 def vector_of(table: Mapping[str, Any]) -> FloatArray | None:
     """Vector of a load, (3,); None where it has none."""
+    given = table.get("vector")
+    if table.get("kind") == "gravity":
+        given = table.get("acceleration", (0.0, 0.0, -9.81))
     try:
-        vector = np.array(table.get("vector"), dtype=float)
+        vector = np.array(given, dtype=float)
     except (TypeError, ValueError):
         return None
     return vector if vector.shape == (3,) else None
@@ -104,7 +125,10 @@ class LoadsTab:
             self.case = Field(page, gui.add_text("Load case", "load"))
             gui.add_button("Add load").on_click(page.on(self._load))
         self._list = gui.add_folder("In the part", visible=False)
-        self._rows: dict[Name, tuple[Any, Field | None]] = {}
+        with self._list:
+            self._cases = gui.add_tab_group()
+        self._tabs: dict[str, Any] = {}
+        self._rows: dict[Name, tuple[Any, Field | None, Any]] = {}
 
     def entries(self) -> dict[Name, Entry]:
         """Supports and loads of the part file, as far as they read."""
@@ -242,34 +266,44 @@ class LoadsTab:
             self._drop(name)
         for place, (name, entry) in enumerate(entries.items()):
             if name not in self._rows:
-                with self._list:
+                if entry.case not in self._tabs:
+                    self._tabs[entry.case] = self._cases.add_tab(entry.case)
+                with self._tabs[entry.case]:
                     self._rows[name] = self._row(name, entry)
-            folder, field = self._rows[name]
+            folder, field, said = self._rows[name]
             folder.order = place
             if field is not None:
                 field.put(entry.amount)
+            said.content = lines_of(self._lines_about(entry))
+        for case in self._tabs.keys() - {entry.case for entry in entries.values()}:
+            self._tabs.pop(case).remove()
         self._list.visible = bool(entries)
 
+    def _lines_about(self, entry: Entry) -> Said:
+        """Lines of the check that name what an entry acts on, or its load case."""
+        named = re.escape(str(entry.table.get("patch") or entry.keys[1]))
+        return tuple(line for line in self.page.said if re.search(rf"\b{named}\b", line[1]))
+
     def _drop(self, name: Name) -> None:
-        folder, field = self._rows.pop(name)
+        folder, field, _ = self._rows.pop(name)
         folder.remove()
         if field is not None:
             self.page.fields.remove(field)
 
-    def _row(self, name: Name, entry: Entry) -> tuple[Any, Field | None]:
+    def _row(self, name: Name, entry: Entry) -> tuple[Any, Field | None, Any]:
         page, gui = self.page, self.page.server.gui
         field, folder = None, gui.add_folder(entry.title)
         with folder:
             if entry.amount is not None:
-                label, key, step, add = "Pressure, MPa", "magnitude", 0.1, gui.add_number
-                if isinstance(entry.amount, tuple):
-                    label = f"Vector{_UNITS.get(str(entry.table.get('kind')), '')}"
-                    key, step, add = "vector", 1.0, gui.add_vector3
+                several = isinstance(entry.amount, tuple)
+                add, step = (gui.add_vector3, 1.0) if several else (gui.add_number, 0.1)
+                label = ", ".join(filter(None, (entry.key.capitalize(), entry.unit)))
                 handle = add(label, entry.amount, step=step)
-                field = Field(page, handle, partial(self._change, name, key))
+                field = Field(page, handle, partial(self._change, name))
+            said = gui.add_html("")
             remove = gui.add_button("Remove", color="gray", hint=entry.title)
             remove.on_click(page.on(self._remove, name, folder))
-        return folder, field
+        return folder, field, said
 
     def _remove(self, name: Name, folder: Any) -> None:
         if name in self._rows and self._rows[name][0] is folder:  # else it was clicked twice
@@ -277,6 +311,6 @@ class LoadsTab:
             self._drop(name)
             self.page.edit(removed(keys))
 
-    def _change(self, name: Name, key: str, value: Any) -> None:
-        plain = list(value) if isinstance(value, tuple) else float(value)
-        self.page.edit(valued((*self.entry(name).keys, key), plain), f"{name} {key}")
+    def _change(self, name: Name, value: Any) -> None:
+        entry, plain = self.entry(name), list(value) if isinstance(value, tuple) else float(value)
+        self.page.edit(valued((*entry.keys, entry.key), plain), f"{name}")

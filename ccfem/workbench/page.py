@@ -16,14 +16,13 @@ import numpy as np
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
 from ccfem.cases.inspection import Check
+from ccfem.cases.inspection.patch_places import PatchPlace, patch_places
 from ccfem.cases.part_editing import valued
 from ccfem.comparison.plot.face_meshes import borders, face_meshes
-from ccfem.comparison.plot.symbols import arrow_outside, bed_under, box_edges
+from ccfem.comparison.plot.symbols import arrow_outside, bed_under, box_edges, pressing, swung
 from ccfem.workbench.bench import Bench, Said
 from ccfem.workbench.body_scene import (
-    PatchPlace,
     boxes,
-    patch_places,
     snapped,
     stretched,
     upward,
@@ -34,24 +33,21 @@ from ccfem.workbench.guard import Guard, Served, escaped, limit_uploads
 from ccfem.workbench.loads_tab import LoadsTab, Name, vector_of
 from ccfem.workbench.newest import Newest
 from ccfem.workbench.print_tab import PrintTab
-from ccfem.workbench.tab import MATT, PART, VIEWS, Tabbed, draw_arrows, draw_lines
+from ccfem.workbench.tab import MATT, PART, VIEWS, Tabbed, draw_arrows, draw_lines, lines_of
 
 _FACE, _CHOSEN = (203, 210, 216), (245, 190, 65)
 _HELD, _LOADED, _BOTH = (120, 168, 214), (226, 142, 120), (170, 140, 190)
 _EDGE, _LOAD, _SUPPORT, _BED = (70, 80, 92), (179, 38, 30), (0, 98, 155), (110, 120, 130)
+_RIM = 0.07
+"""Width of the rim of the bed over its own half."""
+Dragged = Callable[[FloatArray, FloatArray], None]
 _MARKS = 10
 """Symbols on a patch."""
 
 
-def lines_of(said: Said) -> str:
-    """HTML of what a check says, the worst first."""
-    items = "".join(
-        f'<li class="{kind.replace(" ", "-")}">'
-        + (f"<b>{kind}</b> " if kind != "known" else "")
-        + f"{escaped(line)}</li>"
-        for kind, line in said
-    )
-    return f"<ul>{items}</ul>" if items else ""
+def _closed(corners: FloatArray) -> FloatArray:
+    """Sides (k, 2, 3) of the loop of some corners."""
+    return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
 
 
 class Page(Tabbed):
@@ -69,7 +65,7 @@ class Page(Tabbed):
 
         super().__init__(bench)
         self.guard = Guard(self._served)
-        self._checked_text, self._said = "", Said()
+        self._checked_text = ""
         self._faces: dict[int, Any] = {}
         self.body: Any = None
         self._listing: Any = None
@@ -107,7 +103,7 @@ class Page(Tabbed):
         self.server.flush()
         self.bench.open(what)
         self.say("")
-        self.chosen, self.checked, self._said = [], None, ()
+        self.chosen, self.checked, self.said = [], None, ()
         for field in self.fields:
             field.typed = False
         self.compare.forget()
@@ -181,20 +177,21 @@ class Page(Tabbed):
     def _heed(self, text: str, came: tuple[Check | None, Said]) -> None:
         """Show what the check of a text said."""
         if text == self.bench.text:
-            self.checked, self._said = came
+            self.checked, self.said = came
             self._tell_lines("")
             self._draw_symbols()
+            self.loads.show()
             self.prints.show()
             for field in self.fields:
                 field.settle()
             self.drawn.set()
 
     def _tell_lines(self, doing: str) -> None:
-        bad = sum(kind not in ("known", "warning") for kind, _ in self._said)
-        warned = sum(kind == "warning" for kind, _ in self._said)
+        bad = sum(kind not in ("known", "warning") for kind, _ in self.said)
+        warned = sum(kind == "warning" for kind, _ in self.said)
         counted = [f"{bad} to mend"] * bool(bad) + [f"{warned} to look at"] * bool(warned)
         head = doing or ("Check: " + (", ".join(counted) or "nothing keeps it from being solved"))
-        body = lines_of(self._said)
+        body = lines_of(self.said)
         self.lines.content = f'<div class="ccfem check"><h2>{escaped(head)}</h2>{body}</div>'
 
     def _served(self, name: str) -> Served | None:
@@ -278,28 +275,27 @@ class Page(Tabbed):
         corners = listing.points[listing.triangles]
         for k, (called, entry) in enumerate(self.loads.entries().items()):
             place = places.get(str(entry.table.get("patch")))
+            if entry.table.get("kind") == "gravity":
+                place = PatchPlace(corners)
             if place is None:
                 continue
             name, support = f"/body/symbol_{k}", entry.keys[0] == "supports"
             force = vector_of(entry.table)
             if support or force is None:
-                marks, colour = place.marks(_MARKS, 0.035 * size), _SUPPORT if support else _LOAD
+                marks = pressing(place.corners, _MARKS, 0.035 * size)
+                colour = _SUPPORT if support else _LOAD
                 self._drawn.append(draw_arrows(scene, name, marks, colour, 0.035 * size, 0.4))
             elif np.any(force):
                 ends, presses = arrow_outside(place.centre, force, 0.22 * size, corners)
                 turned = partial(self._turn_force, called, presses)
-                said = f"{np.linalg.norm(force):.4g} N"
+                said = f"{np.linalg.norm(force):.4g} {entry.unit}"
                 self._drawn += self._arrow(name, ends, presses, place.centre, said, turned)
         bounds = np.array(self._bounds())
         for k, box in boxes(self.bench.content).items():
             self._drawn += self._box(k, box, bounds)
         up = upward(self.bench.content)
         if up is not None:
-            rim, foot = bed_under(corners.reshape(-1, 3), up)
-            self._drawn.append(draw_lines(scene, "/body/bed", rim, _BED))
-            ends = np.array([foot, foot + 0.22 * size * up])
-            lay, name = self.prints.lay, "/body/build"
-            self._drawn += self._arrow(name, ends, False, foot, "build direction", lay, _BED)
+            self._drawn += self._bed(corners.reshape(-1, 3), up, 0.22 * size)
         self.paint()
 
     def _arrow(
@@ -333,6 +329,28 @@ class Page(Tabbed):
 
         return [drawn, self._ball(name, free, 0.08 * long, colour, moved, dropped), label]
 
+    def _bed(self, points: FloatArray, up: FloatArray, long: float) -> list[Any]:
+        """Bed, to be dragged round the part by its rim, and the build direction."""
+        lay, scene, outer = self.prints.lay, self.server.scene, bed_under(points, up)
+        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        inner = outer + _RIM * (outer.mean(axis=0) - outer)
+        here, there = np.arange(4), (np.arange(4) + 1) % 4
+        sides = np.stack([here, there, here + 4, there, there + 4, here + 4], 1).reshape(-1, 3)
+        name, both = "/body/bed_rim", np.concatenate([outer, inner])
+        rim = scene.add_mesh_simple(name, both, sides, color=_BED, side="double", **MATT)
+        lines = draw_lines(scene, "/body/bed", _closed(outer), _BED)
+
+        def turned(start: FloatArray, end: FloatArray) -> FloatArray:
+            return snapped(swung(up, start - middle, end - middle))
+
+        def moved(start: FloatArray, end: FloatArray) -> None:
+            lines.points = _closed(bed_under(points, turned(start, end))).astype(np.float32)
+
+        self._drag(rim, moved, lambda start, end: lay(turned(start, end)))
+        ends = np.array([outer[0], outer[0] + long * up])
+        name, said = "/body/build", "build direction"
+        return [rim, lines, *self._arrow(name, ends, False, outer[0], said, lay, _BED)]
+
     def _ball(
         self,
         name: str,
@@ -346,19 +364,28 @@ class Page(Tabbed):
         name = f"{name}_ball"
         ball = self.server.scene.add_icosphere(name, radius, colour, position=tuple(place), **MATT)
 
-        async def drag(event: Any) -> None:
-            self.act(dragged, np.array(event.end_position), event.phase, event.client_id)
+        def put(_: FloatArray, end: FloatArray) -> None:
+            ball.position = tuple(moved(end))
 
-        def dragged(end: FloatArray, phase: str, client: int) -> None:
+        self._drag(ball, put, lambda _, end: dropped(end))
+        return ball
+
+    def _drag(self, handle: Any, moved: Dragged, dropped: Dragged) -> None:
+        """Have something dragged: where it was taken, and where it is, mm."""
+
+        async def drag(event: Any) -> None:
+            ends = np.array(event.start_position), np.array(event.end_position)
+            self.act(dragged, *ends, event.phase, event.client_id)
+
+        def dragged(start: FloatArray, end: FloatArray, phase: str, client: int) -> None:
             self._dragging = None if phase == "end" else client
             if phase == "end":
                 self._draw_symbols()
-                dropped(end)
+                dropped(start, end)
             else:
-                ball.position = tuple(moved(end))
+                moved(start, end)
 
-        ball.on_drag(drag)
-        return ball
+        handle.on_drag(drag)
 
     def _box(self, place: int, corners: FloatArray, body: FloatArray) -> list[Any]:
         """Box of a fibre region, with a ball at its lower and its upper corner."""
@@ -388,4 +415,4 @@ class Page(Tabbed):
         now = self.loads.entry(name)
         size = np.linalg.norm(now.amount or 0.0) * (-1.0 if presses else 1.0)
         vector = [round(float(x), 3) + 0.0 for x in size * along]
-        self.edit(valued((*now.keys, "vector"), vector))
+        self.edit(valued((*now.keys, now.key), vector))

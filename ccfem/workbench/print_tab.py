@@ -15,11 +15,13 @@ from ccfem.machine.named_machines import machine_about, machine_names
 from ccfem.paths.plastic import Plastic
 from ccfem.printing.bed_layout import axis_and_angle
 from ccfem.workbench.guard import escaped
-from ccfem.workbench.tab import Field, Tabbed
+from ccfem.workbench.tab import Field, Tabbed, lines_of
 
 _STANDARD, _WRITTEN = "standard", "as the part file has it"
 _LARGE = 1e15
 """Beyond what numbers can be shown digit by digit."""
+_PRINTED = ("cannot be planned", "not printable")
+"""Kinds of lines of the check that are of the print."""
 _SPARSE = ("density", "skins", "fibre_skins")
 """What a solid part has nothing of."""
 
@@ -155,6 +157,7 @@ class PrintTab:
             with gui.add_folder(title, expand_by_default=False):
                 self._add(those)
         self._said = gui.add_html("")
+        self._lines = gui.add_html("")
 
     def _add(self, rows: tuple[Row, ...]) -> None:
         for row in rows:
@@ -223,6 +226,8 @@ class PrintTab:
         kept = f"As the part file has it: {hidden}" if hidden else ""
         for handle, said in ((self._about, about), (self._fibre_said, fibre), (self._said, kept)):
             handle.content = f'<p class="ccfem">{escaped(said)}</p>' if said else ""
+        lines = tuple(line for line in self.page.said if line[0] in _PRINTED)
+        self._lines.content = f'<div class="ccfem">{lines_of(lines)}</div>'
 
     def _show(self, row: Row) -> str:
         """Show one value; what it is, in words, where its field cannot."""

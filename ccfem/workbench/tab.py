@@ -10,7 +10,7 @@ from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError, SolveError
 from ccfem.cases.inspection import Check
 from ccfem.cases.part_editing import Change
-from ccfem.workbench.bench import Bench
+from ccfem.workbench.bench import Bench, Said
 from ccfem.workbench.guard import escaped, send_again
 
 PART, STRESS, MOVED, FIBRE, PRINT = VIEWS = ("Part", "Stress", "Deformed", "Fibre", "Print")
@@ -34,6 +34,8 @@ class Tabbed:
         Numbers of the faces that are chosen.
     checked : Check, optional
         What the newest check knows of the part.
+    said : tuple of (str, str)
+        What it says: kind and line of each.
     fields : list of Field
     """
 
@@ -48,6 +50,7 @@ class Tabbed:
     def __init__(self, bench: Bench) -> None:
         self.bench, self.chosen = bench, list[int]()
         self.checked: Check | None = None
+        self.said = Said()
         self.fields: list[Field] = []
         self._acts = ThreadPoolExecutor(1, "page")
 
@@ -194,6 +197,17 @@ class Field:
         if self._doubtful and self._came == self._taken:
             self._doubtful, self._sent = False, self.handle.update_timestamp
             send_again(self.handle)
+
+
+def lines_of(said: Said) -> str:
+    """HTML of what a check says, the worst first."""
+    items = "".join(
+        f'<li class="{kind.replace(" ", "-")}">'
+        + (f"<b>{kind}</b> " if kind != "known" else "")
+        + f"{escaped(line)}</li>"
+        for kind, line in said
+    )
+    return f"<ul>{items}</ul>" if items else ""
 
 
 MATT = {"cast_shadow": False, "receive_shadow": False}

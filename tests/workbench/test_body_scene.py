@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from ccfem.cases.inspection.face_choice import across
-from ccfem.comparison.plot.symbols import bed_under, box_edges
+from ccfem.comparison.plot.symbols import bed_under, box_edges, pressing, swung
 from ccfem.workbench.body_scene import (
-    PatchPlace,
     boxes,
     snapped,
     stretched,
@@ -18,11 +17,11 @@ def square(height, normal):
     corners = np.array(
         [[[0, 0, 0], [2, 0, 0], [2, 2, 0]], [[0, 0, 0], [2, 2, 0], [0, 2, 0]]], float
     )
-    return PatchPlace((corners if normal > 0 else corners[:, ::-1]) + [0, 0, height])
+    return (corners if normal > 0 else corners[:, ::-1]) + [0, 0, height]
 
 
 def test_marks_touch_the_surface_with_their_tips():
-    marks = square(5.0, 1.0).marks(2, 1.5)
+    marks = pressing(square(5.0, 1.0), 2, 1.5)
     np.testing.assert_allclose(marks[:, 1] - marks[:, 0], [[0, 0, -1.5]] * 2)
     assert {tuple(tip) for tip in marks[:, 1].round(3)} == {(1.333, 0.667, 5), (0.667, 1.333, 5)}
 
@@ -38,13 +37,26 @@ def test_the_bed_lies_under_the_part_as_it_is_built():
     corners = np.array([[x, y, z] for x in (0.0, 10.0) for y in (0.0, 20.0) for z in (5.0, 6.0)])
     for build, height in (("z", 5.0), ("-z", -6.0), ("x", 0.0), ("-y", -20.0)):
         up = upward({"build": build})
-        rim, foot = bed_under(corners, up)
+        rim = bed_under(corners, up)
         assert rim @ up == pytest.approx(height)
-        assert any((foot == end).all() for end in rim.reshape(-1, 3))
-        assert ((corners - rim.min(axis=(0, 1))) @ (1.0 - abs(up)) > 0.0).all()
+        assert ((corners - rim.min(axis=0)) @ (1.0 - abs(up)) > 0.0).all()
     # A turn by 90 degrees about x lays y, which pointed back, upwards.
     np.testing.assert_allclose(upward({"bed": {"turn": "x=90"}}), [0, 1, 0], atol=1e-12)
     assert upward({"build": "w"}) is None
+
+
+def test_the_bed_swings_as_it_is_dragged():
+    up, below = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -30.0])
+    # From below the part to its side: what was up looks away from there.
+    np.testing.assert_allclose(swung(up, below, np.array([50.0, 0, 0])), [-1, 0, 0], atol=1e-12)
+    # About the build direction itself nothing turns; a general turn keeps length and angle.
+    here, there = np.array([10.0, 0, 0]), np.array([0.0, 5, 0])
+    np.testing.assert_allclose(swung(up, here, there), up, atol=1e-12)
+    here, there = np.array([3.0, -4, 2]), np.array([1.0, 7, 5])
+    turned = swung(up, here, there)
+    assert np.linalg.norm(turned) == pytest.approx(1.0)
+    cosine = turned @ there / np.linalg.norm(there)
+    assert cosine == pytest.approx(up @ here / np.linalg.norm(here))
 
 
 def test_a_pin_is_pulled_across_its_axis_and_away_from_the_part():

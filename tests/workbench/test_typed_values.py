@@ -1,8 +1,12 @@
 """What is typed reaches the part file, whatever is drawn, checked or undone meanwhile."""
 
 import asyncio
+import re
+import shlex
 import threading
 from contextlib import contextmanager
+from functools import partial
+from html import unescape
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +14,10 @@ import pytest
 
 from ccfem.body.files import write_mesh
 from ccfem.body.mesh.box import box_mesh
+from ccfem.cases.part_editing import removed
+from ccfem.workbench import compare_tab
 from ccfem.workbench.bench import Bench
+from ccfem.workbench.child_run import RunState
 
 HELD = """\
 mesh = "bar.npz"
@@ -136,7 +143,7 @@ def vectors(page, case):
 
 
 def row(page, title):
-    return next(field for name, (_, field) in page.loads._rows.items() if name[0] == title)
+    return next(field for name, (_, field, _) in page.loads._rows.items() if name[0] == title)
 
 
 def test_a_typed_force_survives_what_is_shown_before_it_is_added(page, visit):
@@ -326,18 +333,20 @@ def test_a_check_that_ends_leaves_what_is_dragged_alone(page, monkeypatch):
     assert page._drawn is not drawn
 
 
+def dragged(page, visit, name, to, phase, start=(0.0, 0.0, 0.0)):
+    handle = next(h for h in page._drawn if h.name == name)
+    event = SimpleNamespace(start_position=start, end_position=to, phase=phase, client_id=7)
+    asyncio.run(handle._impl.drag_cb[0].callback(event))
+    visit.settle()
+    return handle
+
+
 def test_fibre_lies_in_a_box_that_is_dragged(page, visit):
     page.act(page.prints._regions, "In a box").result()
     region = {"rule": "box", "lower": [0.0, 0.0, 0.0], "upper": [40.0, 10.0, 2.0]}
     assert page.bench.content["fibre"] == {"regions": [region]}
 
-    def drag(to, phase):
-        ball = next(h for h in page._drawn if h.name == "/body/box_0_1_ball")
-        event = SimpleNamespace(end_position=to, phase=phase, client_id=7)
-        asyncio.run(ball._impl.drag_cb[0].callback(event))
-        visit.settle()
-        return ball
-
+    drag = partial(dragged, page, visit, "/body/box_0_1_ball")
     assert drag((30.0, 10.2, 3.0), "update").position == pytest.approx((30.0, 10.0, 3.0))
     assert page.bench.content["fibre"] == {"regions": [region]}
     drag((30.0, 10.2, 3.0), "end")
@@ -346,3 +355,85 @@ def test_fibre_lies_in_a_box_that_is_dragged(page, visit):
     assert lines.max(axis=(0, 1)) == pytest.approx([30.0, 10.0, 3.0])
     page.act(page.step, -1).result()
     assert page.bench.content["fibre"] == {"regions": [region]}
+
+
+def test_the_bed_is_dragged_round_the_part_by_its_rim(page, visit):
+    drag = partial(dragged, page, visit, "/body/bed_rim", start=(20.0, 5.0, -40.0))
+    drag((80.0, 5.0, 2.0), "update")
+    assert "build" not in page.bench.content
+    (x,) = set(page.server.scene.get_handle_by_name("/body/bed").points[..., 0].ravel().tolist())
+    assert x == pytest.approx(40.0)
+    # From below the part to its right: it is built to the left, on its right end.
+    drag((80.0, 5.0, 2.0), "end")
+    assert page.bench.content["build"] == "-x"
+
+
+def test_weight_has_an_arrow_that_turns_it(page, visit):
+    page.act(page.loads.kind.put, "weight of the whole part").result()
+    page.act(page.loads.case.put, "load").result()
+    page.act(page.loads._load).result()
+    said = [h.text for h in page._drawn if h.name.endswith("_said")]
+    assert "9.81 m/s²" in said
+    name = next(h.name for h in page._drawn if getattr(h, "text", "") == "9.81 m/s²")
+    ball = name.replace("_said", "_ball")
+    # Its free end is dragged to the left of the middle of the part.
+    dragged(page, visit, ball, (-60.0, 5.0, 2.0), "end")
+    (weight,) = page.bench.content["loads"]["load"]
+    assert weight == {"kind": "gravity", "acceleration": [-9.81, 0.0, 0.0]}
+    visit.type(row(page, "load: gravity"), -1.62, 2)
+    visit.settle()
+    assert page.bench.content["loads"]["load"][0]["acceleration"] == [-9.81, 0.0, -1.62]
+
+
+def test_load_cases_are_tabs_and_lines_stand_beside_what_they_mean(page):
+    assert set(page.loads._tabs) == {"pull", "press"}
+    said = (("warning", "patch 'end' is <odd>"), ("not printable", "the part is larger"))
+    page.act(page._heed, page.bench.text, (None, said)).result()
+    beside = [html.content for _, _, html in page.loads._rows.values()]
+    assert len(beside) == 2
+    assert all("is &lt;odd&gt;" in text and "larger" not in text for text in beside)
+    assert "larger" in page.prints._lines.content
+    page.act(page.edit, removed(("loads", "press", 0))).result()
+    assert list(page.loads._tabs) == ["pull"]
+
+
+def test_each_button_runs_the_command_that_it_shows(page, visit, monkeypatch):
+    compare, ran = page.compare, []
+
+    class Run:
+        state = RunState(code=1)
+
+        def __init__(self, arguments, *more):
+            ran.append(["ccfem", *arguments])
+
+        def stop(self):
+            pass
+
+    monkeypatch.setattr(compare_tab, "ChildRun", Run)
+    for name, tick in compare.ticks.items():
+        visit.type(tick, name == "zigzag")
+    visit.type(compare.support, True)
+    (page.bench.folder / "two parts.toml").write_text(HELD)
+    page.act(compare._add_part, "two parts.toml").result()
+    page.act(compare._add_part, "bar.toml").result()
+    shown = re.findall("<p>(.*?): <code>(.*?)</code></p>", compare._command.content)
+    assert [name for name, _ in shown] == list(compare.starts)
+    for name, _ in shown:
+        visit.click(name)
+        visit.settle()
+    assert ran == [shlex.split(unescape(command)) for _, command in shown]
+    solve, comparison, plan, bed, support = ran
+    assert solve[1:] == [
+        *("solve", "bar.toml", "--out", "results/bar-solved.vtu", "--load-case", "pull")
+    ]
+    assert comparison[1:] == ["compare", "bar.toml", "--strategies", "zigzag"]
+    assert plan[1:] == ["plan", "bar.toml", "--strategy", "zigzag", "--gcode", "--support"]
+    assert bed[1:5] == ["bed", "bar.toml", "two parts.toml", "bar.toml"]
+    assert bed[5:] == ["--strategy", "zigzag", "--support", "--out", "results/bar-bed"]
+    assert support[1:] == ["support", "bar.toml", "--out", "results/bar-support.stl"]
+    # Nothing outside the folder is printed beside it.
+    visit.type(compare.others, "../else.toml")
+    visit.click("G-code of all parts in one file")
+    visit.settle()
+    assert "../else.toml" in page.message.content
+    assert len(ran) == 5

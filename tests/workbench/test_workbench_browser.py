@@ -129,7 +129,7 @@ def test_from_a_body_to_a_part_file_by_clicks_alone(work):
     del wanted["title"]
     assert tomllib.loads(bench.text) == wanted
     wait(view, lambda: work.page.drawn.is_set() and work.page.checked)
-    assert not [line for kind, line in work.page._said if kind == "mistake"]
+    assert not [line for kind, line in work.page.said if kind == "mistake"]
     assert tab.evaluate(NAMELESS) == 0
 
 

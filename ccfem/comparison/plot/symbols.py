@@ -16,6 +16,16 @@ def spread(points: FloatArray, count: int) -> IntArray:
     return np.array(chosen, dtype=np.int64)
 
 
+def pressing(corners: FloatArray, count: int, length: float) -> FloatArray:
+    """Up to some arrows (m, 2, 3), mm, of a length, onto places all over triangles (k, 3, 3)."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    rows = spread(corners.mean(axis=1), count)
+    normals = np.cross(b - a, c - a)[rows]
+    sizes = np.maximum(np.linalg.norm(normals, axis=1), 1e-300)
+    middles = corners[rows].mean(axis=1)
+    return np.stack([middles + length * normals / sizes[:, None], middles], axis=1)
+
+
 def arrow_outside(
     place: FloatArray, force: FloatArray, length: float, body: FloatArray
 ) -> tuple[FloatArray, bool]:
@@ -55,15 +65,29 @@ def _way_out(start: FloatArray, along: FloatArray, body: FloatArray) -> float:
     return float(far[met].max(initial=0.0))
 
 
-def bed_under(points: FloatArray, up: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Rim (4, 2, 3) of a piece of the bed that a part stands on, and a corner (3,) of it, mm."""
+def bed_under(points: FloatArray, up: FloatArray) -> FloatArray:
+    """Corners (4, 3) of a piece of the bed that a part stands on, mm."""
     frame = plane_frame(up.tolist())
     low, high = (points @ frame.T).min(axis=0), (points @ frame.T).max(axis=0)
     margin = 0.2 * float(np.max(high - low))
     x, y = np.stack([low - margin, high + margin], axis=1)[:2]
     plane = np.array([[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]])
-    corners = np.insert(plane, 2, low[2], axis=1) @ frame
-    return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1), corners[0]
+    return np.asarray(np.insert(plane, 2, low[2], axis=1) @ frame)
+
+
+def swung(up: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    """Direction (3,) that another one gets where the shortest turn takes a place to a direction.
+
+    Parameters
+    ----------
+    up : (3,) array
+    start, end : (3,) array, mm
+        From the middle about which is turned; not opposite.
+    """
+    start, end = (v / max(float(np.linalg.norm(v)), 1e-300) for v in (start, end))
+    axis, cosine = np.cross(start, end), float(start @ end)
+    turned = np.cross(axis, up)
+    return np.asarray(up + turned + np.cross(axis, turned) / max(1.0 + cosine, 1e-9))
 
 
 def box_edges(corners: FloatArray) -> FloatArray:

@@ -1,0 +1,70 @@
+"""Where the patches of a part file lie, as far as that is known before it is meshed."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ccfem.base.arrays import FloatArray
+from ccfem.base.errors import InputError, Mistakes
+from ccfem.body.mesh.face_places import BodyFaces
+from ccfem.body.mesh.face_rules import Faces, Holes
+from ccfem.cases.inspection.part_check import Check
+from ccfem.cases.part_tables import rules_of
+
+
+@dataclass(frozen=True)
+class PatchPlace:
+    """Where a patch lies.
+
+    Attributes
+    ----------
+    corners : (k, 3, 3) array, mm
+        Of its triangles.
+    numbers : tuple of int
+        Faces that it is made of; empty where it is none.
+    """
+
+    corners: FloatArray
+    numbers: tuple[int, ...] = ()
+
+    @property
+    def _across(self) -> FloatArray:
+        a, b, c = np.moveaxis(self.corners, 1, 0)
+        return np.asarray(0.5 * np.cross(b - a, c - a))
+
+    @property
+    def centre(self) -> FloatArray:
+        """Centre (3,) of the area, mm."""
+        areas = np.linalg.norm(self._across, axis=1)
+        return np.asarray(areas @ self.corners.mean(axis=1) / max(float(areas.sum()), 1e-300))
+
+
+def patch_places(
+    content: Mapping[str, Any], listing: BodyFaces, checked: Check | None
+) -> dict[str, PatchPlace]:
+    """Places of the patches of a part file, as far as they are known.
+
+    Those by rules for faces are known at once; others, and groups of a mesh file, when the part has
+    been checked.
+    """
+    places = {}
+    if checked is not None:
+        mesh = checked.case.problem.mesh
+        places = {
+            name: PatchPlace(mesh.points[facets[:, :3]])
+            for name, facets in mesh.patches.items()
+            if len(facets)
+        }
+    tables = content.get("patches")
+    for name, rule in rules_of(tables if isinstance(tables, Mapping) else {}, Mistakes()).items():
+        try:
+            numbers = rule.numbers_on(listing) if isinstance(rule, Faces | Holes) else ()
+        except InputError:  # the check says so
+            continue
+        rows = [listing.face(number).facets for number in numbers]
+        if rows:
+            corners = listing.points[listing.triangles[np.concatenate(rows)]]
+            places[name] = PatchPlace(corners, numbers)
+    return places
