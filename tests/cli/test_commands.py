@@ -9,6 +9,7 @@ import sys
 
 import numpy as np
 import pytest
+import pyvista
 
 from ccfem import __version__
 from ccfem.base.errors import InputError
@@ -548,3 +549,40 @@ def test_help_names_the_limits_that_hold():
     tested, layers = (kind.__metadata__[0].help for kind in (options.TestOrNot, options.EveryLayer))
     assert f"up to {request.LONGEST_TEST / 1e6:g} km" in tested
     assert f"on {stages._MOST_LAYERS}, evenly" in layers
+
+
+LEANING = """\
+material = "pla"
+build = "y"
+layers = 2
+[planform]
+outline = [[0, 0], [10, 0], [10, 20], [30, 20], [30, 30], [0, 30]]
+height = 8.0
+edge_length = 5.0
+[patches.low]
+rule = "plane"
+normal = "y"
+offset = "min"
+[patches.high]
+rule = "plane"
+normal = "y"
+offset = "max"
+[[supports]]
+patch = "low"
+[[loads.press]]
+kind = "force"
+patch = "high"
+vector = [0, -10, 0]
+"""
+
+
+def test_support_is_written_as_a_body(ccfem, folder):
+    """Below an arm of 20 x 8 mm, 20 mm above the bed."""
+    (folder / "leaning.toml").write_text(LEANING)
+    code, out, err = ccfem("support", "leaning.toml", "--out", "under.stl")
+    assert (code, err) == (0, "")
+    body = pyvista.read(folder / "under.stl")
+    assert body.is_manifold
+    assert body.volume == pytest.approx(20.0 * 8.0 * 20.0, rel=1e-6)
+    np.testing.assert_allclose(np.reshape(body.bounds, (3, 2)), [[10, 30], [0, 20], [0, 8]])
+    assert "under.stl: the support as a body of " in out

@@ -13,6 +13,7 @@ from ccfem.base.errors import InputError
 from ccfem.base.tensor import to_voigt
 from ccfem.body.mesh import TetMesh, box_mesh
 from ccfem.cases.part_file import read_part
+from ccfem.comparison.report.report_views import read_solution
 from ccfem.fem.elasticity import solve
 from ccfem.fem.stress_files import read_stress
 from ccfem.printing.export.vtu_result import result_path
@@ -30,6 +31,23 @@ def test_solve_writes_and_prints_each_load_case(ccfem, tmp_path):
     assert "support support: (-1000," in out
     assert "linear cells; error" in out
     assert "in energy norm" in out
+    # As a page shows it: the surface, and shares of the largest values.
+    shown = read_solution(tmp_path / "bar.vtu", "title = 'x'")
+    size = np.linalg.norm(grid.point_data["displacement"], axis=1)
+    moved, stress = shown.surface("moved"), shown.surface("stress")
+    assert moved.said.startswith(f"displacement, up to {size.max():.3g} mm")
+    far = np.linalg.norm(grid.points[:, None] - stress.points, axis=2)
+    near = far.argmin(axis=0)
+    np.testing.assert_allclose(moved.share, size[near] / size.max(), atol=0.5 / 254.0 + 1e-9)
+    assert far.min(axis=0).max() < 0.01
+    a, b, c = np.moveaxis(stress.points[stress.triangles], 1, 0)
+    volume = np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0
+    assert volume == pytest.approx(grid.volume, rel=1e-3)
+    assert list(shown.files) == ["bar.vtu"]
+    assert (shown.names, shown.layers, shown.part_file) == ([], [], "title = 'x'")
+    (tmp_path / "odd.vtu").write_text("odd")
+    with pytest.raises(InputError, match=r"odd\.vtu"):
+        read_solution(tmp_path / "odd.vtu")
     code, _, err = ccfem("solve", "bar", "-o", "bar.vtk")
     assert code == 2
     assert "end it in .vtu" in err
