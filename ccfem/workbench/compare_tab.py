@@ -105,10 +105,13 @@ class CompareTab:
         self.printed: list[PrintLayer] = []
 
     def _add_ticks(self, known: dict[str, Any]) -> None:
+        gui, lines = self.page.server.gui, []
         for name, strategy in known.items():
             about = (inspect.getdoc(strategy) or "").split("\n")[0]
-            tick = self.page.server.gui.add_checkbox(name, name in STRATEGIES, hint=about)
+            tick = gui.add_checkbox(name, name in STRATEGIES, hint=about)
             self.ticks[name] = Field(self.page, tick, lambda _: self.show())
+            lines.append(f"<li><b>{name}</b> {escaped(about)}</li>")
+        gui.add_html(f'<ul class="ccfem small">{"".join(lines)}</ul>')
 
     # Running.
 
@@ -207,6 +210,9 @@ class CompareTab:
                 self._more[out.name] = out
             else:
                 self.results = read_solution(out, text) if out.suffix else read_results(out)
+            if out.suffix:  # what it found stands in no report
+                said = escaped("\n".join(state.lines))
+                self._said.content = f'<pre class="ccfem" tabindex="0">{said}</pre>'
             self._show_results()
             self._show_age()
             self.page.show_view(view)

@@ -38,7 +38,7 @@ from ccfem.workbench.tab import MATT, PART, VIEWS, Tabbed, draw_arrows, draw_lin
 _FACE, _CHOSEN = (203, 210, 216), (245, 190, 65)
 _HELD, _LOADED, _BOTH = (120, 168, 214), (226, 142, 120), (170, 140, 190)
 _EDGE, _LOAD, _SUPPORT, _BED = (70, 80, 92), (179, 38, 30), (0, 98, 155), (110, 120, 130)
-_RIM = 0.07
+_RIM = 0.05
 """Width of the rim of the bed over its own half."""
 Dragged = Callable[[FloatArray, FloatArray], None]
 _MARKS = 10

@@ -143,3 +143,27 @@ def test_from_a_file_to_its_gcode(visit, file):
     assert page.view.value == "Print"
     visit.tab.get_by_role("link", name=gcode.name).wait_for(timeout=10_000)
     assert visit.count <= 20
+
+
+@pytest.mark.skipif(
+    not os.environ.get("CCFEM_SLOW"), reason="takes a minute: set CCFEM_SLOW=1 to run it"
+)
+def test_three_parts_are_printed_together(visit):
+    """The last of them, with both others beside it, as they were set up above."""
+    page = visit.page
+    visit.go_to("Compare")
+    visit.tab.get_by_text("With other parts on the bed").click()
+    for name in ("results/l_bracket.toml", "results/crane_hook.toml"):
+        visit.choose("Add a part", name)
+    command = "ccfem bed results/brake_lever.toml results/l_bracket.toml results/crane_hook.toml"
+    visit.tab.get_by_text(command).wait_for(timeout=10_000)
+    visit.press("G-code of all parts in one file")
+    assert page.compare.run.wait(240).written, page.compare.run.state
+    visit.settle()
+    assert page.view.value == "Print"
+    assert page.compare.results.names == ["bed"]
+    with visit.tab.expect_download() as download:
+        visit.tab.get_by_role("link", name="bed.gcode").click()
+    assert "T1" in download.value.path().read_text()
+    for name in ("brake_lever", "l_bracket", "crane_hook"):
+        visit.tab.get_by_role("row", name=name).wait_for(timeout=10_000)
