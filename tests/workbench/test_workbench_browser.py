@@ -186,6 +186,29 @@ def test_an_arrow_is_dragged_and_undone(work):
     view.button("Undo")
 
 
+def test_the_bed_is_dragged_round_the_part(work):
+    view, bench, before = work.first, work.bench, work.bench.text
+    rim = next(handle for handle in work.page._drawn if handle.name == "/body/bed_rim")
+    corners = np.asarray(rim.vertices)
+    # Its front side, between the outer and the inner edge.
+    sides = 0.25 * (
+        corners[:4] + np.roll(corners[:4], -1, 0) + corners[4:] + np.roll(corners[4:], -1, 0)
+    )
+    camera = np.asarray(next(iter(work.page.server.get_clients().values())).camera.position)
+    start = min(sides, key=lambda place: np.linalg.norm(place - camera))
+    at, to = pixel(view, start), pixel(view, start + np.array([0.0, 0.0, 60.0]))
+    view.tab.mouse.move(*at)
+    view.tab.wait_for_timeout(200)
+    view.tab.mouse.down()
+    view.tab.mouse.move(0.5 * (at[0] + to[0]), 0.5 * (at[1] + to[1]), steps=3)
+    view.tab.mouse.move(*to, steps=3)
+    view.tab.wait_for_timeout(200)
+    view.tab.mouse.up()
+    wait(view, lambda: "build" in bench.content, 10)
+    view.button("Undo")
+    assert bench.text == before
+
+
 def alive(group):
     try:
         os.killpg(group, 0)
@@ -286,6 +309,14 @@ def test_the_same_by_hand_is_the_same_byte_for_byte(work):
         assert by_page == (folder / "by_hand" / name).read_bytes(), name
 
 
+DROP = """(bytes) => {
+    const dataTransfer = new DataTransfer();
+    dataTransfer.items.add(new File([new Uint8Array(bytes)], "dropped.stl"));
+    for (const kind of ["dragover", "drop"]) document.querySelector("canvas").dispatchEvent(
+        new DragEvent(kind, { dataTransfer, bubbles: true, cancelable: true }));
+}"""
+
+
 def bar_file(folder):
     return (folder / "bar.stl").read_bytes()
 
@@ -307,6 +338,11 @@ def test_two_visits_see_one_part_and_texts_of_files_are_texts(work):
     first.tab.locator('input[type="file"]').set_input_files(files=[upload])
     first.tab.get_by_role("heading", name="up", exact=True).wait_for(timeout=10_000)
     assert (work.bench.results / "uploads/up.stl").exists()
+    # So is one that is dropped on the page, whatever tab is shown.
+    first.choose_tab("Loads")
+    first.tab.evaluate(DROP, list(bar_file(work.bench.folder)))
+    first.tab.get_by_role("heading", name="dropped", exact=True).wait_for(timeout=10_000)
+    first.choose_tab("Part file")
     work.page.act(work.page.open, "hand.toml").result()
     # A file that is no body is one line, and changes nothing.
     (work.bench.folder / "wrong.stl").write_text("no body")
