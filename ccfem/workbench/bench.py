@@ -325,8 +325,10 @@ class Bench:
             checked = check(case)
         except InputError as error:
             return None, tuple(("mistake", line) for line in error.mistakes)
-        except (SolveError, ArithmeticError, MemoryError) as error:
+        except SolveError as error:
             return None, (("mistake", str(error)),)
+        except Exception as error:  # a check that fails ends no other
+            return None, (("mistake", f"{type(error).__name__}: {error}"),)
         lines = checked.faults | {"warning": checked.warnings, "known": checked.facts}
         return checked, tuple((kind, line) for kind, those in lines.items() for line in those)
 

@@ -9,6 +9,7 @@ import pytest
 from ccfem.base.errors import InputError
 from ccfem.body.files import write_mesh
 from ccfem.body.files.surface import write_stl
+from ccfem.body.isolated.process import ChildError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.part_editing import appended, check_files, edited, patch_of, valued
 from ccfem.cases.part_file import read_part
@@ -242,3 +243,23 @@ def test_a_body_in_metres_is_opened_in_millimetres(bench):
     corners = bench.listing.points[bench.listing.triangles]
     volume = np.einsum("ij,ij->", np.cross(corners[:, 0], corners[:, 1]), corners[:, 2]) / 6.0
     assert volume == pytest.approx(60.0 * 20.0 * 4.0)  # outward, as they are drawn
+
+
+def test_a_body_that_crashes_the_mesher_is_one_line(tmp_path, monkeypatch):
+    mesh = box_mesh((60.0, 20.0, 4.0), (1, 1, 1))
+    write_stl(tmp_path / "bar.stl", mesh.points, mesh.boundary)
+    bench = Bench(tmp_path)
+    bench.open("bar.stl")
+    set_up(bench)
+
+    def crash(*_, **__):
+        raise ChildError("the library crashed (SIGSEGV)")
+
+    monkeypatch.setattr("ccfem.body.meshing.volume.in_own_process", crash)
+    checked, ((kind, line),) = bench.check(bench.text)
+    assert (checked, kind) == (None, "mistake")
+    assert "the library crashed (SIGSEGV)" in line
+    assert "\n" not in line
+    # Whatever else goes wrong in a check is one line, too, and ends nothing.
+    monkeypatch.setattr("ccfem.workbench.bench.part_case", {}.__getitem__)
+    assert bench.check(bench.text)[1][0][1].startswith("TypeError: ")

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import tomllib
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -351,6 +352,20 @@ def test_two_visits_see_one_part_and_texts_of_files_are_texts(work):
     first.tab.get_by_role("option", name="wrong.stl", exact=True).click()
     first.tab.get_by_role("alert").filter(has_text="wrong.stl").wait_for(timeout=10_000)
     assert work.bench.text == BY_HAND
+
+
+def test_nothing_serious_is_found_by_axe(work):
+    """On every tab: critical or serious findings of axe-core, which brings its own script."""
+    axe = pytest.importorskip("axe_playwright_python", reason="axe-playwright-python is missing")
+    script = Path(axe.__file__).with_name("axe.min.js").read_text(encoding="utf-8")
+    view = work.first
+    view.tab.evaluate(f"{script};0")
+    for name in ("Loads", "Print", "Compare", "Part file"):
+        view.choose_tab(name)
+        found = view.tab.evaluate("axe.run().then((it) => it.violations)")
+        grave = [it for it in found if it["impact"] in ("serious", "critical")]
+        assert not grave, (name, grave)
+        assert found  # it has looked: there are findings that do not count
 
 
 def test_no_request_left_the_machine_and_nothing_went_wrong(work):
