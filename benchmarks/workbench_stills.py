@@ -17,6 +17,14 @@ from ccfem.workbench.page import Page
 
 FOLDER = Path(__file__).parent.parent / "docs" / "pictures" / "workbench"
 
+_WITH_GPU = """
+const get = WebGL2RenderingContext.prototype.getExtension;
+WebGL2RenderingContext.prototype.getExtension = function (name) {
+  return name === "WEBGL_debug_renderer_info" ? null : get.call(this, name);
+};
+"""
+"""Lets the page draw as where there is a GPU: with smooth edges."""
+
 
 def main(folder: Path = FOLDER) -> None:
     """Write the stills into a folder."""
@@ -30,8 +38,9 @@ def main(folder: Path = FOLDER) -> None:
         page = Page(bench)
         browser = launched(program)
         tab = browser.new_page(viewport={"width": 1180, "height": 760})
+        tab.add_init_script(_WITH_GPU)
         tab.goto(page.link)
-        tab.get_by_role("button", name="Close").click(timeout=60_000)
+        tab.get_by_role("heading", name="Check").wait_for(timeout=60_000)
 
         def still(name: str) -> None:
             tab.wait_for_timeout(500)
@@ -67,6 +76,7 @@ def main(folder: Path = FOLDER) -> None:
         tab.wait_for_timeout(500)
         assert page.compare.run is not None
         page.compare.run.wait()
+        tab.get_by_role("slider", name="Layer", exact=True).scroll_into_view_if_needed()
         still("fibre")
         page.act(page.show_view, "Deformed")
         still("deformed")

@@ -79,7 +79,6 @@ class CompareTab:
         self.ending.on_click(page.on(self.stop))
         self.bar = gui.add_progress_bar(0.0, visible=False)
         self._said = gui.add_html("")
-        self._command = gui.add_html("")
         old = "<p class='ccfem'><b>These results are of the part before it was changed.</b></p>"
         self._old = gui.add_html(old, visible=False)
         self._table = gui.add_html("", visible=False)
@@ -99,7 +98,7 @@ class CompareTab:
             self._layer_said = gui.add_html("")
             self.prints = gui.add_button("G-code of this strategy", icon="printer")
             self.prints.on_click(page.on(self._begin, lambda: self._plan(self.left.value)))
-        self._links = gui.add_html("")
+        self._links, self._command = gui.add_html(""), gui.add_html("")
         self._handles: list[Any] = []
         self._more: dict[str, Path] = {}
         self.printed: list[PrintLayer] = []
@@ -111,7 +110,8 @@ class CompareTab:
             tick = gui.add_checkbox(name, name in STRATEGIES, hint=about)
             self.ticks[name] = Field(self.page, tick, lambda _: self.show())
             lines.append(f"<li><b>{name}</b> {escaped(about)}</li>")
-        gui.add_html(f'<ul class="ccfem small">{"".join(lines)}</ul>')
+        said = f"<summary>What they do</summary><ul>{''.join(lines)}</ul>"
+        gui.add_html(f'<details class="ccfem">{said}</details>')
 
     # Running.
 
