@@ -80,7 +80,7 @@ def proposed_load(listing: BodyFaces, numbers: Collection[int]) -> tuple[str, Fl
     """
     faces = [listing.face(number) for number in numbers]
     if all(face.kind == "cylinder" for face in faces):
-        middle = listing.points[np.unique(listing.triangles)].mean(axis=0)
+        middle = 0.5 * (listing.points.min(axis=0) + listing.points.max(axis=0))
         return "bearing", across(faces[0].direction, faces[0].centre - middle)
     return "force", faces[0].direction if [face.kind for face in faces] == ["plane"] else None
 
