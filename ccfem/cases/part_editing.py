@@ -8,6 +8,7 @@ import copy
 import re
 import tomllib
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from os.path import relpath
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,43 @@ Change = Callable[[Any], None]
 
 _HEAVY = re.compile(r">\s*([^<>]+?):/")
 """File of the numbers of an XDMF mesh, in front of their place in it."""
+
+
+@dataclass(frozen=True)
+class History:
+    """Texts of a part file, one after the other, and which of them is shown.
+
+    Attributes
+    ----------
+    texts : tuple of str
+        At least one.
+    place : int
+        Of the text that is shown.
+    field : str
+        Field whose value was changed last: to change it again is the same step.
+    """
+
+    texts: tuple[str, ...]
+    place: int = 0
+    field: str = ""
+
+    @property
+    def text(self) -> str:
+        """The text that is shown."""
+        return self.texts[self.place]
+
+    def after(self, text: str, field: str = "") -> "History":
+        """Add a text; what was undone is forgotten."""
+        if text == self.text:
+            return self
+        again = bool(field) and field == self.field and self.place > 0
+        kept = self.texts[: self.place + (0 if again else 1)]
+        return History((*kept, text), len(kept), field)
+
+    def moved(self, steps: int) -> "History":
+        """Go back by a number below 0, or forth again."""
+        place = min(max(self.place + steps, 0), len(self.texts) - 1)
+        return replace(self, place=place, field="")
 
 
 def content_of(text: str) -> dict[str, Any]:

@@ -5,10 +5,11 @@ Nothing is read outside the folder where the workbench was started, and nothing 
 """
 
 import functools
+import itertools
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from ccfem.cases.inspection import Check, check
 from ccfem.cases.inspection.beginning import empty_part, faces_in_mm
 from ccfem.cases.part_editing import (
     Change,
+    History,
     check_body,
     check_files,
     check_inside,
@@ -43,43 +45,6 @@ UPLOADS = "uploads"
 """Folder in ``results/`` for files that were uploaded."""
 _LISTED = 100
 """Files that are offered."""
-
-
-@dataclass(frozen=True)
-class History:
-    """Texts of a part file, one after the other, and which of them is shown.
-
-    Attributes
-    ----------
-    texts : tuple of str
-        At least one.
-    place : int
-        Of the text that is shown.
-    field : str
-        Field whose value was changed last: to change it again is the same step.
-    """
-
-    texts: tuple[str, ...]
-    place: int = 0
-    field: str = ""
-
-    @property
-    def text(self) -> str:
-        """The text that is shown."""
-        return self.texts[self.place]
-
-    def after(self, text: str, field: str = "") -> "History":
-        """Add a text; what was undone is forgotten."""
-        if text == self.text:
-            return self
-        again = bool(field) and field == self.field and self.place > 0
-        kept = self.texts[: self.place + (0 if again else 1)]
-        return History((*kept, text), len(kept), field)
-
-    def moved(self, steps: int) -> "History":
-        """Go back by a number below 0, or forth again."""
-        place = min(max(self.place + steps, 0), len(self.texts) - 1)
-        return replace(self, place=place, field="")
 
 
 Said = tuple[tuple[str, str], ...]
@@ -264,13 +229,13 @@ class Bench:
 
     def _free(self, place: Path, content: bytes) -> Path:
         """Return a place in ``results``, or that with a number, where nothing else is replaced."""
-        count, path = 1, place
-        while True:
-            mine = self.opened is not None and path == self.opened.file
-            if mine or not path.exists() or path.read_bytes() == content:
-                return path
-            count += 1
-            path = place.with_stem(f"{place.stem}-{count}")
+        mine = None if self.opened is None else self.opened.file
+        places = (place.with_stem(f"{place.stem}-{count}") for count in itertools.count(2))
+        return next(
+            path
+            for path in itertools.chain([place], places)
+            if path == mine or not path.exists() or path.read_bytes() == content
+        )
 
     def _write(self, path: Path, content: bytes) -> None:
         """Write a file in ``results``."""
@@ -297,7 +262,15 @@ class Bench:
 
     def part_argument(self) -> str:
         """Name of that file from the folder, as a command takes it."""
-        return self.part_file().relative_to(self.folder).as_posix()
+        return self._argument(self.part_file())
+
+    def _argument(self, path: Path) -> str:
+        name = path.relative_to(self.folder).as_posix()
+        return f"./{name}" if name.startswith("-") else name
+
+    def result(self, ending: str) -> str:
+        """Name of a file or a folder of results, as a command takes it: in ``results`` alone."""
+        return self._argument(check_inside(self.results / f"{self.name}{ending}", [self.results]))
 
     @property
     def name(self) -> str:
@@ -314,7 +287,7 @@ class Bench:
         """
         path = check_inside(self.folder / name, [self.folder])
         check_files(text_of(path, "part file"), path.parent, [self.folder])
-        return path.relative_to(self.folder).as_posix()
+        return self._argument(path)
 
     def check(self, text: str) -> tuple[Check | None, Said]:
         """Check a text as ``ccfem check`` does: what is known of it, and the lines to be said."""

@@ -35,8 +35,8 @@ from ccfem.workbench.tab import (
 _NO_ONE, _FIRST, _ALL = "none", "the first", "all at once"
 _PLAN, _BED = "G-code of the ticked strategy", "G-code of all parts in one file"
 _BODY = "Support as STL"
-Begun = tuple[list[str], str, str]
-"""What is run, where its results are, and the view that shows them."""
+Begun = tuple[str, list[str], str, str]
+"""What is run: a command, its options, the end of the name of its results, the view of them."""
 _BESIDE = 1.25
 """Distance of two strategies side by side, in widths of the part."""
 _LINE = 0.6
@@ -134,50 +134,44 @@ class CompareTab:
             return []
         return ["--load-case", "all" if self.case.value == _ALL else self.case.value]
 
-    # What each button runs, and the folder of its results, or the file.
+    # What each button runs.
 
     def _solve(self) -> Begun:
         if self.case.value == _ALL:
             raise InputError("one load case is shown: choose one")
         first = ["--load-case", self.case.handle.options[1]] if self.case.handle.visible else []
-        out = self._result("-solved.vtu")
-        return ["solve", self._part, "--out", out, *(self._load_case() or first)], out, STRESS
+        return "solve", self._load_case() or first, "-solved.vtu", STRESS
 
     def _compare(self) -> Begun:
         names = self._ticked()
         if not names:
             raise InputError("no strategy is ticked: tick one or more")
         chosen = [] if set(names) == set(STRATEGIES) else ["--strategies", ",".join(names)]
-        return ["compare", self._part, *chosen, *self._load_case()], self._result(""), FIBRE
+        return "compare", [*chosen, *self._load_case()], "", FIBRE
 
     def _plan(self, name: str) -> Begun:
-        command = ["plan", self._part, "--strategy", name, "--gcode", *self._supported()]
-        return [*command, *self._load_case()], self._result(f"-{name}"), PRINT
+        options = ["--strategy", name, "--gcode", *self._supported(), *self._load_case()]
+        return "plan", options, f"-{name}", PRINT
 
     def _bed(self) -> Begun:
-        parts = [self.page.bench.other_part(name) for name in self._others()]
-        chosen, out = ["--strategy", self._only(), *self._supported()], self._result("-bed")
-        return ["bed", self._part, *parts, *chosen, "--out", out], out, PRINT
-
-    def _others(self) -> list[str]:
         try:
-            return shlex.split(self.others.value)
+            parts = [self.page.bench.other_part(name) for name in shlex.split(self.others.value)]
         except ValueError as error:
             raise InputError(f"other parts are names, apart by spaces; got {error}") from None
+        return "bed", [*parts, "--strategy", self._only(), *self._supported()], "-bed", PRINT
 
     def _support(self) -> Begun:
-        out = self._result("-support.stl")
-        return ["support", self._part, "--out", out], out, PART
-
-    @property
-    def _part(self) -> str:
-        return self.page.bench.part_argument()
+        return "support", [], "-support.stl", PART
 
     def _supported(self) -> list[str]:
         return ["--support"] if self.support.value else []
 
-    def _result(self, ending: str) -> str:
-        return f"results/{self.page.bench.name}{ending}"
+    def _command_of(self, begun: Begun) -> tuple[list[str], str]:
+        """Words of a command behind ``ccfem``, and where its results are."""
+        verb, options, ending, _ = begun
+        out = self.page.bench.result(ending)
+        named = [] if verb in ("compare", "plan") else ["--out", out]
+        return [verb, self.page.bench.part_argument(), *options, *named], out
 
     def _add_part(self, name: str) -> None:
         if name != _NO_ONE:
@@ -186,7 +180,8 @@ class CompareTab:
             self._show_commands()
 
     def _begin(self, begin: Callable[[], Begun]) -> None:
-        page, (arguments, out, view) = self.page, begin()
+        page, begun = self.page, begin()
+        (arguments, out), view = self._command_of(begun), begun[-1]
         if self._running:
             raise InputError("a run is going on: stop it first")
         page.say("")
@@ -265,7 +260,11 @@ class CompareTab:
         said = []
         for name, begin in self._begins.items():
             try:
-                command = shlex.join(["ccfem", *begin()[0]]) if self._offers(name) else ""
+                command = (
+                    shlex.join(["ccfem", *self._command_of(begin())[0]])
+                    if self._offers(name)
+                    else ""
+                )
             except InputError as error:
                 command = str(error)
             said.append(f"<p>{name}: <code>{escaped(command)}</code></p>" if command else "")

@@ -205,13 +205,10 @@ class LoadsTab:
             return
         faces = [page.bench.listing.face(number) for number in page.chosen]
         area = sum(face.area for face in faces)
-        items = "".join(
-            f"<li>{escaped(f'face {k}: {face.shape}')}</li>"
-            for k, face in list(zip(page.chosen, faces, strict=True))[:6]
-        )
-        items += f"<li>and {len(faces) - 6} more</li>" if len(faces) > 6 else ""
-        several = "faces" if len(faces) > 1 else "face"
-        head = f"{len(faces)} {several}, {area:.4g} mm²"
+        named = [f"face {k}: {face.shape}" for k, face in zip(page.chosen, faces, strict=True)]
+        named[6:] = [f"and {len(faces) - 6} more"] if len(faces) > 6 else []
+        items = "".join(f"<li>{escaped(name)}</li>" for name in named)
+        head = f"{len(faces)} face{'s' * (len(faces) > 1)}, {area:.4g} mm²"
         self._said.content = f'<div class="ccfem"><b>{head}</b><ul>{items}</ul></div>'
 
     def propose(self) -> None:

@@ -11,9 +11,9 @@ from ccfem.body.files import write_mesh
 from ccfem.body.files.surface import write_stl
 from ccfem.body.isolated.process import ChildError
 from ccfem.body.mesh.box import box_mesh
-from ccfem.cases.part_editing import appended, check_files, edited, patch_of, valued
+from ccfem.cases.part_editing import History, appended, check_files, edited, patch_of, valued
 from ccfem.cases.part_file import read_part
-from ccfem.workbench.bench import Bench, History
+from ccfem.workbench.bench import Bench
 
 BY_HAND = """\
 # A bar, by hand.

@@ -424,14 +424,19 @@ def test_each_button_runs_the_command_that_it_shows(page, visit, monkeypatch):
     assert ran == [shlex.split(unescape(command)) for _, command in shown]
     solve, comparison, plan, bed, support = ran
     assert solve[1:] == [
-        *("solve", "bar.toml", "--out", "results/bar-solved.vtu", "--load-case", "pull")
+        *("solve", "bar.toml", "--load-case", "pull", "--out", "results/bar-solved.vtu")
     ]
     assert comparison[1:] == ["compare", "bar.toml", "--strategies", "zigzag"]
     assert plan[1:] == ["plan", "bar.toml", "--strategy", "zigzag", "--gcode", "--support"]
     assert bed[1:5] == ["bed", "bar.toml", "two parts.toml", "bar.toml"]
     assert bed[5:] == ["--strategy", "zigzag", "--support", "--out", "results/bar-bed"]
     assert support[1:] == ["support", "bar.toml", "--out", "results/bar-support.stl"]
-    # Nothing outside the folder is printed beside it.
+    # Nothing outside the folder is printed beside it, or written.
+    page.act(page.edit, f'name = "../../x"\n{HELD}').result()
+    visit.click("Solve")
+    visit.settle()
+    assert "lies outside" in page.message.content
+    page.act(page.step, -1).result()
     visit.type(compare.others, "../else.toml")
     visit.click("G-code of all parts in one file")
     visit.settle()
