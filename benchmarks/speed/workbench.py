@@ -189,7 +189,7 @@ def layers(work: Path) -> None:
     with _visit(work, "loop") as view:
         page, compare = view.page, view.page.compare
         page.act(page.edit, valued(("layers",), 12)).result()
-        page.act(compare._compare).result()
+        page.act(compare._begin, compare._compare).result()
         compare.run.wait()
         view.settle()
         places = [*range(len(compare.results.layers))] * 4

@@ -4,6 +4,7 @@ import ast
 import socket
 import sys
 import urllib.request
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -40,7 +41,8 @@ def test_nothing_is_open_at_first(tmp_path):
     workbench = ccfem.open(folder=tmp_path)
     page = workbench._page
     try:
-        for act in (page.compare._compare, page.loads._load, lambda: page.show_view("Fibre")):
+        compare = partial(page.compare._begin, page.compare._compare)
+        for act in (compare, page.loads._load, lambda: page.show_view("Fibre")):
             page.act(act).result()
             assert "Error" not in page.message.content.replace("InputError", "")
         page.act(page.open, "nothing").result()
