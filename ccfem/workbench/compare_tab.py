@@ -50,6 +50,7 @@ class CompareTab:
         self.page, gui = page, page.server.gui
         self.run: ChildRun | None = None
         self.results: RunResults | None = None
+        self._ran = ""
         known = strategy_modules.named()
         self.ticks: dict[str, Field] = {}
         with gui.add_folder("Strategies"):
@@ -208,6 +209,7 @@ class CompareTab:
             if out.suffix:  # what it found stands in no report
                 said = escaped("\n".join(state.lines))
                 self._said.content = f'<pre class="ccfem" tabindex="0">{said}</pre>'
+            self._ran = (self.results and self.results.part_file) or text
             self._show_results()
             self._show_age()
             self.page.show_view(view)
@@ -280,8 +282,7 @@ class CompareTab:
             button.visible = not self._running and self._offers(name)
 
     def _show_age(self) -> None:
-        ran = None if self.results is None else self.results.part_file
-        self._old.visible = ran is not None and not self.page.bench.is_of(ran)
+        self._old.visible = self.results is not None and not self.page.bench.is_of(self._ran)
 
     def _show_results(self) -> None:
         items = "".join(
@@ -289,7 +290,8 @@ class CompareTab:
             "</a></li>"
             for name in self._taken
         )
-        where = self.page.bench.results.relative_to(self.page.bench.folder)
+        folder = self.results.folder if self.results else self.page.bench.results
+        where = folder.relative_to(self.page.bench.folder)
         self._links.content = (
             f'<div class="ccfem"><h2>Take away</h2><ul>{items}</ul><p>All of it is in '
             f"<code>{escaped(where)}</code>.</p></div>"
@@ -297,8 +299,11 @@ class CompareTab:
         if self.results is None:
             return
         names, table = self.results.names, self.results.table
-        head = f'<div class="ccfem wide ranked" tabindex="0">{table.html("strategy")}</div>'
-        self._table.content, self._table.visible = head, bool(table.rows)
+        several = names == ["bed"]  # parts, of which none is better than another
+        kind, corner = ("wide", "part") if several else ("wide ranked", "strategy")
+        shown = f'<div class="ccfem {kind}" tabindex="0">{table.html(corner)}</div>'
+        self._table.content, self._table.visible = shown, bool(table.rows)
+        self.left.handle.visible = not several
         self._found.visible = bool(names)
         if names:
             self.left.handle.options, self.right.handle.options = tuple(names), (_NO_ONE, *names)

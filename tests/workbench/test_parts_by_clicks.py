@@ -165,5 +165,8 @@ def test_three_parts_are_printed_together(visit):
     with visit.tab.expect_download() as download:
         visit.tab.get_by_role("link", name="bed.gcode").click()
     assert "T1" in download.value.path().read_text()
+    old = "These results are of the part before it was changed."
+    assert not visit.tab.get_by_text(old).is_visible()
+    visit.tab.get_by_role("columnheader", name="part", exact=True).wait_for(timeout=10_000)
     for name in ("brake_lever", "l_bracket", "crane_hook"):
         visit.tab.get_by_role("row", name=name).wait_for(timeout=10_000)
