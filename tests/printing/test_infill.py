@@ -193,7 +193,7 @@ def test_walls_begin_at_their_seam(seam):
 
 
 def test_layers_end_where_their_lines_lie():
-    """Also where their height is half a micrometre more than whole ones, which rounds either way."""
+    """Also at half a micrometre more than whole ones, which rounds either way."""
     mesh = box_mesh((70.0, 32.0, 6.0035), (7, 4, 2))
     layers = Planar(heights=(3.0,)).cut(mesh)
     plan = plan_print(Toolpaths.from_plane(LINES, layers[0]), layers, mesh, MACHINE)
