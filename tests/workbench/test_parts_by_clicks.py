@@ -170,3 +170,27 @@ def test_three_parts_are_printed_together(visit):
     visit.tab.get_by_role("columnheader", name="part", exact=True).wait_for(timeout=10_000)
     for name in ("brake_lever", "l_bracket", "crane_hook"):
         visit.tab.get_by_role("row", name=name).wait_for(timeout=10_000)
+
+
+@pytest.mark.skipif(
+    not os.environ.get("CCFEM_SLOW"), reason="takes a minute: set CCFEM_SLOW=1 to run it"
+)
+def test_a_part_is_solved_and_its_support_taken_away(visit):
+    page = visit.page
+    page.act(page.open, "results/l_bracket.toml").result()
+    visit.press("Solve")
+    assert page.compare.run.wait(120).written, page.compare.run.state
+    visit.settle()
+    assert page.view.value == "Stress"
+    visit.tab.get_by_text("largest displacement").wait_for(timeout=10_000)
+    visit.tab.get_by_label("Print support").click()
+    visit.settle()
+    visit.press("Support as STL")
+    assert page.compare.run.wait(120).written, page.compare.run.state
+    visit.settle()
+    with visit.tab.expect_download() as download:
+        visit.tab.get_by_role("link", name="l_bracket-support.stl").click()
+    # What was solved can still be taken away.
+    visit.tab.get_by_role("link", name="l_bracket-solved.vtu").wait_for(timeout=10_000)
+    body = download.value.path().read_bytes()
+    assert len(body) == 84 + 50 * int.from_bytes(body[80:84], "little") > 84
