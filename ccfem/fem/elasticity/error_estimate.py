@@ -89,7 +89,7 @@ def estimate_error(
     if mesh.order == 1:
         difference = patches.coefficients[patches.of_corner, 0] - stress
         error = mesh.volumes * _linear_energy(difference, compliance)
-        energy = mesh.volumes * (stress @ compliance * stress).sum(axis=(1, 2))
+        energy = mesh.volumes * _sum_of_squares(stress, compliance)
     else:
         # Linear in a cell, so the values at its corners determine it.
         corner = _stress_at(mesh, displacement, stiffness, ease, np.eye(4))
@@ -120,8 +120,16 @@ def _stress_at(
 def _linear_energy(values: FloatArray, compliance: FloatArray) -> FloatArray:
     """Mean (m,) of ``v . S v`` over cells of fields linear in them, by corners (m, 4, 6)."""
     total = values.sum(axis=1, keepdims=True)
-    single, double = ((part @ compliance * part).sum(axis=(1, 2)) for part in (values, total))
-    return np.asarray((single + double) / 20.0)
+    return (_sum_of_squares(values, compliance) + _sum_of_squares(total, compliance)) / 20.0
+
+
+def _sum_of_squares(values: FloatArray, compliance: FloatArray) -> FloatArray:
+    """Sum (m,) of ``v . S v`` of the values (m, q, 6) of each cell."""
+    if len(compliance) > 1:
+        image = values @ compliance
+    else:
+        image = (values.reshape(-1, 6) @ compliance[0]).reshape(values.shape)
+    return np.asarray(np.einsum("mqi,mqi->m", image, values))
 
 
 @njit(cache=True)
