@@ -53,7 +53,6 @@ def along_curve(
         Length per layer of the comparison; one of the three if possible.
     tested : callable
         Tests a run of the part virtually.
-    tell : callable
     """
     reaches = [reach for reach in (_reach(run, part, tell) for run in runs) if reach is not None]
     free = [reach for reach in reaches if not isinstance(reach.run.strategy, GivenPaths)]

@@ -66,7 +66,6 @@ def fibre_front(
     strengths : sequence of float in [0, 1], optional
         Plan every length with each of these shares of the load at first failure in what is planned
         for, too; default the strategy as it is.
-    progress : callable
 
     Raises
     ------

@@ -58,7 +58,6 @@ def plan_to_stiffness(
         Cut into the layers that are asked for.
     cut : callable
         Cuts the part by another slicer.
-    tell : callable
 
     Returns
     -------

@@ -351,7 +351,6 @@ def to_length(
         Name of the run whose natural length this is; it is not planned again.
     length : float, mm, optional
         None if no run lays fibre.
-    tell, ahead : callable
     """
 
     def level(run: Run) -> Run:

@@ -55,7 +55,6 @@ class Page(Tabbed):
 
     Parameters
     ----------
-    bench : Bench
     port : int
         0 for any that is free.
     """

@@ -113,7 +113,6 @@ class Field:
 
     Parameters
     ----------
-    page : Tabbed
     handle : handle of viser
     changed : callable, optional
         Takes each value that is typed. Where it raises, the field shows what it showed before.

@@ -112,8 +112,6 @@ def ratio_scatter(
 
     Parameters
     ----------
-    test : VirtualTest
-    scatter : Scatter
     build : tuple of 3 floats
         Normal of the layers; strands move across themselves in the plane to which it is normal.
     """

@@ -86,7 +86,6 @@ def write_gcode(path: str | Path, plan: PrintPlan, machine: Machine, title: str 
 
     Parameters
     ----------
-    path : str or Path
     machine : Machine
         The one that the plan was made for.
     title : str, optional

@@ -17,10 +17,6 @@ _TOGETHER = 100_000
 def write_robot_cell(path: str | Path, moves: Moves) -> None:
     """Write moves as CSV, one row a move or an event.
 
-    Parameters
-    ----------
-    path : str or Path
-
     Notes
     -----
     Columns: ``path, tool, layer, x, y, z, nx, ny, nz, speed, feed, beside, width, height, event``.

@@ -30,7 +30,6 @@ def write_robot_waypoints(
 
     Parameters
     ----------
-    path : str or Path
     toolpaths : Toolpaths
         Paths of other kinds are left out.
     layers : sequence of Layer
@@ -88,7 +87,6 @@ def write_layer_waypoints(path: str | Path, toolpaths: Toolpaths, layer: int) ->
 
     Parameters
     ----------
-    path : str or Path
     layer : int
         Index of the layer.
 
@@ -119,7 +117,6 @@ def read_layer_waypoints(path: str | Path, layer: Layer) -> Toolpaths:
 
     Parameters
     ----------
-    path : str or Path
     layer : Layer
         That the strands lie on.
 

@@ -9,10 +9,6 @@ from ccfem.printing.print_plan import PrintPlan
 def write_trims(path: str | Path, plan: PrintPlan) -> None:
     """Write the places as CSV: ``layer, x, y, z``, on the bed of the printer, mm.
 
-    Parameters
-    ----------
-    path : str or Path
-
     Raises
     ------
     InputError

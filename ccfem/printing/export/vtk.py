@@ -26,7 +26,6 @@ def write_paths(
 
     Parameters
     ----------
-    path : str or Path
     path_data : mapping of name to (K,) array, optional
         Further values, one per path.
 

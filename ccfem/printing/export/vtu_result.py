@@ -40,10 +40,6 @@ def write_result(field: StressField, path: str | Path) -> None:
     no strings. Tensors have six components by name, shear of the strain being half the engineering
     one.
 
-    Parameters
-    ----------
-    path : path
-
     Raises
     ------
     InputError

@@ -33,7 +33,6 @@ def read_waypoints(path: str | Path, frame: FloatArray) -> Toolpaths:
 
     Parameters
     ----------
-    path : str or Path
     frame : (3, 3) array
         Frame of the layers (`Layer.frame`); its rows are the tool's axes in the frame of the mesh.
 
@@ -134,7 +133,6 @@ def write_waypoints(
 
     Parameters
     ----------
-    path : str or Path
     toolpaths : Toolpaths
         Paths of other kinds than fibre are left out.
     layers : sequence of Layer

@@ -159,7 +159,6 @@ def designed_fields(
 
     Parameters
     ----------
-    problem : StreamProblem or StrengthProblem
     start : (c,) array
     evaluations : int
         Maximum number of evaluations of the objective, one or a few solves each; at least 1.

@@ -112,7 +112,6 @@ def grouped_by_stress(
     ----------
     stresses : sequence of (m, 3, 3) arrays, MPa
         Of the load cases.
-    layers : sequence of Layer
     size : float, mm, default 0
         As of `alike_share`, where it is more than the mean edge of the cells.
     """

@@ -82,7 +82,6 @@ def led_round_holes(
     Parameters
     ----------
     lines : sequence of (n_i, 2) arrays, mm
-    section : Polygon or MultiPolygon
     width : float, mm
         Of a strand.
     radius : float, mm

@@ -49,7 +49,6 @@ def plan_cases(
     ----------
     layers : sequence of Layer
         All layers of the part.
-    stress : StressField or WeightedCases
     wanted : float, mm, optional
         Fibre per layer, mean over the stack; default what the strategy lays by itself, of which
         nothing is taken off.

@@ -456,7 +456,6 @@ def lines_to_slide_in(
     Parameters
     ----------
     lines : sequence of (n_i, 2) arrays, mm
-    section : Polygon or MultiPolygon
     inset : float >= 0, mm
 
     Returns

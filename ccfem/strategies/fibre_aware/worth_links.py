@@ -62,7 +62,6 @@ def link_by_worth(
     Parameters
     ----------
     lines : sequence of (n_i, 2) arrays, mm
-    section : Polygon or MultiPolygon
     limit : float, mm
         Longest link.
     width : float, mm

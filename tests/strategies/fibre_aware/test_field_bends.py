@@ -26,7 +26,7 @@ def circles(points, values):
 
 @pytest.mark.parametrize("radius", [3.0, 6.0, 20.0])
 def test_circles_cost_what_they_are_tighter(rng, radius):
-    points = rng.uniform(-8.0, 8.0, (1400, 2))
+    points = rng.uniform(-12.0, 12.0, (3000, 2))
     points = points[np.linalg.norm(points, axis=1) > 2.0]
     bends, values = bends_at(points, radius)
     r = np.linalg.norm(points, axis=1)
