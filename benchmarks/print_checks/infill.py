@@ -415,22 +415,28 @@ def cut_walls(job: Job, regions: list[Regions]) -> float:
     """Length of borders of layers of matrix without a wall along them, and of walls in fibre, mm.
 
     Where a section is narrower than a line there is no wall; a wall is in fibre where its top lies
-    between top and bottom of a strand that crosses it.
+    between top and bottom of a strand that crosses it. Sections are those of the mesh, whose sides
+    are chords of the round walls that are printed: a border may be off by as much, also in height.
     """
     lines, width = Lines.of(job.done), job.machine.matrix_width
     height, laid = lines.end[:, 2].round(3), lines.lays & lines.in_part & ~lines.beside_part
     strokes = shapely.linestrings(np.stack([lines.start, lines.end], axis=1)[:, :, :2])
     walls, strands = laid & (lines.kind == PART[0]), laid & (lines.tool == 1)
-    missing, lower = 0.0, 0.0
+    missing, lower, reach = 0.0, 0.0, width + job.chords
     for region in regions:
-        section = job.section(0.5 * (lower + region.top))
-        lower = region.top
+        middle = 0.5 * (lower + region.top)
+        section, lower = job.section(middle), region.top
+        near = [job.section(middle + step) for step in (-job.chords, job.chords)]
+        near = [section if other.is_empty else other for other in near]
+        sloping = shapely.symmetric_difference(*near)
+        unsure = sloping.buffer(-0.01).buffer(0.01 + job.chords)
         wide = shapely.buffer(shapely.buffer(section, -0.5 * width), 0.5 * width)
-        border = shapely.segmentize(shapely.intersection(section.boundary, wide.buffer(0.01)), 0.5)
+        border = shapely.intersection(section.boundary, wide.buffer(0.01)) - unsure
+        border = shapely.segmentize(border, 0.5)
         mine = shapely.STRtree(strokes[walls & (height == region.top)])
         pieces = _steps(border)
-        near = mine.query(shapely.centroid(pieces), predicate="dwithin", distance=width)[0]
-        missing += float(shapely.length(np.delete(pieces, np.unique(near))).sum())
+        walled = mine.query(shapely.centroid(pieces), predicate="dwithin", distance=reach)[0]
+        missing += float(shapely.length(np.delete(pieces, np.unique(walled))).sum())
     for z in np.unique(height[strands]).tolist():
         inside = (height > z - job.machine.strand_height + 1e-3) & (height <= z)
         mine = strokes[walls & inside]

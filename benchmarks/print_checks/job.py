@@ -44,6 +44,8 @@ class Job:
     bent : float
         Factor by which a strand may be faster in a turn than by the radius that the check finds:
         of a polyline it is a matter of how it is taken.
+    chords : float, mm
+        How far sides of the mesh, whose section this is, are off the round walls that are printed.
     """
 
     name: str
@@ -55,6 +57,7 @@ class Job:
     area: Callable[[float], float]
     volume: float
     bent: float = 1.01
+    chords: float = 0.0
     done: Run = field(init=False)
 
     def __post_init__(self) -> None:

@@ -10,6 +10,7 @@ import shapely
 
 from benchmarks.print_checks.job import Job
 from benchmarks.print_checks.sections import Sections
+from ccfem.body.mesh.curved_cells import EDGES
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases import Case, create_case
 from ccfem.cases.inspection.beginning import examples
@@ -95,10 +96,18 @@ def job_of(
         lambda z: sum(sections.area(z) for _, sections in copies),
         layout.count * float(mesh.volumes.sum()),
         _BENT,
+        _chords(mesh),
     )
     followed = time.process_time()
     spent = {"plan": planned - began, "write": written - planned, "follow": followed - written}
     return job, spent
+
+
+def _chords(mesh: TetMesh) -> float:
+    """How far middles of sides are off the round walls of a part, mm."""
+    round_mesh = mesh.quadratic()
+    ends = round_mesh.points[round_mesh.cells[:, EDGES]].mean(axis=2)
+    return float(np.linalg.norm(round_mesh.points[round_mesh.cells[:, 4:]] - ends, axis=2).max())
 
 
 def on_bed(
