@@ -7,7 +7,7 @@ On the authors' meshes and twelve layers, 34.66 m of fibre on the Loop and 25.46
 row has the fibre; the strands; those of them that fold, by the polyline as it is; the stiffness of
 the virtual test over that of the part without fibre, of what carries of the strands; its share of
 the gain that the upper bound allows; and the CPU seconds of planning. The authors' own paths are
-tested as they are published.
+tested as they are published. A strategy may have parameters, as in `stream_function:moves=6`.
 """
 
 import sys
@@ -16,6 +16,7 @@ from pathlib import Path
 from time import process_time
 
 from benchmarks.studies.table import with_strategies
+from ccfem.base.toml import assignment
 from ccfem.fem.elasticity.solve import solve
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strands import cut_strands
@@ -26,6 +27,7 @@ from ccfem.papers.chen_2021.virtual_test import authors_paths
 from ccfem.papers.evidence.prints import shell_field, shell_paths
 from ccfem.paths.folds import folds
 from ccfem.paths.planning.equal_fibre import plan_to_length
+from ccfem.paths.planning.strategy import Strategy
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
 from ccfem.strategies.fibre_aware.upper_bound import upper_bound
@@ -39,6 +41,12 @@ PARTS = {
 """Fibre, mm in all, the solved part, and the authors' paths."""
 _STRATEGIES = ("stream_function", "isocurve")
 _BUILD = (0.0, 1.0, 0.0)
+
+
+def _strategy(text: str) -> Strategy:
+    """Make a strategy from ``NAME:PARAMETER=VALUE:...``."""
+    name, *settings = text.split(":")
+    return create(name, dict(map(assignment, settings)))
 
 
 def rows(name: str, pictures: Path | None, strategies: Iterable[str] = ()) -> list[str]:
@@ -55,7 +63,7 @@ def rows(name: str, pictures: Path | None, strategies: Iterable[str] = ()) -> li
             strands = cut_strands(paths, field.mesh)
         else:
             wanted = length / len(layers)
-            paths = plan_to_length(create(what), layers, field, machine, wanted).toolpaths
+            paths = plan_to_length(_strategy(what), layers, field, machine, wanted).toolpaths
             strands = cut_strands(paths, field.mesh, machine=machine, layers=layers, crosses=False)
         seconds, ratio = process_time() - before, virtual_test(strands, specimen, span=()).ratio
         about = (paths.points, paths.offsets, paths.closed, machine.minimum_radius)
