@@ -163,12 +163,8 @@ def test_what_is_typed_in_one_moment_all_arrives(work):
         assert force.input_value() == "80.25"
 
 
-def test_an_arrow_is_dragged_and_undone(work):
-    view, bench = work.first, work.bench
-    before = bench.text
-    ball = next(handle for handle in work.page._drawn if handle.name.endswith("_ball"))
-    start = np.array(ball.position)
-    at, to = pixel(view, start), pixel(view, start + np.array([-12.0, 0.0, 12.0]))
+def drag(view, at, to):
+    """Drag from one pixel to another with the mouse."""
     view.tab.mouse.move(*at)
     view.tab.wait_for_timeout(200)
     view.tab.mouse.down()
@@ -176,6 +172,15 @@ def test_an_arrow_is_dragged_and_undone(work):
     view.tab.mouse.move(*to, steps=3)
     view.tab.wait_for_timeout(200)
     view.tab.mouse.up()
+
+
+def test_an_arrow_is_dragged_and_undone(work):
+    view, bench = work.first, work.bench
+    before = bench.text
+    ball = next(handle for handle in work.page._drawn if handle.name.endswith("_ball"))
+    start = np.array(ball.position)
+    at, to = pixel(view, start), pixel(view, start + np.array([-12.0, 0.0, 12.0]))
+    drag(view, at, to)
     wait(view, lambda: bench.text != before, 10)
     vector = np.array(bench.content["loads"]["pull"][0]["vector"])
     assert np.linalg.norm(vector) == pytest.approx(200.0, rel=1e-3)
@@ -198,13 +203,7 @@ def test_the_bed_is_dragged_round_the_part(work):
     camera = np.asarray(next(iter(work.page.server.get_clients().values())).camera.position)
     start = min(sides, key=lambda place: np.linalg.norm(place - camera))
     at, to = pixel(view, start), pixel(view, start + np.array([0.0, 0.0, 60.0]))
-    view.tab.mouse.move(*at)
-    view.tab.wait_for_timeout(200)
-    view.tab.mouse.down()
-    view.tab.mouse.move(0.5 * (at[0] + to[0]), 0.5 * (at[1] + to[1]), steps=3)
-    view.tab.mouse.move(*to, steps=3)
-    view.tab.wait_for_timeout(200)
-    view.tab.mouse.up()
+    drag(view, at, to)
     wait(view, lambda: "build" in bench.content, 10)
     view.button("Undo")
     assert bench.text == before

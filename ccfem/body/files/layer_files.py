@@ -52,5 +52,7 @@ def read_layer(path: Path) -> tuple[FloatArray, IntArray]:
         raise InputError(f"{path} has points that are not finite: repair the file")
     _, first, same = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
     corners = first[same.reshape(-1)][corners]
-    apart = np.diff(np.sort(corners, axis=1), axis=1) > 0
-    return vertices, corners[apart.all(axis=1)]
+    corners = corners[(np.diff(np.sort(corners, axis=1), axis=1) > 0).all(axis=1)]
+    if not len(corners):
+        raise InputError(f"{path} has no triangle of three points: export it again")
+    return vertices, corners

@@ -1,4 +1,4 @@
-"""The authors' strands on the T-bracket, and the layers that they lie on, rebuilt from them.
+"""The authors' strands on the T-bracket, and where they lie on the layers rebuilt from them.
 
 The data set has the strands of this part as lines, without its layers. The part is that of Fang et
 al. 2024, whose solid is recovered from their own layers.

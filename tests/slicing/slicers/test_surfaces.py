@@ -98,6 +98,9 @@ def test_folders_and_files_that_are_none_are_one_line(tmp_path):
     (tmp_path / "1.obj").write_text(corners.replace("v 1 1 0", "v 1 nan 0") + "f 1 2 3\n")
     with pytest.raises(InputError, match="points that are not finite"):
         slicer(stress(), UP, Machine())
+    (tmp_path / "1.obj").write_text(corners + "f 1 1 2\n")
+    with pytest.raises(InputError, match="has no triangle of three points: export it again"):
+        slicer(stress(), UP, Machine())
     (tmp_path / "1.obj").write_text("v 1 2 3\nf 1 2 3\n")
     with pytest.raises(InputError, match="has no triangles, or they name points"):
         slicer(stress(), UP, Machine())
