@@ -121,8 +121,8 @@ def support_layers(
         first = layers[0].flat
         if not flat or first is None:
             raise InputError(
-                "support below curved layers needs the field they were cut from: call "
-                "slice_with_support with their slicer"
+                "support below curved layers needs the field they were cut from: slice by spatial "
+                "or load_oriented (from Python: slice_with_support), or leave it out"
             )
         field = mesh.points @ first.frame[2]
     levels = np.array([float(np.median(layer.interpolate(field))) for layer in layers])
