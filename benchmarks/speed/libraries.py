@@ -149,7 +149,7 @@ def locate_in_space() -> Rivals:
 
 def find_crossings() -> Rivals:
     """Find crossings of 220 diagonal strands, whose boxes all overlap, and one across them."""
-    from ccfem.geometry.intersections import find_crossings as ours
+    from ccfem.judging.evaluation.indices.crossings import find_crossings as ours
 
     lines = [[[0.0, 0.9 * k], [200.0, 0.9 * k + 150.0]] for k in range(220)]
     points = np.concatenate([*lines, [[10.0, 0.0], [15.0, 340.0]]])

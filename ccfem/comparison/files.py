@@ -20,6 +20,7 @@ from ccfem.base.errors import spared
 from ccfem.base.parallel import in_processes
 from ccfem.base.progress import Progress, silent
 from ccfem.base.result_folder import whole_folder
+from ccfem.base.whole import whole_file
 from ccfem.comparison.headline import TEST_COLUMNS, headline_values, print_values
 from ccfem.comparison.plot.colours import palette
 from ccfem.comparison.result import Comparison
@@ -30,11 +31,13 @@ from ccfem.judging.virtual_testing.progressive_failure import BreakingLoad
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.given_paths import pattern_that_folds
 from ccfem.paths.toolpaths import Toolpaths
+from ccfem.printing.print_plan import PrintPlan
 from ccfem.slicing.layers.layer import curved_layers
 
 if TYPE_CHECKING:
     from ccfem.comparison.pictures import Pictures
     from ccfem.comparison.report.html_report import Record
+
 
 RESULT_FILES = (
     *("results.csv", "results.json", "report.html", "paths.vtp", "curve.csv", "curve.png"),
@@ -269,7 +272,6 @@ def write_printed(
 def files_of_print(folder: Path, name: str, run: Printed, cell: bool) -> list[_Write]:
     """Files of the same chain of moves for a cell of robots, and of where strands are trimmed."""
     from ccfem.printing.export.robot_cell import write_robot_cell
-    from ccfem.printing.export.trim_table import write_trims
 
     files: list[_Write] = []
     if cell and run.moves is not None:
@@ -580,3 +582,19 @@ def plain_record(value: Any) -> Any:
     if isinstance(value, float) and not np.isfinite(value):
         return None
     return value if value is None or isinstance(value, bool | int | float | str) else str(value)
+
+
+def write_trims(path: str | Path, plan: PrintPlan) -> None:
+    """Write where the knife comes behind a print: places at which strands cross the part's border.
+
+    ``layer, x, y, z``, on the bed of the printer, mm.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be written.
+    """
+    with whole_file(path) as temporary, temporary.open("w", encoding="ascii") as file:
+        file.write("layer,x,y,z\n")
+        for layer, x, y in plan.trims.tolist():
+            file.write(f"{layer:.0f},{x:.3f},{y:.3f},{plan.top[int(layer)]:.3f}\n")

@@ -149,7 +149,7 @@ class GcodeProfile:
     compact : bool
         Whether the file says no more than the printer needs: no ends of zeros, no width and height
         of lines, flow of matrix over fibre and speed of strands in fewer steps
-        (`ccfem.printing.matrix_flow`, `ccfem.printing.part_moves`).
+        (`ccfem.printing.laid_layer`, `ccfem.printing.part_moves`).
     longest_feed : float, mm
         Longest feed in one move. Marlin refuses more than EXTRUDE_MAXLENGTH, by default 200.
     thumbnails : tuple of str

@@ -1,20 +1,241 @@
 """Paths of one layer of a print, matrix or fibre, in the order of printing."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import shapely
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
-from ccfem.geometry.polylines import is_closed, merge_repeated, pack
-from ccfem.geometry.shapes import Region, strings
+from ccfem.base.errors import InputError
+from ccfem.geometry.polylines import is_closed, merge_repeated, pack, starts_segment, subdivide
+from ccfem.geometry.shapes import Region, Shapes, bends, strings
 from ccfem.machine.machine import Machine
 from ccfem.paths.linking.print_order import nearest_end_order
 from ccfem.paths.splitting.printed_strands import border_crossings
+from ccfem.paths.splitting.slabs import StrandDensity
 from ccfem.paths.toolpaths import FIBRE, MATRIX, SUPPORT, Toolpaths
-from ccfem.printing.matrix_flow import pad_flow, with_flow
 from ccfem.printing.matrix_lines import MatrixFill
+
+# Flow of matrix over fibre: lines are laid so that the layer comes out exactly full.
+#
+# Strands do not fill the layer that they lie in, and where they cross they stand higher than it.
+# The matrix above fills up to its own top. At a place x with rho mm of strand per mm^2 its
+# height is
+#
+# t(x) = h_m + h_f - A rho(x),
+#
+# with the heights h_m of the matrix layer and h_f of the fibre below it, and the section A of a
+# strand. The whole layer is then scaled, by at most a tenth, so that its volume is the free volume
+# of its section: a zigzag does not pass exactly once everywhere.
+
+
+_PIECE = 2.0
+"""Longest piece, mm, over which the height is constant."""
+_STEP = 0.05
+"""Steps in which the height changes along a line, over that of the layer."""
+_MISPLACED = 2.0
+"""Matrix that a compact file lays elsewhere along a line, at most, in mm of a line as high as its
+layer. Our choice."""
+_STRETCH = 1e3
+"""Of the way along lines, so that what is laid elsewhere is the distance from a simplified line."""
+_SCALE = 1.1
+"""Largest factor by which a layer is scaled. If lines miss a tenth of a section, as between walls
+nearer than a line is wide, more flow would not reach it either. Our choice."""
+_THIN, _TOO_THIN = 0.01, 0.1
+"""Shares of a layer's lines that may be thinner, because fibre below stands too high: without a
+warning, and with one. Our choice."""
+
+
+def with_flow(
+    paths: Toolpaths,
+    section: Region,
+    height: float,
+    strands: Sequence[FloatArray],
+    below: float,
+    machine: Machine,
+    sections: Sequence[float] | None = None,
+    shares: FloatArray | None = None,
+    sparse: BoolArray | None = None,
+) -> tuple[Toolpaths, FloatArray, str]:
+    """Lines of a matrix layer with the height that each of their steps lays.
+
+    Parameters
+    ----------
+    paths : Toolpaths
+        Of one layer of matrix.
+    section : shapely (Multi)Polygon, mm
+        What the layer has to fill, in the plane of the paths; without sparse infill.
+    height : float, mm
+        Of the layer.
+    strands : sequence of (n, 2) arrays, mm
+        Fibre directly below it, none for a layer on matrix.
+    below : float, mm
+        Height of the fibre layers that they lie in.
+    sections : sequence of float, mm^2, optional
+        Section of each strand; by default `Machine.strand_area`.
+    shares : (K,) array, optional
+        Width of each path over that of the machine; by default 1.
+    sparse : (K,) bool array, optional
+        Paths of sparse infill, which end in the section, and are not scaled; by default none.
+
+    Returns
+    -------
+    paths : Toolpaths
+        With a point wherever the height changes by a twentieth.
+    share : (P,) array, mm
+        Height of matrix, a line wide, on the step from each point; 0 at the end of a line.
+    warning : str
+        Where strands stand higher on more than a hundredth; else empty.
+
+    Raises
+    ------
+    InputError
+        Where strands stand higher than the matrix above them on more than a tenth of the layer.
+    """
+    points, offsets, segment = subdivide(paths.points, paths.offsets, _PIECE)
+    start = np.flatnonzero(starts_segment(offsets))
+    length = np.linalg.norm(points[start + 1] - points[start], axis=1)
+    middle = 0.5 * (points[start] + points[start + 1])[:, :2]
+    way = paths.link[segment]
+    length[way[start]] = 0.0  # nothing is laid there
+    if sections is None:
+        sections = [machine.strand_area] * len(strands)
+    volume = height + below - _density(strands, sections, middle, machine)
+    least = min(machine.least_line, height)
+    warning = _check(volume, length, height, below, least, machine)
+    wanted = np.maximum(volume, least)
+    if machine.gcode.compact:
+        last = np.searchsorted(start, offsets[1:]) - 1
+        wanted = _evened(wanted / height, length, last) * height
+    # Of neighbouring pieces with the same height level only the first keeps its point.
+    level = np.full(len(points), -1)
+    level[start] = np.round(wanted / (_STEP * height)).astype(np.int64)
+    level[way] = -2
+    keep = np.append(True, np.diff(segment) > 0)
+    keep[1:] |= level[1:] != level[:-1]
+    kept = np.flatnonzero(keep)
+    run = (np.cumsum(keep) - 1)[start]
+    long = np.bincount(run, length, len(kept))
+    share = np.bincount(run, wanted * length, len(kept)) / np.maximum(long, 1e-300)
+    if machine.gcode.compact:
+        share = share.round(6)  # equal heights are exactly equal
+    line = np.searchsorted(np.searchsorted(kept, offsets), np.arange(len(kept)), "right") - 1
+    if shares is not None:
+        share *= shares[line]
+    scaled = np.ones(len(kept), dtype=bool) if sparse is None else ~sparse[line]
+    inside = shapely.length(shapely.intersection(strings(strands), section))
+    room = section.area * (height + below) - float(inside @ np.asarray(sections))
+    if sparse is not None and sparse.any():
+        ends, solid = _laid_lines(paths.select(sparse)), shapely.force_2d(section)
+        shapely.prepare(solid)
+        ends = ends[shapely.intersects(ends, solid)]  # the ends of lines: few of their steps
+        overlap = float(shapely.length(shapely.intersection(ends, section)).sum())
+        room -= machine.matrix_width * (height + below) * overlap
+    scale = room / (machine.matrix_width * (share * long)[scaled].sum())
+    share[scaled] *= np.clip(scale, 1.0 / _SCALE, _SCALE)
+    # No line thinner than the machine prints; those in gaps are narrower instead.
+    floor = np.full(len(share), least) if shares is None else least * shares[line]
+    share = np.where(long > 0.0, np.maximum(share, floor), 0.0)
+    fewer = replace(
+        paths,
+        points=points[kept],
+        normals=np.broadcast_to(paths.normals[0], (len(kept), 3)),
+        offsets=np.searchsorted(kept, offsets),
+        link=way[kept],
+    )
+    return fewer, share, warning
+
+
+def _laid_lines(paths: Toolpaths) -> Shapes:
+    """Lines of matrix, without the ways between them on which nothing is laid."""
+    start = np.flatnonzero(starts_segment(paths.offsets) & ~paths.link)
+    ends = np.stack([paths.points[start], paths.points[start + 1]], axis=1)
+    return shapely.linestrings(ends[:, :, :2])
+
+
+def _evened(share: FloatArray, length: FloatArray, last: IntArray) -> FloatArray:
+    """Heights of steps (s,) in as few runs of one height as `_MISPLACED` allows.
+
+    What is laid up to a place, over the way to there, is a line that is simplified.
+
+    Parameters
+    ----------
+    share, length : (s,) arrays
+        Height of each step over that of the layer, and its length, mm.
+    last : (K,) int array
+        Steps that paths end with: no run goes on from one path to the next.
+    """
+    along, laid = (np.append(0.0, np.cumsum(column)) for column in (length, share * length))
+    curve = np.column_stack([_STRETCH * along, laid])
+    at = bends(curve, last[:-1] + 1, _MISPLACED)
+    run = np.diff(laid[at]) / np.maximum(np.diff(along[at]), 1e-300)
+    return np.repeat(run, np.diff(at))
+
+
+def pad_flow(
+    paths: Toolpaths,
+    height: float,
+    strands: Sequence[FloatArray],
+    below: float,
+    machine: Machine,
+    sections: Sequence[float],
+) -> tuple[Toolpaths, FloatArray]:
+    """Lines of pads, with the height that strands on the pads below leave to each step.
+
+    Parameters and results are those of `with_flow`; nothing is scaled, and nothing refused.
+    """
+    points, offsets, _ = subdivide(paths.points, paths.offsets, _PIECE)
+    after = np.minimum(np.arange(len(points)) + 1, len(points) - 1)
+    middle = 0.5 * (points + points[after])[:, :2]
+    volume = height + below - _density(strands, sections, middle, machine)
+    finer = replace(
+        paths,
+        points=points,
+        normals=np.broadcast_to(paths.normals[0], (len(points), 3)),
+        offsets=offsets,
+        link=np.zeros(len(points), dtype=bool),
+    )
+    return finer, np.maximum(volume, min(machine.least_line, height))
+
+
+def _density(
+    strands: Sequence[FloatArray],
+    sections: Sequence[float],
+    places: FloatArray,
+    machine: Machine,
+) -> FloatArray:
+    """Volume of strands per area, mm, round places (k, 2)."""
+    if not len(strands):
+        return np.zeros(len(places))
+    return StrandDensity.of(strands, sections, machine.fibre_width, places).at(places)
+
+
+def _check(
+    volume: FloatArray,
+    length: FloatArray,
+    height: float,
+    below: float,
+    least: float,
+    machine: Machine,
+) -> str:
+    """Refuse strands that stand higher than the matrix above them on too much of the layer."""
+    thin = length[volume < least].sum() / length.sum()
+    if thin <= _THIN:
+        return ""
+    order = np.argsort(volume, kind="stable")
+    share = np.cumsum(length[order]) / length.sum()
+    missing = least - float(volume[order[np.searchsorted(share, 0.01)]])
+    cure = "" if machine.process.stacks == "end" else ", or set process.stacks = 'end'"
+    said = (
+        f"strands stand higher than the {height:.3g} mm of matrix above them on {thin:.0%} of the "
+        f"layer; {height + missing:.3g} mm would do: lay fibre layers at least "
+        f"{height + below + missing:.3g} mm apart{cure}"
+    )
+    if thin > _TOO_THIN:
+        raise InputError(said)
+    return said
+
 
 COORDINATE_DIGITS = 3
 """Decimals of coordinates, mm."""

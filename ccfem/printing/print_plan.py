@@ -182,7 +182,7 @@ def plan_print(
     layers of equal height, as few as `Machine.matrix_height` allows, so that the part gets its full
     height. A matrix layer is walls and a zigzag of the section at its middle, which turns from
     one matrix layer to the next, or sparse infill (`Plastic`); over fibre it lays what the strands
-    leave (`ccfem.printing.matrix_flow`). A fibre layer holds fibre, and lines of matrix in place of
+    leave (`ccfem.printing.laid_layer`). A fibre layer holds fibre, and lines of matrix in place of
     strands that are too short for the cutter; a layer without fibre is left out. No strand is cut
     here. The lowest layer is that of `Process.first_layer_height`. Within a layer the next path is
     always the one with the nearest end. The part stands in the middle of the bed.

@@ -18,7 +18,55 @@ from ccfem.printing.beside import GAP, beside
 from ccfem.printing.laid_layer import COORDINATE_DIGITS
 from ccfem.printing.poses import poses
 from ccfem.printing.print_plan import PrintPlan, Standing, check_bed
-from ccfem.printing.shelves import shelves
+
+# Boxes laid out in rows on a bed, the most compact way first.
+
+
+def shelves(sizes: FloatArray, gap: float, room: FloatArray) -> Iterator[FloatArray]:
+    """Ways to lay boxes out in rows, one behind the other.
+
+    The deepest boxes come first, each row from left to right, as long as the first few of them
+    together. (Next-fit decreasing height: Coffman et al. 1980, SIAM J. Comput. 9, 808.)
+
+    Parameters
+    ----------
+    sizes : (n, 2) array, mm
+    gap : float, mm
+        Least distance of two boxes.
+    room : (2,) array, mm
+        Size beyond which no way is of use.
+
+    Yields
+    ------
+    (n, 2) array, mm
+        Corner of each box with the least coordinates, from that of all; in order of half the
+        perimeter of the box round all.
+    """
+    order = np.lexsort([np.arange(len(sizes)), -sizes[:, 1]])
+    ways = []
+    for length in (np.cumsum(sizes[order, 0] + gap) - gap).tolist():
+        if length > room[0]:
+            break
+        corners = _in_rows(sizes, order.tolist(), gap, max(length, float(sizes[:, 0].max())))
+        extent = (corners + sizes).max(axis=0)
+        if (extent <= room).all():
+            ways.append((float(extent.sum().round(6)), float(extent[1].round(6)), corners))
+    for *_, corners in sorted(ways, key=lambda way: way[:2]):
+        yield corners
+
+
+def _in_rows(sizes: FloatArray, order: list[int], gap: float, length: float) -> FloatArray:
+    """Corners (n, 2) of boxes in rows of at most a length."""
+    corners = np.zeros_like(sizes)
+    x, y, depth = 0.0, 0.0, 0.0
+    for k in order:
+        width, deep = sizes[k].tolist()
+        if x > 0.0 and x + width > length + 1e-6:
+            x, y, depth = 0.0, y + depth + gap, 0.0
+        corners[k] = x, y
+        x, depth = x + width + gap, max(depth, deep)
+    return corners
+
 
 _UP = np.array([0.0, 0.0, 1.0])
 _ROUNDING = 1e-6
@@ -54,7 +102,7 @@ def arranged(
     """Print plans together, each at its place on the bed and as often as it is wanted.
 
     Copies of a part are the same plan several times. Parts without a centre are laid out in rows
-    (`ccfem.printing.shelves`), as far apart as a part from the block beside it, with room for the
+    (`ccfem.printing.together`), as far apart as a part from the block beside it, with room for the
     brims of both, and for a head that leans over curved layers. They are printed together, the
     lowest layer of all next: of layers at one height first the matrix of all parts, then their
     fibre, so that there is one change of tools for all parts of the same layers. The nozzle travels

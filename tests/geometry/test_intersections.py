@@ -7,8 +7,8 @@ import pytest
 import shapely
 from hypothesis import given, strategies as st
 
-from ccfem.geometry.intersections import find_crossings
 from ccfem.geometry.polylines import pack
+from ccfem.judging.evaluation.indices.crossings import find_crossings
 
 
 def count(*lines: list[tuple[float, float]]) -> int:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ccfem.body.mesh.box import box_mesh
-from ccfem.geometry.surfaces_in_cells import areas_in_cells
+from ccfem.strategies.fibre_aware.heights import areas_in_cells
 
 SIZE = (4.0, 3.0, 2.0)
 

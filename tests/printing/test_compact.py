@@ -6,7 +6,7 @@ import pytest
 from benchmarks.print_checks.all_checks import CHECKS
 from benchmarks.print_checks.job import FILAMENT, Lines
 from ccfem.printing.export.gcode import _shorter
-from ccfem.printing.matrix_flow import _MISPLACED, _evened
+from ccfem.printing.laid_layer import _MISPLACED, _evened
 
 COMPACT = {"gcode": {"compact": True}}
 ROUND = {"gcode": {"compact": True, "arcs": True, "arc_tolerance": 0.05}}

@@ -15,7 +15,7 @@ from ccfem.machine import machine_from, machine_names
 from ccfem.paths.splitting.slabs import LOW, slabs_of
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.export.gcode import gcode
-from ccfem.printing.matrix_flow import with_flow
+from ccfem.printing.laid_layer import with_flow
 from ccfem.printing.print_plan import plan_print
 from ccfem.slicing.slicers.planar import Planar
 

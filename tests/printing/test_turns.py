@@ -9,7 +9,7 @@ from benchmarks.print_checks.job import own
 from benchmarks.print_checks.motion import bed, support, travel
 from benchmarks.print_checks.tooling import cuts, heat
 from ccfem.base.errors import InputError
-from ccfem.printing.export.trim_table import write_trims
+from ccfem.comparison.files import write_trims
 
 # Two strands joined by a loop 11 mm outside the part; a span of 30 mm over nothing.
 LOOP = np.concatenate(

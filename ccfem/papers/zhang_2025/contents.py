@@ -3,12 +3,16 @@
 What the paper claims is taken from its abstract.
 """
 
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from ccfem.base.errors import InputError
 from ccfem.base.progress import Progress, silent
 from ccfem.body.mesh.patches import Cylinder
 from ccfem.cases.bodies import T_BRACKET_HOLES
@@ -24,21 +28,50 @@ from ccfem.papers.fang_2024.authors import (
     authors_strands as sparse_strands,
     authors_stress,
 )
-from ccfem.papers.zhang_2025.authors import (
-    BUILD,
-    DATA,
-    authors_folder,
-    authors_strands,
-    strands_on,
-)
 from ccfem.papers.zhang_2025.measures import SHORTEST, WIDTH, angles_to_axes, measured
 from ccfem.paths.planning import plan
 from ccfem.paths.planning.given_paths import GivenPaths
 from ccfem.paths.toolpaths import Toolpaths
+from ccfem.printing.export.path_table import read_strands
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.spatial import Spatial
 from ccfem.slicing.slicers.through_strands import ThroughStrands
 from ccfem.strategies import create
+
+# The authors' strands on the T-bracket, and where they lie on the layers rebuilt from them.
+#
+# The data set has the strands of this part as lines, without its layers. The part is that of Fang
+# et al. 2024, whose solid is recovered from their own layers.
+
+
+DATA = "CCFEM_ZHANG2025"
+"""Environment variable that names the folder of the published data."""
+BUILD = (0.0, 1.0, 0.0)
+
+
+def authors_folder() -> Path:
+    """Folder of the strands of the T-bracket."""
+    named = os.environ.get(DATA)
+    if not named:
+        raise InputError(f"set {DATA} to the folder of the data of Zhang et al. 2025")
+    return Path(named) / "T-bracket" / "StripPath"
+
+
+def authors_strands(folder: Path) -> Toolpaths:
+    """Read the strands, numbered by the layers of their files."""
+    return read_strands(folder, np.eye(3), np.array(BUILD))
+
+
+def strands_on(layers: tuple[Layer, ...], strands: Toolpaths) -> Toolpaths:
+    """Move strands onto the layers that were laid through them."""
+    numbers = np.unique(strands.layer).tolist()
+    return Toolpaths.concatenate(
+        [
+            GivenPaths(strands.on_layer(number), "the authors' strands").on([layer]).toolpaths
+            for number, layer in zip(numbers, layers, strict=True)
+        ]
+    )
+
 
 EXPECTED = Path(__file__).with_name("expected.toml")
 """Claims of the paper, with the ranges that count as reproduced."""

@@ -2,7 +2,7 @@
 
 Conventions of the file: mm and mm/min; X, Y, Z absolute, E relative (M83). G1 lays material, G0
 only travels. E of the matrix is length of filament, so that a line has the volume of its length,
-its width and the height that it lays (`ccfem.printing.matrix_flow`). E of the fibre is length of
+its width and the height that it lays (`ccfem.printing.laid_layer`). E of the fibre is length of
 fibre: before a path, the distance from the cutter to the nozzle and a little more (G1 with E
 alone), then the distance that the nozzle moves. The cut comes that first distance before the end of
 the path; the rest is dragged out and laid by G1 without E.

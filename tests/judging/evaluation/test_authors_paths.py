@@ -96,7 +96,7 @@ def test_coverage_is_the_area_of_the_buffered_paths(authors, totals):
 
 
 def test_crossings_and_kinks_are_those_stated(authors, totals):
-    from ccfem.geometry.intersections import find_crossings
+    from ccfem.judging.evaluation.indices.crossings import find_crossings
     from ccfem.judging.evaluation.layer_paths import plane_paths
 
     _, layers, _ = authors.solved_loop()

@@ -17,7 +17,7 @@ from ccfem.machine import Machine, Process, SpeedTable
 from ccfem.machine.gcode_profile import GcodeProfile
 from ccfem.paths.toolpaths import MATRIX, Toolpaths
 from ccfem.printing.export.gcode import gcode, write_gcode
-from ccfem.printing.matrix_flow import with_flow
+from ccfem.printing.laid_layer import with_flow
 from ccfem.printing.print_plan import check_machine, plan_print
 from ccfem.slicing.slicers.planar import Planar
 

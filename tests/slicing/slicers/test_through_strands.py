@@ -18,7 +18,7 @@ from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.machine import Machine
 from ccfem.papers.fang_2024.authors import authors_mesh
-from ccfem.papers.zhang_2025.authors import authors_strands, strands_on
+from ccfem.papers.zhang_2025.contents import authors_strands, strands_on
 from ccfem.paths.planning.given_paths import GivenPaths
 from ccfem.printing.export.path_table import read_paths
 from ccfem.slicing.slicers import create

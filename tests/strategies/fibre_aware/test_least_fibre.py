@@ -4,13 +4,13 @@ import pytest
 from ccfem.base.errors import InputError
 from ccfem.cases.load_cases import weighted_cases
 from ccfem.cases.reading import read
+from ccfem.comparison.plan_to_stiffness import for_every_case, least_fibre
 from ccfem.fem.elasticity.solve import solve
 from ccfem.judging.virtual_testing.several_cases import virtual_tests
 from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
-from ccfem.strategies.fibre_aware.least_fibre import for_every_case, least_fibre
 from ccfem.strategies.fibre_aware.plan_cases import plan_cases
 from ccfem.strategies.fibre_aware.upper_bound import LEAST, upper_bound
 from ccfem.strategies.stream_function import StreamFunction
