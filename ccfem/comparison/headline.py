@@ -2,16 +2,16 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from ccfem.base.toml import read_toml
 from ccfem.comparison.runs import Run, Tested
 from ccfem.judging.evaluation.layer_paths import Column
 from ccfem.judging.virtual_testing.failure_laws import named
 from ccfem.judging.virtual_testing.scatter import RatioScatter
 from ccfem.judging.virtual_testing.strength import FirstFailure
-
-_RATIO = "stiffness of the part with its fibres over that without"
 
 
 @dataclass(frozen=True)
@@ -31,11 +31,6 @@ def _of_failure(
 def _of_bond(value: Callable[[FirstFailure], float]) -> Callable[[Tested], float | None]:
     """Value of the bond between layers, where it was judged."""
     return _of_failure(lambda f, tested: value(f) if f.interlayer_zones else None)
-
-
-def _opening_along(axis: int) -> Callable[[Tested], float | None]:
-    """Coordinate of the place where layers first come apart."""
-    return _of_bond(lambda failure: failure.interlayer_where[axis])
 
 
 def _of_law(law: str, column: Column) -> _Index:
@@ -60,194 +55,42 @@ def _under_alternative(index: _Index) -> _Index:
     )
 
 
+_VALUES: dict[str, Callable[[Tested], float | None]] = {
+    "stiffness_ratio_tension": lambda tested: tested.bracket.tension.ratio,
+    "stiffness_ratio_partial": lambda tested: tested.bracket.partial.ratio,
+    "stiffness_ratio_bonded": lambda tested: tested.bracket.bonded.ratio,
+    "stiffness_ratio_scatter": _of_scatter(lambda scatter: scatter.deviation),
+    "fibre_sensitivity": _of_scatter(lambda scatter: scatter.fibre),
+    "matrix_sensitivity": _of_scatter(lambda scatter: scatter.matrix),
+    "strand_scatter": _of_scatter(lambda scatter: scatter.independent),
+    "stiffness": lambda tested: tested.bracket.tension.stiffness,
+    "displacement": lambda tested: tested.bracket.tension.force / tested.bracket.tension.stiffness,
+    "share_of_gain": lambda tested: (
+        (tested.bracket.tension.ratio - 1.0) / (tested.most - 1.0) if tested.most > 1.0 else None
+    ),
+    "gain_per_metre": lambda tested: tested.bracket.tension.gain_per_metre,
+    "strain_energy": lambda tested: tested.bracket.tension.solution.strain_energy,
+    "matrix_stress_change": _of_failure(
+        lambda failure, tested: failure.matrix_index / tested.matrix_before - 1.0
+    ),
+    "first_failure_load": _of_failure(lambda failure, tested: failure.load),
+    "pinned_joint_load": lambda tested: tested.joints[0].load if tested.joints else None,
+    "interlayer_load": _of_bond(lambda failure: failure.interlayer_zones[0]),
+    "interlayer_load_near": _of_bond(lambda failure: failure.interlayer_zones[1]),
+    "interlayer_load_everywhere": _of_bond(lambda failure: failure.interlayer_zones[2]),
+    "interlayer_index": _of_bond(lambda failure: failure.interlayer_index),
+    "interlayer_x": _of_bond(lambda failure: failure.interlayer_where[0]),
+    "interlayer_y": _of_bond(lambda failure: failure.interlayer_where[1]),
+    "interlayer_z": _of_bond(lambda failure: failure.interlayer_where[2]),
+    "interlayer_opening": _of_bond(lambda failure: failure.opening),
+    "interlayer_sliding": _of_bond(lambda failure: failure.sliding),
+}
+"""How indices follow from a test; what they mean stands in ``test_columns.toml``."""
+
 _TESTED = (
-    _Index(
-        "stiffness_ratio_tension",
-        "1",
-        f"The {_RATIO}, fibres in compression carrying nothing; default EA/E = 4 mm^2.",
-        ">= 1, higher is better; missing where there was no virtual test",
-        lambda tested: tested.bracket.tension.ratio,
-    ),
-    _Index(
-        "stiffness_ratio_partial",
-        "1",
-        f"The {_RATIO}, fibres carrying a fifth of their stiffness in compression: the upper end "
-        "of the range that tables show.",
-        ">= stiffness_ratio_tension",
-        lambda tested: tested.bracket.partial.ratio,
-    ),
-    _Index(
-        "stiffness_ratio_bonded",
-        "1",
-        f"The {_RATIO}, if strands carried compression fully; no verdict rests on it.",
-        ">= stiffness_ratio_partial",
-        lambda tested: tested.bracket.bonded.ratio,
-    ),
-    _Index(
-        "stiffness_ratio_scatter",
-        "1",
-        "Standard deviation of stiffness_ratio_tension over its mean, from print to print, by the "
-        "[scatter] of the part: to first order, strand energies being the sensitivities.",
-        ">= 0",
-        _of_scatter(lambda scatter: scatter.deviation),
-    ),
-    _Index(
-        "fibre_sensitivity",
-        "1",
-        "d ln(stiffness_ratio_tension) / d ln(EA): the share of the strain energy in fibres.",
-        "0 to 1",
-        _of_scatter(lambda scatter: scatter.fibre),
-    ),
-    _Index(
-        "matrix_sensitivity",
-        "1",
-        "d ln(stiffness_ratio_tension) / d ln(E) of the matrix, in the part with fibre and "
-        "without.",
-        "-fibre_sensitivity where no springs hold the part",
-        _of_scatter(lambda scatter: scatter.matrix),
-    ),
-    _Index(
-        "strand_scatter",
-        "1",
-        "The part of stiffness_ratio_scatter that differs from strand to strand: axial stiffness "
-        "and place. Two designs from the same spools have this and the difference of the "
-        "sensitivities between them.",
-        ">= 0",
-        _of_scatter(lambda scatter: scatter.independent),
-    ),
-    _Index(
-        "stiffness",
-        "N/mm",
-        "Size of the load squared over its work, fibres carrying tension only.",
-        "> 0, higher is better",
-        lambda tested: tested.bracket.tension.stiffness,
-    ),
-    _Index(
-        "displacement",
-        "mm",
-        "Size of the load over the stiffness: how far the load moves along itself.",
-        "> 0, lower is better under forces",
-        lambda tested: tested.bracket.tension.force / tested.bracket.tension.stiffness,
-    ),
-    _Index(
-        "share_of_gain",
-        "1",
-        "(stiffness_ratio_tension - 1) over the same of the bound that no paths of the compared "
-        "length exceed, strands beside each other carrying tension only; empty at another length.",
-        "at most 1, but where strands cross: see the remarks; higher is better",
-        lambda tested: (
-            (tested.bracket.tension.ratio - 1.0) / (tested.most - 1.0)
-            if tested.most > 1.0
-            else None
-        ),
-    ),
-    _Index(
-        "gain_per_metre",
-        "1/m",
-        "(stiffness_ratio_tension - 1) over the length of fibre inside the part.",
-        ">= 0, higher is better",
-        lambda tested: tested.bracket.tension.gain_per_metre,
-    ),
-    _Index(
-        "strain_energy",
-        "N mm",
-        "Strain energy of matrix and fibres under the load, fibres carrying tension only.",
-        "> 0, lower is better under forces",
-        lambda tested: tested.bracket.tension.solution.strain_energy,
-    ),
-    _Index(
-        "matrix_stress_change",
-        "1",
-        "Peak of the matrix's von Mises stress, averaged as for first_failure_load, over that of "
-        "the part without fibre under the same load, less 1.",
-        ">= -1, lower is better; missing where first_failure_load is",
-        _of_failure(lambda failure, tested: failure.matrix_index / tested.matrix_before - 1.0),
-    ),
-    _Index(
-        "printed_volume",
-        "1",
-        "Volume of matrix and fibre of the planned print over the volume of the part.",
-        "about 1 is right; missing where no print was planned",
-    ),
-    _Index(
-        "whole_print_time",
-        "s",
-        "Time of the whole print as its file states it: matrix, fibre, tool changes and their "
-        "waits, without the first heating.",
-        "> 0, lower is better; missing where no print was planned",
-    ),
-    _Index(
-        "first_failure_load",
-        "N",
-        "Load at which the matrix (von Mises stress averaged over a 2 mm ball, away from loads and "
-        "supports), the fibre (highest axial force, averaged over 5 mm) or the bond between layers "
-        "(interlayer_load) first reaches its strength, fibres carrying tension only.",
-        "> 0, higher is better; missing where a strength is unknown",
-        _of_failure(lambda failure, tested: failure.load),
-    ),
-    _Index(
-        "pinned_joint_load",
-        "N",
-        "Load at which a pin first tears out of a hole or crushes its wall: the least of bearing, "
-        "net section and shear-out of all loaded or held holes, by mean stresses and the strength "
-        "of the matrix alone. Not part of first_failure_load, which leaves out what is near loads.",
-        "> 0; missing where no pin presses on the wall of a hole, or a strength is unknown",
-        lambda tested: tested.joints[0].load if tested.joints else None,
-    ),
-    _Index(
-        "interlayer_load",
-        "N",
-        "Load at which printed layers come apart: the stress tensor averaged over a 2 mm ball, "
-        "its traction on the layer against tensile and shear strength of the bond (quadratic "
-        "criterion), at least 3 mm from loads and supports.",
-        "> 0, infinite where nothing opens; missing where the bond's strength is unknown; of use "
-        "for comparing layers of one part, not as a load",
-        _of_bond(lambda failure: failure.interlayer_zones[0]),
-    ),
-    _Index(
-        "interlayer_load_near",
-        "N",
-        "As interlayer_load, at least 1.5 mm from loads and supports.",
-        "<= interlayer_load; the difference shows the effect of that distance",
-        _of_bond(lambda failure: failure.interlayer_zones[1]),
-    ),
-    _Index(
-        "interlayer_load_everywhere",
-        "N",
-        "As interlayer_load, in all cells.",
-        "<= interlayer_load_near",
-        _of_bond(lambda failure: failure.interlayer_zones[2]),
-    ),
-    _Index(
-        "interlayer_index",
-        "1",
-        "Largest value of that criterion under the load of the test.",
-        ">= 0, 1 at failure, lower is better; missing as interlayer_load",
-        _of_bond(lambda failure: failure.interlayer_index),
-    ),
     *(
-        _Index(
-            f"interlayer_{axis}",
-            "mm",
-            f"Coordinate {axis} of the place where layers first come apart.",
-            "in the frame of the mesh",
-            _opening_along(k),
-        )
-        for k, axis in enumerate("xyz")
-    ),
-    _Index(
-        "interlayer_opening",
-        "MPa",
-        "Averaged traction across the layer at that place.",
-        "negative where it presses",
-        _of_bond(lambda failure: failure.opening),
-    ),
-    _Index(
-        "interlayer_sliding",
-        "MPa",
-        "Averaged traction in the layer at that place.",
-        ">= 0",
-        _of_bond(lambda failure: failure.sliding),
+        _Index(name, **text, value=_VALUES.get(name, lambda tested: None))
+        for name, text in read_toml(Path(__file__).with_name("test_columns.toml"), "table").items()
     ),
     *(_of_law(name, law.COLUMN) for name, law in named().items() if hasattr(law, "COLUMN")),
 )

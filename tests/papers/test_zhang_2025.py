@@ -5,7 +5,7 @@ import pytest
 
 from ccfem.body.mesh import box_mesh
 from ccfem.body.mesh.patches import Cylinder
-from ccfem.papers.zhang_2025.measures import angles_to_axes
+from ccfem.papers.zhang_2025.contents import angles_to_axes
 from ccfem.slicing.slicers import Planar
 
 

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -133,57 +134,5 @@ def part_page(checked: Check) -> str:
         "arrows": drawn_arrows(load_arrows(checked), size / 5.0, mesh.points[mesh.boundary[:, :3]]),
     }
     text = json.dumps(data, separators=(",", ":")).replace("</", "<\\/")
-    return _PAGE.replace("@TITLE@", escape(checked.case.title)).replace("@DATA@", text)
-
-
-_PAGE = """<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"><title>@TITLE@</title>
-<style>body{margin:0;font:14px sans-serif;background:#fff}canvas{display:block}
-#bar{position:fixed;left:12px;top:10px}</style></head><body>
-<div id="bar"><b>@TITLE@</b><br>drag to turn, wheel to zoom; red: loads; triangles: held</div>
-<canvas id="view"></canvas><script>
-const data=@DATA@,view=document.getElementById("view"),pen=view.getContext("2d");
-let low=[1e99,1e99,1e99],high=[-1e99,-1e99,-1e99];
-for(const p of data.points)for(let i=0;i<3;i++){
-low[i]=Math.min(low[i],p[i]);high[i]=Math.max(high[i],p[i]);}
-const mid=low.map((v,i)=>(v+high[i])/2),size=Math.hypot(...low.map((v,i)=>high[i]-v));
-let turn=-0.6,tilt=0.5,zoom=1;
-function draw(){view.width=innerWidth;view.height=innerHeight;
-const s=0.8*zoom*Math.min(view.width,view.height)/size,ct=Math.cos(turn),st=Math.sin(turn),
-ce=Math.cos(tilt),se=Math.sin(tilt);
-// right, up, and towards the reader
-function at(p){const x=p[0]-mid[0],y=p[1]-mid[1],z=p[2]-mid[2],u=ct*x-st*y,v=st*x+ct*y;
-return[view.width/2+s*u,view.height/2-s*(ce*z+se*v),se*z-ce*v];}
-const q=data.points.map(at),seen=[];
-data.triangles.forEach((t,k)=>{const a=q[t[0]],b=q[t[1]],c=q[t[2]];
-const area=(b[0]-a[0])*(c[1]-a[1])-(b[1]-a[1])*(c[0]-a[0]);
-if(area<0)seen.push([a[2]+b[2]+c[2],a,b,c,k]);});
-seen.sort((f,g)=>f[0]-g[0]);
-for(const [d,a,b,c,k] of seen){const f=[b[0]-a[0],b[1]-a[1],(b[2]-a[2])*s],
-g=[c[0]-a[0],c[1]-a[1],(c[2]-a[2])*s],n=[f[1]*g[2]-f[2]*g[1],f[2]*g[0]-f[0]*g[2],
-f[0]*g[1]-f[1]*g[0]],w=0.5+0.5*Math.abs(n[2])/(Math.hypot(...n)||1);
-pen.fillStyle=pen.strokeStyle="rgb("+data.colours[data.colour[k]].map(v=>Math.round(v*w))+")";
-pen.beginPath();pen.moveTo(a[0],a[1]);pen.lineTo(b[0],b[1]);pen.lineTo(c[0],c[1]);
-pen.closePath();pen.fill();pen.stroke();}
-pen.strokeStyle="#2a7a2a";for(const line of data.lines){pen.beginPath();
-for(const p of line){const [x,y]=at(p);pen.lineTo(x,y);}pen.stroke();}
-pen.fillStyle="#fff";pen.strokeStyle="#1d2430";
-for(const m of data.marks){const [x,y]=at(m);pen.beginPath();pen.moveTo(x,y-5);
-pen.lineTo(x-5,y+4);pen.lineTo(x+5,y+4);pen.closePath();pen.fill();pen.stroke();}
-pen.font="14px sans-serif";pen.textAlign="center";
-for(const {text,ends,at:place} of data.arrows){const [a,b,c]=[...ends,place].map(at),
-w=Math.atan2(b[1]-a[1],b[0]-a[0]);pen.strokeStyle=pen.fillStyle="#b3261e";pen.lineWidth=3;
-pen.beginPath();pen.moveTo(a[0],a[1]);pen.lineTo(b[0],b[1]);pen.stroke();pen.lineWidth=1;
-pen.beginPath();pen.moveTo(b[0],b[1]);for(const e of [2.7,-2.7])
-pen.lineTo(b[0]+14*Math.cos(w+e),b[1]+14*Math.sin(w+e));pen.fill();pen.fillText(text,c[0],c[1]-6);}
-pen.fillStyle="#1d2430";for(const [word,p] of data.labels){const [x,y]=at(p);
-pen.fillText(word,x,y);}}
-let held=null;
-view.onmousedown=e=>{held=[e.clientX,e.clientY];};
-onmouseup=()=>{held=null;};
-onmousemove=e=>{if(!held)return;turn+=(e.clientX-held[0])/200;tilt+=(e.clientY-held[1])/200;
-held=[e.clientX,e.clientY];draw();};
-view.onwheel=e=>{zoom*=Math.exp(-e.deltaY/800);draw();e.preventDefault();};
-onresize=draw;draw();
-</script></body></html>
-"""
+    page = Path(__file__).with_name("part_page.html").read_text(encoding="utf-8")
+    return page.replace("@TITLE@", escape(checked.case.title)).replace("@DATA@", text)

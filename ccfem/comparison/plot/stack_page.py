@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -116,44 +117,5 @@ def turning_page(
         for name, lines in (("strands", strands), ("rims", rims))
     }
     text = json.dumps({**data, "count": len(layers)}, separators=(",", ":"))
-    return _PAGE.replace("@TITLE@", escape(title)).replace("@DATA@", text)
-
-
-_PAGE = """<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"><title>@TITLE@</title>
-<style>body{margin:0;font:14px sans-serif;background:#fff}canvas{display:block}
-#bar{position:fixed;left:12px;top:10px}</style></head><body>
-<div id="bar"><b>@TITLE@</b><br>
-layers up to <input id="top" type="range" min="1"> <span id="said"></span></div>
-<canvas id="view"></canvas><script>
-const data=@DATA@,view=document.getElementById("view"),pen=view.getContext("2d"),
-top_=document.getElementById("top"),said=document.getElementById("said");
-top_.max=data.count;top_.value=data.count;
-let low=[1e9,1e9,1e9],high=[-1e9,-1e9,-1e9];
-for(const [k,line] of data.strands.concat(data.rims))for(const p of line)for(let i=0;i<3;i++){
-low[i]=Math.min(low[i],p[i]);high[i]=Math.max(high[i],p[i]);}
-const mid=low.map((v,i)=>(v+high[i])/2),half=low.map((v,i)=>(high[i]-v)/2);
-let turn=-0.6,tilt=0.5,zoom=1;
-const wide=Math.cos(turn)*half[0]-Math.sin(turn)*half[1],
-deep=-Math.sin(turn)*half[0]+Math.cos(turn)*half[1],
-tall=Math.cos(tilt)*half[2]+Math.sin(tilt)*deep;
-function draw(){view.width=innerWidth;view.height=innerHeight;
-const s=zoom*0.46*Math.min(view.width/wide,(view.height-60)/tall),ct=Math.cos(turn),
-st=Math.sin(turn),ce=Math.cos(tilt),se=Math.sin(tilt),limit=+top_.value;
-function at(p){const x=p[0]-mid[0],y=p[1]-mid[1],z=p[2]-mid[2],u=ct*x-st*y,v=st*x+ct*y;
-return[view.width/2+s*u,view.height/2+25-s*(ce*z+se*v)];}
-function stroke(line,colour,width){pen.strokeStyle=colour;pen.lineWidth=width;pen.beginPath();
-line.forEach((p,i)=>{const q=at(p);i?pen.lineTo(q[0],q[1]):pen.moveTo(q[0],q[1]);});pen.stroke();}
-for(const [k,line] of data.rims)if(k<limit)stroke(line,"#aaa",0.7);
-for(const [k,line] of data.strands)if(k<limit)
-stroke(line,"hsl("+(260-220*k/data.count)+",70%,42%)",1);
-said.textContent=limit+" of "+data.count;}
-let held=null;
-view.onmousedown=e=>{held=[e.clientX,e.clientY];};
-onmouseup=()=>{held=null;};
-onmousemove=e=>{if(!held)return;turn+=(e.clientX-held[0])/200;tilt+=(e.clientY-held[1])/200;
-held=[e.clientX,e.clientY];draw();};
-view.onwheel=e=>{zoom*=Math.exp(-e.deltaY/800);draw();e.preventDefault();};
-top_.oninput=draw;onresize=draw;draw();
-</script></body></html>
-"""
+    page = Path(__file__).with_name("stack_page.html").read_text(encoding="utf-8")
+    return page.replace("@TITLE@", escape(title)).replace("@DATA@", text)

@@ -220,27 +220,8 @@ def study_page(result: StudyResult) -> str:
         f'<h2>Runs</h2><div class="wide">{shown_table(result.frame)}</div>'
     )
     body = "\n".join(parts)
-    return _PAGE.replace("@TITLE@", escape(result.name)).replace("@BODY@", body)
-
-
-_PAGE = """<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1"><title>@TITLE@</title>
-<style>body{margin:1.5rem auto;max-width:82rem;padding:0 1rem;font:15px/1.45 sans-serif;
-color:#1d2430}img{max-width:100%}.wide{overflow-x:auto}table{border-collapse:collapse}
-th,td{padding:.25rem .7rem;text-align:left;border-bottom:1px solid #ddd;white-space:nowrap}
-th{cursor:pointer;white-space:normal;vertical-align:bottom}.failed{white-space:normal;color:#b3261e}.remark{color:#b3261e}</style></head>
-<body>
-@BODY@
-<script>
-for(const head of document.querySelectorAll("th"))head.onclick=()=>{
-const table=head.closest("table"),k=head.cellIndex,turn=head.dataset.turn=-(head.dataset.turn||-1),
-text=row=>row.cells[k]?row.cells[k].textContent:"";
-[...table.rows].slice(1).sort((a,b)=>{const x=text(a),y=text(b);
-return turn*(x!==""&&y!==""&&!isNaN(x)&&!isNaN(y)?x-y:x.localeCompare(y));})
-.forEach(row=>row.parentNode.append(row));};
-</script></body></html>
-"""
+    page = Path(__file__).with_name("study.html").read_text(encoding="utf-8")
+    return page.replace("@TITLE@", escape(result.name)).replace("@BODY@", body)
 
 
 # Runs of a study on a Dask cluster.

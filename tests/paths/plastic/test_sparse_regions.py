@@ -7,12 +7,12 @@ import shapely
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.geometry.infill_lines import gyroid_lines, parallel_lines
 from ccfem.machine import Machine
 from ccfem.paths.plastic import Plastic
 from ccfem.paths.plastic.plastic import GYROID
 from ccfem.paths.plastic.sparse_regions import matrix_sections
 from ccfem.paths.splitting.slabs import Slab
+from ccfem.printing.matrix_lines import gyroid_lines, parallel_lines
 from ccfem.slicing.slicers.planar import Planar
 
 MACHINE = Machine()
