@@ -13,6 +13,7 @@ import re
 from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
+from types import ModuleType
 from typing import Any
 
 from ccfem.base.checks import check_known
@@ -42,6 +43,13 @@ def discovered(package: str, group: str) -> dict[str, Any]:
     for entry in entries(group):
         members[entry.name] = entry.load()
     return members
+
+
+def modules(package: str, group: str) -> dict[str, ModuleType]:
+    """Every module of a package by name, and those of entry points of a group."""
+    names = [info.name for info in pkgutil.iter_modules(importlib.import_module(package).__path__)]
+    own = {name: importlib.import_module(f"{package}.{name}") for name in names}
+    return own | {entry.name: entry.load() for entry in entries(group)}
 
 
 def create(

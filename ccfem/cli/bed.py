@@ -32,33 +32,38 @@ if TYPE_CHECKING:
 _EACH = "once for all parts, or once for each in their order"
 
 
+_Parts = Annotated[
+    list[str],
+    typer.Argument(metavar="CASE_OR_PART.toml ...", help="Parts; one may be named twice."),
+]
+_Strategies = Annotated[
+    list[str] | None,
+    typer.Option(metavar="S", help=f"Strategy, {_EACH}; default stream_function."),
+]
+_Layers = Annotated[list[int] | None, typer.Option(metavar="N", help=f"Layers of fibre, {_EACH}.")]
+_Copies = Annotated[
+    list[str] | None,
+    typer.Option(metavar="N|NXxNY", help=f"How many, as 4, or 2x3 by X and Y, {_EACH}."),
+]
+_Turns = Annotated[
+    list[str] | None, typer.Option(metavar="AXIS=DEGREES", help=f"Turn, as z=37, {_EACH}.")
+]
+_Centres = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="X,Y", help="Middle of each part on the bed, mm; else they are laid out in rows."
+    ),
+]
+
+
 def bed(
-    parts: Annotated[
-        list[str],
-        typer.Argument(metavar="CASE_OR_PART.toml ...", help="Parts; one may be named twice."),
-    ],
-    strategy: Annotated[
-        list[str] | None,
-        typer.Option(metavar="S", help=f"Strategy, {_EACH}; default stream_function."),
-    ] = None,
+    parts: _Parts,
+    strategy: _Strategies = None,
     set_: SetOfStrategies = None,
-    layers: Annotated[
-        list[int] | None, typer.Option(metavar="N", help=f"Layers of fibre, {_EACH}.")
-    ] = None,
-    copies: Annotated[
-        list[str] | None,
-        typer.Option(metavar="N|NXxNY", help=f"How many, as 4, or 2x3 by X and Y, {_EACH}."),
-    ] = None,
-    turn: Annotated[
-        list[str] | None, typer.Option(metavar="AXIS=DEGREES", help=f"Turn, as z=37, {_EACH}.")
-    ] = None,
-    centre: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="X,Y",
-            help="Middle of each part on the bed, mm; else they are laid out in rows.",
-        ),
-    ] = None,
+    layers: _Layers = None,
+    copies: _Copies = None,
+    turn: _Turns = None,
+    centre: _Centres = None,
     machine: MachineName = None,
     set_machine: SetMachine = None,
     set_plastic: SetPlastic = None,

@@ -1,7 +1,10 @@
 """Materials: stiffness, strengths, and where the numbers come from."""
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +20,7 @@ from ccfem.base.checks import (
     check_number,
 )
 from ccfem.base.errors import InputError
+from ccfem.base.toml import read_toml
 
 
 @dataclass(frozen=True)
@@ -243,93 +247,15 @@ def plane_stress(
     return np.array([[e1 / rest, q12, 0.0], [q12, e2 / rest, 0.0], [0.0, 0.0, shear_fibre]])
 
 
-_NEURAL_TOMO = "NeuralTOMO repository, materialsBase.py"
-_MARKFORGED = "Markforged composites data sheet, older edition (Onyx 1.4 GPa)"
-_BORROWED = "assumed: E2 4.1 GPa, nu12 0.33, G12 2.2 GPa as C-FRAM, nu23 0.45"
-_PLOCHER = "Plocher, table 5"
-
-
-def _printed_fibre(name: str, modulus: float, tensile: float, compressive: float) -> Material:
-    """Markforged fibre: the sheet gives the axial values only."""
-    source = f"{_MARKFORGED}; {_BORROWED}"
-    return transversely_isotropic(
-        modulus, 4100.0, 0.33, 2200.0, 0.45, name, tensile, compressive, source
-    )
-
-
-_TABLE: dict[str, Callable[[], Material]] = {
-    "pla": lambda: isotropic(
-        3000.0,
-        0.35,
-        "pla",
-        52.0,
-        61.0,
-        f"{_NEURAL_TOMO} (in-plane axis 1; transverse 32/-47; between layers 18, printed PLA spans "
-        "12 to 29); assumed: shear between layers as tension",
-        interlayer_tensile=18.0,
-        interlayer_shear=18.0,
-    ),
-    "pla_plus": lambda: isotropic(
-        3000.0,
-        0.35,
-        "pla_plus",
-        52.0,
-        61.0,
-        f"{_NEURAL_TOMO} (elastic constants as PLA there; between layers 18 and 14.43)",
-        interlayer_tensile=18.0,
-        interlayer_shear=14.43,
-    ),
-    "printed_pla": lambda: printed_pla(),  # as in the cases that come with ccfem
-    "onyx": lambda: isotropic(
-        1400.0,
-        0.41,
-        "onyx",
-        36.0,
-        None,
-        f"{_MARKFORGED}; strength at yield; assumed: nu 0.41, and 13 MPa between layers, the share "
-        "0.36 of the strength in the layer that other short-fibre polyamides have",
-        interlayer_tensile=13.0,
-        interlayer_shear=13.0,
-    ),
-    "nylon_w": lambda: isotropic(
-        1700.0, 0.39, "nylon_w", 51.0, None, f"{_MARKFORGED}; strength at yield; assumed: nu 0.39"
-    ),
-    "pa6": lambda: isotropic(
-        2600.0, 0.39, "pa6", 60.0, None, "typical dry PA6; all values assumed"
-    ),
-    "mf_carbon": lambda: _printed_fibre("mf_carbon", 60000.0, 800.0, 320.0),
-    "mf_kevlar": lambda: _printed_fibre("mf_kevlar", 27000.0, 610.0, 97.0),
-    "mf_fiberglass": lambda: _printed_fibre("mf_fiberglass", 21000.0, 590.0, 140.0),
-    "mf_hsht_fg": lambda: _printed_fibre("mf_hsht_fg", 21000.0, 600.0, 192.0),
-    "s_fram": lambda: transversely_isotropic(
-        1900.0, 1100.0, 0.41, 700.0, 0.45, "s_fram", source=f"{_PLOCHER}; assumed: nu23 0.45"
-    ),
-    "c_fram": lambda: transversely_isotropic(
-        73200.0,
-        4100.0,
-        0.33,
-        2200.0,
-        0.45,
-        "c_fram",
-        source=f"{_PLOCHER}, measured by Saeed 2021 (whose abstract reads 85 GPa); "
-        "assumed: nu23 0.45",
-    ),
-    "wang_laminate": lambda: transversely_isotropic(
-        18300.0,
-        19800.0,
-        0.17,
-        5150.0,
-        0.45,
-        "wang_laminate",
-        source="Wang 2021, from a woven laminate of Kenedi 2017, in the plane; assumed: the "
-        "direction through the thickness as axis 2, nu23 0.45",
-    ),
-}
+@cache
+def _table() -> Mapping[str, Mapping[str, Any]]:
+    """Arguments of `isotropic` or `transversely_isotropic` by name of the material."""
+    return read_toml(Path(__file__).with_name("materials.toml"), "table of materials")
 
 
 def material_names() -> tuple[str, ...]:
     """Names of the materials of the table."""
-    return tuple(sorted(_TABLE))
+    return tuple(sorted([*_table(), "printed_pla"]))
 
 
 def named_material(name: str) -> Material:
@@ -341,7 +267,10 @@ def named_material(name: str) -> Material:
         For an unknown name; the known ones are listed.
     """
     check_known("material", name, material_names())
-    return _TABLE[name]()
+    if name == "printed_pla":
+        return printed_pla()  # as in the cases that come with ccfem
+    values = _table()[name]
+    return (isotropic if "modulus" in values else transversely_isotropic)(name=name, **values)
 
 
 def printed_pla() -> Material:

@@ -189,22 +189,11 @@ def curved_plan(
     if isinstance(strands, Toolpaths):
         strands = printed_strands(strands, layers, mesh, machine)
     fibre = strands.fibre
-    wanted = plane_frame(build)[2]
-    if support is None:
-        frame = plane_frame(standing(layers, build))
-    else:
-        frame = plane_frame(support.columns.up.tolist())
-    frame = BedLayout(spin).frame(frame)
+    up = standing(layers, build) if support is None else support.columns.up.tolist()
+    frame = BedLayout(spin).frame(plane_frame(up))
     filled = filled_layers(fibre, layers, support, machine)
     islands = islands_of([layer.layer for layer in filled])
-    clash = clashes(islands, frame[2], machine)
-    steps = [
-        (step, *_of_step(filled, islands, step))
-        for step in steps_of(islands, island_order(rests_on(islands), clash), clash)
-    ]
-    steps = [step for step in steps if len(step[1])]
-    if not steps:
-        raise InputError("there is nothing to print: the part is thinner than a line of matrix")
+    steps = _steps(filled, islands, frame[2], machine)
     paths = Toolpaths.concatenate(
         replace(step_paths, layer=np.full(len(step_paths), number))
         for number, (_, step_paths, _) in enumerate(steps)
@@ -233,11 +222,26 @@ def curved_plan(
         touched=(before, leaned.before, leaned.after),
         warnings=(
             *strands.warnings,
-            *_stands(frame[2], wanted, support),
+            *_stands(frame[2], plane_frame(build)[2], support),
             *_not_full(filled, mesh),
             *_said(before, leaned.before, leaned.after, leaned.place),
         ),
     )
+
+
+def _steps(
+    filled: Sequence[FilledLayer], islands: Islands, up: FloatArray, machine: Machine
+) -> list[tuple[IntArray, Toolpaths, FloatArray]]:
+    """Islands that are printed one after the other, each step with its paths and their heights."""
+    clash = clashes(islands, up, machine)
+    steps = [
+        (step, *_of_step(filled, islands, step))
+        for step in steps_of(islands, island_order(rests_on(islands), clash), clash)
+    ]
+    steps = [step for step in steps if len(step[1])]
+    if not steps:
+        raise InputError("there is nothing to print: the part is thinner than a line of matrix")
+    return steps
 
 
 def _of_step(

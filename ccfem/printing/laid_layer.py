@@ -108,12 +108,10 @@ def with_flow(
     if machine.gcode.compact:
         last = np.searchsorted(start, offsets[1:]) - 1
         wanted = _evened(wanted / height, length, last) * height
-    # Of neighbouring pieces with the same height level only the first keeps its point.
     level = np.full(len(points), -1)
     level[start] = np.round(wanted / (_STEP * height)).astype(np.int64)
     level[way] = -2
-    keep = np.append(True, np.diff(segment) > 0)
-    keep[1:] |= level[1:] != level[:-1]
+    keep = _begins_level(level, segment)
     kept = np.flatnonzero(keep)
     run = (np.cumsum(keep) - 1)[start]
     long = np.bincount(run, length, len(kept))
@@ -127,10 +125,7 @@ def with_flow(
     inside = shapely.length(shapely.intersection(strings(strands), section))
     room = section.area * (height + below) - float(inside @ np.asarray(sections))
     if sparse is not None and sparse.any():
-        ends, solid = _laid_lines(paths.select(sparse)), shapely.force_2d(section)
-        shapely.prepare(solid)
-        ends = ends[shapely.intersects(ends, solid)]  # the ends of lines: few of their steps
-        overlap = float(shapely.length(shapely.intersection(ends, section)).sum())
+        overlap = _ends_inside(paths.select(sparse), section)
         room -= machine.matrix_width * (height + below) * overlap
     scale = room / (machine.matrix_width * (share * long)[scaled].sum())
     share[scaled] *= np.clip(scale, 1.0 / _SCALE, _SCALE)
@@ -145,6 +140,21 @@ def with_flow(
         link=way[kept],
     )
     return fewer, share, warning
+
+
+def _begins_level(level: IntArray, segment: IntArray) -> BoolArray:
+    """Mark points that are kept: of neighbouring pieces at one height level only the first."""
+    keep = np.append(True, np.diff(segment) > 0)
+    keep[1:] |= level[1:] != level[:-1]
+    return keep
+
+
+def _ends_inside(sparse: Toolpaths, section: Region) -> float:
+    """Length, mm, of lines of sparse infill that end in a section, within it."""
+    ends, solid = _laid_lines(sparse), shapely.force_2d(section)
+    shapely.prepare(solid)
+    ends = ends[shapely.intersects(ends, solid)]  # the ends of lines: few of their steps
+    return float(shapely.length(shapely.intersection(ends, section)).sum())
 
 
 def _laid_lines(paths: Toolpaths) -> Shapes:

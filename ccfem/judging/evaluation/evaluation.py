@@ -176,14 +176,31 @@ def evaluate(
     if not layers:
         raise InputError("expected at least one layer to evaluate; got none: slice the part")
     _check_layers(toolpaths, layers)
-    fibre = toolpaths.of_kind(FIBRE).layer
-    late = fibre[fibre < np.maximum.accumulate(fibre)]
-    stack = printed(layers, build)
-    upright = _upright(layers, build)
     whole = _spread_over(len(layers), most)
-    area = np.array([float(layer.areas.sum()) for layer in layers])
     material = _material(layers, stress, machine, strand or Strand())
     basis = Basis(machine, material, filled=filled)
+    rows, along_fibre = _rows(toolpaths, layers, stress, basis, build, whole)
+    nan = float("nan")
+    return Evaluation(
+        np.array([layer.index for layer in layers]),
+        {column.name: np.array([row.get(column.name, nan) for row in rows]) for column in COLUMNS},
+        tuple(along_fibre),
+    )
+
+
+def _rows(
+    toolpaths: Toolpaths,
+    layers: Sequence[Layer],
+    stress: PartStress,
+    basis: Basis,
+    build: Sequence[float] | None,
+    whole: BoolArray,
+) -> tuple[list[dict[str, float]], list[FibreSamples]]:
+    """Take the indices of each layer and of all, and the samples of layers where `whole` is set."""
+    machine, fibre = basis.machine, toolpaths.of_kind(FIBRE).layer
+    late = fibre[fibre < np.maximum.accumulate(fibre)]
+    stack, upright = printed(layers, build), _upright(layers, build)
+    area = np.array([float(layer.areas.sum()) for layer in layers])
     sampled = 1.0 if whole.all() else float(area[whole].sum() / area.sum())
 
     shared = [toolpaths, stress, machine, stack]
@@ -215,13 +232,7 @@ def evaluate(
                 along_fibre.append(FibreSamples(samples["curvature"], samples["alignment"]))
         for name, pooled in pools.items():  # one kind at a time: each fills memory
             total |= _indices({name: pooled.samples()}, replace(basis, sampled=sampled))
-    rows.append(total)
-    nan = float("nan")
-    return Evaluation(
-        np.array([layer.index for layer in layers]),
-        {column.name: np.array([row.get(column.name, nan) for row in rows]) for column in COLUMNS},
-        tuple(along_fibre),
-    )
+    return [*rows, total], along_fibre
 
 
 def _spread_over(count: int, most: int | None) -> BoolArray:

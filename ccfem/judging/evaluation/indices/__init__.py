@@ -16,8 +16,6 @@ Modules of other packages are found by entry points of the group ``ccfem.indices
 registered anywhere.
 """
 
-import importlib
-import pkgutil
 from collections.abc import Mapping
 from functools import cache
 from types import ModuleType
@@ -32,9 +30,5 @@ _LAST = 1000
 @cache
 def named() -> Mapping[str, ModuleType]:
     """Every module of indices by name, in the order of the tables."""
-    modules = {
-        info.name: importlib.import_module(f"{__name__}.{info.name}")
-        for info in pkgutil.iter_modules(__path__)
-    }
-    modules |= {entry.name: entry.load() for entry in plugins.entries("ccfem.indices")}
+    modules = plugins.modules(__name__, "ccfem.indices")
     return dict(sorted(modules.items(), key=lambda pair: getattr(pair[1], "PLACE", _LAST)))

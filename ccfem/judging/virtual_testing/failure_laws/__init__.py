@@ -17,8 +17,6 @@ The name of the module is what a part then fails in. Modules of other packages a
 points of the group ``ccfem.failure_laws``. Nothing is registered anywhere.
 """
 
-import importlib
-import pkgutil
 from collections.abc import Mapping
 from functools import cache
 from types import ModuleType
@@ -31,8 +29,4 @@ __all__ = ["named"]
 @cache
 def named() -> Mapping[str, ModuleType]:
     """Every law by name."""
-    modules = {
-        info.name: importlib.import_module(f"{__name__}.{info.name}")
-        for info in pkgutil.iter_modules(__path__)
-    }
-    return modules | {entry.name: entry.load() for entry in plugins.entries("ccfem.failure_laws")}
+    return plugins.modules(__name__, "ccfem.failure_laws")
