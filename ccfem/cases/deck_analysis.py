@@ -22,20 +22,7 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases.deck_constraints import DEGREES, Coupling, DeckConstraints, Tie, tied
 from ccfem.cases.deck_materials import TAKE_OUT, CellMaterials, DeckMaterials, DeckReading
 from ccfem.cases.deck_steps import BODY, DeckSteps, FaceLoad, State
-from ccfem.fem.elasticity.load_kinds import (
-    BodyForce,
-    Centrifugal,
-    Force,
-    Gravity,
-    Load,
-    Moment,
-    NodeForces,
-    Pressure,
-    Temperature,
-    Traction,
-    Vector,
-    points_of,
-)
+from ccfem.fem.elasticity import load_kinds
 from ccfem.fem.elasticity.problem import Region
 from ccfem.fem.elasticity.support_kinds import (
     AnySupport,
@@ -73,14 +60,14 @@ class DeckAnalysis:
     materials: CellMaterials
     supports: tuple[AnySupport, ...]
     case_supports: Mapping[str, tuple[AnySupport, ...]]
-    loads: Mapping[str, tuple[Load, ...]]
+    loads: Mapping[str, tuple[load_kinds.Load, ...]]
     remarks: tuple[str, ...]
 
     def on_cells(self, mesh: TetMesh) -> tuple[Material, tuple[Region, ...], FloatArray | None]:
         """Material, regions and axes of the cells of its mesh, mended or made quadratic."""
         _, at = cKDTree(self.mesh.centres).query(mesh.centres)
         kinds = [*self.supports, *chain(*self.case_supports.values()), *chain(*self.loads.values())]
-        places = [point for kind in kinds for point in points_of(kind)]
+        places = [point for kind in kinds for point in load_kinds.points_of(kind)]
         size = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
         away = cKDTree(mesh.points).query(places)[0] if places else np.zeros(0)
         if (away > _MOVED * size).any():
@@ -142,7 +129,9 @@ def read_analysis(path: Path, scale: float = 1.0, step: str | None = None) -> De
     cases = conversion.chosen(step, path)
     reading.mistakes.complain()
     assert materials is not None
-    if any(isinstance(load, Temperature) for _, loads in cases.values() for load in loads):
+    if any(
+        isinstance(load, load_kinds.Temperature) for _, loads in cases.values() for load in loads
+    ):
         materials = materials.with_expansion()
     first = next(iter(cases.values()))[0]
     shared = tuple(s for s in first if all(s in supports for supports, _ in cases.values()))
@@ -178,7 +167,7 @@ class _Conversion:
 
     def chosen(
         self, wanted: str | None, path: Path
-    ) -> dict[str, tuple[tuple[AnySupport, ...], tuple[Load, ...]]]:
+    ) -> dict[str, tuple[tuple[AnySupport, ...], tuple[load_kinds.Load, ...]]]:
         """Supports and loads of the static steps that do something, or of the one that is named.
 
         Raises
@@ -197,7 +186,7 @@ class _Conversion:
                     f"{known_names(wanted, names) or 'none'}"
                 )
             steps = known[:1]
-        cases: dict[str, tuple[tuple[AnySupport, ...], tuple[Load, ...]]] = {}
+        cases: dict[str, tuple[tuple[AnySupport, ...], tuple[load_kinds.Load, ...]]] = {}
         for step in steps:
             with self.reading.noted(step.block):
                 supports, moves = self._supports(step.state)
@@ -316,7 +305,7 @@ class _Conversion:
         px, py, pz = (self.reading.scale * coupling.place).tolist()
         yield RigidPatch(patch, moved, about, (x, y, z), (u, v, w), (px, py, pz))
 
-    def _places(self, chosen: BoolArray | IntArray) -> tuple[Vector, ...]:
+    def _places(self, chosen: BoolArray | IntArray) -> tuple[load_kinds.Vector, ...]:
         """Places of nodes, mm."""
         return tuple(
             (x, y, z) for x, y, z in (self.mesh.points[chosen] * self.reading.scale).tolist()
@@ -335,7 +324,7 @@ class _Conversion:
         self._patches[name] = facets
         return name
 
-    def _loads(self, state: State) -> tuple[Load, ...]:
+    def _loads(self, state: State) -> tuple[load_kinds.Load, ...]:
         """Find the loads that act."""
         return (
             *self._forces(state),
@@ -344,7 +333,7 @@ class _Conversion:
             *self._heat(state),
         )
 
-    def _forces(self, state: State) -> Iterator[Load]:
+    def _forces(self, state: State) -> Iterator[load_kinds.Load]:
         """Sum up the forces at nodes: those of a step replace those of the steps before."""
         force = np.zeros((len(self.mesh.points), 6 if self.constraints.couplings else 3))
         since = np.zeros(force.shape, dtype=np.int64)
@@ -363,9 +352,11 @@ class _Conversion:
                 own = np.flatnonzero(self.constraints.system_of[loaded] == k)
                 axes = system.at(self.mesh.points[loaded[own]])
                 vectors[own] = np.einsum("kij,kj->ki", axes, vectors[own])
-            yield NodeForces(self._places(loaded), tuple((x, y, z) for x, y, z in vectors.tolist()))
+            yield load_kinds.NodeForces(
+                self._places(loaded), tuple((x, y, z) for x, y, z in vectors.tolist())
+            )
 
-    def _spread(self, coupling: Coupling, total: FloatArray) -> Iterator[Load]:
+    def _spread(self, coupling: Coupling, total: FloatArray) -> Iterator[load_kinds.Load]:
         """Force and moment (6,) of a reference node as they act on the faces that hang on it."""
         if not total.any():
             return
@@ -381,14 +372,14 @@ class _Conversion:
         force, moment = total[:3], total[3:] + np.cross(arm, total[:3])
         if force.any():
             fx, fy, fz = force.tolist()
-            yield Force(patch, (fx, fy, fz))
+            yield load_kinds.Force(patch, (fx, fy, fz))
         if np.linalg.norm(moment) > _SAME * np.linalg.norm(force) * np.linalg.norm(arm):
             mx, my, mz = (scale * moment).tolist()
-            yield Moment(patch, (mx, my, mz))
+            yield load_kinds.Moment(patch, (mx, my, mz))
 
-    def _on_faces(self, state: State) -> Iterator[Load]:
+    def _on_faces(self, state: State) -> Iterator[load_kinds.Load]:
         """Pressures and tractions, one of each size on a patch; those on one set add up."""
-        sums: dict[tuple[str, bytes, Vector | None], tuple[FaceLoad, float]] = {}
+        sums: dict[tuple[str, bytes, load_kinds.Vector | None], tuple[FaceLoad, float]] = {}
         for load in state.faces:
             (keys,) = facet_keys(load.facets)
             key = (load.title, np.sort(keys, kind="stable").tobytes(), load.vector)
@@ -398,12 +389,12 @@ class _Conversion:
                 continue
             patch = self._patch(load.title, load.facets)
             if load.vector is None:
-                yield Pressure(patch, size)
+                yield load_kinds.Pressure(patch, size)
             else:
                 x, y, z = (size * part for part in load.vector)
-                yield Traction(patch, (x, y, z))
+                yield load_kinds.Traction(patch, (x, y, z))
 
-    def _in_volume(self, state: State) -> Iterator[Load]:
+    def _in_volume(self, state: State) -> Iterator[load_kinds.Load]:
         """Weight, forces of the volume and centrifugal loads, which the whole part must bear."""
         scale = self.reading.scale
         pull = np.zeros((len(self.mesh.cells), 3))
@@ -430,19 +421,19 @@ class _Conversion:
                 )
         if pull.any():
             x, y, z = (pull[0] * scale * 1e-3).tolist()
-            yield Gravity((x, y, z))
+            yield load_kinds.Gravity((x, y, z))
         if force.any():
             x, y, z = (force[0] * scale**-3).tolist()
-            yield BodyForce((x, y, z))
+            yield load_kinds.BodyForce((x, y, z))
         for (px, py, pz, *axis), squares in turning.items():
             if not squares[0] >= 0.0:
                 raise InputError("CENTRIF takes the square of a speed, above 0: correct it")
             if squares[0]:
                 u, v, w = axis
                 point = (px * scale, py * scale, pz * scale)
-                yield Centrifugal(float(np.sqrt(squares[0])), point, (u, v, w))
+                yield load_kinds.Centrifugal(float(np.sqrt(squares[0])), point, (u, v, w))
 
-    def _heat(self, state: State) -> Iterator[Load]:
+    def _heat(self, state: State) -> Iterator[load_kinds.Load]:
         """Change of temperature, uniform or at the nodes."""
         if state.warmth is None:
             return
@@ -464,6 +455,6 @@ class _Conversion:
         if not self.expand:
             self.reading.remarks.append("*TEMPERATURE is left out: no material has *EXPANSION")
         elif np.ptp(change) == 0.0:
-            yield Temperature(float(change[0]))
+            yield load_kinds.Temperature(float(change[0]))
         else:
-            yield Temperature(tuple(change.tolist()), self._places(self.steps.in_cell))
+            yield load_kinds.Temperature(tuple(change.tolist()), self._places(self.steps.in_cell))

@@ -10,21 +10,13 @@ from ccfem.base.toml import from_table
 from ccfem.base.whole import existing_file
 from ccfem.body.files.surface import read_surface
 from ccfem.cases.part_tables import named_table
-from ccfem.paths.placement.fibre_places import (
-    FibrePlaces,
-    FibreRegion,
-    InBody,
-    InBox,
-    InCylinder,
-    NearPatch,
-    Shape,
-)
+from ccfem.paths.placement import fibre_places
 
-FIBRE_REGIONS: dict[str, Callable[..., Shape]] = {
-    "patch": NearPatch,
-    "box": InBox,
-    "cylinder": InCylinder,
-    "body": InBody,
+FIBRE_REGIONS: dict[str, Callable[..., fibre_places.Shape]] = {
+    "patch": fibre_places.NearPatch,
+    "box": fibre_places.InBox,
+    "cylinder": fibre_places.InCylinder,
+    "body": fibre_places.InBody,
 }
 """Shapes of regions by their rule."""
 
@@ -33,8 +25,8 @@ _KEYS = {"from": "from_height", "to": "to_height"}
 
 
 def fibre_of(
-    table: object, folder: Path | None = None, base: FibrePlaces | None = None
-) -> FibrePlaces:
+    table: object, folder: Path | None = None, base: fibre_places.FibrePlaces | None = None
+) -> fibre_places.FibrePlaces:
     """Read a table [fibre].
 
     Parameters
@@ -68,9 +60,9 @@ def fibre_of(
                     regions.append(_region(region, f"fibre.regions[{k}]", folder))
     places = None
     with mistakes.noted():
-        read = from_table(FibrePlaces, given, "fibre")
+        read = from_table(fibre_places.FibrePlaces, given, "fibre")
         names = {name: getattr(read, name) for name in given}
-        places = replace(base or FibrePlaces(), **names)
+        places = replace(base or fibre_places.FibrePlaces(), **names)
     for key, name in _KEYS.items():
         mistakes.lines = [
             line.replace("fibre: fibre_places.", "fibre.").replace(name, key)
@@ -81,14 +73,14 @@ def fibre_of(
     return replace(places, regions=tuple(regions))
 
 
-def _region(table: object, where: str, folder: Path) -> FibreRegion:
+def _region(table: object, where: str, folder: Path) -> fibre_places.FibreRegion:
     """Read a region."""
     rule, rest = named_table(table, "rule", FIBRE_REGIONS, where)
     common = {key: rest.pop(key) for key in ("mode", "priority") if key in rest}
     if rule == "body":
         file = from_table(_file, rest, where)
         path = existing_file(folder / file, f"{where}.file")
-        shape: Shape = InBody(read_surface(path), file)
+        shape: fibre_places.Shape = fibre_places.InBody(read_surface(path), file)
     else:
         shape = from_table(FIBRE_REGIONS[rule], rest, where, infinite=rule == "box")
     return replace(from_table(_region_of_rules, common, where), shape=shape)
@@ -99,20 +91,22 @@ def _file(file: str) -> str:
     return file
 
 
-def _region_of_rules(mode: Literal["only", "exclude"] = "only", priority: int = 1) -> FibreRegion:
+def _region_of_rules(
+    mode: Literal["only", "exclude"] = "only", priority: int = 1
+) -> fibre_places.FibreRegion:
     """Keys that all regions have; their shape comes after."""
-    return FibreRegion(NearPatch("", 1.0), mode, priority)
+    return fibre_places.FibreRegion(fibre_places.NearPatch("", 1.0), mode, priority)
 
 
-def patches_of_fibre(places: FibrePlaces | None) -> tuple[str, ...]:
+def patches_of_fibre(places: fibre_places.FibrePlaces | None) -> tuple[str, ...]:
     """Patches that regions lie near."""
     if places is None:
         return ()
     shapes = [region.shape for region in places.regions]
-    return tuple(shape.patch for shape in shapes if isinstance(shape, NearPatch))
+    return tuple(shape.patch for shape in shapes if isinstance(shape, fibre_places.NearPatch))
 
 
-def fibre_table(places: FibrePlaces | None) -> dict[str, Any]:
+def fibre_table(places: fibre_places.FibrePlaces | None) -> dict[str, Any]:
     """Table [fibre] that reads as some places; empty without any.
 
     Raises

@@ -6,76 +6,46 @@ from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError, Mistakes, known_names, shown
 from ccfem.base.toml import TomlTable, cure_of, from_table
 from ccfem.cases.part_tables import named_table
-from ccfem.fem.elasticity.load_kinds import (
-    Bearing,
-    BodyForce,
-    Centrifugal,
-    Displacement,
-    Force,
-    Gravity,
-    Load,
-    Moment,
-    NodeForces,
-    PointForce,
-    Pressure,
-    Temperature,
-    Traction,
-)
-from ccfem.fem.elasticity.support_kinds import (
-    AnySupport,
-    EdgeSupport,
-    Foundation,
-    LocalSupport,
-    NodeSupport,
-    Pin,
-    PointSpring,
-    PointSupport,
-    PressingSupport,
-    RigidPatch,
-    SlidingSupport,
-    Spring,
-    Support,
-    TiedPatch,
-)
+from ccfem.fem.elasticity import load_kinds, support_kinds
 
-LOADS: dict[str, Callable[..., Load]] = {
-    "force": Force,
-    "traction": Traction,
-    "pressure": Pressure,
-    "bearing": Bearing,
-    "moment": Moment,
-    "point": PointForce,
-    "nodes": NodeForces,
-    "body_force": BodyForce,
-    "gravity": Gravity,
-    "centrifugal": Centrifugal,
-    "temperature": Temperature,
-    "displacement": Displacement,
+LOADS: dict[str, Callable[..., load_kinds.Load]] = {
+    "force": load_kinds.Force,
+    "traction": load_kinds.Traction,
+    "pressure": load_kinds.Pressure,
+    "bearing": load_kinds.Bearing,
+    "moment": load_kinds.Moment,
+    "point": load_kinds.PointForce,
+    "nodes": load_kinds.NodeForces,
+    "body_force": load_kinds.BodyForce,
+    "gravity": load_kinds.Gravity,
+    "centrifugal": load_kinds.Centrifugal,
+    "temperature": load_kinds.Temperature,
+    "displacement": load_kinds.Displacement,
 }
 """Loads by their kind."""
 
 _HELD, _CASE = "held", "case"
-SUPPORTS: dict[str, Callable[..., AnySupport]] = {
-    _HELD: Support,
-    "edge": EdgeSupport,
-    "point": PointSupport,
-    "nodes": NodeSupport,
-    "local": LocalSupport,
-    "sliding": SlidingSupport,
-    "rigid": RigidPatch,
-    "pin": Pin,
-    "spring": Spring,
-    "point_spring": PointSpring,
-    "foundation": Foundation,
-    "pressing": PressingSupport,
-    "tied": TiedPatch,
+SUPPORTS: dict[str, Callable[..., support_kinds.AnySupport]] = {
+    _HELD: support_kinds.Support,
+    "edge": support_kinds.EdgeSupport,
+    "point": support_kinds.PointSupport,
+    "nodes": support_kinds.NodeSupport,
+    "local": support_kinds.LocalSupport,
+    "sliding": support_kinds.SlidingSupport,
+    "rigid": support_kinds.RigidPatch,
+    "pin": support_kinds.Pin,
+    "spring": support_kinds.Spring,
+    "point_spring": support_kinds.PointSpring,
+    "foundation": support_kinds.Foundation,
+    "pressing": support_kinds.PressingSupport,
+    "tied": support_kinds.TiedPatch,
 }
 """Supports by their kind."""
 
 
 def supports_of(
     tables: tuple[TomlTable, ...], cases: TomlTable, mistakes: Mistakes
-) -> tuple[tuple[AnySupport, ...], dict[str, tuple[AnySupport, ...]]]:
+) -> tuple[tuple[support_kinds.AnySupport, ...], dict[str, tuple[support_kinds.AnySupport, ...]]]:
     """Supports of the tables [[supports]]: those of all load cases, and those of each alone.
 
     One without a kind holds its patch; one with ``case`` holds in the load cases named alone. What
@@ -83,8 +53,8 @@ def supports_of(
     """
     if not tables:
         mistakes.lines.append("a part needs a support: add [[supports]] with its patch")
-    always: list[AnySupport] = []
-    in_case: dict[str, tuple[AnySupport, ...]] = {}
+    always: list[support_kinds.AnySupport] = []
+    in_case: dict[str, tuple[support_kinds.AnySupport, ...]] = {}
     for k, table in enumerate(tables):
         with mistakes.noted():
             names = _cases_of(table, cases, f"supports[{k}]")
@@ -118,28 +88,28 @@ def _cases_of(table: TomlTable, cases: TomlTable, where: str) -> tuple[str, ...]
 
 def alternative_supports_of(
     tables: tuple[TomlTable, ...], mistakes: Mistakes
-) -> tuple[AnySupport, ...]:
+) -> tuple[support_kinds.AnySupport, ...]:
     """Supports of the tables [[alternative_supports]], if any; what is wrong is noted."""
-    supports: list[AnySupport] = []
+    supports: list[support_kinds.AnySupport] = []
     for k, table in enumerate(tables):
         with mistakes.noted():
             supports.append(_support(table, f"alternative_supports[{k}]"))
     return tuple(supports)
 
 
-def _support(table: TomlTable, where: str) -> AnySupport:
+def _support(table: TomlTable, where: str) -> support_kinds.AnySupport:
     kind, rest = named_table({"kind": _HELD, **table}, "kind", SUPPORTS, where)
     return from_table(SUPPORTS[kind], rest, where)
 
 
-def loads_of(cases: TomlTable, mistakes: Mistakes) -> dict[str, tuple[Load, ...]]:
+def loads_of(cases: TomlTable, mistakes: Mistakes) -> dict[str, tuple[load_kinds.Load, ...]]:
     """Read the loads of every load case, of the tables [[loads.NAME]]; what is wrong is noted.
 
     A case without loads, ``NAME = []``, is one in which supports alone move.
     """
     if not cases:
         mistakes.lines.append("a part needs a load: add [[loads.NAME]] with its kind")
-    loads: dict[str, tuple[Load, ...]] = {}
+    loads: dict[str, tuple[load_kinds.Load, ...]] = {}
     for name, tables in cases.items():
         if not isinstance(tables, list):
             mistakes.lines.append(

@@ -11,19 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from ccfem.base.errors import InputError
+from ccfem.cli import options
 from ccfem.cli.arguments import bed_table_of, parameters_by_strategy
 from ccfem.cli.machines import MachineName, SetMachine
-from ccfem.cli.options import (
-    Backend,
-    Force,
-    FromLayer,
-    Out,
-    Pause,
-    PrintedSupport,
-    RobotCell,
-    SetOfStrategies,
-    TestOrNot,
-)
 from ccfem.cli.part_choices import SetPlastic
 
 if TYPE_CHECKING:
@@ -59,7 +49,7 @@ _Centres = Annotated[
 def bed(
     parts: _Parts,
     strategy: _Strategies = None,
-    set_: SetOfStrategies = None,
+    set_: options.SetOfStrategies = None,
     layers: _Layers = None,
     copies: _Copies = None,
     turn: _Turns = None,
@@ -67,14 +57,14 @@ def bed(
     machine: MachineName = None,
     set_machine: SetMachine = None,
     set_plastic: SetPlastic = None,
-    support: PrintedSupport = False,
-    virtual_test: TestOrNot = None,
-    backend: Backend = "auto",
-    pause: Pause = None,
-    from_layer: FromLayer = 0,
-    cell: RobotCell = False,
-    out: Out = None,
-    force: Force = False,
+    support: options.PrintedSupport = False,
+    virtual_test: options.TestOrNot = None,
+    backend: options.Backend = "auto",
+    pause: options.Pause = None,
+    from_layer: options.FromLayer = 0,
+    cell: options.RobotCell = False,
+    out: options.Out = None,
+    force: options.Force = False,
 ) -> None:
     """Print several parts, each with its own fibre, in one file.
 
@@ -148,8 +138,8 @@ class _Part(NamedTuple):
 
 def _counted(parts: Sequence[str], *given: Sequence[Any] | None) -> dict[_Part, str | None]:
     """Parts in their order, and how many of each; given are strategies and so on, and copies."""
-    options = ("--strategy", "--layers", "--turn", "--centre", "--copies")
-    columns = [_for_each(*named, parts) for named in zip(options, given, strict=True)]
+    flags = ("--strategy", "--layers", "--turn", "--centre", "--copies")
+    columns = [_for_each(*named, parts) for named in zip(flags, given, strict=True)]
     numbers: dict[_Part, list[str | None]] = {}
     for *about, number in zip(parts, *columns, strict=True):
         numbers.setdefault(_Part(*about), []).append(number)

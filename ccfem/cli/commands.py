@@ -14,58 +14,12 @@ import typer
 
 from ccfem.base.errors import InputError
 from ccfem.base.progress import progress_bar
+from ccfem.cli import options
 from ccfem.cli.arguments import bed_table_of, drawings_of, names_of, parameters_by_strategy, path_of
 from ccfem.cli.bed import bed
 from ccfem.cli.fibre_amounts import front
 from ccfem.cli.machines import MachineName, SetMachine, machines
 from ccfem.cli.optimising import optimise
-from ccfem.cli.options import (
-    Backend,
-    BreakingLoad,
-    Calibration,
-    CasePath,
-    Centre,
-    Copies,
-    Curve,
-    Details,
-    Drawings,
-    EveryLayer,
-    Fibre,
-    FibreInAll,
-    Force,
-    FromLayer,
-    Heights,
-    Layers,
-    LoadCase,
-    Natural,
-    OneLoadCase,
-    Out,
-    Paths,
-    PathsFrame,
-    Pause,
-    Pictures,
-    PrintedSupport,
-    PrintFile,
-    Refine,
-    RobotCell,
-    Scheduler,
-    SetCase,
-    SetOfOne,
-    SetOfStrategies,
-    Slicing,
-    Slicings,
-    Stiffness,
-    Strategies,
-    Strategy,
-    StressArray,
-    StressComponents,
-    StressFile,
-    StressStep,
-    StressUnit,
-    TestOrNot,
-    Turn,
-    VirtualTest,
-)
 from ccfem.cli.part_choices import SetFibre, SetPlastic
 from ccfem.cli.part_commands import add_part_commands
 from ccfem.cli.run import (
@@ -84,10 +38,10 @@ from ccfem.cli.run import (
 
 
 def support(
-    case: CasePath,
-    set_case: SetCase = None,
-    layers: Layers = None,
-    slicing: Slicing = None,
+    case: options.CasePath,
+    set_case: options.SetCase = None,
+    layers: options.Layers = None,
+    slicing: options.Slicing = None,
     angle: Annotated[
         float | None,
         typer.Option(
@@ -104,8 +58,8 @@ def support(
             "layers, which become flat in it.",
         ),
     ] = None,
-    load_case: OneLoadCase = None,
-    backend: Backend = "auto",
+    load_case: options.OneLoadCase = None,
+    backend: options.Backend = "auto",
     out: Annotated[
         Path | None,
         typer.Option(
@@ -175,9 +129,9 @@ def study(
         int | None,
         typer.Option(metavar="N", help="Processes; default as many as processors.", min=0),
     ] = None,
-    scheduler: Scheduler = None,
-    out: Out = None,
-    force: Force = False,
+    scheduler: options.Scheduler = None,
+    out: options.Out = None,
+    force: options.Force = False,
 ) -> None:
     """Run parts x slicings x strategies x parameters; one that was stopped goes on where it was."""
     if example:
@@ -380,15 +334,15 @@ def faces(
 
 @app.command()
 def check(
-    case: CasePath,
-    set_case: SetCase = None,
+    case: options.CasePath,
+    set_case: options.SetCase = None,
     machine: MachineName = None,
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
     set_plastic: SetPlastic = None,
-    turn: Turn = None,
-    centre: Centre = None,
-    copies: Copies = None,
+    turn: options.Turn = None,
+    centre: options.Centre = None,
+    copies: options.Copies = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -414,43 +368,43 @@ def check(
 
 @app.command()
 def compare(
-    case: CasePath,
-    strategies: Strategies = None,
-    set_case: SetCase = None,
-    layers: Layers = None,
-    heights: Heights = None,
-    slicing: Slicing = None,
-    slicings: Slicings = None,
-    fibre_per_layer: Fibre = None,
-    fibre: FibreInAll = None,
-    natural: Natural = False,
-    set_: SetOfStrategies = None,
-    paths: Paths = None,
-    paths_frame: PathsFrame = None,
-    curve: Curve = None,
-    virtual_test: VirtualTest = True,
-    breaking_load: BreakingLoad = False,
-    every_layer: EveryLayer = False,
-    load_case: LoadCase = None,
-    refine: Refine = False,
-    calibration: Calibration = None,
+    case: options.CasePath,
+    strategies: options.Strategies = None,
+    set_case: options.SetCase = None,
+    layers: options.Layers = None,
+    heights: options.Heights = None,
+    slicing: options.Slicing = None,
+    slicings: options.Slicings = None,
+    fibre_per_layer: options.Fibre = None,
+    fibre: options.FibreInAll = None,
+    natural: options.Natural = False,
+    set_: options.SetOfStrategies = None,
+    paths: options.Paths = None,
+    paths_frame: options.PathsFrame = None,
+    curve: options.Curve = None,
+    virtual_test: options.VirtualTest = True,
+    breaking_load: options.BreakingLoad = False,
+    every_layer: options.EveryLayer = False,
+    load_case: options.LoadCase = None,
+    refine: options.Refine = False,
+    calibration: options.Calibration = None,
     machine: MachineName = None,
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
     set_plastic: SetPlastic = None,
-    turn: Turn = None,
-    backend: Backend = "auto",
-    stress: StressFile = None,
-    stress_unit: StressUnit = None,
-    stress_array: StressArray = None,
-    stress_step: StressStep = None,
-    stress_components: StressComponents = None,
-    pictures: Pictures = False,
-    drawings: Drawings = None,
-    details: Details = False,
-    scheduler: Scheduler = None,
-    out: Out = None,
-    force: Force = False,
+    turn: options.Turn = None,
+    backend: options.Backend = "auto",
+    stress: options.StressFile = None,
+    stress_unit: options.StressUnit = None,
+    stress_array: options.StressArray = None,
+    stress_step: options.StressStep = None,
+    stress_components: options.StressComponents = None,
+    pictures: options.Pictures = False,
+    drawings: options.Drawings = None,
+    details: options.Details = False,
+    scheduler: options.Scheduler = None,
+    out: options.Out = None,
+    force: options.Force = False,
 ) -> None:
     """Plan a part by several strategies and show which is best, in numbers and a report."""
 
@@ -492,45 +446,45 @@ def compare(
 
 @app.command()
 def plan(
-    case: CasePath,
-    strategy: Strategy = "stream_function",
-    set_: SetOfOne = None,
-    set_case: SetCase = None,
-    layers: Layers = None,
-    heights: Heights = None,
-    slicing: Slicing = None,
-    fibre_per_layer: Fibre = None,
-    stiffness: Stiffness = None,
-    virtual_test: TestOrNot = None,
-    breaking_load: BreakingLoad = False,
-    every_layer: EveryLayer = False,
-    load_case: LoadCase = None,
-    refine: Refine = False,
-    calibration: Calibration = None,
+    case: options.CasePath,
+    strategy: options.Strategy = "stream_function",
+    set_: options.SetOfOne = None,
+    set_case: options.SetCase = None,
+    layers: options.Layers = None,
+    heights: options.Heights = None,
+    slicing: options.Slicing = None,
+    fibre_per_layer: options.Fibre = None,
+    stiffness: options.Stiffness = None,
+    virtual_test: options.TestOrNot = None,
+    breaking_load: options.BreakingLoad = False,
+    every_layer: options.EveryLayer = False,
+    load_case: options.LoadCase = None,
+    refine: options.Refine = False,
+    calibration: options.Calibration = None,
     machine: MachineName = None,
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
     set_plastic: SetPlastic = None,
-    turn: Turn = None,
-    backend: Backend = "auto",
-    gcode: PrintFile = False,
-    support: PrintedSupport = False,
-    centre: Centre = None,
-    copies: Copies = None,
-    pause: Pause = None,
-    from_layer: FromLayer = 0,
-    cell: RobotCell = False,
-    stress: StressFile = None,
-    stress_unit: StressUnit = None,
-    stress_array: StressArray = None,
-    stress_step: StressStep = None,
-    stress_components: StressComponents = None,
-    pictures: Pictures = False,
-    drawings: Drawings = None,
-    details: Details = False,
-    scheduler: Scheduler = None,
-    out: Out = None,
-    force: Force = False,
+    turn: options.Turn = None,
+    backend: options.Backend = "auto",
+    gcode: options.PrintFile = False,
+    support: options.PrintedSupport = False,
+    centre: options.Centre = None,
+    copies: options.Copies = None,
+    pause: options.Pause = None,
+    from_layer: options.FromLayer = 0,
+    cell: options.RobotCell = False,
+    stress: options.StressFile = None,
+    stress_unit: options.StressUnit = None,
+    stress_array: options.StressArray = None,
+    stress_step: options.StressStep = None,
+    stress_components: options.StressComponents = None,
+    pictures: options.Pictures = False,
+    drawings: options.Drawings = None,
+    details: options.Details = False,
+    scheduler: options.Scheduler = None,
+    out: options.Out = None,
+    force: options.Force = False,
 ) -> None:
     """Plan a part by one strategy, by default with its natural amount of fibre.
 
@@ -581,7 +535,7 @@ def plan(
 
 @app.command()
 def calibrate(
-    case: CasePath,
+    case: options.CasePath,
     unreinforced: Annotated[
         Path, typer.Option(metavar="CURVE.csv", help="Test of the part printed without fibre.")
     ],
@@ -596,10 +550,10 @@ def calibrate(
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="Parameter of it; repeatable."),
     ] = None,
-    set_case: SetCase = None,
-    layers: Layers = None,
-    fibre_per_layer: Fibre = None,
-    load_case: OneLoadCase = None,
+    set_case: options.SetCase = None,
+    layers: options.Layers = None,
+    fibre_per_layer: options.Fibre = None,
+    load_case: options.OneLoadCase = None,
     machine: MachineName = None,
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
@@ -619,7 +573,7 @@ def calibrate(
     from ccfem.cli.fitting import fit_material
 
     parameters = parameters_by_strategy(set_ or (), strategy) if strategy is not None else {}
-    options = {
+    settings = {
         "layers": layers,
         "fibre_per_layer": fibre_per_layer,
         "natural": fibre_per_layer is None,
@@ -629,7 +583,7 @@ def calibrate(
     read = partial(
         load, case, set_case, False, machine, set_machine, set_fibre, set_plastic=set_plastic
     )
-    fit_material(read, unreinforced, reinforced, strategy, parameters, options, out)
+    fit_material(read, unreinforced, reinforced, strategy, parameters, settings, out)
 
 
 app.command()(bed)

@@ -8,17 +8,8 @@ from pathlib import Path
 from typing import Any, cast
 
 from ccfem.base.errors import spared
+from ccfem.comparison import files
 from ccfem.comparison.bed_print import BedPrint
-from ccfem.comparison.files import (
-    files_of_print,
-    plain_record,
-    print_record,
-    results_rows,
-    run_record,
-    versions,
-    write_printed,
-    write_table,
-)
 
 BED_FILES = ("bed.gcode", "bed_cell.csv", "bed_trim.csv", "bed.json", "parts.csv", "report.html")
 """All files that parts printed together write."""
@@ -39,10 +30,10 @@ def write_bed(bed: BedPrint, folder: Path, command: str = "", cell: bool = False
     from ccfem.comparison.report.html_report import Record, bed_html
 
     title = ", ".join(f"{name}, {run.strategy_name}" for name, run in bed.runs.items())
-    write_printed(folder / "bed.gcode", bed, bed.machine, title, bed.doubts)
-    for write in files_of_print(folder, "bed", bed, cell):
+    files.write_printed(folder / "bed.gcode", bed, bed.machine, title, bed.doubts)
+    for write in files.files_of_print(folder, "bed", bed, cell):
         write()
-    write_table(_rows(bed), folder / "parts.csv")
+    files.write_table(_rows(bed), folder / "parts.csv")
     about, left_out = _record(bed, command), list[str]()
     with spared("report.html", left_out):
         page = bed_html(bed, cast("Record", about), left_out)
@@ -58,7 +49,7 @@ def _rows(bed: BedPrint) -> list[dict[str, Any]]:
     for name, comparison in bed.comparisons.items():
         share = dataclasses.asdict(shares[name])
         printed = {f"print_{key}": value for key, value in share.items() if key != "name"}
-        rows.append({"part": name, **printed, **results_rows(comparison)[-1]})
+        rows.append({"part": name, **printed, **files.results_rows(comparison)[-1]})
     return rows
 
 
@@ -68,10 +59,10 @@ def _record(bed: BedPrint, command: str) -> dict[str, Any]:
         "ccfem": version("ccfem"),
         "command": command,
         "made": datetime.now(UTC).isoformat(timespec="seconds"),
-        "versions": versions(),
+        "versions": files.versions(),
         "machine": dataclasses.asdict(bed.machine),
         "standing": [dataclasses.asdict(spot) for spot in bed.print_plan.standing],
-        "print": print_record(bed),
-        "parts": {name: run_record(run) for name, run in bed.runs.items()},
+        "print": files.print_record(bed),
+        "parts": {name: files.run_record(run) for name, run in bed.runs.items()},
     }
-    return cast("dict[str, Any]", plain_record(about))
+    return cast("dict[str, Any]", files.plain_record(about))

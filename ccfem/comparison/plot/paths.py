@@ -9,15 +9,7 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.tensor import in_plane, largest_in_plane
-from ccfem.comparison.plot.canvas import (
-    colour_bar,
-    extents_of,
-    inches_per_mm,
-    new_figure,
-    png_series,
-    scale_bar,
-    title,
-)
+from ccfem.comparison.plot import canvas
 from ccfem.comparison.plot.colours import INK, LINK, OUTLINE, SECTION, palette, scale
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer, LayerStress
@@ -101,7 +93,7 @@ def picture_extents(
     for paths in toolpaths:
         wanted = paths.select((paths.layer == layer.index) & (paths.kind == FIBRE))
         points.append(layer.plane.project(wanted.points))
-    return extents_of(np.concatenate(points))
+    return canvas.extents_of(np.concatenate(points))
 
 
 def draw_section(axes: "Axes", layer: Layer, filled: bool = True) -> None:
@@ -211,7 +203,7 @@ def mark_failure(axes: "Axes", point: FloatArray, label: str = "") -> None:
 
 def _points(axes: "Axes", length: float) -> float:
     """Size in points of a length, mm, on the axes, at least that of a hairline."""
-    return max(72.0 * inches_per_mm(axes) * length, 0.3)
+    return max(72.0 * canvas.inches_per_mm(axes) * length, 0.3)
 
 
 def layer_picture(
@@ -245,9 +237,9 @@ def layer_picture(
     colour : str, optional
         Of the mark before the heading: that of the strategy.
     """
-    figure, (axes,) = new_figure(picture_extents(layer, [paths]))
+    figure, (axes,) = canvas.new_figure(picture_extents(layer, [paths]))
     _draw(axes, layer, stress, paths, width, limit, coloured)
-    title(axes, heading, caption, colour)
+    canvas.title(axes, heading, caption, colour)
     return figure
 
 
@@ -272,15 +264,15 @@ def layer_pictures(
     captions, colours : mappings of strategy name to str
         Lines with key numbers, and marks.
     """
-    figure, (axes,) = new_figure(picture_extents(layer, paths.values()))
+    figure, (axes,) = canvas.new_figure(picture_extents(layer, paths.values()))
     _draw_background(axes, layer, stress, limit)
-    scale_bar(axes)
+    canvas.scale_bar(axes)
     above = []
     for name, lines in paths.items():
         heading = f"{name}, layer {layer.index}"
         drawn = _draw_paths(axes, layer, lines, width)
-        above.append(drawn + title(axes, heading, captions[name], colours[name]))
-    return dict(zip(paths, png_series(figure, above), strict=True))
+        above.append(drawn + canvas.title(axes, heading, captions[name], colours[name]))
+    return dict(zip(paths, canvas.png_series(figure, above), strict=True))
 
 
 def _draw_background(
@@ -290,7 +282,7 @@ def _draw_background(
     draw_section(axes, layer, filled=stress is None)
     if stress is not None:
         end = tension_limit(stress) if limit is None else limit
-        colour_bar(axes, draw_stress(axes, stress, end), (0.0, end), "MPa tension")
+        canvas.colour_bar(axes, draw_stress(axes, stress, end), (0.0, end), "MPa tension")
 
 
 def compare_layer(
@@ -313,13 +305,13 @@ def compare_layer(
     """
     rows = max(1, -(-len(paths) // _A_ROW))
     columns = max(1, -(-len(paths) // rows))
-    figure, places = new_figure(picture_extents(layer, paths.values()), columns, rows)
+    figure, places = canvas.new_figure(picture_extents(layer, paths.values()), columns, rows)
     for left in places[max(len(paths), 1) :]:
         left.remove()
     colours = palette(paths)
     for axes, (name, lines) in zip(places[: len(paths)], paths.items(), strict=True):
         _draw(axes, layer, stress, lines, width, limit)
-        title(axes, name, (captions or {}).get(name, ""), colours[name])
+        canvas.title(axes, name, (captions or {}).get(name, ""), colours[name])
     return figure
 
 
@@ -336,7 +328,7 @@ def _draw(
     _draw_background(axes, layer, stress if coloured is None else None, limit)
     if coloured is not None:
         colours = _draw_segments(axes, coloured, width)
-        colour_bar(axes, colours, coloured.limits, coloured.label)
+        canvas.colour_bar(axes, colours, coloured.limits, coloured.label)
     else:
         _draw_paths(axes, layer, paths, width)
-    scale_bar(axes)
+    canvas.scale_bar(axes)

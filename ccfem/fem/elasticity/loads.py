@@ -12,37 +12,9 @@ from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError
 from ccfem.base.formula import formula_values
 from ccfem.base.tensor import strain_to_voigt
-from ccfem.body.mesh import TetMesh
-from ccfem.body.mesh.curved_cells import (
-    CELL_POINTS,
-    CELL_WEIGHTS,
-    EDGES,
-    STRAIGHT,
-    facet_integrals,
-    gradients_at,
-    integrals,
-    jacobians,
-    shape_values,
-)
+from ccfem.body.mesh import TetMesh, curved_cells
+from ccfem.fem.elasticity import load_kinds
 from ccfem.fem.elasticity.assembly import cell_gradients
-from ccfem.fem.elasticity.load_kinds import (
-    Bearing,
-    BodyForce,
-    Centrifugal,
-    Displacement,
-    Force,
-    Gravity,
-    Load,
-    Moment,
-    NodeForces,
-    PointForce,
-    Pressure,
-    SurfaceLoad,
-    Temperature,
-    Traction,
-    VolumeLoad,
-    sizes_of,
-)
 from ccfem.fem.elasticity.nodes import (
     FACET_PRODUCTS,
     LoadedBody,
@@ -92,9 +64,9 @@ class _Curved:
         corners, middles = mesh.points[nodes[:, :3]], mesh.points[nodes[:, 3:]]
         after = np.roll(corners, -1, axis=1)
         gap = np.linalg.norm(middles - 0.5 * (corners + after), axis=2)
-        off = gap > STRAIGHT * np.linalg.norm(after - corners, axis=2)
+        off = gap > curved_cells.STRAIGHT * np.linalg.norm(after - corners, axis=2)
         rows = np.flatnonzero(off.any(axis=1))
-        return cls(rows, nodes[rows], *facet_integrals(mesh.points[nodes[rows]]))
+        return cls(rows, nodes[rows], *curved_cells.facet_integrals(mesh.points[nodes[rows]]))
 
     def true_areas(self, area: FloatArray) -> FloatArray:
         """Areas (k,), mm^2, of all facets, of those of their corners."""
@@ -126,12 +98,15 @@ def _consistent_forces(mesh: LoadedBody, facets: IntArray, forces: FloatArray) -
     return result
 
 
-def _load_vector(mesh: LoadedBody, load: Force | Traction | Bearing | PointForce) -> FloatArray:
+def _load_vector(
+    mesh: LoadedBody,
+    load: load_kinds.Force | load_kinds.Traction | load_kinds.Bearing | load_kinds.PointForce,
+) -> FloatArray:
     """Components of a load in the space of the mesh; PlaneProblem refuses one out of its plane."""
     return np.array(load.vector, dtype=np.float64)[: mesh.points.shape[1]]
 
 
-def _force(mesh: LoadedBody, load: Force) -> FloatArray:
+def _force(mesh: LoadedBody, load: load_kinds.Force) -> FloatArray:
     facets = patch_facets(mesh, load.patch)
     curved = _Curved.among(mesh, facets)
     area = curved.true_areas(mesh.facet_areas(facets)[0])
@@ -140,7 +115,7 @@ def _force(mesh: LoadedBody, load: Force) -> FloatArray:
     return curved.replaced(_consistent_forces(mesh, facets, forces), forces, exact)
 
 
-def _traction(mesh: LoadedBody, load: Traction) -> FloatArray:
+def _traction(mesh: LoadedBody, load: load_kinds.Traction) -> FloatArray:
     facets = patch_facets(mesh, load.patch)
     curved = _Curved.among(mesh, facets)
     forces = mesh.facet_areas(facets)[0][:, None] * _load_vector(mesh, load)
@@ -148,7 +123,7 @@ def _traction(mesh: LoadedBody, load: Traction) -> FloatArray:
     return curved.replaced(_consistent_forces(mesh, facets, forces), forces, exact)
 
 
-def _pressure(mesh: LoadedBody, load: Pressure) -> FloatArray:
+def _pressure(mesh: LoadedBody, load: load_kinds.Pressure) -> FloatArray:
     facets, area, normal = _outward(mesh, load.patch)
     curved = _Curved.among(mesh, facets)
     forces = -load.magnitude * area[:, None] * normal
@@ -157,7 +132,7 @@ def _pressure(mesh: LoadedBody, load: Pressure) -> FloatArray:
     )
 
 
-def _bearing(mesh: LoadedBody, load: Bearing) -> FloatArray:
+def _bearing(mesh: LoadedBody, load: load_kinds.Bearing) -> FloatArray:
     """Pressure ``-normal . a`` where that is positive, with a fitted to the total force.
 
     On an evenly meshed half cylinder a is parallel to the force, and the pressure is a cosine. On a
@@ -188,7 +163,7 @@ def _bearing(mesh: LoadedBody, load: Bearing) -> FloatArray:
     return _consistent_forces(mesh, facets, forces + area[:, None] / area.sum() * rest)
 
 
-def _moment(mesh: LoadedBody, load: Moment) -> FloatArray:
+def _moment(mesh: LoadedBody, load: load_kinds.Moment) -> FloatArray:
     """Tractions ``a x (x - centroid)``, with a such that the nodal forces have the moment.
 
     The forces are consistent: those of a linear traction on straight facets are exact.
@@ -208,13 +183,13 @@ def _moment(mesh: LoadedBody, load: Moment) -> FloatArray:
     return result
 
 
-def _point(mesh: LoadedBody, load: PointForce) -> FloatArray:
+def _point(mesh: LoadedBody, load: load_kinds.PointForce) -> FloatArray:
     result = np.zeros(mesh.points.shape)
     result[nearest_node(mesh, load.point, "a point force")] = _load_vector(mesh, load)
     return result
 
 
-def _nodes(mesh: LoadedBody, load: NodeForces) -> FloatArray:
+def _nodes(mesh: LoadedBody, load: load_kinds.NodeForces) -> FloatArray:
     result = np.zeros(mesh.points.shape)
     vectors = np.asarray(load.vectors)[:, : mesh.points.shape[1]]
     np.add.at(result, nearest_nodes(mesh, load.points, "a force"), vectors)
@@ -222,17 +197,17 @@ def _nodes(mesh: LoadedBody, load: NodeForces) -> FloatArray:
 
 
 _KINDS: dict[type, Callable[..., FloatArray]] = {
-    Force: _force,
-    Traction: _traction,
-    Pressure: _pressure,
-    Bearing: _bearing,
-    Moment: _moment,
-    PointForce: _point,
-    NodeForces: _nodes,
+    load_kinds.Force: _force,
+    load_kinds.Traction: _traction,
+    load_kinds.Pressure: _pressure,
+    load_kinds.Bearing: _bearing,
+    load_kinds.Moment: _moment,
+    load_kinds.PointForce: _point,
+    load_kinds.NodeForces: _nodes,
 }
 
 
-def check_load(load: Load) -> None:
+def check_load(load: load_kinds.Load) -> None:
     """Refuse a load that is not finite, absurdly large, or zero; displacements may be zero."""
     for value in vars(load).values():
         if value is None or isinstance(value, str) or value == ():
@@ -246,14 +221,14 @@ def check_load(load: Load) -> None:
             )
     sizes = ("vector", "vectors", "magnitude", "acceleration", "speed", "change")
     size = next(getattr(load, name) for name in sizes if hasattr(load, name))
-    may_be_none = isinstance(load, Displacement) or isinstance(size, str)
+    may_be_none = isinstance(load, load_kinds.Displacement) or isinstance(size, str)
     if not may_be_none and np.max(np.abs(size)) < _SMALLEST:
         raise InputError(f"a load must not be zero; got {load}: give it a size or leave it out")
-    for what, value, bounds in sizes_of(load):
+    for what, value, bounds in load_kinds.sizes_of(load):
         bounds.check(what, value)
 
 
-def nodal_forces(mesh: LoadedBody, load: SurfaceLoad) -> FloatArray:
+def nodal_forces(mesh: LoadedBody, load: load_kinds.SurfaceLoad) -> FloatArray:
     """Return the forces at the nodes that do the same work as a load on the surface.
 
     Returns
@@ -282,18 +257,18 @@ def load_case(problem: SupportedProblem, name: str) -> FloatArray:
     parts = []
     for load in loads:
         check_load(load)
-        if isinstance(load, SurfaceLoad):
+        if isinstance(load, load_kinds.SurfaceLoad):
             parts.append(nodal_forces(problem.body, load))
-        elif isinstance(load, VolumeLoad):
+        elif isinstance(load, load_kinds.VolumeLoad):
             assert isinstance(problem, Problem)
             parts.append(volume_forces(problem, load))
-    heat = any(isinstance(load, Temperature) for load in loads)
+    heat = any(isinstance(load, load_kinds.Temperature) for load in loads)
     if heat:
         assert isinstance(problem, Problem)
         parts.append(heat_forces(problem, name))
     total: FloatArray = sum(parts, np.zeros(problem.body.points.shape))
     largest = max((float(np.abs(part).max()) for part in parts), default=0.0)
-    moved: list[Any] = [load.vector for load in loads if isinstance(load, Displacement)]
+    moved: list[Any] = [load.vector for load in loads if isinstance(load, load_kinds.Displacement)]
     moved += [getattr(support, "value", 0.0) for support in problem.supports]
     moved += [getattr(support, "angle", 0.0) for support in problem.supports]
     still = not heat and not any(np.any(value) for value in moved)
@@ -328,7 +303,7 @@ _TONNES = 1e-9
 """Tonnes per mm^3 in a gram per cm^3; a tonne times a mm/s^2 is a newton."""
 
 
-def volume_forces(problem: Problem, load: VolumeLoad) -> FloatArray:
+def volume_forces(problem: Problem, load: load_kinds.VolumeLoad) -> FloatArray:
     """Find the forces at the nodes (n, 3), N, that do the same work as a load in the volume.
 
     Raises
@@ -337,9 +312,9 @@ def volume_forces(problem: Problem, load: VolumeLoad) -> FloatArray:
         For a weight where a material has no mass density and none is given.
     """
     mesh = problem.mesh
-    if isinstance(load, Centrifugal):
+    if isinstance(load, load_kinds.Centrifugal):
         return _centrifugal_forces(problem, load)
-    if isinstance(load, BodyForce):
+    if isinstance(load, load_kinds.BodyForce):
         force = np.tile(np.asarray(load.vector, dtype=np.float64), (len(mesh.cells), 1))
     else:
         density = _mass_density(problem, load)
@@ -347,7 +322,7 @@ def volume_forces(problem: Problem, load: VolumeLoad) -> FloatArray:
     shares = np.full(4, 0.25) if mesh.order == 1 else np.array([-0.05] * 4 + [0.2] * 6)
     volumes = mesh.volumes[:, None] * shares
     if len(mesh.curved):
-        volumes[mesh.curved] = integrals(mesh.points[mesh.cells[mesh.curved]])
+        volumes[mesh.curved] = curved_cells.integrals(mesh.points[mesh.cells[mesh.curved]])
     return _summed(mesh, force[:, None] * volumes[:, :, None])
 
 
@@ -360,7 +335,7 @@ def _summed(mesh: TetMesh, forces: FloatArray) -> FloatArray:
     return result
 
 
-def _centrifugal_forces(problem: Problem, load: Centrifugal) -> FloatArray:
+def _centrifugal_forces(problem: Problem, load: load_kinds.Centrifugal) -> FloatArray:
     """``int N rho speed^2 r dV`` with the radius r from the axis, by quadrature in each cell."""
     mesh = problem.mesh
     axis = np.asarray(load.axis) / np.linalg.norm(load.axis)
@@ -368,17 +343,21 @@ def _centrifugal_forces(problem: Problem, load: Centrifugal) -> FloatArray:
     radius = (arm - np.outer(arm @ axis, axis))[mesh.cells]
     size = _TONNES * _mass_density(problem, load) * load.speed**2
     forces = np.zeros(radius.shape)
-    for weight, at in zip(CELL_WEIGHTS, CELL_POINTS, strict=True):
-        values = at if mesh.order == 1 else shape_values(at)
+    for weight, at in zip(curved_cells.CELL_WEIGHTS, curved_cells.CELL_POINTS, strict=True):
+        values = at if mesh.order == 1 else curved_cells.shape_values(at)
         volume = np.array(mesh.volumes)
         if len(mesh.curved):
-            volume[mesh.curved] = jacobians(mesh.points[mesh.cells[mesh.curved]], at) / 6.0
+            volume[mesh.curved] = (
+                curved_cells.jacobians(mesh.points[mesh.cells[mesh.curved]], at) / 6.0
+            )
         here = (weight * size * volume)[:, None] * np.einsum("a,mai->mi", values, radius)
         forces += values[:, None] * here[:, None]
     return _summed(mesh, forces)
 
 
-def _mass_density(problem: Problem, load: Gravity | Centrifugal) -> FloatArray:
+def _mass_density(
+    problem: Problem, load: load_kinds.Gravity | load_kinds.Centrifugal
+) -> FloatArray:
     """Mass density (m,), g/cm^3; density and fill of a cell, where the part has them, scale it."""
     factor = np.ones(len(problem.mesh.cells)) if problem.density is None else problem.density
     factor = factor if problem.fill is None else factor * problem.fill
@@ -387,7 +366,7 @@ def _mass_density(problem: Problem, load: Gravity | Centrifugal) -> FloatArray:
     result = np.empty(len(factor))
     for material, cells in problem.materials:
         if material.mass_density is None:
-            what = "gravity" if isinstance(load, Gravity) else "a centrifugal load"
+            what = "gravity" if isinstance(load, load_kinds.Gravity) else "a centrifugal load"
             raise InputError(
                 f"{what} needs the mass density of material '{material.name}', g/cm^3, which has "
                 "none: give mass_density to the load or to the material"
@@ -396,7 +375,7 @@ def _mass_density(problem: Problem, load: Gravity | Centrifugal) -> FloatArray:
     return factor * result
 
 
-def temperature_change(mesh: TetMesh, load: Temperature) -> FloatArray:
+def temperature_change(mesh: TetMesh, load: load_kinds.Temperature) -> FloatArray:
     """Change of temperature (n,), K, at the nodes of a mesh."""
     if isinstance(load.change, str):
         return formula_values(load.change, mesh.points)
@@ -423,7 +402,10 @@ def temperature_change(mesh: TetMesh, load: Temperature) -> FloatArray:
 _PRODUCTS = (np.ones((4, 4)) + np.eye(4)) / 20.0
 """Integrals of the products of two barycentric coordinates over a cell of unit volume."""
 _MOMENTS = np.concatenate(
-    [(np.eye(4) - 1.0) / 60.0, (1.0 + (np.arange(4)[:, None, None] == EDGES).any(axis=2)) / 30.0],
+    [
+        (np.eye(4) - 1.0) / 60.0,
+        (1.0 + (np.arange(4)[:, None, None] == curved_cells.EDGES).any(axis=2)) / 30.0,
+    ],
     axis=1,
 )
 """Those of a barycentric coordinate and a quadratic shape function."""
@@ -446,7 +428,7 @@ def free_strain(problem: Problem, case: str) -> FloatArray | None:
     change = np.zeros(len(mesh.points))
     for name, factor in problem.factors(case).items():
         for load in problem.loads.get(name, ()):
-            if isinstance(load, Temperature):
+            if isinstance(load, load_kinds.Temperature):
                 change += factor * temperature_change(mesh, load)
     if not change[mesh.cells].any():
         return None
@@ -519,9 +501,9 @@ def _curved_strain_forces(mesh: TetMesh, stress: FloatArray) -> FloatArray:
     """Do the same, (c, 10, 3), in the cells with curved sides, of a stress (c, 1 or 4, 3, 3)."""
     nodes = mesh.points[mesh.cells[mesh.curved]]
     forces = np.zeros(nodes.shape)
-    for weight, at in zip(CELL_WEIGHTS, CELL_POINTS, strict=True):
+    for weight, at in zip(curved_cells.CELL_WEIGHTS, curved_cells.CELL_POINTS, strict=True):
         shares = at if stress.shape[1] == 4 else np.ones(1)
         here = np.einsum("a,maij->mij", shares, stress)
-        volume = weight / 6.0 * jacobians(nodes, at)
-        forces += volume[:, None, None] * (gradients_at(nodes, at) @ here)
+        volume = weight / 6.0 * curved_cells.jacobians(nodes, at)
+        forces += volume[:, None, None] * (curved_cells.gradients_at(nodes, at) @ here)
     return forces

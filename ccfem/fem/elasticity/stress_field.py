@@ -14,6 +14,7 @@ from ccfem.base.errors import InputError
 from ccfem.base.tensor import strain_from_voigt, to_voigt
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.curved_cells import shape_values
+from ccfem.fem.elasticity import support_kinds
 from ccfem.fem.elasticity.error_estimate import ErrorEstimate, estimate_error
 from ccfem.fem.elasticity.load_kinds import patches_in_use
 from ccfem.fem.elasticity.loads import free_strain
@@ -21,16 +22,6 @@ from ccfem.fem.elasticity.nodes import edge_nodes, nearest_node, nearest_nodes, 
 from ccfem.fem.elasticity.plausibility import about_problem, about_solution
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.recovery import cell_strain, nodal_stress
-from ccfem.fem.elasticity.support_kinds import (
-    AnySupport,
-    EdgeSupport,
-    LocalSupport,
-    NodeSupport,
-    PointSpring,
-    PointSupport,
-    RigidPatch,
-    TiedPatch,
-)
 from ccfem.fem.elasticity.supports import held
 from ccfem.fem.materials import Material
 from ccfem.geometry.locate import locate
@@ -212,7 +203,7 @@ def support_forces(problem: Problem, reactions: FloatArray) -> dict[str, FloatAr
         As `StressField.reactions`.
     """
     mesh = problem.mesh
-    holding = (each for each in problem.supports if not isinstance(each, TiedPatch))
+    holding = (each for each in problem.supports if not isinstance(each, support_kinds.TiedPatch))
     claims = [_claim(mesh, support) for support in holding]
     held = np.zeros(mesh.points.shape)
     for _, nodes, components in claims:
@@ -226,18 +217,18 @@ def support_forces(problem: Problem, reactions: FloatArray) -> dict[str, FloatAr
     return forces
 
 
-def _claim(mesh: TetMesh, support: AnySupport) -> tuple[str, IntArray, IntArray]:
+def _claim(mesh: TetMesh, support: support_kinds.AnySupport) -> tuple[str, IntArray, IntArray]:
     """Name of a support, its nodes, and the components that it may hold there."""
-    turned = isinstance(support, RigidPatch | LocalSupport)
-    turned |= isinstance(support, NodeSupport) and bool(support.axes)
+    turned = isinstance(support, support_kinds.RigidPatch | support_kinds.LocalSupport)
+    turned |= isinstance(support, support_kinds.NodeSupport) and bool(support.axes)
     letters = "xyz" if turned else getattr(support, "components", "xyz")
     components = np.array([k for k in range(3) if "xyz"[k] in letters], dtype=np.int64)
-    if isinstance(support, EdgeSupport):
+    if isinstance(support, support_kinds.EdgeSupport):
         label = f"edge of {support.patches[0]} and {support.patches[1]}"
         return label, edge_nodes(mesh, support.patches), components
-    if isinstance(support, NodeSupport):
+    if isinstance(support, support_kinds.NodeSupport):
         return support.name, nearest_nodes(mesh, support.points, "a support"), components
-    if isinstance(support, PointSupport | PointSpring):
+    if isinstance(support, support_kinds.PointSupport | support_kinds.PointSpring):
         node = nearest_node(mesh, support.point, "a support")
         at = ", ".join(f"{x:.6g}" for x in support.point)
         return f"point ({at})", np.array([node]), components

@@ -18,19 +18,9 @@ from ccfem.fem.elasticity import PartStress
 from ccfem.fem.materials import Material, named_material
 from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.geometry.shapes import Region
-from ccfem.judging.evaluation import indices
+from ccfem.judging.evaluation import indices, layer_paths
 from ccfem.judging.evaluation.indices.alignment import AlignmentSamples
 from ccfem.judging.evaluation.indices.curvature import CurvatureSamples
-from ccfem.judging.evaluation.layer_paths import (
-    Basis,
-    Column,
-    LayerPaths,
-    PlanePaths,
-    Pool,
-    Printed,
-    plane_paths,
-    printed,
-)
 from ccfem.judging.evaluation.sensitivity import strand_lamina
 from ccfem.judging.virtual_testing import Strand
 from ccfem.machine.machine import Machine
@@ -42,7 +32,7 @@ from ccfem.slicing.slicers.planar import Planar
 if TYPE_CHECKING:
     import pandas as pd
 
-COLUMNS: tuple[Column, ...] = tuple(
+COLUMNS: tuple[layer_paths.Column, ...] = tuple(
     column for module in indices.named().values() for column in module.COLUMNS
 )
 """Every index in the order of the tables."""
@@ -178,7 +168,7 @@ def evaluate(
     _check_layers(toolpaths, layers)
     whole = _spread_over(len(layers), most)
     material = _material(layers, stress, machine, strand or Strand())
-    basis = Basis(machine, material, filled=filled)
+    basis = layer_paths.Basis(machine, material, filled=filled)
     rows, along_fibre = _rows(toolpaths, layers, stress, basis, build, whole)
     nan = float("nan")
     return Evaluation(
@@ -192,14 +182,14 @@ def _rows(
     toolpaths: Toolpaths,
     layers: Sequence[Layer],
     stress: PartStress,
-    basis: Basis,
+    basis: layer_paths.Basis,
     build: Sequence[float] | None,
     whole: BoolArray,
 ) -> tuple[list[dict[str, float]], list[FibreSamples]]:
     """Take the indices of each layer and of all, and the samples of layers where `whole` is set."""
     machine, fibre = basis.machine, toolpaths.of_kind(FIBRE).layer
     late = fibre[fibre < np.maximum.accumulate(fibre)]
-    stack, upright = printed(layers, build), _upright(layers, build)
+    stack, upright = layer_paths.printed(layers, build), _upright(layers, build)
     area = np.array([float(layer.areas.sum()) for layer in layers])
     sampled = 1.0 if whole.all() else float(area[whole].sum() / area.sum())
 
@@ -222,7 +212,7 @@ def _rows(
             samples = {name: kind.sample(view) for name, kind in taken.items()}
             return samples, _indices(samples, basis)
 
-        pools = {name: Pool() for name in kinds}
+        pools = {name: layer_paths.Pool() for name in kinds}
         results = in_processes(measured, layers, whole.tolist(), shared=shared)
         for row, every, (samples, values) in zip(rows, whole.tolist(), results, strict=True):
             row |= values
@@ -330,19 +320,19 @@ def _view(
     machine: Machine,
     below: Region | None,
     late: int,
-    stack: Printed | None,
+    stack: layer_paths.Printed | None,
     build: FloatArray,
-) -> LayerPaths:
+) -> layer_paths.LayerPaths:
     """See the paths of one layer in every way that an index may need."""
     chart = chart_of(layer)
-    flat, paths = chart.flat, plane_paths(chart.flattened(toolpaths), chart.flat)
+    flat, paths = chart.flat, layer_paths.plane_paths(chart.flattened(toolpaths), chart.flat)
     fibre = toolpaths.select(toolpaths.kind == FIBRE)
     inside = fibre if layer.flat is None else _in_space(paths.in_part)
     about = (layer, stress_on(flat, stress), stress, machine, below, late, stack, build)
-    return LayerPaths(toolpaths, fibre, inside, paths, *about)
+    return layer_paths.LayerPaths(toolpaths, fibre, inside, paths, *about)
 
 
-def _in_space(paths: PlanePaths) -> Toolpaths:
+def _in_space(paths: layer_paths.PlanePaths) -> Toolpaths:
     """Paths of a flat layer as toolpaths."""
     lines = np.split(paths.points, paths.offsets[1:-1]) if len(paths) else []
     return Toolpaths.from_plane(lines, paths.layer, paths.closed.tolist())
@@ -358,7 +348,7 @@ def _material(
     return strand_lamina(stress.material, strand.rho / section)
 
 
-def _indices(samples: Mapping[str, Any], basis: Basis) -> dict[str, float]:
+def _indices(samples: Mapping[str, Any], basis: layer_paths.Basis) -> dict[str, float]:
     """Value of each of `COLUMNS` that is made of these samples."""
     values: dict[str, float] = {}
     for name, kind in indices.named().items():

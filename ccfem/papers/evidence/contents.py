@@ -22,31 +22,8 @@ from ccfem.papers.contents import (
     write_figures,
     write_report,
 )
+from ccfem.papers.evidence import rows
 from ccfem.papers.evidence.prints import PARTS, parts_tested
-from ccfem.papers.evidence.rows import (
-    ALSO_OURS,
-    BREAKING,
-    FITTED,
-    LOAD,
-    NONE,
-    ORDER,
-    SLOPE,
-    SOLIDS,
-    STIFFNESS,
-    PartResult,
-    Prediction,
-    Row,
-    Summary,
-    calibrated,
-    error,
-    fitted_rho,
-    measured_of,
-    order,
-    parts_of,
-    predicted,
-    rows,
-    summary,
-)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -62,35 +39,35 @@ BAND = 10.0
 class Study:
     """Parts, each tested when it is first asked for."""
 
-    tests: Mapping[str, PartResult]
+    tests: Mapping[str, rows.PartResult]
 
     @staticmethod
-    def missing(row: Row) -> tuple[str, ...]:
+    def missing(row: rows.Row) -> tuple[str, ...]:
         """Environment variables that a row needs and that are not set."""
-        needed = [PARTS[part].missing for part in parts_of(row) if part in PARTS]
+        needed = [PARTS[part].missing for part in rows.parts_of(row) if part in PARTS]
         return tuple(dict.fromkeys(name for names in needed for name in names))
 
     @cached_property
-    def predictions(self) -> Mapping[Row, Prediction]:
+    def predictions(self) -> Mapping[rows.Row, rows.Prediction]:
         """Predictions of all rows that can be computed here."""
         return {
-            row: predicted(row, self.tests)
-            for row in rows()
+            row: rows.predicted(row, self.tests)
+            for row in rows.rows()
             if not row.why and not self.missing(row)
         }
 
     @cached_property
-    def summary(self) -> Summary:
+    def summary(self) -> rows.Summary:
         """Errors and orders of all."""
-        return summary(self.predictions)
+        return rows.summary(self.predictions)
 
-    def status(self, row: Row) -> str:
+    def status(self, row: rows.Row) -> str:
         """How a row came about, or why it is empty."""
         if row.why:
             return f"not computed: {row.why}"
         if self.missing(row):
             return f"not run: set {', '.join(self.missing(row))}"
-        if row.specimen == NONE:
+        if row.specimen == rows.NONE:
             return "no fibre"
         rebuilt = "rebuilt" if row.published == "a drawing" else "theirs"
         paths = "ours" if row.ours else rebuilt
@@ -110,13 +87,13 @@ _COLUMNS = (
 def write_evidence(study: Study, file: Path) -> None:
     """Write all rows, those that are not computed too, as CSV."""
     lines = []
-    for row in rows():
+    for row in rows.rows():
         made = study.predictions.get(row)
         about = (row.part, row.quantity, row.kind, row.paper, row.source, row.tests, row.published)
         values: tuple[Any, ...] = (None,) * 6
         if made is not None:
-            off = error(row, made.value)
-            values = (made.value, made.low, made.high, off, made.left_out, order(row, made))
+            off = rows.error(row, made.value)
+            values = (made.value, made.low, made.high, off, made.left_out, rows.order(row, made))
         lines.append((*about, row.measured, *values, study.status(row), row.rests_on, row.remark))
     write_csv(file, _COLUMNS, lines)
 
@@ -125,7 +102,7 @@ def _number(value: float) -> str:
     return "" if np.isnan(value) else f"{value:#.3g}"
 
 
-def _predicted_cell(made: Prediction) -> str:
+def _predicted_cell(made: rows.Prediction) -> str:
     """Predicted value, with its interval where it has one."""
     text = _number(made.value)
     if made.high - made.low < 0.005 * made.value:
@@ -137,16 +114,16 @@ def pairs_table(study: Study) -> str:
     """Rows that are predicted, or would be with their data: for the screen and the page."""
     head = ("part", "quantity", "measured", "predicted", "error %", "order", "paths")
     lines = []
-    for row in rows():
+    for row in rows.rows():
         if row.why:
             continue
         made = study.predictions.get(row)
-        measured = "more" if row.kind == ORDER else _number(row.measured)
+        measured = "more" if row.kind == rows.ORDER else _number(row.measured)
         if made is None:
             lines.append((row.part, row.quantity, measured, "", "", "", study.status(row)))
             continue
-        off = "" if row.kind == ORDER else f"{error(row, made.value):+.0f}"
-        cells = (_predicted_cell(made), off, order(row, made), study.status(row))
+        off = "" if row.kind == rows.ORDER else f"{rows.error(row, made.value):+.0f}"
+        cells = (_predicted_cell(made), off, rows.order(row, made), study.status(row))
         lines.append((row.part, row.quantity, measured, *cells))
     return _aligned(head, lines)
 
@@ -165,7 +142,7 @@ def absent_table() -> str:
     """Write what was measured and cannot be predicted."""
     head = ("paper", "part", "measured", "source", "why not")
     lines = []
-    for row in rows():
+    for row in rows.rows():
         if row.why:
             number = "" if np.isnan(row.measured) else f": {row.measured:.3g}"
             lines.append((row.paper, row.part, row.quantity + number, row.source, row.why))
@@ -176,7 +153,7 @@ def basis_table() -> str:
     """Write the source, specimens, what is published and what was taken from where, row by row."""
     head = ("part", "quantity", "paper", "source", "specimens", "published", "rests on", "remark")
     lines = []
-    for row in rows():
+    for row in rows.rows():
         if not row.why:
             about = (row.part, row.quantity, row.paper, row.source, str(row.tests), row.published)
             lines.append((*about, row.rests_on, row.remark))
@@ -194,8 +171,8 @@ def left_out_table(study: Study) -> str:
                 row.part,
                 row.quantity,
                 f"{row.measured:.3g}",
-                f"{made.value:.3g} ({error(row, made.value):+.0f} %)",
-                f"{made.left_out:.3g} ({error(row, made.left_out):+.0f} %)",
+                f"{made.value:.3g} ({rows.error(row, made.value):+.0f} %)",
+                f"{made.left_out:.3g} ({rows.error(row, made.left_out):+.0f} %)",
             )
         )
     return table(("part", "quantity", "measured", "rho 4", "rho of the other solid"), lines)
@@ -204,12 +181,14 @@ def left_out_table(study: Study) -> str:
 def calibrated_table(study: Study) -> str:
     """Gain of the authors' paths, with rho fitted to the zigzag of the same part."""
     lines = []
-    for part in FITTED:
-        paths = next(r for r in rows() if (r.part, r.specimen, r.kind) == (part, "authors", SLOPE))
+    for part in rows.FITTED:
+        paths = next(
+            r for r in rows.rows() if (r.part, r.specimen, r.kind) == (part, "authors", rows.SLOPE)
+        )
         if paths.ours or study.missing(paths):
             continue
-        rho, ratio = calibrated(part, study.tests)
-        measured = paths.measured / measured_of(part, NONE, SLOPE)
+        rho, ratio = rows.calibrated(part, study.tests)
+        measured = paths.measured / rows.measured_of(part, rows.NONE, rows.SLOPE)
         off = 100.0 * (ratio / measured - 1.0)
         lines.append((part, f"{rho:.2f}", f"{measured:.3g}", f"{ratio:.3g} ({off:+.0f} %)"))
     head = ("part", "rho, mm^2", "stiffness, authors' / no fibre, measured", "predicted")
@@ -219,11 +198,11 @@ def calibrated_table(study: Study) -> str:
 def force_table(study: Study) -> str:
     """Averaged force in a strand at the load at which each print of Chen et al. broke."""
     lines = []
-    for part in FITTED:
+    for part in rows.FITTED:
         if PARTS[part].missing:
             continue
         for name, force in (study.tests[part].strand_force or {}).items():
-            load = 1000.0 * measured_of(part, name, LOAD)
+            load = 1000.0 * rows.measured_of(part, name, rows.LOAD)
             lines.append((part, name, f"{1e-3 * load:.3f}", f"{force * load:.0f}"))
     shown = table(("part", "print", "broke at, kN", "highest strand force then, N"), lines)
     return f"""{shown}
@@ -239,15 +218,15 @@ def quantities(study: Study) -> dict[str, float]:
     values: dict[str, float] = {
         f"{row.part}, {row.quantity}": made.value
         for row, made in study.predictions.items()
-        if row.kind == STIFFNESS
+        if row.kind == rows.STIFFNESS
     }
-    if any(study.missing(row) for row in rows()):
+    if any(study.missing(row) for row in rows.rows()):
         return values
     values["published pairs that are predicted"] = len(study.predictions)
     named = {row.part.split(",")[0] for row in study.predictions}
     values["solids"] = len(named)
-    for kind in (STIFFNESS, BREAKING):
-        for name in (kind, kind + ALSO_OURS):
+    for kind in (rows.STIFFNESS, rows.BREAKING):
+        for name in (kind, kind + rows.ALSO_OURS):
             values[f"median error of {name}, %"] = study.summary.median(name)
         values[f"median error of {kind}, rho of the other solid, %"] = (
             study.summary.median_left_out(kind)
@@ -255,16 +234,16 @@ def quantities(study: Study) -> dict[str, float]:
     orders = study.summary.orders
     values["orders wrong or tied"] = len(orders["wrong"]) + len(orders["tie"])
     for solid in ("Loop", "Shell"):
-        others = [part for part in FITTED if SOLIDS[part] != solid]
-        values[f"rho without the {solid}"] = fitted_rho(others, study.tests)
+        others = [part for part in rows.FITTED if rows.SOLIDS[part] != solid]
+        values[f"rho without the {solid}"] = rows.fitted_rho(others, study.tests)
     return values
 
 
 _PLURAL = {
-    STIFFNESS: "stiffness ratios",
-    BREAKING: "ratios of breaking loads",
-    SLOPE: "slopes",
-    LOAD: "breaking loads",
+    rows.STIFFNESS: "stiffness ratios",
+    rows.BREAKING: "ratios of breaking loads",
+    rows.SLOPE: "slopes",
+    rows.LOAD: "breaking loads",
 }
 
 
@@ -272,16 +251,16 @@ def summary_lines(study: Study) -> str:
     """Medians and orders in words, as a list."""
     whole = study.summary
     lines = []
-    wanted = {STIFFNESS: ", wanted at most 8", BREAKING: ", wanted at most 10"}
-    for kind in (STIFFNESS, BREAKING, SLOPE, LOAD):
+    wanted = {rows.STIFFNESS: ", wanted at most 8", rows.BREAKING: ", wanted at most 10"}
+    for kind in (rows.STIFFNESS, rows.BREAKING, rows.SLOPE, rows.LOAD):
         errors = whole.errors.get(kind, ())
-        every = whole.errors.get(kind + ALSO_OURS, ())
+        every = whole.errors.get(kind + rows.ALSO_OURS, ())
         if not errors:
             continue
         said = f"{whole.median(kind):.1f} %{wanted.get(kind, '')} ({len(errors)} values"
         said += f", {min(errors):+.0f} to {max(errors):+.0f} %)"
         if len(every) > len(errors):
-            said += f"; with our paths {whole.median(kind + ALSO_OURS):.1f} % ({len(every)})"
+            said += f"; with our paths {whole.median(kind + rows.ALSO_OURS):.1f} % ({len(every)})"
         if kind in whole.left_out:
             said += f"; rho fitted to the other solid {whole.median_left_out(kind):.1f} %"
             said += f" ({len(whole.left_out[kind])})"
@@ -300,7 +279,12 @@ def summary_lines(study: Study) -> str:
 # The figure: predicted over measured.
 
 
-_KINDS = {STIFFNESS: "#0072b2", BREAKING: "#d55e00", SLOPE: "#56b4e9", LOAD: "#e69f00"}
+_KINDS = {
+    rows.STIFFNESS: "#0072b2",
+    rows.BREAKING: "#d55e00",
+    rows.SLOPE: "#56b4e9",
+    rows.LOAD: "#e69f00",
+}
 _MARKS = {
     "Loop": "o",
     "Shell, pulled": "s",
@@ -316,14 +300,14 @@ def _scatter(study: Study) -> "Figure | None":
     """Draw predicted over measured ratios, and absolute values, each with its interval."""
     from ccfem.papers.panels import canvas
 
-    drawn = [row for row in study.predictions if row.kind != ORDER]
+    drawn = [row for row in study.predictions if row.kind != rows.ORDER]
     if not drawn:
         return None
     figure = canvas(11.0, 5.6, layout="constrained", dpi=130.0)
     grid = figure.subplots(1, 2)
     for axes, kinds, unit in (
-        (grid[0], (STIFFNESS, BREAKING), "ratio of two prints"),
-        (grid[1], (SLOPE, LOAD), "slope, kN/mm, or breaking load, kN"),
+        (grid[0], (rows.STIFFNESS, rows.BREAKING), "ratio of two prints"),
+        (grid[1], (rows.SLOPE, rows.LOAD), "slope, kN/mm, or breaking load, kN"),
     ):
         rows_here = [row for row in drawn if row.kind in kinds]
         values = [row.measured for row in rows_here]
@@ -344,8 +328,8 @@ def _scatter(study: Study) -> "Figure | None":
         axes.set_xlabel(f"measured: {unit}")
         axes.set_ylabel(f"predicted: {unit}")
         _plain_ticks(axes, span)
-    _legend(grid[0], {row.part for row in drawn}, (STIFFNESS, BREAKING))
-    _legend(grid[1], set(), (SLOPE, LOAD))
+    _legend(grid[0], {row.part for row in drawn}, (rows.STIFFNESS, rows.BREAKING))
+    _legend(grid[1], set(), (rows.SLOPE, rows.LOAD))
     return figure
 
 

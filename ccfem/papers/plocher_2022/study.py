@@ -28,20 +28,7 @@ from ccfem.judging.evaluation.indices.stiffness_alignment import READINGS
 from ccfem.judging.evaluation.layer_paths import PlanePaths, plane_paths
 from ccfem.machine import Machine, Process
 from ccfem.papers.contents import WhenAsked
-from ccfem.papers.plocher_2022.plane_study import (
-    PRINT_SPEED,
-    TRAVEL_SPEED,
-    Benchmark,
-    FibreMap,
-    LaidPlate,
-    bead_area,
-    benchmark,
-    fibre_map,
-    laid_plate,
-    mixed_stiffness,
-    print_seconds,
-    reduced_stiffness,
-)
+from ccfem.papers.plocher_2022 import plane_study
 from ccfem.papers.plocher_2022.plates import Plate, five_holes, plates
 from ccfem.paths.linking.print_order import nearest_end_order
 from ccfem.paths.planning import plan
@@ -94,8 +81,8 @@ class PatternStudy:
 
     toolpaths: Toolpaths
     paths: tuple[PlanePaths, ...]
-    maps: tuple[FibreMap, ...]
-    laid: Mapping[str, LaidPlate]
+    maps: tuple[plane_study.FibreMap, ...]
+    laid: Mapping[str, plane_study.LaidPlate]
     values: Mapping[str, float]
     raster: tuple[RasterPlan, ...] = ()
 
@@ -105,7 +92,7 @@ class CaseStudy:
     """All patterns on one plate; `benchmarks` by material."""
 
     plate: Plate
-    benchmarks: Mapping[str, Benchmark]
+    benchmarks: Mapping[str, plane_study.Benchmark]
     patterns: Mapping[str, PatternStudy]
     seconds: float
 
@@ -121,8 +108,8 @@ def machine_of(plate: Plate) -> Machine:
         minimum_length=0.0,
         minimum_radius=0.0,
         cutter_distance=0.0,
-        fibre_speed=PRINT_SPEED,
-        travel_speed=TRAVEL_SPEED,
+        fibre_speed=plane_study.PRINT_SPEED,
+        travel_speed=plane_study.TRAVEL_SPEED,
         process=Process(prime="none", skirt_loops=0),
     )
 
@@ -161,17 +148,21 @@ def _load(patterns: Patterns) -> None:
 def run_case(
     plate: Plate,
     patterns: Patterns = PATTERNS,
-    benchmarks: Mapping[str, Benchmark] | None = None,
+    benchmarks: Mapping[str, plane_study.Benchmark] | None = None,
 ) -> CaseStudy:
     """Plan, solve and judge all patterns on one plate."""
     begun = perf_counter()
-    stiffness = {key: reduced_stiffness(named_material(name)) for key, name in MATERIALS.items()}
+    stiffness = {
+        key: plane_study.reduced_stiffness(named_material(name)) for key, name in MATERIALS.items()
+    }
     solve_plane(plate.isotropic_field.problem)
     solved = perf_counter() - begun
     layers, stress = plate.planned_on(2)
     if benchmarks is None:
         field = plate.isotropic_field
-        benchmarks = {key: benchmark(field, matrix) for key, matrix in stiffness.items()}
+        benchmarks = {
+            key: plane_study.benchmark(field, matrix) for key, matrix in stiffness.items()
+        }
     machine = machine_of(plate)
     studies = {}
     for name, (strategy, parameters) in patterns.items():
@@ -185,14 +176,16 @@ def run_case(
         toolpaths = Toolpaths.concatenate([first, plan(planner, chosen[1:], stress, machine)])
         raster = _on_pixels(planner, chosen, stress, machine)
         paths = tuple(plane_paths(toolpaths, layer) for layer in chosen)
-        maps = tuple(fibre_map(p, plate.mesh.centres, plate.bead) for p in paths)
+        maps = tuple(plane_study.fibre_map(p, plate.mesh.centres, plate.bead) for p in paths)
         angles = np.stack([m.angle for m in maps])
         solved_plates = {
-            key: laid_plate(plate.problem(matrix), angles, matrix)
+            key: plane_study.laid_plate(plate.problem(matrix), angles, matrix)
             for key, matrix in stiffness.items()
         }
-        mixed = mixed_stiffness(paths, maps, stiffness["C"], stiffness["S"])
-        solved_plates["mixed"] = laid_plate(plate.problem(stiffness["S"]), angles, mixed)
+        mixed = plane_study.mixed_stiffness(paths, maps, stiffness["C"], stiffness["S"])
+        solved_plates["mixed"] = plane_study.laid_plate(
+            plate.problem(stiffness["S"]), angles, mixed
+        )
         values = {
             "cpu": planned,
             "cpu_to_gcode": printed,
@@ -258,7 +251,7 @@ def _of_paths(
     paths = [plane_paths(toolpaths, layer) for layer in layers]
     winding = [sinuosity_indices(sample_sinuosity(p, plate.bead)) for p in paths]
     mean = {key: float(np.mean([indices[key] for indices in winding])) for key in winding[0]}
-    cover = np.mean([bead_area(p, plate.bead) for p in paths], axis=0)
+    cover = np.mean([plane_study.bead_area(p, plate.bead) for p in paths], axis=0)
     return {
         "paths": total["paths"] / len(layers),
         "length": total["fibre_length"] / len(layers),
@@ -266,7 +259,7 @@ def _of_paths(
         "si_mean": mean["sinuosity_mean"],
         "over_40": 100.0 * mean["over_40_count"],
         "over_40_length": 100.0 * mean["over_40_length"],
-        "print": float(np.mean([print_seconds(p) for p in paths])),
+        "print": float(np.mean([plane_study.print_seconds(p) for p in paths])),
         "overlap": 100.0 * float(cover[0]),
         "gaps": 100.0 * float(cover[1]),
     }
@@ -274,9 +267,9 @@ def _of_paths(
 
 def _of_plate(
     plate: Plate,
-    benchmarks: Mapping[str, Benchmark],
-    maps: Sequence[FibreMap],
-    solved: Mapping[str, LaidPlate],
+    benchmarks: Mapping[str, plane_study.Benchmark],
+    maps: Sequence[plane_study.FibreMap],
+    solved: Mapping[str, plane_study.LaidPlate],
 ) -> dict[str, float]:
     """Compute the indices of the solved plate."""
     off = plate.off_peaks
