@@ -5,21 +5,14 @@ from typing import Any
 
 import numpy as np
 import shapely
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 
 from ccfem.base.arrays import FloatArray
+from ccfem.comparison.plot.canvas import canvas
 from ccfem.comparison.plot.colours import INK, OUTLINE, SECTION
-
-
-def canvas(width: float, height: float, **options: Any) -> Figure:
-    """Make an empty white figure, inches, that draws without a window."""
-    figure = Figure(figsize=(width, height), facecolor="white", **options)
-    FigureCanvasAgg(figure)
-    return figure
 
 
 def panels(

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from ccfem.base.errors import InputError
-from ccfem.comparison.plot.canvas import save
+from ccfem.comparison.plot.canvas import canvas, save
 from ccfem.comparison.plot.colours import palette
-from ccfem.papers.panels import canvas
 from ccfem.papers.plocher_2022.figures import draw_radar, normalised
 
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ccfem.comparison.plot.canvas import canvas
 from ccfem.comparison.plot.colours import INK, OUTLINE, palette
 from ccfem.comparison.plot.curves import style_axes
 
@@ -84,15 +85,12 @@ def amount_curves(
     together : mapping of label to sequence of (float, float), optional
         Lengths, m, and what no paths exceed in all panels of this mapping at once.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
     rows = -(-len(panels) // _ABREAST)
     columns = -(-len(panels) // rows)
     tall = _MARGINS + _PANEL * rows + _BETWEEN * (rows - 1)
-    figure = Figure(figsize=(4.4 * columns, tall), dpi=150.0, facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = canvas(4.4 * columns, tall, dpi=150.0)
     figure.subplots_adjust(
         left=0.55 / (4.4 * columns),
         right=0.985,
@@ -150,12 +148,9 @@ def trade_curves(
     across, up : str
         What the axes are.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-    figure = Figure(figsize=(5.6, 4.0), dpi=150.0, facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = canvas(5.6, 4.0, dpi=150.0)
     axes = figure.add_axes((0.09, 0.23, 0.88, 0.68))
     figure.text(0.02, 0.945, heading, size=10, weight="bold", color=INK)
     style_axes(axes, across, up)

@@ -30,6 +30,16 @@ _FORMATS = (".png", ".pdf", ".svg")
 _FONT: dict[str, Any] = {"family": ["DejaVu Sans"], "color": INK}
 
 
+def canvas(width: float, height: float, **options: Any) -> "Figure":
+    """Make an empty white figure, inches, that draws without a window."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), facecolor="white", **options)
+    FigureCanvasAgg(figure)
+    return figure
+
+
 def new_figure(
     extents: Sequence[float], columns: int = 1, rows: int = 1
 ) -> tuple["Figure", list["Axes"]]:
@@ -44,16 +54,12 @@ def new_figure(
         width. Their axes have no frame and no ticks, and are in mm, both to one scale. They come
         row by row from the upper left.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     left, bottom, right, top = extents
     margin = _MARGIN * max(right - left, top - bottom)
     wide, high = right - left + 2.0 * margin, top - bottom + 2.0 * margin
     height = _WIDTH * min(max(high / wide, 0.2), 1.5)
     total = height + _HEAD + _FOOT
-    figure = Figure(figsize=(columns * _WIDTH, rows * total), dpi=_DPI, facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = canvas(columns * _WIDTH, rows * total, dpi=_DPI)
     axes = []
     for k in range(columns * rows):
         row, column = divmod(k, columns)

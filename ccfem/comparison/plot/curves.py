@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ccfem.comparison.plot.canvas import canvas
 from ccfem.comparison.plot.colours import INK, OUTLINE, palette
 
 if TYPE_CHECKING:
@@ -63,11 +64,7 @@ def stiffness_curves(
 
 def axes_below(heading: str, across: str, up: str) -> tuple["Figure", Any]:
     """Figure with one pair of axes from 0 to 100 %, and room for a legend below."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(4.6, 3.6), dpi=150.0, facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = canvas(4.6, 3.6, dpi=150.0)
     axes = figure.add_axes((0.13, 0.24, 0.82, 0.65))
     figure.text(0.03, 0.94, heading, size=10, weight="bold", color=INK)
     style_axes(axes, across, up)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from ccfem.comparison.plot.canvas import canvas
 from ccfem.comparison.plot.colours import INK, OUTLINE, palette
 from ccfem.comparison.plot.curves import style_axes
 
@@ -35,15 +36,12 @@ class FrontPoint(NamedTuple):
 
 def front_figure(panels: Mapping[str, Sequence[FrontPoint]], across: str, up: str) -> "Figure":
     """Draw fronts, a panel each with its heading, three side by side; axes are what is named."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
     wide = max(min(3, len(panels)), 1)
     tall = -(-max(len(panels), 1) // wide)
     width, height = 4.4 * wide, 3.4 * tall + 0.5
-    figure = Figure(figsize=(width, height), dpi=100.0)
-    FigureCanvasAgg(figure)
+    figure = canvas(width, height, dpi=100.0)
     figure.subplots_adjust(  # in inches: room for labels and the legend
         left=0.62 / width, right=1.0 - 0.12 / width, bottom=0.95 / height, top=1.0 - 0.3 / height,
         wspace=0.7 / 3.6, hspace=0.8 / 2.6,

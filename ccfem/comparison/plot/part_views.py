@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
-from ccfem.comparison.plot.canvas import save
+from ccfem.comparison.plot.canvas import canvas, save
 from ccfem.comparison.plot.colours import INK
 
 if TYPE_CHECKING:
@@ -88,10 +88,8 @@ def part_figure(
     outlines : sequence of (n, 3) arrays, mm, optional
         Lines that are seen through the part.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import to_rgb
-    from matplotlib.figure import Figure
 
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     tails = [each.place - size / 6.0 * _unit(each.direction) for each in arrows]
@@ -99,8 +97,7 @@ def part_figure(
     sides = [_sides(shown, *_frame(*view)[:2]) for view in _VIEWS]
     high = max(float((each[1, 1] - each[0, 1]) / (each[1, 0] - each[0, 0])) for each in sides)
     height = _SIZE * min(max(high, _LOWEST), 1.0)
-    figure = Figure(figsize=(2.0 * _SIZE, height), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = canvas(2.0 * _SIZE, height, layout="constrained")
     a, b, c = np.moveaxis(points[triangles], 1, 0)
     normal = np.cross(b - a, c - a)
     normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
+from ccfem.comparison.plot.canvas import canvas
 from ccfem.geometry.polylines import resample
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
@@ -53,8 +54,6 @@ def space_picture(
         Upwards in the picture.
     """
     from matplotlib import colormaps
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
     from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
     up = np.asarray(build, dtype=np.float64)
@@ -69,8 +68,7 @@ def space_picture(
     shades = [colours[k] for k, _ in lines]
     everything = np.concatenate([*borders, *strands])
     low, high = everything.min(axis=0), everything.max(axis=0)
-    figure = Figure(figsize=(13.5, 5.0))
-    FigureCanvasAgg(figure)
+    figure = canvas(13.5, 5.0)
     for number, (elevation, azimuth) in enumerate(_VIEWS):
         axes = figure.add_subplot(1, len(_VIEWS), number + 1, projection="3d")
         axes.add_collection3d(Line3DCollection(borders, colors="0.75", linewidths=0.4))

@@ -9,11 +9,12 @@ kept in files are plain arrays.
 import io
 import pickle
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any
 
 import cloudpickle
 import numpy as np
+
+from ccfem.base.parallel import ReadOnlyPickler
 
 Parted = tuple[bytes, Mapping[str, Any]]
 """A value as bytes without its arrays, and the arrays by name: for `unpacked`."""
@@ -44,19 +45,11 @@ def _is_plain(value: Any) -> bool:
     return type(value) is np.ndarray and not value.flags.writeable and not value.dtype.hasobject
 
 
-class _Pickler(cloudpickle.Pickler):
+class _Pickler(ReadOnlyPickler, cloudpickle.Pickler):
     """Pickles what frozen dataclasses hold: a plain pickle would make arrays writable.
 
     Compiled functions would be compiled anew for writable arrays, and values could be changed.
     """
-
-    def reducer_override(self, value: Any) -> Any:
-        if isinstance(value, MappingProxyType):
-            return _mapping, (dict(value),)
-        if _is_plain(value):
-            data = np.ascontiguousarray(value).tobytes()
-            return _array, (data, value.dtype.str, value.shape)
-        return super().reducer_override(value)
 
 
 class _PartingPickler(_Pickler):
@@ -86,13 +79,3 @@ class _Unpickler(pickle.Unpickler):
         array = self._arrays[name]
         array.flags.writeable = False
         return array
-
-
-def _mapping(entries: dict[Any, Any]) -> MappingProxyType[Any, Any]:
-    """Read-only mapping."""
-    return MappingProxyType(entries)
-
-
-def _array(data: bytes, kind: str, shape: tuple[int, ...]) -> Any:
-    """Read-only array over bytes."""
-    return np.ndarray(shape, dtype=np.dtype(kind), buffer=data)

@@ -298,7 +298,7 @@ _MARKS = {
 
 def _scatter(study: Study) -> "Figure | None":
     """Draw predicted over measured ratios, and absolute values, each with its interval."""
-    from ccfem.papers.panels import canvas
+    from ccfem.comparison.plot.canvas import canvas
 
     drawn = [row for row in study.predictions if row.kind != rows.ORDER]
     if not drawn:

@@ -450,7 +450,7 @@ def openings_picture(by_supports: dict[str, dict[str, Opening]], title: str, fil
     """Draw, seen along z, the least load that opens layers along each line of sight."""
     from matplotlib.colors import LogNorm
 
-    from ccfem.papers.panels import canvas
+    from ccfem.comparison.plot.canvas import canvas
 
     columns = max(len(slicings) for slicings in by_supports.values())
     figure = canvas(4.0 * columns, 2.6 * len(by_supports) + 0.4, layout="constrained")

@@ -6,9 +6,8 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.body.mesh import box_mesh
-from ccfem.comparison.plot.canvas import png
+from ccfem.comparison.plot.canvas import canvas, png
 from ccfem.geometry.polylines import resample
-from ccfem.papers.panels import canvas
 from ccfem.slicing.guidance.height_field import height_field
 from ccfem.slicing.guidance.normal_field import normal_field
 from ccfem.slicing.guidance.stress_regions import StressRegions

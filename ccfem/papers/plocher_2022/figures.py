@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
 from ccfem.base.tensor import strongest_in_plane
+from ccfem.comparison.plot.canvas import canvas
 from ccfem.comparison.plot.colours import INK, OUTLINE, scale
 from ccfem.fem.materials import named_material
 from ccfem.fem.plates import rotate_plane, stack_plane
@@ -19,7 +20,7 @@ from ccfem.judging.evaluation.layer_paths import PlanePaths
 from ccfem.judging.evaluation.sensitivity import OffAxis
 from ccfem.papers import panels
 from ccfem.papers.contents import drawn_of
-from ccfem.papers.panels import bar, canvas, title
+from ccfem.papers.panels import bar, title
 from ccfem.papers.plocher_2022.plane_study import (
     ANGLES,
     laid_plate,
