@@ -18,7 +18,7 @@ GONE = {
     "papers.layer_traction": (
         "use ccfem.judging.virtual_testing.failure_laws.interlayer.layer_traction, which returns "
         "the averaged stress too: opening, sliding, tensor"
-    ),
+    )
 }
 """What replaces modules whose functions changed when they moved."""
 

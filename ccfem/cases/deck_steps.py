@@ -22,13 +22,7 @@ from ccfem.body.files.deck import Block, element_faces
 from ccfem.body.files.formats.inp import facets_of_surface
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases.deck_constraints import DEGREES, DeckConstraints
-from ccfem.cases.deck_materials import (
-    TAKE_OUT,
-    DeckReading,
-    check_count,
-    check_parameters,
-    numbers,
-)
+from ccfem.cases.deck_materials import TAKE_OUT, DeckReading, check_count, check_parameters, numbers
 from ccfem.fem.elasticity.load_kinds import Vector
 from ccfem.geometry.facets import are_among
 

@@ -48,13 +48,7 @@ from ccfem.cases.part_loads import (
     supports_of,
     weights_of,
 )
-from ccfem.cases.part_tables import (
-    check_strategies,
-    material_of,
-    named_table,
-    plastic_of,
-    rules_of,
-)
+from ccfem.cases.part_tables import check_strategies, material_of, named_table, plastic_of, rules_of
 from ccfem.fem.elasticity.load_kinds import Load, SurfaceLoad, patches_in_use, patches_of
 from ccfem.fem.elasticity.loads import nodal_forces
 from ccfem.fem.elasticity.nodes import LoadedBody

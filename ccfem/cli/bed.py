@@ -27,8 +27,7 @@ _Parts = Annotated[
     typer.Argument(metavar="CASE_OR_PART.toml ...", help="Parts; one may be named twice."),
 ]
 _Strategies = Annotated[
-    list[str] | None,
-    typer.Option(metavar="S", help=f"Strategy, {_EACH}; default stream_function."),
+    list[str] | None, typer.Option(metavar="S", help=f"Strategy, {_EACH}; default stream_function.")
 ]
 _Layers = Annotated[list[int] | None, typer.Option(metavar="N", help=f"Layers of fibre, {_EACH}.")]
 _Copies = Annotated[
@@ -80,12 +79,7 @@ def bed(
     from ccfem.cli.screen import print_bed
     from ccfem.comparison.bed_files import BED_FILES, write_bed
     from ccfem.comparison.bed_print import needs_support, print_together
-    from ccfem.comparison.request import (
-        DEFAULT_STRAND,
-        LONGEST_TEST,
-        Request,
-        named_strategies,
-    )
+    from ccfem.comparison.request import DEFAULT_STRAND, LONGEST_TEST, Request, named_strategies
     from ccfem.printing.course import Course
 
     where = out or Path("results") / "bed"

@@ -81,8 +81,7 @@ _Solid = Annotated[
     ),
 ]
 _Void = Annotated[
-    list[str] | None,
-    typer.Option(metavar="X,Y,R", help="The same, to keep empty; repeatable."),
+    list[str] | None, typer.Option(metavar="X,Y,R", help="The same, to keep empty; repeatable.")
 ]
 _Iterations = Annotated[int, typer.Option(metavar="N", help="Iterations at most.")]
 _InSpace = Annotated[

@@ -119,8 +119,7 @@ Force = Annotated[
     ),
 ]
 Pictures = Annotated[
-    bool,
-    typer.Option("--pictures", help="Also draw what the report shows as PNG files."),
+    bool, typer.Option("--pictures", help="Also draw what the report shows as PNG files.")
 ]
 Drawings = Annotated[
     str | None,
@@ -133,17 +132,14 @@ Drawings = Annotated[
 RobotCell = Annotated[
     bool,
     typer.Option(
-        "--cell",
-        help="With --gcode: write all moves as a table for a cell of robots, too.",
+        "--cell", help="With --gcode: write all moves as a table for a cell of robots, too."
     ),
 ]
 Details = Annotated[
-    bool,
-    typer.Option("--details", help="Print every index and remark, as the report shows them."),
+    bool, typer.Option("--details", help="Print every index and remark, as the report shows them.")
 ]
 PrintedSupport = Annotated[
-    bool,
-    typer.Option("--support", help="With --gcode: print support below what hangs over, too."),
+    bool, typer.Option("--support", help="With --gcode: print support below what hangs over, too.")
 ]
 VirtualTest = Annotated[
     bool,

@@ -105,8 +105,7 @@ def _mesh(
     ],
     size: Annotated[float, typer.Option("--size", metavar="MM", help="Edge length of the cells.")],
     out: Annotated[
-        Path,
-        typer.Option("-o", "--out", metavar="MESH", parser=path_of, help="Mesh ({meshes})."),
+        Path, typer.Option("-o", "--out", metavar="MESH", parser=path_of, help="Mesh ({meshes}).")
     ],
     scale: Annotated[
         float, typer.Option(metavar="S", help="Factor that converts a file's coordinates to mm.")

@@ -165,11 +165,7 @@ def _forces(
     end = max((lines.limits[1] for lines in coloured.values()), default=0.0)
     return {
         run.name: _force(
-            run,
-            flat,
-            width,
-            replace(coloured[run.name], limits=(0.0, end)),
-            colours[run.name],
+            run, flat, width, replace(coloured[run.name], limits=(0.0, end)), colours[run.name]
         )
         for run in runs
         if run.name in coloured

@@ -26,11 +26,7 @@ _DIGITS = 2
 _SURE = 2.0
 """Standard deviations of the scatter between two runs that an order has to exceed."""
 
-_STIFFNESSES = (
-    "stiffness",
-    "stiffness_ratio_tension",
-    "displacement",
-)
+_STIFFNESSES = ("stiffness", "stiffness_ratio_tension", "displacement")
 """Columns whose best value is that of the stiffest run, if there is one."""
 
 

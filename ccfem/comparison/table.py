@@ -161,9 +161,7 @@ def headline_table(runs: Sequence[Run], wanted: Wanted, over_slicings: bool = Fa
     return Table(
         tuple(
             Head(
-                head.title,
-                _OWN.get(head.column, about.get(head.column, "")),
-                head.column in hidden,
+                head.title, _OWN.get(head.column, about.get(head.column, "")), head.column in hidden
             )
             for head in heads
         ),

@@ -105,10 +105,7 @@ class TestedCases:
 
 
 def in_all_cases(
-    strands: Strands,
-    cases: WeightedCases,
-    strand: Strand,
-    layers: Sequence[Layer],
+    strands: Strands, cases: WeightedCases, strand: Strand, layers: Sequence[Layer]
 ) -> TestedCases:
     """Test strands under all cases, in every mode."""
     parts = specimens(cases)

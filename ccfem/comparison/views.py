@@ -32,11 +32,7 @@ def shown_layer(runs: Sequence[Run], layers: Sequence[Layer]) -> int:
 
 
 def layer_view(
-    runs: Sequence[Run],
-    layers: Sequence[Layer],
-    stress: PartStress,
-    machine: Machine,
-    index: int,
+    runs: Sequence[Run], layers: Sequence[Layer], stress: PartStress, machine: Machine, index: int
 ) -> "Figure":
     """Draw the paths of all runs on one layer, side by side, on the tension there.
 

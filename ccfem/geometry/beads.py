@@ -140,11 +140,7 @@ def beads(
 
 
 def _layer_normals(
-    points: FloatArray,
-    normals: FloatArray,
-    offsets: IntArray,
-    middle: FloatArray,
-    line: IntArray,
+    points: FloatArray, normals: FloatArray, offsets: IntArray, middle: FloatArray, line: IntArray
 ) -> FloatArray:
     """Find the normal of the layer at each part: that of the nearest point of its polyline."""
     first = normals[offsets[:-1]]

@@ -189,12 +189,7 @@ def least_distance(curves: Isocontours, reach: float, enough: float) -> float:
 
 @njit(cache=True, nogil=True)
 def _least_distance(
-    grid: Buckets,
-    start: IntArray,
-    points: FloatArray,
-    level: IntArray,
-    reach: float,
-    enough: float,
+    grid: Buckets, start: IntArray, points: FloatArray, level: IntArray, reach: float, enough: float
 ) -> float:
     least = reach * reach
     for p in range(len(points)):

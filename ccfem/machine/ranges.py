@@ -121,11 +121,7 @@ RANGES = {
         "acceleration": Range(1.0, 1e6, "mm/s^2"),
         "junction": Range(0.00001, 10.0, "mm"),
     },
-    "kinematics": {
-        "centre": _PLACE,
-        "pivot": _LENGTH,
-        "tilt_limit": Range(0.0, 179.0, "degrees"),
-    },
+    "kinematics": {"centre": _PLACE, "pivot": _LENGTH, "tilt_limit": Range(0.0, 179.0, "degrees")},
     "spools": dict.fromkeys(
         [f"{name}{rest}" for name in ("fibre", "matrix", "coextruded") for rest in ("", "_left")],
         Range(0.01, 1e6, "m", zero=True),

@@ -163,11 +163,7 @@ def joined_folds(of: Sequence[Folds]) -> Folds:
 
 
 def folds(
-    points: FloatArray,
-    offsets: IntArray,
-    closed: BoolArray,
-    radius: float,
-    strict: bool = False,
+    points: FloatArray, offsets: IntArray, closed: BoolArray, radius: float, strict: bool = False
 ) -> Folds:
     """Find the folds of polylines.
 
@@ -414,11 +410,7 @@ def _tangents(
 
 
 def _mean_tangents(
-    tangent: FloatArray,
-    first: IntArray,
-    number: IntArray,
-    samples: IntArray,
-    closed: BoolArray,
+    tangent: FloatArray, first: IntArray, number: IntArray, samples: IntArray, closed: BoolArray
 ) -> FloatArray:
     """Average tangents over some samples: a printer does not feel a waver of a tenth of a mm.
 

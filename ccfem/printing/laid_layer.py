@@ -210,10 +210,7 @@ def pad_flow(
 
 
 def _density(
-    strands: Sequence[FloatArray],
-    sections: Sequence[float],
-    places: FloatArray,
-    machine: Machine,
+    strands: Sequence[FloatArray], sections: Sequence[float], places: FloatArray, machine: Machine
 ) -> FloatArray:
     """Volume of strands per area, mm, round places (k, 2)."""
     if not len(strands):

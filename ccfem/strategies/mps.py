@@ -160,12 +160,7 @@ class Mps(Infill):
         return stress_regions(image.mask, guides, self.shells)
 
     def _guides(
-        self,
-        layer: Layer,
-        stress: LayerStress,
-        interior: Region,
-        seeds: FloatArray,
-        pitch: float,
+        self, layer: Layer, stress: LayerStress, interior: Region, seeds: FloatArray, pitch: float
     ) -> list[FloatArray]:
         """Streamlines inside the shells, shifted sideways so that whole strands fit beside them."""
         if shapely.is_empty(interior):

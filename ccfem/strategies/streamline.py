@@ -344,13 +344,7 @@ def _take_back(placed: _Placed, first: int, end: int) -> None:
 
 @njit(cache=True, nogil=True)
 def _crowded(
-    placed: _Placed,
-    x: float,
-    y: float,
-    number: int,
-    along: float,
-    limit: float,
-    homing: bool,
+    placed: _Placed, x: float, y: float, number: int, along: float, limit: float, homing: bool
 ) -> bool:
     """Whether a point of another line, or of another stretch of this one, is nearer than a limit.
 

@@ -266,11 +266,7 @@ def rest_of(section: Region, lines: Sequence[FloatArray], width: float, reach: f
 
 
 def blobs(
-    section: Region,
-    lines: Sequence[FloatArray],
-    width: float,
-    spacing: float,
-    least: float,
+    section: Region, lines: Sequence[FloatArray], width: float, spacing: float, least: float
 ) -> list[list[FloatArray]]:
     """Fill places that strands leave open with concentric rings, joined to spirals.
 

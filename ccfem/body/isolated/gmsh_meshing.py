@@ -53,11 +53,7 @@ def cad_surface(path: str, size: float, scale: float, joined: str) -> dict[str, 
 
 
 def fill(
-    points: NDArray[Any],
-    triangles: NDArray[Any],
-    size: float,
-    angle: float,
-    walls: NDArray[Any],
+    points: NDArray[Any], triangles: NDArray[Any], size: float, angle: float, walls: NDArray[Any]
 ) -> dict[str, Any]:
     """Tetrahedra in a closed surface, its smooth faces meshed anew; ``points`` and ``cells``.
 

@@ -9,19 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _FACETS = {5: 3, 22: 6, 9: 4, 23: 8, 28: 9}
-_SOLIDS = {
-    10: 4,
-    24: 10,
-    14: 5,
-    27: 13,
-    13: 6,
-    26: 15,
-    32: 18,
-    11: 8,
-    12: 8,
-    25: 20,
-    29: 27,
-}
+_SOLIDS = {10: 4, 24: 10, 14: 5, 27: 13, 13: 6, 26: 15, 32: 18, 11: 8, 12: 8, 25: 20, 29: 27}
 _NODES = {**_FACETS, **_SOLIDS}
 """Nodes of the cells whose nodes are wanted, by VTK's number of their type."""
 _LAGRANGE = {

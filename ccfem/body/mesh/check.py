@@ -91,10 +91,7 @@ class MeshReport:
                 f"by up to {self.farthest:.3g} mm: mesh curved walls finer where that is too far",
             ),
             (self.dropped, f"{self.dropped} patch facets were not on the boundary: left out"),
-            (
-                self.empty,
-                f"patches without a facet on the boundary: {', '.join(self.empty)}",
-            ),
+            (self.empty, f"patches without a facet on the boundary: {', '.join(self.empty)}"),
             (self.coincident, f"{self.coincident} nodes lie on another one: {together}"),
             (
                 self.hanging,

@@ -395,12 +395,7 @@ class TetMesh(CellMesh, Shown):
 # What keeps a mesh from being solved on: one line with its cure.
 
 
-def first_flaw(
-    points: FloatArray,
-    cells: IntArray,
-    volumes: FloatArray,
-    partners: IntArray,
-) -> str:
+def first_flaw(points: FloatArray, cells: IntArray, volumes: FloatArray, partners: IntArray) -> str:
     """Say what is wrong with a mesh of tetrahedra; empty for a sound one.
 
     Parameters

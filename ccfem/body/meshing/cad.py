@@ -81,10 +81,7 @@ def read_cad(
 
 
 def mesh_cad(
-    path: str | os.PathLike[str],
-    edge_length: float,
-    scale: float = 1.0,
-    joined: Joined = "glued",
+    path: str | os.PathLike[str], edge_length: float, scale: float = 1.0, joined: Joined = "glued"
 ) -> tuple[TetMesh, tuple[str, ...]]:
     """Fill the solids of a CAD file with tetrahedra.
 

@@ -85,10 +85,7 @@ def space_picture(
 
 
 def turning_page(
-    layers: Sequence[Layer],
-    paths: Toolpaths,
-    title: str,
-    build: Sequence[float] = (0.0, 0.0, 1.0),
+    layers: Sequence[Layer], paths: Toolpaths, title: str, build: Sequence[float] = (0.0, 0.0, 1.0)
 ) -> str:
     """Write a page, complete in itself, on which the strands turn under the mouse.
 

@@ -108,11 +108,7 @@ def _without_best(table: Table) -> Table:
     return replace(table, rows=tuple(rows))
 
 
-def report_html(
-    comparison: Comparison,
-    record: Record,
-    part_file: str = "",
-) -> str:
+def report_html(comparison: Comparison, record: Record, part_file: str = "") -> str:
     """Return the report as one HTML text that needs no other file and no network.
 
     Parameters
@@ -239,9 +235,7 @@ def _breaking(
     return {"picture": picture, "said": said, "worth": WORTH}
 
 
-def _parameters(
-    comparison: Comparison,
-) -> list[tuple[str, list[tuple[str, str, bool]]]]:
+def _parameters(comparison: Comparison) -> list[tuple[str, list[tuple[str, str, bool]]]]:
     """Return what every strategy was set to, and which parameter sets its amount of fibre."""
     return [
         (

@@ -314,11 +314,7 @@ def _layer(
 
 
 def _maps(
-    stress: LayerStress,
-    box: Sequence[float],
-    comparison: Comparison,
-    limit: float,
-    layers: int,
+    stress: LayerStress, box: Sequence[float], comparison: Comparison, limit: float, layers: int
 ) -> dict[str, Any]:
     """Tension and error on a raster from the upper left on, and direction on a coarser one."""
     layer = stress.layer

@@ -107,11 +107,7 @@ def study(
 
 
 def _made(
-    definition: Study,
-    jobs: Jobs,
-    missing: list[Job],
-    workers: int,
-    address: str | None,
+    definition: Study, jobs: Jobs, missing: list[Job], workers: int, address: str | None
 ) -> Generator[tuple[Job, Outcome], None, None]:
     """Make runs, wherever that is."""
     if not missing:

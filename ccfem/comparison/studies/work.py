@@ -142,11 +142,7 @@ def crashed(why: str, details: str = "") -> Outcome:
 
 
 def _run(
-    bench: _Bench,
-    load_case: str,
-    slicer: Slicer,
-    strategy: Strategy,
-    wanted: float | None,
+    bench: _Bench, load_case: str, slicer: Slicer, strategy: Strategy, wanted: float | None
 ) -> Outcome:
     """Outcome of one run."""
     stress, case = bench.stress, bench.stress.part.case

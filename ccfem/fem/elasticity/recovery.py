@@ -67,10 +67,7 @@ def strain_at_nodes(mesh: TetMesh, displacement: FloatArray) -> FloatArray:
 
 
 def cell_stress(
-    mesh: TetMesh,
-    displacement: FloatArray,
-    stiffness: FloatArray,
-    free: FloatArray | None = None,
+    mesh: TetMesh, displacement: FloatArray, stiffness: FloatArray, free: FloatArray | None = None
 ) -> FloatArray:
     """Stress of each cell, at its centroid: (m, 3, 3) MPa.
 
@@ -86,10 +83,7 @@ def cell_stress(
 
 
 def nodal_stress(
-    mesh: TetMesh,
-    displacement: FloatArray,
-    stiffness: FloatArray,
-    free: FloatArray | None = None,
+    mesh: TetMesh, displacement: FloatArray, stiffness: FloatArray, free: FloatArray | None = None
 ) -> FloatArray:
     """Stress at the nodes: volume-weighted average over the cells round each node.
 
@@ -112,8 +106,6 @@ def nodal_stress(
         entries = np.arange(m * q)
     weights = np.repeat(mesh.volumes, q)
     nodes, n = mesh.cells.reshape(-1), len(mesh.points)
-    average = sp.csc_array(
-        sp.coo_array((weights, (nodes, entries)), shape=(n, len(stress))),
-    )
+    average = sp.csc_array(sp.coo_array((weights, (nodes, entries)), shape=(n, len(stress))))
     total = np.bincount(nodes, weights, n)
     return from_voigt((average @ stress) / np.where(total > 0.0, total, 1.0)[:, None])

@@ -75,11 +75,7 @@ class Contact:
 
 
 def find_contact(
-    matrix: sp.bsr_array,
-    held: Held,
-    forces: FloatArray,
-    solver: Solver,
-    tolerance: float,
+    matrix: sp.bsr_array, held: Held, forces: FloatArray, solver: Solver, tolerance: float
 ) -> Contact:
     """Solve, release components that pull and hold those that sink in, until nothing changes.
 

@@ -26,10 +26,7 @@ from ccfem.fem.elasticity.direct import skyline, skyline_operations
 DIRECT = ("pypardiso", "cholmod", "superlu", "skyline")
 BACKENDS = (*DIRECT, "amg", "two-level")
 
-_CURES = {
-    "pypardiso": 'pip install "ccfem[mkl]"',
-    "cholmod": 'pip install "scikit-sparse<0.5"',
-}
+_CURES = {"pypardiso": 'pip install "ccfem[mkl]"', "cholmod": 'pip install "scikit-sparse<0.5"'}
 _MODULES = {"pypardiso": "pypardiso", "cholmod": "sksparse"}
 
 _SMALL = 6_000

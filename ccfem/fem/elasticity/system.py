@@ -93,11 +93,7 @@ class System:
         return matrix
 
     def factorise(
-        self,
-        matrix: sp.bsr_array,
-        backend: str = "auto",
-        solves: int = 1,
-        held: Held | None = None,
+        self, matrix: sp.bsr_array, backend: str = "auto", solves: int = 1, held: Held | None = None
     ) -> Solver:
         """Factorise a stiffness matrix (3n, 3n) with the supports in place.
 

@@ -379,10 +379,7 @@ _FREECAD = "Stress xx component"
 
 
 def grid_stress(
-    path: Path,
-    array: str | None = None,
-    components: str | None = None,
-    step: int | None = None,
+    path: Path, array: str | None = None, components: str | None = None, step: int | None = None
 ) -> StressData:
     """Stress at the nodes and in the cells of a grid, as far as it has an array of that name.
 

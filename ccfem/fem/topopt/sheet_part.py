@@ -293,10 +293,7 @@ def sheet_mesh(
     left, bottom, right, top = planform.bounds
     middle = np.array([0.5 * (left + right), 0.5 * (bottom + top)])
     part = shapely.box(
-        left,
-        bottom,
-        middle[0] if 0 in mirrors else right,
-        middle[1] if 1 in mirrors else top,
+        left, bottom, middle[0] if 0 in mirrors else right, middle[1] if 1 in mirrors else top
     )
     quarter = shapely.intersection(planform, part) if mirrors else planform
     if quarter.geom_type != "Polygon":

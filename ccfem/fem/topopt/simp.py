@@ -208,11 +208,7 @@ def _converged(compliance: list[float], changes: list[float], parameters: Parame
 
 
 def optimality_criteria(
-    density: FloatArray,
-    gradient: FloatArray,
-    volume: FloatArray,
-    target: float,
-    move: float,
+    density: FloatArray, gradient: FloatArray, volume: FloatArray, target: float, move: float
 ) -> FloatArray:
     """Densities in [0, 1] that balance gain and volume (Bendsoe, Struct. Optim. 1 (1989) 193).
 

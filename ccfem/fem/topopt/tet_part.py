@@ -30,21 +30,11 @@ _PRISMS = np.array(
 )
 """Orders of the corners of a prism that begin with each of them and do not turn it inside out."""
 _SPLITS = np.array(
-    [
-        [[0, 1, 2, 5], [0, 1, 5, 4], [0, 4, 5, 3]],
-        [[0, 1, 2, 4], [0, 4, 2, 5], [0, 4, 5, 3]],
-    ]
+    [[[0, 1, 2, 5], [0, 1, 5, 4], [0, 4, 5, 3]], [[0, 1, 2, 4], [0, 4, 2, 5], [0, 4, 5, 3]]]
 )
 """Tetrahedra of a prism whose diagonals meet in corner 0, by the third diagonal: 15 or 24."""
 _LONE = ((0, 1, 2, 3), (1, 0, 3, 2), (2, 0, 1, 3), (3, 0, 2, 1))
-_PAIRS = (
-    (0, 1, 2, 3),
-    (2, 3, 0, 1),
-    (0, 2, 3, 1),
-    (3, 1, 0, 2),
-    (0, 3, 1, 2),
-    (1, 2, 0, 3),
-)
+_PAIRS = ((0, 1, 2, 3), (2, 3, 0, 1), (0, 2, 3, 1), (3, 1, 0, 2), (0, 3, 1, 2), (1, 2, 0, 3))
 """Orders of the corners of a tetrahedron that keep it positive."""
 
 

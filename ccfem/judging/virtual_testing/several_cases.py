@@ -129,9 +129,7 @@ def virtual_tests(
 
 
 def cases_failure(
-    tested: CasesTest,
-    strand: Strand | None = None,
-    layers: Sequence[Layer] | None = None,
+    tested: CasesTest, strand: Strand | None = None, layers: Sequence[Layer] | None = None
 ) -> CasesFailure:
     """Find the case in which a part fails at the least multiple of its load.
 

@@ -449,13 +449,7 @@ def _cut_at_faces(
 
 @njit(cache=True)
 def _write(
-    whole: IntArray,
-    real: FloatArray,
-    count: int,
-    segment: int,
-    cell: int,
-    begin: float,
-    end: float,
+    whole: IntArray, real: FloatArray, count: int, segment: int, cell: int, begin: float, end: float
 ) -> int:  # pragma: no cover
     """Write a piece inside a cell, or make the last one longer; return the number of pieces."""
     old = min(count, len(whole)) - 1
@@ -473,12 +467,7 @@ def _write(
 
 @njit(cache=True)
 def _walk(
-    point: FloatArray,
-    step: FloatArray,
-    cell: int,
-    tables: _Tables,
-    met: IntArray,
-    ends: FloatArray,
+    point: FloatArray, step: FloatArray, cell: int, tables: _Tables, met: IntArray, ends: FloatArray
 ) -> int:  # pragma: no cover
     """Write the cells that a step passes, and where it leaves each; return the number of cells.
 

@@ -186,11 +186,7 @@ def virtual_test(
 
 
 def _stiffnesses(
-    specimen: Specimen,
-    strands: Strands,
-    mode: str,
-    span: Sequence[float],
-    balanced: Equilibrium,
+    specimen: Specimen, strands: Strands, mode: str, span: Sequence[float], balanced: Equilibrium
 ) -> list[float]:
     """Stiffness at further values of rho, N/mm; each solve starts from those before."""
     known, stiffnesses = [specimen.unreinforced.displacement], []

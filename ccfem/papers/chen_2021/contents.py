@@ -213,11 +213,7 @@ def _plane_lines(paths: Toolpaths, layer: Layer) -> list[FloatArray]:
 
 
 def _draw_arrows(
-    axes: Any,
-    layer: Layer,
-    vectors: FloatArray,
-    chosen: BoolArray | None = None,
-    colour: str = INK,
+    axes: Any, layer: Layer, vectors: FloatArray, chosen: BoolArray | None = None, colour: str = INK
 ) -> None:
     """Draw arrows on triangles, about 1,500 of them."""
     places = layer.plane.points[layer.triangles].mean(axis=1)

@@ -100,11 +100,7 @@ def vector_field(stress: PartStress) -> VectorField:
 
 
 def layer_stages(
-    layer: Layer,
-    tension: Tension,
-    patches: Sequence[str],
-    machine: Machine,
-    power: float = 1.0,
+    layer: Layer, tension: Tension, patches: Sequence[str], machine: Machine, power: float = 1.0
 ) -> LayerStages:
     """Run one layer, from the vectors of the tetrahedra to its paths.
 

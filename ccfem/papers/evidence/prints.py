@@ -191,10 +191,7 @@ def _cuboid(progress: Progress) -> PartResult:
     """
     gain = IN_COMPRESSION[FAR_END] * GAIN_OF_CUBOID
     return PartResult(
-        (
-            {NONE: 1.0, "along the load": 1.0},
-            {NONE: 1.0, "along the load": 1.0 + gain},
-        )
+        ({NONE: 1.0, "along the load": 1.0}, {NONE: 1.0, "along the load": 1.0 + gain})
     )
 
 

@@ -260,10 +260,7 @@ _STRANDS = (
     _Target("spacing_90", 0.0, 3.4, 3.0),
     _Target("curvature_95", 0.0, 0.14),
 )
-_SECONDS = (
-    _Target("all, clock", 0.0, 15.0),
-    _Target("slowest layer, processors", 0.0, 0.4),
-)
+_SECONDS = (_Target("all, clock", 0.0, 15.0), _Target("slowest layer, processors", 0.0, 0.4))
 _FINER = _Target("all, clock", 0.0, 40.0)
 
 

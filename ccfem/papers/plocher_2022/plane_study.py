@@ -358,10 +358,7 @@ def benchmark(
 
 
 def mixed_stiffness(
-    paths: Sequence[PlanePaths],
-    maps: Sequence[FibreMap],
-    long: FloatArray,
-    short: FloatArray,
+    paths: Sequence[PlanePaths], maps: Sequence[FibreMap], long: FloatArray, short: FloatArray
 ) -> FloatArray:
     """Reduced stiffness (L, m, 3, 3), MPa, of cells by the length of the path in them.
 

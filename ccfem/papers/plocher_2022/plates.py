@@ -352,11 +352,7 @@ def three_point_bending(size: float = 0.8, volume_fraction: float = 0.6) -> Bend
         mask=mask,
         density=fine,
         polygon=outline(
-            fine,
-            size,
-            volume_fraction,
-            keep=np.concatenate([supports, loads]),
-            least_hole=12.0,
+            fine, size, volume_fraction, keep=np.concatenate([supports, loads]), least_hole=12.0
         ),
         size=size,
         supports=supports,

@@ -145,10 +145,7 @@ def variant_quantities(
         f"variant share of vertices below 0.26 with turns of {radius:g} mm {name}": lpp.vertices
         for (name, radius), lpp in tried.items()
     }
-    return {
-        "variant zigzag 45 over the other two at 30 degrees bridge with a hole": lead,
-        **shares,
-    }
+    return {"variant zigzag 45 over the other two at 30 degrees bridge with a hole": lead, **shares}
 
 
 def variant_table(tried: Mapping[tuple[str, float], Tried]) -> str:

@@ -183,10 +183,7 @@ def _curvature_maps(plate: PlateStudy) -> Figure:
 
 def _curvature_shares(plate: PlateStudy) -> Figure:
     """Share below each curvature: by length, and by vertices."""
-    texts = (
-        "every 0.5 mm of the path, links too",
-        "at the vertices as planned, links too",
-    )
+    texts = ("every 0.5 mm of the path, links too", "at the vertices as planned, links too")
     figure, axes = curves([("curvature, 1/mm", "share below it, %")] * 2)
     for panel, reading, text in zip(axes, ("curvature", "native"), texts, strict=True):
         for name, (_, pattern) in _compared(plate).items():

@@ -156,10 +156,7 @@ def run_study(progress: Progress = silent) -> Mapping[str, PlateStudy]:
 
 
 def run_plate(
-    name: str,
-    patterns: Sequence[str],
-    design: bool = False,
-    element_size: float = ELEMENT_SIZE,
+    name: str, patterns: Sequence[str], design: bool = False, element_size: float = ELEMENT_SIZE
 ) -> PlateStudy:
     """Optimise a plate if asked to, then solve, plan and judge both parts."""
     begun = perf_counter()

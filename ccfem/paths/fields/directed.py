@@ -58,10 +58,7 @@ def directed(
     """
     surface = Surface.of(layer)
     percentile = np.quantile(
-        tension.stress,
-        cap / 100.0 * (1.0 - 1e-12),
-        weights=surface.areas,
-        method="inverted_cdf",
+        tension.stress, cap / 100.0 * (1.0 - 1e-12), weights=surface.areas, method="inverted_cdf"
     )
     top = max(float(percentile), 1e-300)
     confidence = np.where(tension.defined, np.minimum(tension.stress / top, 1.0), 0.0)
@@ -161,10 +158,7 @@ _AVERAGES = 50
 
 
 def fill_laplacian(
-    surface: Surface,
-    direction: FloatArray,
-    stress: FloatArray,
-    defined: BoolArray,
+    surface: Surface, direction: FloatArray, stress: FloatArray, defined: BoolArray
 ) -> tuple[FloatArray, FloatArray]:
     """Fill by averaging over neighbouring triangles, 50 times [Chen et al. 2021, Eq. 3-4].
 

@@ -22,10 +22,7 @@ Incompatible = Literal["any", "majority", "all", "none"]
 
 
 def incompatible(
-    direction: FloatArray,
-    cells: IntArray,
-    defined: BoolArray,
-    rule: Incompatible = "any",
+    direction: FloatArray, cells: IntArray, defined: BoolArray, rule: Incompatible = "any"
 ) -> BoolArray:
     """Mark, (m,), cells whose vector disagrees with those of neighbouring cells.
 

@@ -14,12 +14,7 @@ from ccfem.base.whole import text_of
 from ccfem.body.files.strand_files import check_near, holds_strands, read_strand_files
 from ccfem.geometry.polylines import pack
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
-from ccfem.printing.export.waypoints import (
-    CLOSED,
-    LARGEST_NUMBER,
-    close_rings,
-    read_waypoints,
-)
+from ccfem.printing.export.waypoints import CLOSED, LARGEST_NUMBER, close_rings, read_waypoints
 
 FRAMES = ("mesh", "tool")
 """What coordinates of a file may be in: those of the mesh, or the axes of the printer's tool."""

@@ -14,9 +14,7 @@ from ccfem.paths.toolpaths import Toolpaths
 
 
 def write_paths(
-    toolpaths: Toolpaths,
-    path: str | Path,
-    path_data: Mapping[str, FloatArray] | None = None,
+    toolpaths: Toolpaths, path: str | Path, path_data: Mapping[str, FloatArray] | None = None
 ) -> None:
     """Write toolpaths to a ``.vtp`` file, whole or not at all.
 

@@ -259,11 +259,7 @@ def cells_at_wall(mesh: TetMesh, joint: Joint, reach: float) -> IntArray:
 
 
 def _joint_groups(
-    points: FloatArray,
-    cells: IntArray,
-    joints: Sequence[Joint],
-    form: JointForm,
-    slab: float,
+    points: FloatArray, cells: IntArray, joints: Sequence[Joint], form: JointForm, slab: float
 ) -> list[tuple[IntArray, IntArray, int]]:
     """Nodes of each joint, the group of each node, and the number of groups; none for "axis"."""
     parts: list[tuple[IntArray, IntArray, int]] = []
@@ -456,11 +452,7 @@ class FieldQuality:
 
 
 def field_quality(
-    field: GuidanceField,
-    tension: FloatArray,
-    importance: FloatArray,
-    step: float,
-    nominal: float,
+    field: GuidanceField, tension: FloatArray, importance: FloatArray, step: float, nominal: float
 ) -> FieldQuality:
     """Measure a field.
 

@@ -103,10 +103,7 @@ def inverted_share(mesh: TetMesh, gradient: FloatArray, up: FloatArray) -> float
 
 
 def _least_blend(
-    mesh: TetMesh,
-    direction: FloatArray,
-    up: FloatArray,
-    solve: Callable[[FloatArray], HeightField],
+    mesh: TetMesh, direction: FloatArray, up: FloatArray, solve: Callable[[FloatArray], HeightField]
 ) -> HeightField:
     """Field with the least blend that leaves no cell upside down, by bisection."""
     low, high = 0.0, 0.5
@@ -125,10 +122,7 @@ def _least_blend(
 
 
 def _blended(
-    direction: FloatArray,
-    up: FloatArray,
-    blend: float,
-    solve: Callable[[FloatArray], HeightField],
+    direction: FloatArray, up: FloatArray, blend: float, solve: Callable[[FloatArray], HeightField]
 ) -> HeightField:
     field = solve(_mixed(direction, up, blend))
     return HeightField(field.values, field.gradient, up, blend)

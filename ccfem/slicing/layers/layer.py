@@ -433,10 +433,7 @@ def _by_edge(walls: Sequence[tuple[RoundWall, IntArray]]) -> dict[tuple[int, int
 
 
 def _ring(
-    plane: Plane,
-    corners: FloatArray,
-    wall: IntArray,
-    walls: Sequence[tuple[RoundWall, IntArray]],
+    plane: Plane, corners: FloatArray, wall: IntArray, walls: Sequence[tuple[RoundWall, IntArray]]
 ) -> FloatArray:
     """Ring of corners (k, 2) whose sides lie on walls (k,), -1 for none."""
     changes = np.flatnonzero(wall != np.roll(wall, 1))

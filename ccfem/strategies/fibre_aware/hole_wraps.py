@@ -71,11 +71,7 @@ class _Meeting(NamedTuple):
 
 
 def led_round_holes(
-    lines: Sequence[FloatArray],
-    section: Region,
-    width: float,
-    radius: float,
-    levels: int = LEVELS,
+    lines: Sequence[FloatArray], section: Region, width: float, radius: float, levels: int = LEVELS
 ) -> list[FloatArray]:
     """Join strands that the wall of a hole interrupts.
 

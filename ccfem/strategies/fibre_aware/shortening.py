@@ -75,11 +75,7 @@ def shorten(
 
 
 def shorten_bent(
-    toolpaths: Toolpaths,
-    along: Sequence[Profile],
-    length: float,
-    machine: Machine,
-    tight: float,
+    toolpaths: Toolpaths, along: Sequence[Profile], length: float, machine: Machine, tight: float
 ) -> Toolpaths:
     """As `shorten`, with at most a share of the fibre in bends tighter than the machine's radius.
 

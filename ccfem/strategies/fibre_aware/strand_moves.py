@@ -141,11 +141,7 @@ def kept_radius(machine: Machine, tight: float) -> float:
 
 
 def _direction(
-    slide: FloatArray,
-    lines: StrandLines,
-    mesh: TetMesh,
-    judged: Judged,
-    smooth: Any,
+    slide: FloatArray, lines: StrandLines, mesh: TetMesh, judged: Judged, smooth: Any
 ) -> FloatArray:
     """Direction (P,) of slides that increases the worth of fibre less the price of its length.
 

@@ -75,10 +75,7 @@ class Band:
 
 
 def band(
-    path: MainPath,
-    frame: Frame,
-    crossing: bool = True,
-    turns: tuple[float, float] = (0.0, 0.0),
+    path: MainPath, frame: Frame, crossing: bool = True, turns: tuple[float, float] = (0.0, 0.0)
 ) -> Band:
     """Band of a main path.
 

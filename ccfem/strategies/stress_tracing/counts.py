@@ -87,11 +87,7 @@ def _places_between_ends(
     if any_cost < _ONE_SIDE * even_cost:
         number, shift = any_, _outer(band, section)
     whole = np.concatenate(
-        [
-            np.full(first, number[0]),
-            number,
-            np.full(len(wanted) - last, number[-1]),
-        ]
+        [np.full(first, number[0]), number, np.full(len(wanted) - last, number[-1])]
     )
     return _track_places(
         gaussian_filter1d(whole.astype(np.float64), _SPREAD / STEP, mode="nearest"), shift

@@ -55,10 +55,7 @@ class _End(NamedTuple):
 
 
 def main_paths(
-    frame: Frame,
-    stress: LayerStress,
-    criterion: Criterion | None = None,
-    width_ratio: float = 2.0,
+    frame: Frame, stress: LayerStress, criterion: Criterion | None = None, width_ratio: float = 2.0
 ) -> list[MainPath]:
     """Join members to main load paths.
 

@@ -150,11 +150,7 @@ def _way_back(before: IntArray, end: int) -> list[int]:
 
 
 def _refined(
-    mesh: TriangleMesh,
-    way: list[int],
-    tree: IntArray,
-    loop: IntArray,
-    cost: _Cost,
+    mesh: TriangleMesh, way: list[int], tree: IntArray, loop: IntArray, cost: _Cost
 ) -> EdgePath:
     """Shortest curve across the triangles round a way along edges, from the loop to the tree."""
     # Triangles within two rings of the way.

@@ -29,10 +29,7 @@ _SOLIDS = {
     112: ("wedge", [*range(6)]),
     113: ("wedge15", [0, 2, 4, 9, 11, 13, 1, 3, 5, 10, 12, 14, 6, 7, 8]),
     115: ("hexahedron", [*range(8)]),
-    116: (
-        "hexahedron20",
-        [0, 2, 4, 6, 12, 14, 16, 18, 1, 3, 5, 7, 13, 15, 17, 19, 8, 9, 10, 11],
-    ),
+    116: ("hexahedron20", [0, 2, 4, 6, 12, 14, 16, 18, 1, 3, 5, 7, 13, 15, 17, 19, 8, 9, 10, 11]),
 }
 """Solids in meshio's words, and their nodes in its order."""
 _NODES = {kind: len(order) for kind, (_, order) in _SOLIDS.items()}

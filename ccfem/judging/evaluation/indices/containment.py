@@ -77,10 +77,7 @@ def _depth(lines: Shapes, section: Region) -> float:
         best = max(best, float(to_edges(middle, near, far).max()))
         bound = np.maximum(to_edges(a, near, far), to_edges(b, near, far))
         left = bound > best + TOLERANCE
-        a, b = (
-            np.concatenate([a[left], middle[left]]),
-            np.concatenate([middle[left], b[left]]),
-        )
+        a, b = (np.concatenate([a[left], middle[left]]), np.concatenate([middle[left], b[left]]))
     return best
 
 

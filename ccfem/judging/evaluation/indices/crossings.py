@@ -146,10 +146,7 @@ COLUMNS = (
         ">= 0, 0 is best",
     ),
     Column(
-        "self_crossings",
-        "1",
-        "Number of places at which a path crosses itself.",
-        ">= 0, 0 is best",
+        "self_crossings", "1", "Number of places at which a path crosses itself.", ">= 0, 0 is best"
     ),
 )
 
@@ -174,10 +171,7 @@ def sample_crossings(paths: PlanePaths) -> CrossingSamples:
 
 def crossing_indices(samples: CrossingSamples) -> dict[str, float]:
     """Values of `COLUMNS`."""
-    return {
-        "crossings": float(samples.between.sum()),
-        "self_crossings": float(samples.own.sum()),
-    }
+    return {"crossings": float(samples.between.sum()), "self_crossings": float(samples.own.sum())}
 
 
 def sample(paths: LayerPaths) -> CrossingSamples:

@@ -59,12 +59,7 @@ COLUMNS = (
         "degrees, per metre of fibre, links included.",
         ">= 0; NaN without fibre",
     ),
-    Column(
-        "turns_90",
-        "1/m",
-        "The same for more than 90 degrees.",
-        ">= 0; NaN without fibre",
-    ),
+    Column("turns_90", "1/m", "The same for more than 90 degrees.", ">= 0; NaN without fibre"),
 )
 
 

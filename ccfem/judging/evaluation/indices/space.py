@@ -9,11 +9,7 @@ from scipy.spatial import cKDTree
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.locate import locate, nearest_on_triangles
-from ccfem.geometry.polylines import (
-    curvature_samples,
-    merge_repeated,
-    sample_midpoints,
-)
+from ccfem.geometry.polylines import curvature_samples, merge_repeated, sample_midpoints
 from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, LayerSamples
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
@@ -187,10 +183,7 @@ def space_indices(samples: SpaceSamples) -> dict[str, float]:
     known = ~np.isnan(samples.angle)
     length, angle = samples.length[known], samples.angle[known]
     force = length * samples.size[known]
-    values = {
-        "space_angle_mean": _mean(angle, length),
-        "space_angle_stress": _mean(angle, force),
-    }
+    values = {"space_angle_mean": _mean(angle, length), "space_angle_stress": _mean(angle, force)}
     for a in _ANGLES:
         values[f"space_aligned_{a}"] = _mean((angle < a).astype(np.float64), length)
     bend = samples.curvature
