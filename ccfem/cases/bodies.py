@@ -343,9 +343,7 @@ def corner_bracket_outlines() -> dict[str, shapely.Polygon]:
     }
 
 
-def corner_bracket_design(
-    element_size: float, max_iterations: int = 100, progress: Progress = silent
-) -> Design:
+def corner_bracket_design(element_size: float) -> Design:
     """Densities of least compliance, 25 % of the domain filled; takes minutes."""
     mesh = crossed_mesh(corner_bracket_outlines(), element_size, CORNER_BRACKET_HOLES)
     feet = tuple(Support(f"foot_{k}") for k in range(1, 5))
@@ -354,7 +352,7 @@ def corner_bracket_design(
     bolt = np.hypot(np.abs(x) - 20.5, np.abs(y) - 20.5) <= 2.75 + _RIM
     axle = (np.hypot(y, z - 20.0) <= 4.0 + _RIM) & (np.abs(x) <= 5.0)
     rims = np.asarray((bolt & (z <= 6.0)) | axle)
-    return solid_design(problem, 0.25, element_size, rims, max_iterations, progress)
+    return solid_design(problem, 0.25, element_size, rims, 100)
 
 
 BRACKET_HOLES = {

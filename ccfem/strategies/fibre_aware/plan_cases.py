@@ -41,7 +41,6 @@ def plan_cases(
     machine: Machine,
     wanted: float | None = None,
     strand: Strand | None = None,
-    objective: str = WORST,
 ) -> Planned:
     """Plan a part for one or several load cases.
 
@@ -54,8 +53,6 @@ def plan_cases(
         nothing is taken off.
     strand : Strand, optional
         Of the tests; default rho = EA/E = 4 mm^2.
-    objective : {"worst", "sum", "least"}
-        What the fibre is cut for, by strategies that do not say it themselves.
 
     Raises
     ------
@@ -78,8 +75,8 @@ def plan_cases(
         return _planned(strategy, plan_by_layers(strategy, layers, cases, machine), layers, machine)
     too_much = plan_by_layers(strategy, layers, cases, machine, _TOO_MUCH * wanted)
     in_all = wanted * len(layers)
-    bounds = measures(objective, cases, layers, in_all, machine, strand)
-    goal = Goal(specimens(cases), cases.weights, bounds, objective)
+    bounds = measures(WORST, cases, layers, in_all, machine, strand)
+    goal = Goal(specimens(cases), cases.weights, bounds, WORST)
     paths = prune(too_much, goal, in_all, machine, strand, _ROUNDS)
     return _planned(strategy, paths, layers, machine, wanted)
 
