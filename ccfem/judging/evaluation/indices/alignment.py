@@ -141,8 +141,8 @@ def sample_alignment(paths: PlanePaths, stress: LayerStress, step: float) -> Ali
     return AlignmentSamples(length[inside], angle, largest, smallest, along)
 
 
-def alignment_indices(samples: AlignmentSamples) -> dict[str, float]:
-    """Values of `COLUMNS`."""
+def alignment_indices(samples: AlignmentSamples, _: Basis | None = None) -> dict[str, float]:
+    """Value of each of `COLUMNS`."""
     length, angle = samples.length, np.degrees(samples.angle)
     tension = length * np.maximum(samples.largest, 0.0)
     known = ~np.isnan(angle)
@@ -178,6 +178,4 @@ def sample(paths: LayerPaths) -> AlignmentSamples:
     return sample_alignment(paths.plane, paths.layer_stress, paths.machine.fibre_width)
 
 
-def indices(samples: AlignmentSamples, _: Basis) -> dict[str, float]:
-    """Value of each of `COLUMNS`."""
-    return alignment_indices(samples)
+indices = alignment_indices

@@ -96,8 +96,8 @@ def to_edges(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArr
     return np.hypot(*(to - np.clip(share, 0.0, 1.0)[:, None] * along).T)
 
 
-def containment_indices(samples: ContainmentSamples) -> dict[str, float]:
-    """Values of `COLUMNS`."""
+def containment_indices(samples: ContainmentSamples, _: Basis | None = None) -> dict[str, float]:
+    """Value of each of `COLUMNS`."""
     return {
         "outside_length": float(samples.length.sum()),
         "outside_depth": float(samples.depth.max()) if len(samples.depth) else 0.0,
@@ -109,6 +109,4 @@ def sample(paths: LayerPaths) -> ContainmentSamples:
     return sample_containment(paths.plane)
 
 
-def indices(samples: ContainmentSamples, _: Basis) -> dict[str, float]:
-    """Value of each of `COLUMNS`."""
-    return containment_indices(samples)
+indices = containment_indices

@@ -169,8 +169,8 @@ def sample_crossings(paths: PlanePaths) -> CrossingSamples:
     )
 
 
-def crossing_indices(samples: CrossingSamples) -> dict[str, float]:
-    """Values of `COLUMNS`."""
+def crossing_indices(samples: CrossingSamples, _: Basis | None = None) -> dict[str, float]:
+    """Value of each of `COLUMNS`."""
     return {"crossings": float(samples.between.sum()), "self_crossings": float(samples.own.sum())}
 
 
@@ -179,6 +179,4 @@ def sample(paths: LayerPaths) -> CrossingSamples:
     return sample_crossings(paths.plane)
 
 
-def indices(samples: CrossingSamples, _: Basis) -> dict[str, float]:
-    """Value of each of `COLUMNS`."""
-    return crossing_indices(samples)
+indices = crossing_indices

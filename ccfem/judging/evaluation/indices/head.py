@@ -100,8 +100,8 @@ def sample_head(
     return HeadSamples(length, tilt, hits)
 
 
-def head_indices(samples: HeadSamples) -> dict[str, float]:
-    """Values of `COLUMNS`."""
+def head_indices(samples: HeadSamples, _: Basis | None = None) -> dict[str, float]:
+    """Value of each of `COLUMNS`."""
     total = float(samples.length.sum())
     if not total > 0.0:
         return {column.name: float("nan") for column in COLUMNS}
@@ -121,6 +121,4 @@ def sample(paths: LayerPaths) -> HeadSamples:
     return sample_head(paths.inside, paths.layer, paths.stack, paths.machine)
 
 
-def indices(samples: HeadSamples, _: Basis) -> dict[str, float]:
-    """Value of each of `COLUMNS`."""
-    return head_indices(samples)
+indices = head_indices

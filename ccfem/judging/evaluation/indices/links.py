@@ -60,8 +60,8 @@ def sample_links(paths: PlanePaths) -> LinkSamples:
     return LinkSamples(np.array([float((~follows).sum())]), length)
 
 
-def link_indices(samples: LinkSamples) -> dict[str, float]:
-    """Values of `COLUMNS`."""
+def link_indices(samples: LinkSamples, _: Basis | None = None) -> dict[str, float]:
+    """Value of each of `COLUMNS`."""
     lengths = dict(zip(_PLACES, samples.length.sum(axis=0).tolist(), strict=True))
     return {"links": float(samples.count.sum()), **lengths}
 
@@ -71,6 +71,4 @@ def sample(paths: LayerPaths) -> LinkSamples:
     return sample_links(paths.plane)
 
 
-def indices(samples: LinkSamples, _: Basis) -> dict[str, float]:
-    """Value of each of `COLUMNS`."""
-    return link_indices(samples)
+indices = link_indices

@@ -225,8 +225,8 @@ def matching_curve(
     return np.array([float(weight[angle <= limit].sum()) for limit in limits]) / total
 
 
-def matching_indices(samples: AlignmentSamples) -> dict[str, float]:
-    """Values of `COLUMNS`."""
+def matching_indices(samples: AlignmentSamples, _: Basis | None = None) -> dict[str, float]:
+    """Value of each of `COLUMNS`."""
     rates = along_fibre(samples)
     limits = np.array(_ANGLES, dtype=np.float64)
     return {
@@ -236,6 +236,4 @@ def matching_indices(samples: AlignmentSamples) -> dict[str, float]:
     }
 
 
-def indices(samples: AlignmentSamples, _: Basis) -> dict[str, float]:
-    """Value of each of `COLUMNS`."""
-    return matching_indices(samples)
+indices = matching_indices

@@ -201,8 +201,8 @@ def _runs(paths: PlanePaths, reach: float, below: Region | None, link: bool) -> 
     return np.asarray(np.bincount(run, length[free], int(begins.sum())), dtype=np.float64)
 
 
-def room_indices(samples: RoomSamples) -> dict[str, float]:
-    """Values of `COLUMNS`."""
+def room_indices(samples: RoomSamples, _: Basis | None = None) -> dict[str, float]:
+    """Value of each of `COLUMNS`."""
     total = float(samples.length.sum())
 
     def share(length: FloatArray) -> float:
@@ -233,6 +233,4 @@ def sample(paths: LayerPaths) -> RoomSamples:
     return sample_room(paths.plane, paths.machine, paths.below, paths.late)
 
 
-def indices(samples: RoomSamples, _: Basis) -> dict[str, float]:
-    """Value of each of `COLUMNS`."""
-    return room_indices(samples)
+indices = room_indices

@@ -121,8 +121,8 @@ def _open_lines(points: FloatArray, offsets: IntArray) -> tuple[FloatArray, IntA
     return lines, line[index][first]
 
 
-def sinuosity_indices(samples: SinuositySamples) -> dict[str, float]:
-    """Values of `COLUMNS`."""
+def sinuosity_indices(samples: SinuositySamples, _: Basis | None = None) -> dict[str, float]:
+    """Value of each of `COLUMNS`."""
     length = samples.length
     if not len(length):
         return {column.name: float("nan") for column in COLUMNS}
@@ -140,6 +140,4 @@ def sample(paths: LayerPaths) -> SinuositySamples:
     return sample_sinuosity(paths.plane, paths.machine.fibre_width)
 
 
-def indices(samples: SinuositySamples, _: Basis) -> dict[str, float]:
-    """Value of each of `COLUMNS`."""
-    return sinuosity_indices(samples)
+indices = sinuosity_indices

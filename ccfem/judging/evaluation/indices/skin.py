@@ -89,8 +89,8 @@ def _over(layer: Layer, points: FloatArray) -> tuple[FloatArray, BoolArray]:
     return normal, np.linalg.norm(along, axis=1) > 0.5 * nearest.distance + 1e-6
 
 
-def skin_indices(samples: SkinSamples) -> dict[str, float]:
-    """Values of `COLUMNS`."""
+def skin_indices(samples: SkinSamples, _: Basis | None = None) -> dict[str, float]:
+    """Value of each of `COLUMNS`."""
     total = float(samples.length.sum())
     share = float(samples.length @ samples.stands_out) / total if total > 0.0 else float("nan")
     return {"outside_height": share}
@@ -101,6 +101,4 @@ def sample(paths: LayerPaths) -> SkinSamples:
     return sample_skin(paths.fibre, paths.layer, paths.stress.mesh, paths.machine)
 
 
-def indices(samples: SkinSamples, _: Basis) -> dict[str, float]:
-    """Value of each of `COLUMNS`."""
-    return skin_indices(samples)
+indices = skin_indices

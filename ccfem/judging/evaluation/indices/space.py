@@ -7,7 +7,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import FloatArray, IntArray
-from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.locate import locate, nearest_on_triangles
 from ccfem.geometry.polylines import curvature_samples, merge_repeated, sample_midpoints
 from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, LayerSamples
@@ -111,18 +110,13 @@ class SpaceSamples(LayerSamples):
     tension: FloatArray
 
 
-def sample_space(fibre: Toolpaths, layer: Layer, stress: PartStress, step: float) -> SpaceSamples:
-    """Take the samples of one layer.
+def sample(paths: LayerPaths) -> SpaceSamples:
+    """Take the samples of one layer, of the fibre a width apart.
 
-    Parameters
-    ----------
-    fibre : Toolpaths
-        On this layer, without links outside the section or over a void.
-    stress : PartStress
-        Its nodal values are used for the fibre, those of the cells for the layer.
-    step : float, mm
-        Fibre width: distance of samples.
+    Nodal values of the stress are used for the fibre, those of the cells for the layer.
     """
+    fibre, layer, stress = paths.inside, paths.layer, paths.stress
+    step = paths.machine.fibre_width
     points, offsets, _ = merge_repeated(fibre.points, fibre.offsets, 1e-6)
     middle, tangent, length, _ = sample_midpoints(points, offsets, step)
     cells = stress.stress[layer.cell]
@@ -178,8 +172,8 @@ def _linked(fibre: Toolpaths, layer: Layer, patches: Sequence[str], reach: float
     return linked
 
 
-def space_indices(samples: SpaceSamples) -> dict[str, float]:
-    """Values of `COLUMNS`."""
+def indices(samples: SpaceSamples, _: Basis) -> dict[str, float]:
+    """Value of each of `COLUMNS`."""
     known = ~np.isnan(samples.angle)
     length, angle = samples.length[known], samples.angle[known]
     force = length * samples.size[known]
@@ -214,13 +208,3 @@ def _quantiles(values: FloatArray, weight: FloatArray) -> tuple[float, float]:
     below = np.cumsum(weight[order]) / weight.sum()
     low, high = np.minimum(np.searchsorted(below, (0.05, 0.95)), len(values) - 1)
     return float(values[order[low]]), float(values[order[high]])
-
-
-def sample(paths: LayerPaths) -> SpaceSamples:
-    """Take the samples of one layer."""
-    return sample_space(paths.inside, paths.layer, paths.stress, paths.machine.fibre_width)
-
-
-def indices(samples: SpaceSamples, _: Basis) -> dict[str, float]:
-    """Value of each of `COLUMNS`."""
-    return space_indices(samples)

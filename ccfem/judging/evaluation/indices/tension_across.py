@@ -9,9 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
-from ccfem.fem.elasticity import PartStress
 from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, LayerSamples
-from ccfem.slicing.layers.layer import Layer
 
 PLACE = 150
 """Of these columns in tables: the smaller, the farther to the left."""
@@ -95,8 +93,9 @@ class TensionSamples(LayerSamples):
     angle_flat: FloatArray
 
 
-def sample_tension(layer: Layer, stress: PartStress, build: FloatArray) -> TensionSamples:
-    """Take the samples of one layer; `build` is a unit vector."""
+def sample(paths: LayerPaths) -> TensionSamples:
+    """Take the samples of one layer."""
+    layer, stress, build = paths.layer, paths.stress, paths.build
     tensor = stress.stress[layer.cell] * layer.areas[:, None, None]
     values, axes = np.linalg.eigh(tensor)
     pulled = values[:, 2] > 0.0
@@ -118,8 +117,8 @@ def _angle(cosine: FloatArray) -> FloatArray:
     return np.asarray(np.degrees(np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))))
 
 
-def tension_indices(samples: TensionSamples) -> dict[str, float]:
-    """Values of `COLUMNS`."""
+def indices(samples: TensionSamples, _: Basis) -> dict[str, float]:
+    """Value of each of `COLUMNS`."""
     total = float(samples.tension.sum())
     if not total > 0.0:
         return {column.name: float("nan") for column in COLUMNS}
@@ -159,13 +158,3 @@ def _around(axes: FloatArray) -> FloatArray:
         ring = [out * np.cos(turn), out * np.sin(turn), np.full(len(turn), np.sin(height))]
         neighbours.append(np.stack(ring, axis=1))
     return np.concatenate(neighbours) @ axes
-
-
-def sample(paths: LayerPaths) -> TensionSamples:
-    """Take the samples of one layer."""
-    return sample_tension(paths.layer, paths.stress, paths.build)
-
-
-def indices(samples: TensionSamples, _: Basis) -> dict[str, float]:
-    """Value of each of `COLUMNS`."""
-    return tension_indices(samples)
