@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 
 from ccfem import strategies as strategy_modules
-from ccfem.base.arrays import BoolArray, FloatArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.errors import InputError
 from ccfem.comparison.plot.colours import OUTLINE, gradient, rgb
 from ccfem.comparison.report.print_view import BESIDE, COLOURS, FILLS, KINDS, MOVES
 from ccfem.comparison.report.report_views import PrintLayer, RunResults, read_results, read_solution
 from ccfem.comparison.request import STRATEGIES
+from ccfem.printing.support import propped_space
+from ccfem.slicing.slicers.planar import Planar
 from ccfem.workbench.bench import Opened
 from ccfem.workbench.child_run import ChildRun, RunState
 from ccfem.workbench.guard import Served, escaped
@@ -61,7 +63,8 @@ class CompareTab:
         self.case = Field(page, case, lambda _: self.show())
         minutes = gui.add_number("Longest run, min", 120.0, min=0.1, step=10.0)
         self.minutes = Field(page, minutes)
-        self.support = Field(page, gui.add_checkbox("Print support", False), self._show_commands)
+        support = gui.add_checkbox("Print support", False)
+        self.support = Field(page, support, lambda _: page.show())
         with gui.add_folder("With other parts on the bed", expand_by_default=False):
             self.offered = gui.add_dropdown("Add a part", (_NO_ONE,))
             self.offered.on_update(page.on(self._add_part, value=True))
@@ -102,6 +105,7 @@ class CompareTab:
         self._links, self._command = gui.add_html(""), gui.add_html("")
         self._handles: list[Any] = []
         self._more: dict[str, Path] = {}
+        self._body: tuple[Any, ...] = ("",)
         self.printed: list[PrintLayer] = []
 
     def _add_ticks(self, known: dict[str, Any]) -> None:
@@ -167,6 +171,22 @@ class CompareTab:
     def _supported(self) -> list[str]:
         return ["--support"] if self.support.value else []
 
+    def support_body(self) -> tuple[FloatArray, IntArray] | None:
+        """Points and triangles of the support that is asked for, as far as it is known.
+
+        Below flat layers that is before the part is solved, below others when "Support as STL" has
+        found it.
+        """
+        page = self.page
+        if not self.support.value or page.checked is None:
+            return None
+        case = page.checked.case
+        if not isinstance(case.slicing, Planar):
+            text, *body = self._body
+            return (body[0], body[1]) if body and page.bench.is_of(text) else None
+        space = propped_space(case.problem.mesh, case.build, case.machine)
+        return None if space is None else (space.mesh.points, space.mesh.boundary)
+
     def _command_of(self, begun: Begun) -> tuple[list[str], str]:
         """Words of a command behind ``ccfem``, and where its results are."""
         verb, options, ending, _ = begun
@@ -203,7 +223,11 @@ class CompareTab:
             self.page.say(f"the run of the part before has ended: its results are in {where}")
         elif state.written:
             if out.suffix == ".stl":
-                self._more[out.name] = out
+                import trimesh
+
+                body: Any = trimesh.load_mesh(out, process=False)
+                self._more[out.name], self._body = out, (text, body.vertices, body.faces)
+                self.page.show()
             else:
                 self.results = read_solution(out, text) if out.suffix else read_results(out)
             if out.suffix:  # what it found stands in no report

@@ -1,15 +1,12 @@
 """The tab for loads and supports: faces that are chosen, what may act on them, and what does."""
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-import numpy as np
-
-from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
+from ccfem.cases.inspection.acting import Entry, Name, entries
 from ccfem.cases.inspection.face_choice import coplanar, like_holes, proposed_load
 from ccfem.cases.part_editing import appended, edited, patch_of, removed, valued
 from ccfem.workbench.bench import Said
@@ -29,78 +26,6 @@ _BY_FACE = ("pull or push (force)", "bearing of a pin")
 """Kind that is proposed for other faces, and for round ones."""
 _FORCE = 100.0
 """Force, N, that is proposed."""
-
-
-_SUPPORTS = {"held": "Hold", "sliding": "Roll"}
-_UNITS = {"force": "N", "bearing": "N", "point": "N", "pressure": "MPa", "gravity": "m/s²"}
-
-
-@dataclass(frozen=True)
-class Entry:
-    """A load or a support of the part file.
-
-    Attributes
-    ----------
-    keys : tuple
-        Where it stands: ("supports", 0) or ("loads", name, 0).
-    table : mapping
-        What it says.
-    """
-
-    keys: tuple[str | int, ...]
-    table: Mapping[str, Any]
-
-    @property
-    def case(self) -> str:
-        """Tab that it stands in: its load case."""
-        return "Supports" if self.keys[0] == "supports" else str(self.keys[1])
-
-    @property
-    def title(self) -> str:
-        """One line."""
-        patch = self.table.get("patch") or self.table.get("patches") or ""
-        on = f" on {patch}" if patch else ""
-        if self.keys[0] == "supports":
-            kind = str(self.table.get("kind", "held"))
-            return f"{_SUPPORTS.get(kind, kind)}{on}"
-        return f"{self.keys[1]}: {self.table.get('kind', 'load')}{on}"
-
-    @property
-    def key(self) -> str:
-        """Key of what can be typed, or dragged."""
-        by_kind = {"gravity": "acceleration", "pressure": "magnitude"}
-        return by_kind.get(str(self.table.get("kind")), "vector")
-
-    @property
-    def unit(self) -> str:
-        """Unit of that."""
-        return _UNITS.get(str(self.table.get("kind")), "")
-
-    @property
-    def amount(self) -> tuple[float, ...] | float | None:
-        """What of it can be typed: a vector, or a pressure."""
-        vector, size = vector_of(self.table), self.table.get("magnitude")
-        if self.keys[0] == "supports":
-            return None
-        if vector is not None:
-            return tuple(vector.tolist())
-        return float(size) if isinstance(size, int | float) else None
-
-
-Name = tuple[str, type, int]
-"""What an entry is known by while others come and go: title, kind of amount, place among alike."""
-
-
-def vector_of(table: Mapping[str, Any]) -> FloatArray | None:
-    """Vector of a load, (3,); None where it has none."""
-    given = table.get("vector")
-    if table.get("kind") == "gravity":
-        given = table.get("acceleration", (0.0, 0.0, -9.81))
-    try:
-        vector = np.array(given, dtype=float)
-    except (TypeError, ValueError):
-        return None
-    return vector if vector.shape == (3,) else None
 
 
 class LoadsTab:
@@ -130,22 +55,6 @@ class LoadsTab:
         self._tabs: dict[str, Any] = {}
         self._rows: dict[Name, tuple[Any, Field | None, Any]] = {}
 
-    def entries(self) -> dict[Name, Entry]:
-        """Supports and loads of the part file, as far as they read."""
-        content, those = self.page.bench.content, []
-        supports, cases = content.get("supports"), content.get("loads")
-        for k, table in enumerate(supports if isinstance(supports, list) else ()):
-            those.append(Entry(("supports", k), table))
-        for name, tables in (cases if isinstance(cases, Mapping) else {}).items():
-            for k, table in enumerate(tables if isinstance(tables, list) else ()):
-                those.append(Entry(("loads", name, k), table))
-        named: dict[Name, Entry] = {}
-        for entry in those:
-            if isinstance(entry.table, Mapping):
-                alike = (entry.title, type(entry.amount))
-                named[*alike, sum(name[:2] == alike for name in named)] = entry
-        return named
-
     def entry(self, name: Name) -> Entry:
         """Support or load of a name, wherever it stands by now.
 
@@ -154,7 +63,7 @@ class LoadsTab:
         InputError
             Where it is there no more.
         """
-        entry = self.entries().get(name)
+        entry = entries(self.page.bench.content).get(name)
         if entry is None:
             raise InputError(f"{name[0]} is not in the part any more: add it again")
         return entry
@@ -258,10 +167,10 @@ class LoadsTab:
             self._said.content = ""
             return
         self.show_chosen()
-        entries = self.entries()
-        for name in self._rows.keys() - entries.keys():
+        those = entries(self.page.bench.content)
+        for name in self._rows.keys() - those.keys():
             self._drop(name)
-        for place, (name, entry) in enumerate(entries.items()):
+        for place, (name, entry) in enumerate(those.items()):
             if name not in self._rows:
                 if entry.case not in self._tabs:
                     self._tabs[entry.case] = self._cases.add_tab(entry.case)
@@ -272,14 +181,15 @@ class LoadsTab:
             if field is not None:
                 field.put(entry.amount)
             said.content = lines_of(self._lines_about(entry))
-        for case in self._tabs.keys() - {entry.case for entry in entries.values()}:
+        for case in self._tabs.keys() - {entry.case for entry in those.values()}:
             self._tabs.pop(case).remove()
-        self._list.visible = bool(entries)
+        self._list.visible = bool(those)
 
     def _lines_about(self, entry: Entry) -> Said:
         """Lines of the check that name what an entry acts on, or its load case."""
-        named = re.escape(str(entry.table.get("patch") or entry.keys[1]))
-        return tuple(line for line in self.page.said if re.search(rf"\b{named}\b", line[1]))
+        patch, named = entry.table.get("patch"), re.escape(f"load case '{entry.case}'")
+        named = rf"\b{re.escape(patch)}\b" if isinstance(patch, str) else named
+        return tuple(line for line in self.page.said if re.search(named, line[1]))
 
     def _drop(self, name: Name) -> None:
         folder, field, _ = self._rows.pop(name)

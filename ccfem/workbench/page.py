@@ -16,10 +16,19 @@ import numpy as np
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
 from ccfem.cases.inspection import Check
+from ccfem.cases.inspection.acting import Entry, Name, entries
 from ccfem.cases.inspection.patch_places import PatchPlace, patch_places
 from ccfem.cases.part_editing import valued
 from ccfem.comparison.plot.face_meshes import borders, face_meshes
-from ccfem.comparison.plot.symbols import arrow_outside, bed_under, box_edges, pressing, swung
+from ccfem.comparison.plot.symbols import (
+    arrow_outside,
+    bed_under,
+    box_edges,
+    heat_waves,
+    pressing,
+    swung,
+    turning,
+)
 from ccfem.workbench.bench import Bench, Said
 from ccfem.workbench.body_scene import (
     boxes,
@@ -30,7 +39,7 @@ from ccfem.workbench.body_scene import (
 from ccfem.workbench.compare_tab import CompareTab
 from ccfem.workbench.file_tab import FileTab
 from ccfem.workbench.guard import Guard, Served, escaped, limit_uploads
-from ccfem.workbench.loads_tab import LoadsTab, Name, vector_of
+from ccfem.workbench.loads_tab import LoadsTab
 from ccfem.workbench.newest import Newest
 from ccfem.workbench.print_tab import PrintTab
 from ccfem.workbench.tab import MATT, PART, VIEWS, Tabbed, draw_arrows, draw_lines, lines_of
@@ -38,6 +47,7 @@ from ccfem.workbench.tab import MATT, PART, VIEWS, Tabbed, draw_arrows, draw_lin
 _FACE, _CHOSEN = (203, 210, 216), (245, 190, 65)
 _HELD, _LOADED, _BOTH = (120, 168, 214), (226, 142, 120), (170, 140, 190)
 _EDGE, _LOAD, _SUPPORT, _BED = (70, 80, 92), (179, 38, 30), (0, 98, 155), (110, 120, 130)
+_PRINTED = (214, 178, 94)
 _RIM = 0.05
 """Width of the rim of the bed over its own half."""
 Dragged = Callable[[FloatArray, FloatArray], None]
@@ -238,18 +248,19 @@ class Page(Tabbed):
         draw_lines(scene, "/body/borders", borders(listing), _EDGE)
         self.loads.list_faces()
 
-    def places(self) -> dict[str, PatchPlace]:
-        """Places of the patches, as far as they are known."""
-        return patch_places(self.bench.content, self.bench.listing, self.checked)
+    def acting(self) -> dict[Name, tuple[Entry, PatchPlace]]:
+        """Say what acts on the part, and where, as far as that is known."""
+        content, listing = self.bench.content, self.bench.listing
+        places = patch_places(content, listing, self.checked)
+        body = listing.points[listing.triangles]
+        those = entries(content).items()
+        return {k: (one, place) for k, one in those if (place := one.place(places, body))}
 
     def paint(self) -> None:
         """Colour the faces by what acts on them, and those that are chosen."""
         held, loaded = set[int](), set[int]()
-        places = self.places()
-        for entry in self.loads.entries().values():
-            place = places.get(str(entry.table.get("patch")))
-            if place is not None:
-                (held if entry.keys[0] == "supports" else loaded).update(place.numbers)
+        for entry, place in self.acting().values():
+            (held if entry.holds else loaded).update(place.numbers)
         for number, handle in self._faces.items():
             roles = (number in held, number in loaded)
             colour = {(True, False): _HELD, (False, True): _LOADED, (True, True): _BOTH}.get(
@@ -266,36 +277,68 @@ class Page(Tabbed):
         """
         if self._dragging in self.server.get_clients():
             return
-        scene, listing = self.server.scene, self.bench.listing
+        listing = self.bench.listing
         for handle in self._drawn:
             handle.remove()
         self._drawn = []
-        places, size = self.places(), listing.size
         corners = listing.points[listing.triangles]
-        for k, (called, entry) in enumerate(self.loads.entries().items()):
-            place = places.get(str(entry.table.get("patch")))
-            if entry.table.get("kind") == "gravity":
-                place = PatchPlace(corners)
-            if place is None:
-                continue
-            name, support = f"/body/symbol_{k}", entry.keys[0] == "supports"
-            force = vector_of(entry.table)
-            if support or force is None:
-                marks = pressing(place.corners, _MARKS, 0.035 * size)
-                colour = _SUPPORT if support else _LOAD
-                self._drawn.append(draw_arrows(scene, name, marks, colour, 0.035 * size, 0.4))
-            elif np.any(force):
-                ends, presses = arrow_outside(place.centre, force, 0.22 * size, corners)
-                turned = partial(self._turn_force, called, presses)
-                said = f"{np.linalg.norm(force):.4g} {entry.unit}"
-                self._drawn += self._arrow(name, ends, presses, place.centre, said, turned)
+        for k, (called, (entry, place)) in enumerate(self.acting().items()):
+            self._drawn += self._symbol(f"/body/symbol_{k}", called, entry, place, corners)
+        self._drawn += self._support()
         bounds = np.array(self._bounds())
         for k, box in boxes(self.bench.content).items():
             self._drawn += self._box(k, box, bounds)
         up = upward(self.bench.content)
         if up is not None:
-            self._drawn += self._bed(corners.reshape(-1, 3), up, 0.22 * size)
+            self._drawn += self._bed(corners.reshape(-1, 3), up, 0.22 * listing.size)
         self.paint()
+
+    def _symbol(
+        self, name: str, called: Name, entry: Entry, place: PatchPlace, body: FloatArray
+    ) -> list[Any]:
+        """Cones, waves of heat, or an arrow of a force, to be dragged, or about an axis."""
+        scene, size, along = self.server.scene, self.bench.listing.size, entry.along
+        if entry.kind == "temperature":
+            low, high = self._bounds()
+            waves = heat_waves(np.array([*(0.5 * (low + high))[:2], high[2]]), 0.12 * size)
+            lines = draw_lines(scene, name, waves, _LOAD, 3.0)
+            return [lines, self._label(name, entry.said, waves[-1, 1])]
+        if along is None:
+            marks = pressing(
+                place.corners, 0 if entry.amount == (0, 0, 0) else _MARKS, 0.035 * size
+            )
+            colour = _SUPPORT if entry.holds else _LOAD
+            return [draw_arrows(scene, name, marks, colour, 0.035 * size, 0.4)] * bool(len(marks))
+        ends, presses = arrow_outside(place.centre, along, 0.22 * size, body)
+        if entry.kind not in ("moment", "centrifugal"):
+            turned = partial(self._turn_force, called, presses) if entry.amount else None
+            return self._arrow(name, ends, presses, place.centre, entry.said, turned)
+        pieces = turning(ends, 0.08 * size)
+        lines = draw_lines(scene, name, np.concatenate([pieces[:-1], ends[None]]), _LOAD, 3.0)
+        head = draw_arrows(scene, f"{name}_head", pieces[-1:], _LOAD, 0.064 * size, 0.41)
+        return [lines, head, self._label(name, entry.said, ends[0 if presses else 1])]
+
+    def _label(self, name: str, said: str, place: FloatArray) -> Any:
+        """Words at a place."""
+        scene = self.server.scene
+        return scene.add_label(f"{name}_said", said, position=tuple(place), anchor="bottom-center")
+
+    def _support(self) -> list[Any]:
+        """Draw the printed support below the part as it was checked, where it is asked for."""
+        body = self.compare.support_body() if self._checked_text == self.bench.text else None
+        if body is None:
+            return []
+        name, (points, triangles) = "/body/support", body
+        drawn = self.server.scene.add_mesh_simple(
+            name,
+            points.astype(np.float32),
+            triangles.astype(np.uint32),
+            color=_PRINTED,
+            opacity=0.6,
+            flat_shading=True,
+            **MATT,
+        )
+        return [drawn, self._label(name, "printed support", points[points[:, 2].argmin()])]
 
     def _arrow(
         self,
@@ -304,19 +347,17 @@ class Page(Tabbed):
         presses: bool,
         start: FloatArray,
         said: str,
-        turned: Callable[[FloatArray], None],
+        turned: Callable[[FloatArray], None] | None,
         colour: tuple[int, int, int] = _LOAD,
     ) -> list[Any]:
         """Arrow with its words, and a ball at its free end to drag it by, about a place."""
         scene, long = self.server.scene, float(np.linalg.norm(ends[1] - ends[0]))
         drawn = draw_arrows(scene, name, ends[None], colour, 0.22 * long, 0.41)
         free = ends[0 if presses else 1]
-        label = scene.add_label(
-            f"{name}_said",
-            said,
-            position=tuple(free + 0.12 * (ends[1] - ends[0]) * (-1.0 if presses else 1.0)),
-            anchor="bottom-center",
-        )
+        words = free + 0.12 * (ends[1] - ends[0]) * (-1.0 if presses else 1.0)
+        label = self._label(name, said, words)
+        if turned is None:
+            return [drawn, label]
 
         def moved(end: FloatArray) -> FloatArray:
             tip = np.asarray(start + long * snapped(end - start))

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from ccfem.cases.inspection.face_choice import across
-from ccfem.comparison.plot.symbols import bed_under, box_edges, pressing, swung
+from ccfem.comparison.plot.symbols import (
+    bed_under,
+    box_edges,
+    heat_waves,
+    pressing,
+    swung,
+    turning,
+)
 from ccfem.workbench.body_scene import (
     boxes,
     snapped,
@@ -24,6 +31,31 @@ def test_marks_touch_the_surface_with_their_tips():
     marks = pressing(square(5.0, 1.0), 2, 1.5)
     np.testing.assert_allclose(marks[:, 1] - marks[:, 0], [[0, 0, -1.5]] * 2)
     assert {tuple(tip) for tip in marks[:, 1].round(3)} == {(1.333, 0.667, 5), (0.667, 1.333, 5)}
+
+
+def test_marks_stand_below_a_point():
+    (mark,) = pressing(np.full((1, 3, 3), 4.0), 5, 1.5)
+    np.testing.assert_array_equal(mark, [[4.0, 4.0, 2.5], [4.0, 4.0, 4.0]])
+
+
+@pytest.mark.parametrize("along", [[0, 0, 2.0], [-1.0, 0, 0], [1.0, -2.0, 0.5]])
+def test_a_moment_turns_by_the_right_hand(along):
+    """Its pieces lie on a circle about the middle of the axis, and hang together up to the head."""
+    place, along = np.array([3.0, 1.0, 2.0]), np.array(along)
+    pieces = turning(np.stack([place, place + along]), 0.7)
+    arms = pieces[:-1] - (place + 0.5 * along)
+    np.testing.assert_allclose(np.linalg.norm(arms, axis=2), 0.7)
+    np.testing.assert_allclose(arms @ along, 0.0, atol=1e-12)
+    np.testing.assert_array_equal(pieces[1:, 0], pieces[:-1, 1])
+    steps = pieces[:, 1] - pieces[:, 0]
+    assert (np.cross(pieces[:, 0] - (place + 0.5 * along), steps) @ along > 0.0).all()
+
+
+def test_heat_rises():
+    waves = heat_waves(np.array([1.0, 2.0, 3.0]), 4.0)
+    assert (waves[:, 1, 2] > waves[:, 0, 2]).all()
+    assert waves[..., 2].min() == 3.0
+    assert waves[..., 2].max() == 7.0
 
 
 @pytest.mark.parametrize("angle", [0.0, 5.9, 6.1, 45.0])

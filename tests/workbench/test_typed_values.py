@@ -14,6 +14,7 @@ import pytest
 
 from ccfem.body.files import write_mesh
 from ccfem.body.mesh.box import box_mesh
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases.part_editing import removed
 from ccfem.workbench import compare_tab
 from ccfem.workbench.bench import Bench
@@ -383,6 +384,55 @@ def test_weight_has_an_arrow_that_turns_it(page, visit):
     visit.type(row(page, "load: gravity"), -1.62, 2)
     visit.settle()
     assert page.bench.content["loads"]["load"][0]["acceleration"] == [-9.81, 0.0, -1.62]
+
+
+WHOLE = """
+[[supports]]
+patch = "end"
+
+[[loads.spin]]
+kind = "centrifugal"
+speed = 20.0
+point = [0.0, 5.0, 0.0]
+axis = [0.0, 0.0, 1.0]
+
+[[loads.heat]]
+kind = "temperature"
+change = 40.0
+"""
+
+
+def test_what_is_written_by_hand_has_a_symbol_and_so_has_support(page, visit):
+    """A bar of 40 x 10 x 4 mm, of which all but a stem of 10 x 10 x 2 mm is 2 mm thick."""
+    box = box_mesh((40.0, 10.0, 4.0), (8, 2, 2))
+    middles = box.points[box.corners].mean(axis=1)
+    kept = (middles[:, 2] > 2.0) | (middles[:, 0] < 10.0)
+    write_mesh(TetMesh(box.points, box.cells[kept]), page.bench.folder / "bent.npz")
+    text = HELD.replace("bar.npz", "bent.npz").replace('"force"', '"moment"') + WHOLE
+    (page.bench.folder / "bent.toml").write_text(text)
+    page.act(page.open, "bent.toml").result()
+    drawn = {h.name: h for h in page._drawn}
+    said = [h.text for h in page._drawn if h.name.endswith("_said")]
+    assert said == ["100 N mm", "20 rad/s", "40 K", "build direction"]
+    assert [name for name in drawn if name.endswith("_ball")] == ["/body/build_ball"]
+    # The support, the moment, the pressure, the spin on its axis, and the heat.
+    turning = [k for k in range(5) if f"/body/symbol_{k}_head" in drawn]
+    assert turning == [1, 3]
+    assert drawn["/body/symbol_3_said"].position[:2] == pytest.approx((0.0, 5.0))
+    visit.type(row(page, "spin: centrifugal"), 30.0)
+    visit.settle()
+    assert page.bench.content["loads"]["spin"][0]["speed"] == 30.0
+    # Support is drawn when the part as it is now has been checked: 30 x 10 x 2 mm.
+    visit.type(page.compare.support, True)
+    visit.settle()
+    assert "/body/support" not in {h.name for h in page._drawn}
+    page.act(page._heed, page.bench.text, page.bench.check(page.bench.text)).result()
+    (support,) = [h for h in page._drawn if h.name == "/body/support"]
+    low, high = support.vertices.min(axis=0), support.vertices.max(axis=0)
+    np.testing.assert_allclose([low, high], [[10, 0, 0], [40, 10, 2]], atol=1e-6)
+    visit.type(page.compare.support, False)
+    visit.settle()
+    assert "/body/support" not in {h.name for h in page._drawn}
 
 
 def test_load_cases_are_tabs_and_lines_stand_beside_what_they_mean(page):

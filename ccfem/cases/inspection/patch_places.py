@@ -30,15 +30,12 @@ class PatchPlace:
     numbers: tuple[int, ...] = ()
 
     @property
-    def _across(self) -> FloatArray:
-        a, b, c = np.moveaxis(self.corners, 1, 0)
-        return np.asarray(0.5 * np.cross(b - a, c - a))
-
-    @property
     def centre(self) -> FloatArray:
-        """Centre (3,) of the area, mm."""
-        areas = np.linalg.norm(self._across, axis=1)
-        return np.asarray(areas @ self.corners.mean(axis=1) / max(float(areas.sum()), 1e-300))
+        """Centre (3,) of the area, mm; where it has none, as points, of its corners."""
+        a, b, c = np.moveaxis(self.corners, 1, 0)
+        areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        weights = areas if areas.any() else None
+        return np.asarray(np.average(self.corners.mean(axis=1), axis=0, weights=weights))
 
 
 def patch_places(

@@ -5,6 +5,10 @@ import numpy as np
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.slicing.layers.layer import plane_frame
 
+_BELOW = np.array([0.0, 0.0, -1.0])
+_ROUND, _STEPS = np.radians(270.0), 24
+"""Angle of a curved arrow, and its pieces."""
+
 
 def spread(points: FloatArray, count: int) -> IntArray:
     """Up to `count` rows of some points (k, 3), each the farthest from those before it."""
@@ -17,13 +21,17 @@ def spread(points: FloatArray, count: int) -> IntArray:
 
 
 def pressing(corners: FloatArray, count: int, length: float) -> FloatArray:
-    """Up to some arrows (m, 2, 3), mm, of a length, onto places all over triangles (k, 3, 3)."""
+    """Up to some arrows (m, 2, 3), mm, of a length, onto places all over triangles (k, 3, 3).
+
+    They stand on points, triangles without an area, from below.
+    """
     a, b, c = np.moveaxis(corners, 1, 0)
     rows = spread(corners.mean(axis=1), count)
     normals = np.cross(b - a, c - a)[rows]
-    sizes = np.maximum(np.linalg.norm(normals, axis=1), 1e-300)
+    sizes = np.linalg.norm(normals, axis=1)[:, None]
+    outward = np.where(sizes > 0.0, normals / np.maximum(sizes, 1e-300), _BELOW)
     middles = corners[rows].mean(axis=1)
-    return np.stack([middles + length * normals / sizes[:, None], middles], axis=1)
+    return np.stack([middles + length * outward, middles], axis=1)
 
 
 def arrow_outside(
@@ -49,6 +57,30 @@ def arrow_outside(
     free, way = (-along, behind) if presses else (along, ahead)
     ends = np.stack([place + way * free, place + (way + length) * free])
     return (ends[::-1] if presses else ends), presses
+
+
+def turning(ends: FloatArray, radius: float) -> FloatArray:
+    """Pieces (k, 2, 3), mm, of an arrow that turns about the middle of a line; its head the last.
+
+    It turns by the right hand about the direction from the first end (3,) to the second.
+    """
+    right, up, _ = plane_frame((ends[1] - ends[0]).tolist())
+    angle = np.linspace(0.0, _ROUND, _STEPS + 1)[:, None]
+    ring = ends.mean(axis=0) + radius * (np.cos(angle) * right + np.sin(angle) * up)
+    ahead = ring[-1] + 0.8 * radius * (np.cos(_ROUND) * up - np.sin(_ROUND) * right)
+    ring = np.concatenate([ring, ahead[None]])
+    return np.stack([ring[:-1], ring[1:]], axis=1)
+
+
+def heat_waves(place: FloatArray, length: float) -> FloatArray:
+    """Pieces (k, 2, 3), mm, of three wavy lines that rise by a length above a place (3,)."""
+    share = np.linspace(0.0, 1.0, _STEPS + 1)
+    aside = 0.08 * length * np.sin(4.0 * np.pi * share)
+    lines = [
+        place + np.stack([aside + step * length, 0.0 * share, length * share], axis=1)
+        for step in (-0.3, 0.0, 0.3)
+    ]
+    return np.concatenate([np.stack([line[:-1], line[1:]], axis=1) for line in lines])
 
 
 def _way_out(start: FloatArray, along: FloatArray, body: FloatArray) -> float:

@@ -19,7 +19,9 @@ from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.locate import locate
-from ccfem.printing.support.overhang import hanging_facets
+from ccfem.geometry.shapes import Region
+from ccfem.machine.machine import Machine
+from ccfem.printing.support.overhang import hanging_facets, overhang
 from ccfem.slicing.layers.layer import plane_frame
 
 _INWARD = 1e-3
@@ -86,6 +88,7 @@ def column_mesh(
     angle: float = 0.0,
     lift: float = 0.0,
     size: float | None = None,
+    within: Region | None = None,
 ) -> ColumnMesh:
     """Mesh the space below a part that has to be filled while it is printed.
 
@@ -100,6 +103,9 @@ def column_mesh(
     size : float, mm, optional
         Height of the highest cells of a column, each below half as high again; by default the mean
         length of the sides of the facets above.
+    within : (Multi)Polygon, mm, optional
+        Seen along the build direction, in the frame of `ccfem.slicing.layers.layer.plane_frame`:
+        only below facets whose middle lies in it.
 
     Raises
     ------
@@ -114,6 +120,8 @@ def column_mesh(
     bed = float(turned[np.unique(mesh.corners), 2].min()) - lift
     reach = 1e-6 * float(np.ptp(turned, axis=0).max())
     area, lean, hanging = hanging_facets(mesh, frame, bed, angle, reach, _STEEPEST)
+    if within is not None:
+        hanging &= shapely.contains_xy(within, turned[mesh.boundary].mean(axis=1)[:, :2])
     if not hanging.any():
         raise InputError(
             f"no surface of the part overhangs by more than {angle:g} degrees: it needs no support"
@@ -140,6 +148,18 @@ def column_mesh(
     standing = float(shadow @ rests[facets].mean(axis=1))
     contact = float(area[hanging].sum())
     return ColumnMesh(columns, node, below, share, on_bed, contact, standing, frame[2])
+
+
+def propped_space(mesh: TetMesh, build: Sequence[float], machine: Machine) -> ColumnMesh | None:
+    """Mesh the space that support below flat layers fills in a print; None where they need none.
+
+    It stands below what `overhang` finds, as in `ccfem.printing.print_plan.plan_print`; there, it
+    also keeps `support_gap` and `support_clearance` from the part.
+    """
+    hanging = overhang(mesh, build, machine)
+    if hanging is None:
+        return None
+    return column_mesh(mesh, build, machine.limits.overhang, within=hanging.region)
 
 
 def _feet(

@@ -14,6 +14,7 @@ from ccfem.machine import Machine, updated
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.export.gcode import gcode
 from ccfem.printing.print_plan import plan_print
+from ccfem.printing.support import propped_space
 from ccfem.printing.support.overhang import overhang
 from ccfem.slicing.slicers.planar import Planar
 
@@ -73,6 +74,21 @@ def test_gaps_that_fibre_may_span_are_bridged():
     """Machine.limits.free_span is 8 mm."""
     assert overhang(table(6.0), UP, Machine()) is None
     assert overhang(table(14.0), UP, Machine()).region.area == pytest.approx(280.0, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "volume"),
+    [
+        (tee(), 2 * 20.0 * 20.0 * 25.0),
+        (table(20.0), 20.0 * 20.0 * 10.0),
+        (leaning(60.0), 0.5 * 20.0 * 20.0 * 20.0 * np.tan(np.radians(60.0))),
+        (table(6.0), 0.0),
+    ],
+)
+def test_support_fills_the_space_below_what_is_laid_in_air(mesh, volume):
+    """Below both arms, between the feet, in the wedge; not below what is bridged."""
+    space = propped_space(mesh, UP, Machine())
+    assert (0.0 if space is None else space.volume) == pytest.approx(volume, rel=1e-9)
 
 
 @pytest.fixture(scope="module")
