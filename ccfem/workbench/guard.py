@@ -223,21 +223,35 @@ def limit_uploads(server: Any, refuse: Callable[[str], object]) -> None:
     from viser import _messages as messages
 
     sockets, gui = server._websock_server, server.gui
+    going = gui._current_file_upload_states
+
+    def refused(client: Any, message: Any, why: str) -> None:
+        refuse(why)
+        going.pop(message.transfer_uuid, None)
+        if client in server.get_clients():  # where it waits, and may send no other, till it is told
+            send = server.get_clients()[client]._websock_connection.queue_message
+            ends = (message.source_component_uuid, message.transfer_uuid, 1, 1)
+            send(messages.FileTransferPartAck(*ends))
+            send(messages.RemoveNotificationMessage(f"upload-{message.transfer_uuid}"))
 
     def start(client: Any, message: Any) -> None:
-        if message.size_bytes > UPLOAD_LIMIT or message.part_count > UPLOAD_LIMIT // 1000:
-            refuse(
-                f"{message.filename} has {message.size_bytes / 1e6:.0f} MB; files of up to "
+        size = message.size_bytes + sum(state["total_bytes"] for state in going.values())
+        if size > UPLOAD_LIMIT or message.part_count > UPLOAD_LIMIT // 1000:
+            others = " with others on their way" if size > message.size_bytes else ""
+            why = (
+                f"{message.filename} has {size / 1e6:.0f} MB{others}; files of up to "
                 f"{UPLOAD_LIMIT / 1e6:.0f} MB can be uploaded: start ccfem open in its folder"
             )
+            refused(client, message, why)
         else:
             gui._handle_file_transfer_start(client, message)
 
     def part(client: Any, message: Any) -> None:
-        state = gui._current_file_upload_states.get(message.transfer_uuid)
+        state = going.get(message.transfer_uuid)
         if state is not None:
             if state["transferred_bytes"] + len(message.content) > state["total_bytes"]:
-                gui._current_file_upload_states.pop(message.transfer_uuid)
+                why = f"{state['filename']} is larger than the browser said: upload it again"
+                refused(client, message, why)
             else:
                 gui._handle_file_transfer_part(client, message)
 

@@ -134,6 +134,11 @@ def test_large_files_are_refused_before_and_as_they_come(server, monkeypatch):
     assert server.gui._current_file_upload_states
     send(messages.FileTransferPart(upload._impl.uuid, "t", 0, b"x" * 11))  # more than announced
     assert not server.gui._current_file_upload_states
+    assert server.said[-1] == "a.stl is larger than the browser said: upload it again"
+    start(60_000)
+    send(messages.FileTransferStartUpload(upload._impl.uuid, "u", "b.stl", "", 2, 60_000))
+    assert list(server.gui._current_file_upload_states) == ["t"]  # both are too much at once
+    assert "b.stl has 0 MB with others on their way" in server.said[-1]
     assert messages.ShareUrlRequest not in handlers  # nothing is shared through other machines
 
 

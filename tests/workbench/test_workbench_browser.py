@@ -321,9 +321,12 @@ def bar_file(folder):
     return (folder / "bar.stl").read_bytes()
 
 
-def test_two_visits_see_one_part_and_texts_of_files_are_texts(work):
+def test_two_visits_see_one_part_and_texts_of_files_are_texts(work, monkeypatch):
     (work.bench.folder / "hand.toml").write_text(BY_HAND)
     first, second = work.first, work.visit(390, 800)
+    # A body that is dropped on the page is opened, and kept in results, whatever tab is shown.
+    first.tab.evaluate(DROP, list(bar_file(work.bench.folder)))
+    first.tab.get_by_role("heading", name="dropped", exact=True).wait_for(timeout=10_000)
     first.choose_tab("Part file")
     first.tab.get_by_label("In this folder").click()
     first.tab.get_by_role("option", name="hand.toml", exact=True).click()
@@ -333,16 +336,19 @@ def test_two_visits_see_one_part_and_texts_of_files_are_texts(work):
     # 390 px: nothing is cut off to the right.
     wide = "document.documentElement.scrollWidth - window.innerWidth"
     assert second.tab.evaluate(wide) <= 0
-    # A body that is uploaded is opened, and kept in results.
-    upload = {"name": "up.stl", "mimeType": "", "buffer": bar_file(work.bench.folder)}
-    first.tab.locator('input[type="file"]').set_input_files(files=[upload])
+    # A file that is too large is one line, and the next one is opened, and kept in results.
+    monkeypatch.setattr("ccfem.workbench.guard.UPLOAD_LIMIT", 1_000_000)
+    bodies = {"large.stl": bytes(3_000_000), "up.stl": bar_file(work.bench.folder)}
+    large, up = ({"name": k, "mimeType": "", "buffer": v} for k, v in bodies.items())
+    first.tab.locator('input[type="file"]').set_input_files(files=[large])
+    said = "large.stl has 3 MB; files of up to 1 MB can be uploaded: start ccfem open in its folder"
+    first.tab.get_by_role("alert").filter(has_text=said).wait_for(timeout=10_000)
+    first.tab.get_by_text("Uploading large.stl").wait_for(state="detached", timeout=10_000)
+    assert not (work.bench.results / "uploads/large.stl").exists()
+    assert work.bench.text == BY_HAND
+    first.tab.locator('input[type="file"]').set_input_files(files=[up])
     first.tab.get_by_role("heading", name="up", exact=True).wait_for(timeout=10_000)
     assert (work.bench.results / "uploads/up.stl").exists()
-    # So is one that is dropped on the page, whatever tab is shown.
-    first.choose_tab("Loads")
-    first.tab.evaluate(DROP, list(bar_file(work.bench.folder)))
-    first.tab.get_by_role("heading", name="dropped", exact=True).wait_for(timeout=10_000)
-    first.choose_tab("Part file")
     work.page.act(work.page.open, "hand.toml").result()
     # A file that is no body is one line, and changes nothing.
     (work.bench.folder / "wrong.stl").write_text("no body")
