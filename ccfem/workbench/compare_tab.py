@@ -206,7 +206,7 @@ class CompareTab:
         if self._running:
             raise InputError("a run is going on: stop it first")
         page.say("")
-        page.bench.part_file()
+        page.bench.results.mkdir(exist_ok=True)
         part, text = page.bench.opened, page.bench.text
         self.run = ChildRun(
             arguments,

@@ -3,6 +3,7 @@
 import asyncio
 import re
 import shlex
+import shutil
 import threading
 from contextlib import contextmanager
 from functools import partial
@@ -13,9 +14,10 @@ import numpy as np
 import pytest
 
 from ccfem.body.files import write_mesh
+from ccfem.body.files.surface import write_stl
 from ccfem.body.mesh.box import box_mesh
 from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.cases.part_editing import removed
+from ccfem.cases.part_editing import removed, valued
 from ccfem.workbench import compare_tab
 from ccfem.workbench.bench import Bench
 from ccfem.workbench.child_run import RunState
@@ -430,6 +432,16 @@ def test_what_is_written_by_hand_has_a_symbol_and_so_has_support(page, visit):
     (support,) = [h for h in page._drawn if h.name == "/body/support"]
     low, high = support.vertices.min(axis=0), support.vertices.max(axis=0)
     np.testing.assert_allclose([low, high], [[10, 0, 0], [40, 10, 2]], atol=1e-6)
+    # Below curved layers it is drawn when a run has found it, of the part as it is.
+    page.act(page.edit, valued(("slicing",), {"method": "spatial"})).result()
+    page.act(page._heed, page.bench.text, page.bench.check(page.bench.text)).result()
+    assert "/body/support" not in {h.name for h in page._drawn}
+    body = page.bench.results / "bent-support.stl"
+    write_stl(body, box.points, box.boundary)
+    ended = (RunState(code=0), body, "Part", page.bench.opened, page.bench.text)
+    page.act(page.compare._heed, *ended).result()
+    (support,) = [h for h in page._drawn if h.name == "/body/support"]
+    np.testing.assert_allclose(np.ptp(support.vertices, axis=0), [40, 10, 4], atol=1e-6)
     visit.type(page.compare.support, False)
     visit.settle()
     assert "/body/support" not in {h.name for h in page._drawn}
@@ -468,9 +480,11 @@ def test_each_button_runs_the_command_that_it_shows(page, visit, monkeypatch):
     page.act(compare._add_part, "bar.toml").result()
     shown = re.findall("<p>(.*?): <code>(.*?)</code></p>", compare._command.content)
     assert [name for name, _ in shown] == list(compare.starts)
+    shutil.rmtree(page.bench.results, ignore_errors=True)  # as before anything was changed
     for name, _ in shown:
         visit.click(name)
         visit.settle()
+    assert page.bench.results.is_dir()
     assert ran == [shlex.split(unescape(command)) for _, command in shown]
     solve, comparison, plan, bed, support = ran
     assert solve[1:] == [
