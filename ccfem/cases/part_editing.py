@@ -137,7 +137,8 @@ def appended(keys: Keys, table: Mapping[str, Any]) -> Change:
             at = at[key]
         last = keys[-1]
         if last not in at:
-            at[last] = tomlkit.aot() if _is_text(content) else []
+            listed = tomlkit.array() if isinstance(at, InlineTable) else tomlkit.aot()
+            at[last] = listed if _is_text(content) else []
         at[last].append(_like(content, table, inline=not isinstance(at[last], AoT)))
         if isinstance(at[last], AoT):
             at[last][-1].add(tomlkit.nl())
@@ -163,7 +164,7 @@ def removed(keys: Keys) -> Change:
             del at[last]
             if outer and not len(at):
                 del content[outer[0]]
-        for name in names:
+        for name in filter(None, names):
             rest = {key: value for key, value in content.items() if key != "patches"}
             if name in content.get("patches", {}) and not _names(rest, name):
                 del content["patches"][name]

@@ -172,3 +172,13 @@ def test_tables_within_a_line_take_one_more(plate):
     text, name = patch_of(text, plate, holes_of(plate, 6.0))
     assert tomllib.loads(text)["patches"].keys() == {"end", name}
     assert "# mine" in text
+    text = edited(
+        'loads = {a = [{kind = "gravity"}]}  # mine\n', appended(("loads", "b"), {"k": 1})
+    )
+    assert tomllib.loads(text)["loads"] == {"a": [{"kind": "gravity"}], "b": [{"k": 1}]}
+    assert "# mine" in text
+
+
+def test_what_acts_on_no_patch_is_removed_beside_patches():
+    text = edited(TEXT, appended(("loads", "own weight"), {"kind": "gravity"}))
+    assert edited(text, removed(("loads", "own weight", 0))).rstrip() == TEXT.rstrip()
