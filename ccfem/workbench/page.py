@@ -226,7 +226,11 @@ class Page(Tabbed):
         self.view.value = view
         if self.body is not None:
             self.body.visible = view == PART
-        self.look(self.compare.shown(view))
+        try:
+            self.look(self.compare.shown(view))
+        except InputError:  # nothing of that view is there
+            self.show_view(PART)
+            raise
 
     def _bounds(self) -> tuple[FloatArray, FloatArray]:
         corners = self._listing.points[self._listing.triangles]

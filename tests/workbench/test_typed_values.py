@@ -18,6 +18,8 @@ from ccfem.body.files.surface import write_stl
 from ccfem.body.mesh.box import box_mesh
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases.part_editing import removed, valued
+from ccfem.comparison.report.print_view import FILLS, KINDS, MOVES
+from ccfem.comparison.report.report_views import PrintLayer
 from ccfem.workbench import compare_tab
 from ccfem.workbench.bench import Bench
 from ccfem.workbench.child_run import RunState
@@ -457,6 +459,34 @@ def test_load_cases_are_tabs_and_lines_stand_beside_what_they_mean(page):
     assert "larger" in page.prints._lines.content
     page.act(page.edit, removed(("loads", "press", 0))).result()
     assert list(page.loads._tabs) == ["pull"]
+
+
+def test_a_print_is_shown_up_to_a_layer(page, visit, monkeypatch):
+    """Three layers, each with a contour, what fills it, and travel."""
+    kinds = np.array([KINDS.index("contour"), FILLS, MOVES])
+    ends = np.arange(18.0).reshape(3, 2, 3)
+    layers = [PrintLayer(f"Layer {k + 1} of 3", ends + k, kinds) for k in range(3)]
+    results = SimpleNamespace(print_layers=lambda name: layers, layers=layers)
+    monkeypatch.setattr(page.compare, "results", results)
+    scene, compare = page.server.scene, page.compare
+
+    def shown():
+        seen = [scene.get_handle_by_name(f"/print_{k}").visible for k in range(3)]
+        return seen, len(scene.get_handle_by_name("/print_top").points)
+
+    page.act(page.show_view, "Print").result()
+    assert shown() == ([True] * 3, 1)  # of the top one also what fills it
+    visit.send(compare.top, 1)
+    visit.settle()
+    assert shown() == ([True, True, False], 1)
+    visit.send(compare.alone, True)
+    visit.send(compare.travel, True)
+    visit.settle()
+    assert shown() == ([False, True, False], 2)
+    assert "Layer 2 of 3" in compare._layer_said.content
+    assert not compare.layer.visible
+    page.act(page.show_view, "Part").result()
+    assert scene.get_handle_by_name("/print_0") is None
 
 
 def test_each_button_runs_the_command_that_it_shows(page, visit, monkeypatch):
