@@ -112,7 +112,8 @@ class Bench:
         """Files of the folder that can be opened, and earlier part files of the workbench."""
         found = [path for path in sorted(self.folder.iterdir()) if _is_body(path)]
         tables = [*sorted(self.folder.glob("*.toml")), *sorted(self.results.glob("*.toml"))]
-        found += [path for path in tables if _looks_like_part(path)]
+        there = [path for path in tables if path.exists()]
+        found += [path for path in there if _names_body(path, path.stat().st_mtime_ns)]
         return [path.relative_to(self.folder).as_posix() for path in found[:_LISTED]]
 
     def open(self, what: str | os.PathLike[str]) -> None:
@@ -310,19 +311,12 @@ def _is_body(path: Path) -> bool:
     return is_surface(path) or is_cad(path) or path.suffix.lower() in suffixes()
 
 
-def _looks_like_part(path: Path) -> bool:
-    try:
-        return _names_body(path, path.stat().st_mtime_ns)
-    except OSError:
-        return False
-
-
 @functools.cache
 def _names_body(path: Path, _: int) -> bool:
     """Whether a TOML file, as it was at some time, names a body."""
     try:
         content = content_of(text_of(path, "part file"))
-    except InputError:
+    except (InputError, OSError):
         return False
     return bool(content.keys() & {"mesh", "surface", "planform"})
 

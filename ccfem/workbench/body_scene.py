@@ -8,6 +8,7 @@ import numpy as np
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.patches import unit_vector
+from ccfem.cases.inspection.acting import finite
 from ccfem.printing.bed_layout import bed_of
 
 _SNAP = np.cos(np.radians(6.0))
@@ -45,11 +46,8 @@ def boxes(content: Mapping[str, Any]) -> dict[int, FloatArray]:
     those = {}
     for k, region in enumerate(regions if isinstance(regions, list) else ()):
         if isinstance(region, Mapping) and region.get("rule") == "box":
-            try:
-                corners = np.array([region.get("lower"), region.get("upper")], dtype=float)
-            except (TypeError, ValueError):  # the check says so
-                continue
-            if corners.shape == (2, 3) and np.isfinite(corners).all():
+            corners = finite([region.get("lower"), region.get("upper")])
+            if corners is not None and corners.shape == (2, 3):  # else the check says so
                 those[k] = corners
     return those
 

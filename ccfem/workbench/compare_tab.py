@@ -28,6 +28,7 @@ from ccfem.workbench.tab import (
     PART,
     PRINT,
     STRESS,
+    Choice,
     Field,
     Tabbed,
     draw_lines,
@@ -66,8 +67,7 @@ class CompareTab:
         support = gui.add_checkbox("Print support", False)
         self.support = Field(page, support, lambda _: page.show())
         with gui.add_folder("With other parts on the bed", expand_by_default=False):
-            self.offered = gui.add_dropdown("Add a part", (_NO_ONE,))
-            self.offered.on_update(page.on(self._add_part, value=True))
+            self.offered = Choice(page, "Add a part", _NO_ONE, self._add_part)
             self.others = Field(page, gui.add_text("Other parts", ""), self._show_commands)
         self._begins: dict[str, Callable[[], Begun]] = {
             "Solve": self._solve,
@@ -195,10 +195,8 @@ class CompareTab:
         return [verb, self.page.bench.part_argument(), *options, *named], out
 
     def _add_part(self, name: str) -> None:
-        if name != _NO_ONE:
-            self.offered.value = _NO_ONE
-            self.others.put(f"{self.others.value} {shlex.quote(name)}".strip())
-            self._show_commands()
+        self.others.put(f"{self.others.value} {shlex.quote(name)}".strip())
+        self._show_commands()
 
     def _begin(self, begin: Callable[[], Begun]) -> None:
         page, begun = self.page, begin()
@@ -274,9 +272,7 @@ class CompareTab:
         if case.options != options:
             case.options, case.visible = options, len(names) > 1
             self.case.put(case.value)
-        offered = (_NO_ONE, *(name for name in bench.offered() if name.endswith(".toml")))
-        if self.offered.options != offered:
-            self.offered.options = offered
+        self.offered.offer(name for name in bench.offered() if name.endswith(".toml"))
         self._show_age()
         self._show_commands()
 

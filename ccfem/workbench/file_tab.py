@@ -4,9 +4,7 @@ from typing import Any
 
 from ccfem.cases.reading import named_cases
 from ccfem.workbench.guard import Served, escaped
-from ccfem.workbench.tab import Tabbed
-
-_NOTHING = "choose"
+from ccfem.workbench.tab import Choice, Tabbed
 
 
 class FileTab:
@@ -15,21 +13,14 @@ class FileTab:
     def __init__(self, page: Tabbed) -> None:
         self.page, gui = page, page.server.gui
         with gui.add_folder("Open"):
-            files, cases = page.bench.offered(), sorted(named_cases())
-            self.files = gui.add_dropdown("In this folder", (_NOTHING, *files))
-            self.cases = gui.add_dropdown("Cases of ccfem", (_NOTHING, *cases))
-            for choice in (self.files, self.cases):
-                choice.on_update(page.on(self._open, choice, value=True))
+            self.files = Choice(page, "In this folder", "choose", page.open)
+            cases = Choice(page, "Cases of ccfem", "choose", page.open)
+            cases.offer(sorted(named_cases()))
             upload = gui.add_upload_button(
                 "Upload a body or a part file", hint="STEP, STL, mesh or TOML, up to 200 MB."
             )
             upload.on_upload(page.on(self._upload, value=True))
         self._said = gui.add_html("")
-
-    def _open(self, choice: Any, name: str) -> None:
-        if name != _NOTHING:
-            choice.value = _NOTHING
-            self.page.open(name)
 
     def _upload(self, file: Any) -> None:
         self.page.open(self.page.bench.upload(file.name, file.content))
@@ -45,9 +36,7 @@ class FileTab:
     def show(self) -> None:
         """Show the part file."""
         bench = self.page.bench
-        offered = (_NOTHING, *bench.offered())
-        if self.files.options != offered:
-            self.files.options = offered
+        self.files.offer(bench.offered())
         if bench.opened is None:
             self._said.content = ""
             return

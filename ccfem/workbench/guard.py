@@ -56,11 +56,6 @@ class Served:
     save_as: str = ""
 
 
-def no_file(name: str) -> Served | None:
-    """Serve nothing."""
-    return None
-
-
 @dataclass
 class Guard:
     """Lets a request pass, answers it, or refuses it.
@@ -73,7 +68,7 @@ class Guard:
         What the link holds.
     """
 
-    serve: Callable[[str], Served | None] = no_file
+    serve: Callable[[str], Served | None] = lambda name: None
     token: str = field(default_factory=lambda: secrets.token_urlsafe(24))
 
     def link(self, port: int) -> str:
@@ -174,15 +169,14 @@ class Guard:
 def _refused(
     why: str, status: HTTPStatus = HTTPStatus.FORBIDDEN
 ) -> tuple[HTTPStatus, dict[str, str], bytes]:
-    _, headers, content = _answered(f"ccfem: {why}\n".encode(), "text/plain; charset=utf-8", {})
-    return status, headers, content
+    return _answered(f"ccfem: {why}\n".encode(), "text/plain; charset=utf-8", {}, status)
 
 
 def _answered(
-    content: bytes, kind: str, more: dict[str, str]
+    content: bytes, kind: str, more: dict[str, str], status: HTTPStatus = HTTPStatus.OK
 ) -> tuple[HTTPStatus, dict[str, str], bytes]:
     headers = {"Content-Type": kind, "Content-Length": str(len(content)), **_EVERYWHERE, **more}
-    return HTTPStatus.OK, headers, content
+    return status, headers, content
 
 
 def _cookies(text: str) -> dict[str, str]:

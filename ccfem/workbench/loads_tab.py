@@ -11,9 +11,8 @@ from ccfem.cases.inspection.face_choice import coplanar, like_holes, proposed_lo
 from ccfem.cases.part_editing import appended, edited, patch_of, removed, valued
 from ccfem.workbench.bench import Said
 from ccfem.workbench.guard import escaped
-from ccfem.workbench.tab import Field, Tabbed, lines_of
+from ccfem.workbench.tab import Choice, Field, Tabbed, lines_of
 
-_NO_FACE = "choose a face"
 _LISTED = 200
 """Faces that can be chosen from the list; smaller ones by clicking."""
 _KINDS = {
@@ -34,10 +33,8 @@ class LoadsTab:
     def __init__(self, page: Tabbed) -> None:
         self.page, gui = page, page.server.gui
         self._said = gui.add_html("")
-        self._faces = gui.add_dropdown(
-            "Face", [_NO_FACE], hint="Or click it in the picture; with Shift one more."
-        )
-        self._faces.on_update(page.on(self._choose, value=True))
+        hint = "Or click it in the picture; with Shift one more."
+        self._faces = Choice(page, "Face", "choose a face", self._choose, hint)
         more = gui.add_button_group("Choose", ["Same radius", "Same plane", "None"])
         more.on_click(page.on(self._choose_more, value=True))
         holds = gui.add_button_group("Support", ["Hold", "Roll"])
@@ -75,14 +72,11 @@ class LoadsTab:
         listing = self.page.bench.listing
         pairs = zip(listing.numbers, listing.faces, strict=True)
         largest = sorted(pairs, key=lambda pair: -pair[1].area)[:_LISTED]
-        named = [f"{k}: {face.shape}" for k, face in sorted(largest, key=lambda pair: pair[0])]
-        self._faces.options = (_NO_FACE, *named)
-        self._faces.value = _NO_FACE
+        by_number = sorted(largest, key=lambda pair: pair[0])
+        self._faces.offer(f"{k}: {face.shape}" for k, face in by_number)
 
     def _choose(self, name: str) -> None:
-        if name != _NO_FACE:
-            self._faces.value = _NO_FACE
-            self.choose(int(name.partition(":")[0]), True)
+        self.choose(int(name.partition(":")[0]), True)
 
     def _choose_more(self, how: str) -> None:
         alike = {"Same radius": like_holes, "Same plane": coplanar}.get(how)

@@ -30,12 +30,7 @@ from ccfem.comparison.plot.symbols import (
     turning,
 )
 from ccfem.workbench.bench import Bench, Said
-from ccfem.workbench.body_scene import (
-    boxes,
-    snapped,
-    stretched,
-    upward,
-)
+from ccfem.workbench.body_scene import boxes, snapped, stretched, upward
 from ccfem.workbench.compare_tab import CompareTab
 from ccfem.workbench.file_tab import FileTab
 from ccfem.workbench.guard import Guard, Served, escaped, limit_uploads

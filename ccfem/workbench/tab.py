@@ -1,6 +1,6 @@
 """What the tabs of the page share: its fields, and how things are drawn."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
@@ -196,6 +196,36 @@ class Field:
         if self._doubtful and self._came == self._taken:
             self._doubtful, self._sent = False, self.handle.update_timestamp
             send_again(self.handle)
+
+
+class Choice:
+    """A list from which one thing is chosen and done; then it shows its first line again.
+
+    Parameters
+    ----------
+    first : str
+        That line.
+    act : callable
+        Takes the name of what is chosen.
+    """
+
+    def __init__(
+        self, page: Tabbed, label: str, first: str, act: Callable[[str], object], hint: str = ""
+    ) -> None:
+        self._first, self._act = first, act
+        self._handle = page.server.gui.add_dropdown(label, (first,), hint=hint or None)
+        self._handle.on_update(page.on(self._chosen, value=True))
+
+    def _chosen(self, name: str) -> None:
+        if name != self._first:
+            self._handle.value = self._first
+            self._act(name)
+
+    def offer(self, names: Iterable[str]) -> None:
+        """Offer these names."""
+        options = (self._first, *names)
+        if self._handle.options != options:
+            self._handle.options = options
 
 
 def lines_of(said: Said) -> str:

@@ -29,9 +29,32 @@ def test_only_the_newest_is_worked_on():
         newest.ask(item)
     assert came.wait(10.0)
     assert worked == [5]
+    newest.ask(7)
     newest.close()
-    newest._thread.join(5.0)
-    assert not newest._thread.is_alive()
+    threading.Event().wait(0.4)  # longer than it is to be quiet
+    assert worked == [5]
+
+
+def test_what_came_of_an_older_item_is_dropped(monkeypatch):
+    monkeypatch.setattr("ccfem.workbench.newest._QUIET", 0.0)
+    going, newer, done = threading.Event(), threading.Event(), []
+
+    def work(item):
+        going.set()
+        assert newer.wait(10.0)
+        return item
+
+    def came(*what):
+        done.append(what)
+        ended.set()
+
+    ended, newest = threading.Event(), Newest(work, came)
+    newest.ask("old")
+    assert going.wait(10.0)
+    newest.ask("new")
+    newer.set()
+    assert ended.wait(10.0)
+    assert done == [("new", "new")]
 
 
 def alive(process):

@@ -81,7 +81,7 @@ class Entry:
     def amount(self) -> tuple[float, ...] | float | None:
         """What of it can be typed: a vector, or a number."""
         standard = (0.0, 0.0, -9.81) if self.kind == "gravity" else None
-        given = None if self.holds else _numbers(self.table.get(self.key, standard))
+        given = None if self.holds else finite(self.table.get(self.key, standard))
         if given is None or given.shape not in ((), (3,)):
             return None
         return tuple(given.tolist()) if given.ndim else float(given)
@@ -100,9 +100,9 @@ class Entry:
         if self.kind == "centrifugal":
             given = self.table.get("axis")
         elif self.kind == "nodes" and not self.holds:
-            vectors = _numbers(self.table.get("vectors"))
+            vectors = finite(self.table.get("vectors"))
             given = vectors.sum(axis=0) if vectors is not None and vectors.ndim == 2 else None
-        vector = _numbers(given)
+        vector = finite(given)
         return vector if vector is not None and vector.shape == (3,) and vector.any() else None
 
     def place(self, places: Mapping[str, PatchPlace], body: FloatArray) -> PatchPlace | None:
@@ -123,7 +123,7 @@ class Entry:
         if known:
             numbers = tuple(number for place in known for number in place.numbers)
             return PatchPlace(np.concatenate([place.corners for place in known]), numbers)
-        points = _numbers(self.table.get("points", self.table.get("point")))
+        points = finite(self.table.get("points", self.table.get("point")))
         if points is None or points.shape[-1:] != (3,):
             return None
         if self.kind == "centrifugal" and self.along is not None:
@@ -147,7 +147,7 @@ def entries(content: Mapping[str, Any]) -> dict[Name, Entry]:
     return named
 
 
-def _numbers(given: Any) -> FloatArray | None:
+def finite(given: Any) -> FloatArray | None:
     """Array of finite numbers; None where it is something else."""
     try:
         numbers = np.array(given, dtype=float)
