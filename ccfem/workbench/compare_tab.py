@@ -7,6 +7,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 
@@ -281,15 +282,12 @@ class CompareTab:
         self._show_starts()
         said = []
         for name, begin in self._begins.items():
-            try:
-                command = (
-                    shlex.join(["ccfem", *self._command_of(begin())[0]])
-                    if self._offers(name)
-                    else ""
-                )
-            except InputError as error:
-                command = str(error)
-            said.append(f"<p>{name}: <code>{escaped(command)}</code></p>" if command else "")
+            if self._offers(name):
+                try:
+                    command = shlex.join(["ccfem", *self._command_of(begin())[0]])
+                except InputError as error:
+                    command = str(error)
+                said.append(f"<p>{name}: <code>{escaped(command)}</code></p>")
         self._command.content = f'<div class="ccfem"><h2>In a terminal</h2>{"".join(said)}</div>'
 
     def _offers(self, name: str) -> bool:
@@ -306,8 +304,8 @@ class CompareTab:
 
     def _show_results(self) -> None:
         items = "".join(
-            f'<li><a href="/files/{escaped(name)}" target="_blank" rel="noopener">{escaped(name)}'
-            "</a></li>"
+            f'<li><a href="/files/{quote(name)}" target="_blank" rel="noopener">{escaped(name)}</a>'
+            "</li>"
             for name in self._taken
         )
         folder = self.results.folder if self.results else self.page.bench.results

@@ -30,8 +30,7 @@ class FileTab:
         bench = self.page.bench
         if bench.opened is None:
             return None
-        name = "".join(c if c.isascii() and (c.isalnum() or c in "-_") else "_" for c in bench.name)
-        return Served(bench.text.encode(), "application/toml", f"{name}.toml")
+        return Served(bench.text.encode(), "application/toml", f"{bench.name}.toml")
 
     def show(self) -> None:
         """Show the part file."""

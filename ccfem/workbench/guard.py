@@ -16,7 +16,7 @@ from html import escape
 from http import HTTPStatus
 from importlib.resources import files
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs, quote, unquote, urlsplit
 
 UPLOAD_LIMIT = 200_000_000
 """Bytes of a file that may be uploaded."""
@@ -114,12 +114,13 @@ class Guard:
             return _answered(_page(), "text/html; charset=utf-8", policy)
         served = None
         if place.path.startswith("/files/"):
-            served = self.serve(place.path.removeprefix("/files/"))
+            served = self.serve(unquote(place.path.removeprefix("/files/")))
         if served is None:
             return _refused("there is no such file", HTTPStatus.NOT_FOUND)
         more = {"Content-Security-Policy": _FILE}
         if served.save_as:
-            more["Content-Disposition"] = f'attachment; filename="{served.save_as}"'
+            name = quote(served.save_as, safe="")
+            more["Content-Disposition"] = f"attachment; filename*=UTF-8''{name}"
         return _answered(served.content, served.kind, more)
 
     def _is_token(self, given: str) -> bool:

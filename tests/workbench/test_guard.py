@@ -8,7 +8,10 @@ import pytest
 from ccfem.workbench import guard as guarding
 from ccfem.workbench.guard import Guard, Served, escaped, limit_uploads
 
-FILES = {"part.toml": Served(b"layers = 3", "text/plain", "part.toml")}
+FILES = {
+    "part.toml": Served(b"layers = 3", "text/plain", "part.toml"),
+    'häk "1"\r\nX: y': Served(b"hook", "text/plain", 'häk "1"\r\nX: y'),
+}
 
 
 @pytest.fixture(scope="module")
@@ -104,6 +107,14 @@ def test_only_named_files_are_served(server, path):
     assert (status, content) == (200, b"layers = 3")
     assert "sandbox allow-scripts" in head
     assert "allow-same-origin" not in head
+
+
+def test_a_file_of_any_name_is_served_under_it(server):
+    name = "h%C3%A4k%20%221%22%0D%0AX%3A%20y"
+    status, head, content = ask(server, f"/files/{name}", Cookie=cookie(server))
+    assert (status, content) == (200, b"hook")
+    assert f"Content-Disposition: attachment; filename*=UTF-8''{name}\r\n" in head
+    assert "\nX: y" not in head
 
 
 def test_nobody_else_on_the_network_is_listened_to(server):
