@@ -297,10 +297,9 @@ class Bench:
             check_files(text, opened.home, [self.folder])
             case = part_case(content_of(text), opened.home / f"{opened.stem}.toml")
             checked = check(case)
-        except InputError as error:
-            return None, tuple(("mistake", line) for line in error.mistakes)
-        except SolveError as error:
-            return None, (("mistake", str(error)),)
+        except (InputError, SolveError) as error:
+            mistakes = getattr(error, "mistakes", (str(error),))
+            return None, tuple(("mistake", line) for line in mistakes)
         except Exception as error:  # a check that fails ends no other
             return None, (("mistake", f"{type(error).__name__}: {error}"),)
         lines = checked.faults | {"warning": checked.warnings, "known": checked.facts}

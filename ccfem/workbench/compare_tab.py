@@ -22,19 +22,9 @@ from ccfem.printing.support import propped_space
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.workbench.bench import Opened
 from ccfem.workbench.child_run import ChildRun, RunState
+from ccfem.workbench.drawing import draw_label, draw_lines, linear
 from ccfem.workbench.guard import Served, escaped
-from ccfem.workbench.tab import (
-    FIBRE,
-    MOVED,
-    PART,
-    PRINT,
-    STRESS,
-    Choice,
-    Field,
-    Tabbed,
-    draw_lines,
-    linear,
-)
+from ccfem.workbench.tab import FIBRE, MOVED, PART, PRINT, STRESS, Choice, Field, Tabbed
 
 _NO_ONE, _FIRST, _ALL = "none", "the first", "all at once"
 _PLAN, _BED = "G-code of the ticked strategy", "G-code of all parts in one file"
@@ -402,7 +392,7 @@ class CompareTab:
         above = (*(0.5 * (low + high))[:2], high[2] + 0.1 * np.ptp(surface.points))
         self._handles = [
             scene.add_mesh_trimesh("/surface", mesh, cast_shadow=False, receive_shadow=False),
-            scene.add_label("/surface_said", surface.said, position=above, anchor="bottom-center"),
+            draw_label(scene, "/surface", surface.said, above),
         ]
         return low, high
 
@@ -478,10 +468,7 @@ class CompareTab:
                 ends = pieces.ends + k * step
                 drawn.append(draw_lines(scene, f"/fibre_{k}_fibre", ends, shades, width, "world"))
             at = np.where(step > 0.0, low, middle) + k * step
-            title = scene.add_label(
-                f"/fibre_{k}_name", name, position=tuple(at), anchor="top-center"
-            )
-            drawn.append(title)
+            drawn.append(draw_label(scene, f"/fibre_{k}", name, at, "top-center"))
         kept = {handle.name for handle in drawn}
         for handle in self._handles:
             if handle.name not in kept:

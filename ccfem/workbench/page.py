@@ -32,12 +32,13 @@ from ccfem.comparison.plot.symbols import (
 from ccfem.workbench.bench import Bench, Said
 from ccfem.workbench.body_scene import boxes, snapped, stretched, upward
 from ccfem.workbench.compare_tab import CompareTab
+from ccfem.workbench.drawing import MATT, draw_arrows, draw_label, draw_lines, draw_mesh
 from ccfem.workbench.file_tab import FileTab
 from ccfem.workbench.guard import Guard, Served, escaped, limit_uploads
 from ccfem.workbench.loads_tab import LoadsTab
 from ccfem.workbench.newest import Newest
 from ccfem.workbench.print_tab import PrintTab
-from ccfem.workbench.tab import MATT, PART, VIEWS, Tabbed, draw_arrows, draw_lines, lines_of
+from ccfem.workbench.tab import PART, VIEWS, Tabbed, lines_of
 
 _FACE, _CHOSEN = (203, 210, 216), (245, 190, 65)
 _HELD, _LOADED, _BOTH = (120, 168, 214), (226, 142, 120), (170, 140, 190)
@@ -239,8 +240,7 @@ class Page(Tabbed):
         self._faces, self._drawn, self._listing = {}, [], listing
         for mesh in face_meshes(listing):
             name = f"/body/face_{mesh.number}"
-            points, triangles = mesh.points.astype(np.float32), mesh.triangles.astype(np.uint32)
-            handle = scene.add_mesh_simple(name, points, triangles, color=_FACE, **MATT)
+            handle = draw_mesh(scene, name, mesh.points, mesh.triangles, _FACE)
             handle.on_click(self.on(self.loads.choose, mesh.number, False))
             handle.on_click(modifier="shift")(self.on(self.loads.choose, mesh.number, True))
             self._faces[mesh.number] = handle
@@ -301,13 +301,13 @@ class Page(Tabbed):
             low, high = self._bounds()
             waves = heat_waves(np.array([*(0.5 * (low + high))[:2], high[2]]), 0.12 * size)
             lines = draw_lines(scene, name, waves, _LOAD, 3.0)
-            return [lines, self._label(name, entry.said, waves[-1, 1])]
+            return [lines, draw_label(scene, name, entry.said, waves[-1, 1])]
         if along is None:
-            marks = pressing(
-                place.corners, 0 if entry.amount == (0, 0, 0) else _MARKS, 0.035 * size
-            )
+            if isinstance(entry.amount, tuple):  # of no size
+                return []
+            marks = pressing(place.corners, _MARKS, 0.035 * size)
             colour = _SUPPORT if entry.holds else _LOAD
-            return [draw_arrows(scene, name, marks, colour, 0.035 * size, 0.4)] * bool(len(marks))
+            return [draw_arrows(scene, name, marks, colour, 0.035 * size, 0.4)]
         ends, presses = arrow_outside(place.centre, along, 0.22 * size, body)
         if entry.kind not in ("moment", "centrifugal"):
             turned = partial(self._turn_force, called, presses) if entry.amount else None
@@ -315,29 +315,17 @@ class Page(Tabbed):
         pieces = turning(ends, 0.08 * size)
         lines = draw_lines(scene, name, np.concatenate([pieces[:-1], ends[None]]), _LOAD, 3.0)
         head = draw_arrows(scene, f"{name}_head", pieces[-1:], _LOAD, 0.064 * size, 0.41)
-        return [lines, head, self._label(name, entry.said, ends[0 if presses else 1])]
-
-    def _label(self, name: str, said: str, place: FloatArray) -> Any:
-        """Words at a place."""
-        scene = self.server.scene
-        return scene.add_label(f"{name}_said", said, position=tuple(place), anchor="bottom-center")
+        label = draw_label(scene, name, entry.said, ends[0 if presses else 1])
+        return [lines, head, label]
 
     def _support(self) -> list[Any]:
         """Draw the printed support below the part as it was checked, where it is asked for."""
         body = self.compare.support_body() if self._checked_text == self.bench.text else None
         if body is None:
             return []
-        name, (points, triangles) = "/body/support", body
-        drawn = self.server.scene.add_mesh_simple(
-            name,
-            points.astype(np.float32),
-            triangles.astype(np.uint32),
-            color=_PRINTED,
-            opacity=0.6,
-            flat_shading=True,
-            **MATT,
-        )
-        return [drawn, self._label(name, "printed support", points[points[:, 2].argmin()])]
+        scene, name, lowest = self.server.scene, "/body/support", body[0][body[0][:, 2].argmin()]
+        drawn = draw_mesh(scene, name, *body, _PRINTED, opacity=0.6, flat_shading=True)
+        return [drawn, draw_label(scene, name, "printed support", lowest)]
 
     def _arrow(
         self,
@@ -354,7 +342,7 @@ class Page(Tabbed):
         drawn = draw_arrows(scene, name, ends[None], colour, 0.22 * long, 0.41)
         free = ends[0 if presses else 1]
         words = free + 0.12 * (ends[1] - ends[0]) * (-1.0 if presses else 1.0)
-        label = self._label(name, said, words)
+        label = draw_label(scene, name, said, words)
         if turned is None:
             return [drawn, label]
 
@@ -376,7 +364,7 @@ class Page(Tabbed):
         here, there = np.arange(4), (np.arange(4) + 1) % 4
         sides = np.stack([here, there, here + 4, there, there + 4, here + 4], 1).reshape(-1, 3)
         name, both = "/body/bed_rim", np.concatenate([outer, inner])
-        rim = scene.add_mesh_simple(name, both, sides, color=_BED, side="double", **MATT)
+        rim = draw_mesh(scene, name, both, sides, _BED, side="double")
         lines = draw_lines(scene, "/body/bed", _closed(outer), _BED)
 
         def turned(start: FloatArray, end: FloatArray) -> FloatArray:

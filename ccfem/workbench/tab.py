@@ -1,12 +1,9 @@
-"""What the tabs of the page share: its fields, and how things are drawn."""
+"""What the tabs of the page share: how it does one thing after the other, its fields, its lists."""
 
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
-import numpy as np
-
-from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError, SolveError
 from ccfem.cases.inspection import Check
 from ccfem.cases.part_editing import Change
@@ -237,41 +234,3 @@ def lines_of(said: Said) -> str:
         for kind, line in said
     )
     return f"<ul>{items}</ul>" if items else ""
-
-
-MATT = {"cast_shadow": False, "receive_shadow": False}
-"""How everything is drawn: without shadows, which take most of the time."""
-
-
-def draw_arrows(
-    scene: Any, name: str, ends: FloatArray, colour: Any, head: float, slender: float
-) -> Any:
-    """Draw arrows (s, 2, 3), mm, from tail to tip: length of a head, and its radius over that."""
-    return scene.add_arrows(
-        name,
-        ends.astype(np.float32),
-        colour,
-        shaft_radius=0.33 * slender * head,
-        head_radius=slender * head,
-        head_length=head,
-    )
-
-
-def draw_lines(
-    scene: Any, name: str, ends: FloatArray, colour: Any, width: float = 1.5, unit: str = "screen"
-) -> Any:
-    """Draw straight pieces (s, 2, 3), mm, some pixels wide or, by unit "world", some mm.
-
-    They have one colour, or each its own, (s, 3).
-    """
-    where = ends.astype(np.float32)
-    if isinstance(colour, np.ndarray):
-        colour = np.repeat(colour[:, None], 2, axis=1)
-    return scene.add_line_segments(name, where, colour, thickness=width, thickness_units=unit)
-
-
-def linear(colours: FloatArray) -> Any:
-    """Colours (n, 3) as bytes of linear light, which viser takes them for, encoding them itself."""
-    low = colours <= 0.04045
-    light = np.where(low, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
-    return np.round(255.0 * light).astype(np.uint8)
