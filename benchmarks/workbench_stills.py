@@ -12,6 +12,7 @@ from typing import Any
 
 from benchmarks.clicking import launched
 from benchmarks.studies.own_parts import l_bracket
+from ccfem.cases.part_editing import valued
 from ccfem.workbench.bench import Bench
 from ccfem.workbench.page import Page
 
@@ -70,6 +71,11 @@ def main(folder: Path = FOLDER) -> None:
             tab.get_by_text(folder_name, exact=True).click()
         still("settings")
         tab.get_by_role("tab", name="Compare").click()
+        page.act(page.edit, valued(("build",), "-z")).result()
+        tab.get_by_label("Print support").click()
+        still("support")
+        tab.get_by_label("Print support").click()
+        page.act(page.step, -1).result()
         tab.get_by_label("isocurve", exact=True).click()
         tab.get_by_label("contour_zigzag", exact=True).click()
         tab.get_by_role("button", name="Compare", exact=True).click()
