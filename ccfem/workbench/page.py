@@ -75,6 +75,8 @@ class Page(Tabbed):
         self.body: Any = None
         self._listing: Any = None
         self._drawn: list[Any] = []
+        self._acting: dict[Name, tuple[Entry, PatchPlace]] = {}
+        self._acts_in: tuple[Any, ...] = (None, None, None)
         self._dragging: int | None = None
         self.drawn = threading.Event()
         """Set whenever a check has been drawn."""
@@ -249,11 +251,14 @@ class Page(Tabbed):
 
     def acting(self) -> dict[Name, tuple[Entry, PatchPlace]]:
         """Say what acts on the part, and where, as far as that is known."""
-        content, listing = self.bench.content, self.bench.listing
-        places = patch_places(content, listing, self.checked)
-        body = listing.points[listing.triangles]
-        those = entries(content).items()
-        return {k: (one, place) for k, one in those if (place := one.place(places, body))}
+        now = (self.bench.text, self.bench.listing, self.checked)
+        if any(new is not old for new, old in zip(now, self._acts_in, strict=True)):
+            content, listing = self.bench.content, self.bench.listing
+            places, those = patch_places(content, listing, self.checked), entries(content).items()
+            body = listing.points[listing.triangles]
+            found = {k: (one, place) for k, one in those if (place := one.place(places, body))}
+            self._acts_in, self._acting = now, found
+        return self._acting
 
     def paint(self) -> None:
         """Colour the faces by what acts on them, and those that are chosen."""
