@@ -159,7 +159,7 @@ class Bench:
         else:
             case = create_case(name)
             text = part_text(case, f"{name}.vtu")
-            self.results.mkdir(exist_ok=True)
+            self.make(self.results)
             write_mesh(case.problem.mesh, self.results / f"{name}.vtu")
         path = self._free(self.results / f"{name}.toml", text.encode())
         self._write(path, text.encode())
@@ -213,7 +213,7 @@ class Bench:
         if history.text != before.text:
             try:
                 self._save()
-            except InputError:
+            except (InputError, OSError):
                 self.history = before
                 raise
 
@@ -238,10 +238,27 @@ class Bench:
             if path == mine or not path.exists() or path.read_bytes() == content
         )
 
+    def make(self, folder: Path) -> None:
+        """Make a folder, ``results`` or one in it.
+
+        Raises
+        ------
+        InputError
+            Where it lies elsewhere, as by a link, or something is in its place.
+        """
+        check_inside(self.results, [self.folder])
+        check_inside(folder, [self.results])
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(
+                f"{folder} cannot be made ({error.strerror}): move what is in its place, or start "
+                "ccfem open in a folder that you may write to"
+            ) from None
+
     def _write(self, path: Path, content: bytes) -> None:
         """Write a file in ``results``."""
-        path.parent.mkdir(parents=True, exist_ok=True)
-        check_inside(path.parent, [self.results])
+        self.make(path.parent)
         with whole_file(path) as temporary:
             temporary.write_bytes(content)
 
@@ -271,6 +288,7 @@ class Bench:
 
     def result(self, ending: str) -> str:
         """Name of a file or a folder of results, as a command takes it: in ``results`` alone."""
+        check_inside(self.results, [self.folder])
         return self._argument(check_inside(self.results / f"{self.name}{ending}", [self.results]))
 
     @property

@@ -195,7 +195,7 @@ class CompareTab:
         if self._running:
             raise InputError("a run is going on: stop it first")
         page.say("")
-        page.bench.results.mkdir(exist_ok=True)
+        page.bench.make(page.bench.results)
         part, text = page.bench.opened, page.bench.text
         self.run = ChildRun(
             arguments,

@@ -155,6 +155,27 @@ def test_an_upload_is_kept_in_results(bench):
         bench.upload("a.stl", b"")
 
 
+def test_results_that_lead_elsewhere_are_neither_written_nor_shown(bench, tmp_path_factory):
+    """By a link, to nowhere, or a file in their place: one line, and the part is as it was."""
+    bench.open("bar.toml")
+    elsewhere = tmp_path_factory.mktemp("elsewhere")
+    for place, said in ((elsewhere, "lies outside"), ("nowhere", "move what is in its place")):
+        bench.results.symlink_to(place)
+        for act in (
+            lambda: bench.edit(valued(("layers",), 3)),
+            lambda: bench.upload("a.stl", b""),
+            lambda: bench.make(bench.results),
+        ):
+            with pytest.raises(InputError, match=said):
+                act()
+        bench.results.unlink()
+    bench.results.write_text("a file")
+    with pytest.raises(InputError, match="move what is in its place"):
+        bench.edit(valued(("layers",), 3))
+    assert bench.text == BY_HAND
+    assert not any(elsewhere.iterdir())
+
+
 def test_an_edit_that_would_read_elsewhere_is_said(bench):
     bench.open("bar.toml")
     text = bench.text.replace("bar.vtu", "/etc/x.vtu")
