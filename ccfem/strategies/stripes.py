@@ -23,6 +23,7 @@ from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.facets import are_among, connected
 from ccfem.geometry.locate import locate
 from ccfem.geometry.polylines import line_length, pack, starts_segment
+from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
 from ccfem.paths.linking.finishing import keep_off_border, long_enough, trim_to_clearance
 from ccfem.paths.linking.joining import Joined, join
@@ -43,8 +44,8 @@ from ccfem.strategies.stripe_pattern.strand_packing import (
     even_points,
     evened,
     joined_ends,
-    rings_in_rest,
     stepped_over,
+    strands_in_rest,
 )
 
 _EDGE = 0.9
@@ -78,9 +79,9 @@ class Stripes:
         keeps the stretch that carries most.
     pitch : float, default 0.98
         Distance of the curves in fibre widths before they are moved apart to a width.
-    smooth : float, default 4
+    smooth : float, default 5
         Length over which the direction is smoothed, in fibre widths.
-    border : float, default 5
+    border : float, default 10
         How far the border turns strands along itself, in fibre widths.
     tries : int, default 1
         Number of patterns that are tried for each layer; the one that carries most is taken.
@@ -93,8 +94,8 @@ class Stripes:
 
     density: float = 1.0
     pitch: float = 0.98
-    smooth: float = 4.0
-    border: float = 5.0
+    smooth: float = 5.0
+    border: float = 10.0
     tries: int = 1
     folds: bool = False
     turns: Turns = "tight"
@@ -212,8 +213,21 @@ def _packed(
     lines = keep_off_border(lines, section, _END * width)
     lines = trim_to_clearance(even_points(lines, width), _TRIM * width, _PIECE * width)
     lines = _long_chains(lines, width, least, folds)
-    lines += rings_in_rest(lines, section, width, least, machine.minimum_radius)
     joined = join(lines, corners(lines, width, least) if folds else [])
+    joined = _printable(joined, section, machine, least, folds)
+    # Where no strand turns any more, straight ones may still fit.
+    for radius in (0.0, 0.0) if folds else (machine.minimum_radius, 0.0):
+        rest = strands_in_rest(joined.lines, section, width, least, radius)
+        links = [np.zeros(len(line), dtype=bool) for line in rest]
+        joined = Joined(joined.lines + rest, joined.link + links)
+        joined = _printable(joined, section, machine, least, folds)
+    return joined
+
+
+def _printable(
+    joined: Joined, section: Region, machine: Machine, least: float, folds: bool
+) -> Joined:
+    """Strands that are long enough and, unless they may, do not fold."""
     return long_enough(joined if folds else unfolded(joined, section, machine, least), least)
 
 

@@ -1,7 +1,6 @@
 """Curves side by side made to strands: joined, moved apart, long enough for the cutter."""
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +9,7 @@ from scipy.linalg import solveh_banded
 from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.geometry.offsets import rings
 from ccfem.geometry.polylines import (
     farthest_point,
     is_closed,
@@ -20,8 +20,8 @@ from ccfem.geometry.polylines import (
     starts_segment,
 )
 from ccfem.geometry.shapes import Region, strings
-from ccfem.paths.folds import MARGIN, folds
 from ccfem.paths.linking.joining import Joint, join
+from ccfem.strategies.fiso import contour_trees, first_in_spiral_out
 
 STEP = 0.4
 """Distance of points along a strand, in widths."""
@@ -170,7 +170,7 @@ def evened(
     for turn in range(rounds):
         tangent, normal = _frames(points, offsets, rings)
         if not turn % _SEARCH:
-            p, q = _neighbours(points, offsets, rings, width)
+            p, q = _neighbours(points, tangent, offsets, rings, width)
         gap = points[p] - points[q]
         # Beside a line the distance is that from its tangent, beyond its end that from the end.
         across = np.einsum("ij,ij->i", gap, normal[q])
@@ -200,7 +200,7 @@ def evened(
 
 
 def _neighbours(
-    points: FloatArray, offsets: IntArray, rings: BoolArray, width: float
+    points: FloatArray, tangent: FloatArray, offsets: IntArray, rings: BoolArray, width: float
 ) -> tuple[IntArray, IntArray]:
     """Points near each other, each pair in both orders, but for those of one stretch of a line."""
     sizes = np.diff(offsets)
@@ -212,7 +212,12 @@ def _neighbours(
     apart = np.where(rings[one], np.minimum(apart, sizes[one] - 1 - apart), apart)
     pairs = pairs[(one != other) | (apart > round(_OWN / STEP))]
     p, q = np.concatenate([pairs, pairs[:, ::-1]]).T
-    return p, q
+    # Of the points of a neighbour those beside a point are the nearest, and its ends.
+    along = np.abs(np.einsum("ij,ij->i", points[p] - points[q], tangent[q]))
+    end = np.zeros(len(points), dtype=bool)
+    end[offsets[:-1]] = end[offsets[1:] - 1] = True
+    kept = (along < STEP * width) | end[q]
+    return p[kept], q[kept]
 
 
 def _moved_in(points: FloatArray, section: Region, width: float) -> FloatArray:
@@ -397,39 +402,38 @@ def corners(lines: Sequence[FloatArray], width: float, least: float) -> list[Joi
     return joints
 
 
-_BEND = 0.85
-"""Least radius of rings, in least radii of the machine; one of 0.66 folds."""
+_BEND = 0.8
+"""Least radius of strands that fill a rest, in least radii of the machine; one of 0.66 folds."""
+_APART_IN_REST = 0.7
+"""Least distance of opposite sides of such a strand where it may fold, in widths."""
 _ARC = 32
-"""Segments of their arcs per quarter turn: the same ring to some thousandths, however it lies."""
+"""Segments of arcs per quarter turn: the same rest to some thousandths, however it lies."""
+_SIMPLE = 1e-3
+"""Deviation, in widths, up to which points of the border of a rest are left out."""
 
 
-def rings_in_rest(
+def strands_in_rest(
     lines: Sequence[FloatArray], section: Region, width: float, least: float, radius: float
 ) -> list[FloatArray]:
-    """Rings in what lines leave free of a section, from the outside in.
+    """Strands from the middle to the border of each piece of a section that lines leave free.
 
     Parameters
     ----------
     least : float, mm
-        Of a ring.
+        Of a strand.
     radius : float, mm
-        Least radius of the machine.
+        Least radius of the machine; 0 where strands may fold.
     """
-    rings: list[FloatArray] = []
-    rest, new = section, list(lines)
-    grown = partial(shapely.buffer, quad_segs=_ARC)
-    while True:
-        if new:
-            rest = shapely.difference(rest, shapely.union_all(grown(strings(new), 0.5 * width)))
-        room = grown(grown(rest, -0.5 * width - _BEND * radius), _BEND * radius)
-        edges = shapely.get_rings(shapely.get_parts(room))
-        new = [shapely.get_coordinates(edge) for edge in edges if edge.length >= least]
-        # They begin at the same place however the layer lies.
-        first = [farthest_point(ring) for ring in new]
-        new = [np.concatenate([x[k:-1], x[: k + 1]]) for x, k in zip(new, first, strict=True)]
-        new = even_points(new, width)
-        bends = folds(*pack(new), np.ones(len(new), dtype=bool), MARGIN * radius, strict=True)
-        new = [ring for ring, count in zip(new, bends.counts, strict=True) if not count]
-        if not new:
-            return rings
-        rings += new
+    bands = shapely.buffer(strings(lines), 0.5 * width, quad_segs=_ARC)
+    taken = shapely.union_all(shapely.make_valid(bands))
+    rest = shapely.simplify(shapely.difference(section, taken), _SIMPLE * width)
+    # Strands begin at the same place however the layer lies.
+    border = max(rings(section), key=line_length)
+    start, fill = border[farthest_point(border)], list[FloatArray]()
+    for piece in shapely.get_parts(shapely.make_valid(rest)):
+        if piece.area < 0.5 * width * least:
+            continue
+        apart = 1.0 if radius else _APART_IN_REST
+        for tree in contour_trees(piece, width, start, apart, _BEND * radius):
+            fill += first_in_spiral_out(tree, width, start, radius=_BEND * radius, alone_from=least)
+    return even_points([line for line in fill if line_length(line) >= least], width)

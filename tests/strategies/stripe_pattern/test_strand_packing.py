@@ -2,15 +2,15 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.geometry.polylines import is_closed, line_length
+from ccfem.geometry.polylines import line_length, pack
 from ccfem.paths.folds import folds
 from ccfem.strategies.stripe_pattern.strand_packing import (
     corners,
     even_points,
     evened,
     joined_ends,
-    rings_in_rest,
     stepped_over,
+    strands_in_rest,
 )
 
 WIDE = shapely.box(-50.0, -50.0, 150.0, 50.0)
@@ -62,13 +62,17 @@ def test_corners_join_what_is_too_short_side_by_side():
     assert not corners(lines, 1.0, 25.0)
 
 
-def test_rings_fill_what_is_left_and_do_not_fold():
-    rings = rings_in_rest([], shapely.box(0.0, 0.0, 40.0, 30.0), 1.0, 42.0, 3.85)
-    assert len(rings) > 5
-    assert all(is_closed(ring) for ring in rings)
-    offsets = np.concatenate([[0], np.cumsum([len(ring) for ring in rings])])
-    bends = folds(np.concatenate(rings), offsets, np.ones(len(rings), bool), 3.85, strict=True)
-    assert bends.counts.sum() == 0
-    string = shapely.linestrings(rings[0])
-    apart = [shapely.distance(string, shapely.linestrings(ring)) for ring in rings[1:]]
-    assert min(apart) > 0.97
+@pytest.mark.parametrize("radius", [3.85, 0.0])
+def test_what_is_left_is_filled_by_strands_that_fold_only_where_they_may(radius):
+    """Rectangles of 60 x 14.5 mm: rings of known length, as long as their corners fit."""
+    lines = even_points([straight(0.0, 60.0, 15.0)], 1.0)
+    fill = strands_in_rest(lines, shapely.box(0.0, 0.0, 60.0, 30.0), 1.0, 42.0, radius)
+    corner, least = 0.8 * radius, 0.72 * 3.85
+    inset = np.arange(0.5, 7.25 - corner)
+    rings = 149.0 - 8.0 * inset - (8.0 - 2.0 * np.pi) * corner
+    size = [line_length(line) for line in fill]
+    assert size == pytest.approx([rings.sum()] * 2, rel=0.02)
+    bends = folds(*pack(fill), np.zeros(2, dtype=bool), least, strict=True)
+    assert (bends.counts.sum() == 0) == (radius > 0.0)
+    apart = shapely.distance(shapely.linestrings(lines[0]), [*map(shapely.linestrings, fill)])
+    np.testing.assert_allclose(apart, 1.0, atol=0.03)
