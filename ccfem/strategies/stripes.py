@@ -46,6 +46,7 @@ from ccfem.strategies.stripe_pattern.strand_packing import (
     joined_ends,
     stepped_over,
     strands_in_rest,
+    with_detours,
 )
 
 _EDGE = 0.9
@@ -218,8 +219,9 @@ def _packed(
     # Where no strand turns any more, straight ones may still fit.
     for radius in (0.0, 0.0) if folds else (machine.minimum_radius, 0.0):
         rest = strands_in_rest(joined.lines, section, width, least, radius)
-        links = [np.zeros(len(line), dtype=bool) for line in rest]
-        joined = Joined(joined.lines + rest, joined.link + links)
+        links = [np.zeros(len(line), dtype=bool) for line in rest.strands]
+        joined = Joined(joined.lines + rest.strands, joined.link + links)
+        joined = with_detours(joined, rest.rings, width) if folds else joined
         joined = _printable(joined, section, machine, least, folds)
     return joined
 

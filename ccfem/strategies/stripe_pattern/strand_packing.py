@@ -20,7 +20,7 @@ from ccfem.geometry.polylines import (
     starts_segment,
 )
 from ccfem.geometry.shapes import Region, strings
-from ccfem.paths.linking.joining import Joint, join
+from ccfem.paths.linking.joining import Joined, Joint, join
 from ccfem.strategies.fiso import contour_trees, first_in_spiral_out
 
 STEP = 0.4
@@ -404,7 +404,7 @@ def corners(lines: Sequence[FloatArray], width: float, least: float) -> list[Joi
 
 _BEND = 0.8
 """Least radius of strands that fill a rest, in least radii of the machine; one of 0.66 folds."""
-_APART_IN_REST = 0.7
+_APART_IN_REST = 0.5
 """Least distance of opposite sides of such a strand where it may fold, in widths."""
 _ARC = 32
 """Segments of arcs per quarter turn: the same rest to some thousandths, however it lies."""
@@ -412,9 +412,22 @@ _SIMPLE = 1e-3
 """Deviation, in widths, up to which points of the border of a rest are left out."""
 
 
+_DETOUR = 6.0
+"""Shortest ring that is a detour of a strand, in widths."""
+_REACHED = 1.6
+"""Largest distance of such a ring from the strand, in widths."""
+
+
+class Rest(NamedTuple):
+    """What fills the rest of a section: strands, and rings of pieces too small for one, in mm."""
+
+    strands: list[FloatArray]
+    rings: list[FloatArray]
+
+
 def strands_in_rest(
     lines: Sequence[FloatArray], section: Region, width: float, least: float, radius: float
-) -> list[FloatArray]:
+) -> Rest:
     """Strands from the middle to the border of each piece of a section that lines leave free.
 
     Parameters
@@ -429,11 +442,45 @@ def strands_in_rest(
     rest = shapely.simplify(shapely.difference(section, taken), _SIMPLE * width)
     # Strands begin at the same place however the layer lies.
     border = max(rings(section), key=line_length)
-    start, fill = border[farthest_point(border)], list[FloatArray]()
+    start, fill = border[farthest_point(border)], Rest([], [])
+    apart, bend = 1.0 if radius else _APART_IN_REST, _BEND * radius
     for piece in shapely.get_parts(shapely.make_valid(rest)):
-        if piece.area < 0.5 * width * least:
+        for tree in contour_trees(piece, width, start, apart, bend):
+            strands = first_in_spiral_out(tree, width, start, radius=bend, alone_from=least)
+            fill.strands.extend(line for line in strands if line_length(line) >= least)
+            if all(line_length(line) < least for line in strands):
+                closed = [np.concatenate([ring, ring[:1]]) for ring in tree.contours]
+                fill.rings.extend(x for x in closed if line_length(x) >= _DETOUR * width)
+    return Rest(even_points(fill.strands, width), even_points(fill.rings, width))
+
+
+def with_detours(joined: Joined, rings: Sequence[FloatArray], width: float) -> Joined:
+    """Lead strands round rings (k, 2) beside them, by marked links to the ring and back.
+
+    Strands, and rings, are in steps as of `even_points`.
+    """
+    lines, link = list(joined.lines), list(joined.link)
+    for ring in rings:
+        points, offsets = pack(lines)
+        away, place = cKDTree(ring[:-1]).query(points)
+        inner = np.ones(len(points), dtype=bool)
+        for end in (offsets[:-1], offsets[1:] - 1):
+            for step in (-1, 0, 1):
+                inner[np.clip(end + step, 0, len(points) - 1)] = False
+        away = np.where(inner, away, np.inf)
+        at = int(np.argmin(np.round(away, 6)))
+        if not away[at] < _REACHED * width:
             continue
-        apart = 1.0 if radius else _APART_IN_REST
-        for tree in contour_trees(piece, width, start, apart, _BEND * radius):
-            fill += first_in_spiral_out(tree, width, start, radius=_BEND * radius, alone_from=least)
-    return even_points([line for line in fill if line_length(line) >= least], width)
+        k = int(np.searchsorted(offsets, at, side="right")) - 1
+        line, marks, at = lines[k], link[k], at - int(offsets[k])
+        # The ring without one of its points, from beside the strand before its gap.
+        way = np.roll(ring[:-1], -int(place[at + int(offsets[k])]), axis=0)[1:]
+        forth = np.linalg.norm(way[[0, -1]] - line[[at - 1, at + 1]], axis=1).sum()
+        back = np.linalg.norm(way[[-1, 0]] - line[[at - 1, at + 1]], axis=1).sum()
+        way = way if forth <= back else way[::-1]
+        lines[k] = np.concatenate([line[:at], way, line[at + 1 :]])
+        new = np.zeros(len(way), dtype=bool)
+        new[-1] = True
+        link[k] = np.concatenate([marks[:at], new, marks[at + 1 :]])
+        link[k][at - 1] = True
+    return Joined(lines, link)

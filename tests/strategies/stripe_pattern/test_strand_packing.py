@@ -4,6 +4,7 @@ import shapely
 
 from ccfem.geometry.polylines import line_length, pack
 from ccfem.paths.folds import folds
+from ccfem.paths.linking.joining import join
 from ccfem.strategies.stripe_pattern.strand_packing import (
     corners,
     even_points,
@@ -11,6 +12,7 @@ from ccfem.strategies.stripe_pattern.strand_packing import (
     joined_ends,
     stepped_over,
     strands_in_rest,
+    with_detours,
 )
 
 WIDE = shapely.box(-50.0, -50.0, 150.0, 50.0)
@@ -66,7 +68,8 @@ def test_corners_join_what_is_too_short_side_by_side():
 def test_what_is_left_is_filled_by_strands_that_fold_only_where_they_may(radius):
     """Rectangles of 60 x 14.5 mm: rings of known length, as long as their corners fit."""
     lines = even_points([straight(0.0, 60.0, 15.0)], 1.0)
-    fill = strands_in_rest(lines, shapely.box(0.0, 0.0, 60.0, 30.0), 1.0, 42.0, radius)
+    fill, small = strands_in_rest(lines, shapely.box(0.0, 0.0, 60.0, 30.0), 1.0, 42.0, radius)
+    assert not small
     corner, least = 0.8 * radius, 0.72 * 3.85
     inset = np.arange(0.5, 7.25 - corner)
     rings = 149.0 - 8.0 * inset - (8.0 - 2.0 * np.pi) * corner
@@ -76,3 +79,18 @@ def test_what_is_left_is_filled_by_strands_that_fold_only_where_they_may(radius)
     assert (bends.counts.sum() == 0) == (radius > 0.0)
     apart = shapely.distance(shapely.linestrings(lines[0]), [*map(shapely.linestrings, fill)])
     np.testing.assert_allclose(apart, 1.0, atol=0.03)
+
+
+def test_a_strand_makes_a_detour_round_a_ring_beside_it():
+    lines = even_points([straight(0.0, 60.0, 0.0), straight(0.0, 60.0, 8.0)], 1.0)
+    (ring,) = even_points([np.array([[30, 1], [36, 1], [36, 5], [30, 5], [30, 1]], float)], 1.0)
+    far = ring + np.array([0.0, 30.0])
+    led, other = with_detours(join(lines, []), [ring, far], 1.0).lines
+    np.testing.assert_array_equal(other, lines[1])
+    # Two gaps of two steps each in the strand and the ring, and two links across.
+    step = 0.4
+    assert line_length(led) == pytest.approx(60.0 + 20.0 - 4.0 * step + 2.0, abs=2.0 * step)
+    assert shapely.LineString(led).is_simple
+    (marks, _) = with_detours(join(lines, []), [ring], 1.0).link
+    assert np.count_nonzero(marks) == 2
+    assert (np.linalg.norm(np.diff(led, axis=0)[marks[:-1]], axis=1) < 1.5).all()
