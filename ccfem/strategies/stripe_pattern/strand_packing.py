@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
+from numba import njit
 from scipy.linalg import solveh_banded
 from scipy.spatial import cKDTree
 
@@ -155,7 +156,7 @@ def evened(
     count, sizes = len(points), np.diff(offsets)
     line = np.repeat(np.arange(len(lines)), sizes)
     rings = np.array([is_closed(each) for each in lines])
-    p = q = np.zeros(0, dtype=np.int64)
+    pairs = np.zeros((0, 2), dtype=np.int64)
     border = shapely.get_rings(shapely.get_parts(section))
     wall = shapely.get_coordinates(shapely.segmentize(border, _WALL * width))
     walls = cKDTree(wall)
@@ -170,28 +171,17 @@ def evened(
     for turn in range(rounds):
         tangent, normal = _frames(points, offsets, rings)
         if not turn % _SEARCH:
-            p, q = _neighbours(points, tangent, offsets, rings, width)
-        gap = points[p] - points[q]
-        # Beside a line the distance is that from its tangent, beyond its end that from the end.
-        across = np.einsum("ij,ij->i", gap, normal[q])
-        along = np.abs(np.einsum("ij,ij->i", gap, tangent[q]))
-        beside = along < 0.6 * STEP * width
-        distance = np.where(beside, np.abs(across), np.linalg.norm(gap, axis=1))
-        side = np.einsum("ij,ij->i", gap, normal[p])
-        missing = 0.5 * (_APART * width - distance)
+            pairs = _neighbours(points, offsets, rings, width)
+        up, down = np.zeros(count), np.zeros(count)
+        _pushes(points, tangent, normal, pairs, width, up, down)
         # The border pushes alone, so by all that is missing; not where a line runs into it.
         near, at = walls.query(points, distance_upper_bound=0.5 * width)
         close = np.flatnonzero(np.isfinite(near))
         aside = np.einsum("ij,ij->i", points[close] - wall[at[close]], normal[close])
         facing = np.abs(aside) / np.maximum(near[close], 1e-12)
         pressing = np.clip(2.0 * facing - _FACING, 0.0, 1.0) * (0.5 * width - near[close])
-        pushed, side = np.concatenate([p, close]), np.concatenate([side, aside])
-        missing = np.concatenate([missing, pressing])
-        up, down = np.zeros(count), np.zeros(count)
-        kept = missing > 0.0
-        pushed, side, missing = pushed[kept], side[kept], missing[kept]
-        np.maximum.at(up, pushed[side > 0.0], missing[side > 0.0])
-        np.maximum.at(down, pushed[side < 0.0], missing[side < 0.0])
+        up[close] = np.maximum(up[close], np.where(aside > 0.0, pressing, 0.0))
+        down[close] = np.maximum(down[close], np.where(aside < 0.0, pressing, 0.0))
         push = solveh_banded(band, up - down)
         if rings.any():
             push[ring_first] = push[ring_last] = 0.5 * (push[ring_first] + push[ring_last])
@@ -199,9 +189,33 @@ def evened(
     return np.split(_moved_in(points, section, width), offsets[1:-1])
 
 
-def _neighbours(
-    points: FloatArray, tangent: FloatArray, offsets: IntArray, rings: BoolArray, width: float
-) -> tuple[IntArray, IntArray]:
+@njit(cache=True, nogil=True)
+def _pushes(
+    points: FloatArray,
+    tangent: FloatArray,
+    normal: FloatArray,
+    pairs: IntArray,
+    width: float,
+    up: FloatArray,
+    down: FloatArray,
+) -> None:
+    """Raise the pushes (p,) of points to the left and right of their lines, by their neighbours."""
+    for k in range(len(pairs)):
+        p, q = pairs[k, 0], pairs[k, 1]
+        x, y = points[p, 0] - points[q, 0], points[p, 1] - points[q, 1]
+        # Beside a line the distance is that from its tangent, beyond its end that from the end.
+        distance = abs(x * normal[q, 0] + y * normal[q, 1])
+        if abs(x * tangent[q, 0] + y * tangent[q, 1]) >= 0.6 * STEP * width:
+            distance = np.sqrt(x * x + y * y)
+        missing = 0.5 * (_APART * width - distance)
+        side = x * normal[p, 0] + y * normal[p, 1]
+        if side > 0.0:
+            up[p] = max(up[p], missing)
+        elif side < 0.0:
+            down[p] = max(down[p], missing)
+
+
+def _neighbours(points: FloatArray, offsets: IntArray, rings: BoolArray, width: float) -> IntArray:
     """Points near each other, each pair in both orders, but for those of one stretch of a line."""
     sizes = np.diff(offsets)
     line = np.repeat(np.arange(len(sizes)), sizes)
@@ -211,13 +225,7 @@ def _neighbours(
     apart = np.abs(number[pairs[:, 0]] - number[pairs[:, 1]])
     apart = np.where(rings[one], np.minimum(apart, sizes[one] - 1 - apart), apart)
     pairs = pairs[(one != other) | (apart > round(_OWN / STEP))]
-    p, q = np.concatenate([pairs, pairs[:, ::-1]]).T
-    # Of the points of a neighbour those beside a point are the nearest, and its ends.
-    along = np.abs(np.einsum("ij,ij->i", points[p] - points[q], tangent[q]))
-    end = np.zeros(len(points), dtype=bool)
-    end[offsets[:-1]] = end[offsets[1:] - 1] = True
-    kept = (along < STEP * width) | end[q]
-    return p[kept], q[kept]
+    return np.concatenate([pairs, pairs[:, ::-1]])
 
 
 def _moved_in(points: FloatArray, section: Region, width: float) -> FloatArray:
