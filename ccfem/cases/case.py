@@ -123,16 +123,20 @@ class Case(Shown):
         return self.fibre.on(layers, stress.mesh, self.machine)
 
     def check_layers(self, slicer: Slicer | None = None) -> None:
-        """Refuse flat layers that cannot be cut or planned on, before the part is solved.
+        """Refuse layers that cannot be cut or planned on, before the part is solved.
 
         Raises
         ------
         InputError
-            For layers outside the part or nearer to each other than a strand is high, places of
-            fibre on none of them, and more strands than are planned.
+            For what the slicer refuses whatever the stress is. Of flat layers: those outside the
+            part or nearer to each other than a strand is high, places of fibre on none of them, and
+            more strands than are planned.
         """
         chosen, mesh = self.slicing if slicer is None else slicer, self.problem.mesh
         if not isinstance(chosen, Planar):
+            check = getattr(chosen, "check", None)
+            if check is not None:
+                check(mesh, self.build, self.machine)
             return
         heights = chosen.check(mesh, self.build, self.machine)
         many = about_strands(mesh, len(heights), self.build, self.machine) > MOST_STRANDS

@@ -42,8 +42,8 @@ def check_part(read: Callable[[], Case], picture: Path | None) -> int:
         picture = check_picture(Path(f"{checked.case.name}-check.png"))
     page = check_writable(picture.with_suffix(".html"))
     print(checked.known)
-    if not checked.mistakes:
-        for line in _of_a_solve(checked.case, printed=not checked.not_planned):
+    if not checked.mistakes and not checked.not_planned:
+        for line in _of_a_solve(checked.case):
             print(f"remark: {line}")
     save(part_picture(checked), picture)
     with whole_file(page) as temporary:
@@ -60,13 +60,13 @@ _QUICK = 15.0
 """Estimated seconds of a solve that a check may take."""
 
 
-def _of_a_solve(case: Case, printed: bool) -> list[str]:
+def _of_a_solve(case: Case) -> list[str]:
     """Say what the first load case shows, solved on the cells that there are, if that is quick.
 
     That is a build direction in which fibre would take much more, and a pin that tears out; of the
-    plastic as it is printed, if its layers are known.
+    plastic as it is printed.
     """
-    slicing, problem = case.slicing, case.printed_problem() if printed else case.problem
+    slicing, problem = case.slicing, case.printed_problem()
     if solve_costs(problem)[0].seconds > _QUICK:
         return []
     name = next(iter(problem.loads))

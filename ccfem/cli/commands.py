@@ -81,9 +81,12 @@ def support(
     from ccfem.printing.export.vtk import write_paths
     from ccfem.printing.support import slice_with_support, support_paths
     from ccfem.slicing.layers.layer import plane_frame
+    from ccfem.slicing.layers.slicer import check_field
     from ccfem.slicing.slicers import as_slicer
 
     if out is not None:
+        if out.suffix.lower() not in (".vtp", ".stl"):
+            raise InputError(f"support is written as .vtp or .stl; got {out}: change its suffix")
         check_writable(out)
     part = load(case, set_case)
     names = part.problem.cases
@@ -92,6 +95,7 @@ def support(
     chosen = layers_of(layers, None, slicing)
     slicer = as_slicer(part.slicing if chosen is None else chosen)
     part.check_layers(slicer)
+    check_field(slicer)
     stress = solve(part.printed_problem(slicer), backend=backend)[load_case or names[0]]
     stack, support_stack = slice_with_support(slicer, stress, part.build, part.machine, angle, lift)
     columns = support_stack.columns

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from ccfem.base.arrays import freeze
 from ccfem.base.errors import InputError
 from ccfem.base.progress import Progress, silent
-from ccfem.comparison.engine import answer
+from ccfem.comparison.engine import answer, check_slicings
 from ccfem.comparison.headline import headline_values
 from ccfem.comparison.request import Request, free_name
 from ccfem.comparison.result import Comparison
@@ -200,7 +200,9 @@ def _alone(request: Request) -> Request:
 
 
 def _check_known(named: Mapping[str, Request], machine: Machine) -> None:
-    """Refuse parts that do not fit on the bed, where layers are known before they are solved."""
+    """Refuse layers that cannot be cut, and parts that do not fit on the bed, before any solve."""
+    for request in named.values():
+        check_slicings(request)
     cases = [request.case for request in named.values()]
     stacks = [request.case.known_layers(request.only_slicer) for request in named.values()]
     if all(stacks):

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from ccfem.base.checks import refuse_keywords
+from ccfem.base.checks import member_name, refuse_keywords
 from ccfem.base.errors import InputError, SolveError
 from ccfem.base.parallel import beside, processors
 from ccfem.base.progress import Progress, silent
@@ -60,7 +60,6 @@ from ccfem.comparison.stages import (
 )
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.stress_field import GivenStress, PartStress, StressField, WeightedCases
-from ccfem.fem.stress_files.stress_file import read_stress
 from ccfem.judging.virtual_testing.progressive_failure import BreakingLoad, breaking_load
 from ccfem.judging.virtual_testing.several_cases import specimens
 from ccfem.judging.virtual_testing.specimen import Specimen
@@ -73,7 +72,13 @@ from ccfem.printing.course import WITHOUT_HALT, Course
 from ccfem.printing.line_counts import check_strands
 from ccfem.printing.support import SupportLayers, slice_with_support
 from ccfem.slicing.layers.layer import curved_layers
-from ccfem.slicing.layers.slicer import Slicer, has_field, slicer_remarks
+from ccfem.slicing.layers.slicer import (
+    NO_FIELD,
+    Slicer,
+    always_curved,
+    has_field,
+    slicer_remarks,
+)
 from ccfem.strategies.fibre_aware.smeared import on_linear_cells
 from ccfem.strategies.fibre_aware.upper_bound import UpperBound
 
@@ -151,10 +156,7 @@ class Solved:
             below = None
             check_support(stress.mesh, layers, case.machine)
         elif support and below is None:
-            raise InputError(
-                "support continues the field whose levels the layers are, and these layers were "
-                "given without one: leave out support, or choose --slicing load_oriented or spatial"
-            )
+            raise InputError(NO_FIELD)
         strand = None if self.tests is None else self.tests.strand
         said = slicer_remarks(chosen, stress)
         stack = tuple(layers)
@@ -163,13 +165,17 @@ class Solved:
         return Part(stress, stack, case.machine, self.cases, *about, *more)
 
 
-def solved(request: Request, seconds: dict[str, float] | None = None) -> Solved:
+def solved(
+    request: Request, seconds: dict[str, float] | None = None, progress: Progress = silent
+) -> Solved:
     """Solve what is asked for, and prepare what virtual tests need.
 
     Parameters
     ----------
     seconds : dict of stage to float, optional
         Gets the time of each stage.
+    progress : callable, optional
+        Hears of the solve when nothing is refused any more.
 
     Raises
     ------
@@ -181,17 +187,21 @@ def solved(request: Request, seconds: dict[str, float] | None = None) -> Solved:
     seconds = {} if seconds is None else seconds
     case, strand, backend = request.case, request.strand, request.backend
     check_slicings(request)
+    foreign = request.stress
     with timed(seconds, "solve"):
-        fields = solve(case.printed_problem(request.only_slicer), backend=backend)
+        problem = case.printed_problem(request.only_slicer)
+        given = None if foreign is None else foreign.on(problem.mesh, problem.held_or_loaded)
+        progress(f"solving {case.name}", 0.0)
+        fields = solve(problem, backend=backend)
         if request.all_cases:
             cases = weighted_cases(case, fields)
         else:
             name = request.load_case or case.problem.cases[0]
             cases = WeightedCases.of({name: fields[name]})
-    given, foreign, field = None, request.stress, cases.heaviest
-    if foreign is not None:
-        read = read_stress(foreign.path, field.mesh, foreign.unit, foreign.array,
-                           field.held_or_loaded, foreign.step, foreign.components)  # fmt: skip
+    field = cases.heaviest
+    if foreign is not None:  # quadratic cells may have been solved instead
+        again = given is None or field.mesh is not given.mesh
+        read = foreign.on(field.mesh, field.held_or_loaded) if again else given
         given = replace(read, material=field.material)
     about = (request.every_layer, request.longest_test, request.course)
     if strand is None:
@@ -248,8 +258,7 @@ def answer(
     """
     seconds: dict[str, float] = {}
     processors()  # a wrong number is refused here, not as the failure of a strategy
-    progress(f"solving {request.case.name}", 0.0)
-    basis = solved(request, seconds) if known is None else known
+    basis = solved(request, seconds, progress) if known is None else known
     refused: dict[str, str] = {}
     if parts is None:
         with timed(seconds, "slice"):
@@ -385,7 +394,7 @@ def _cut(request: Request, basis: Solved) -> tuple[dict[str, Part], dict[str, st
 
 
 def check_slicings(request: Request) -> None:
-    """Refuse flat layers that cannot be cut, before anything is solved.
+    """Refuse layers that cannot be cut or planned on, before anything is solved.
 
     Raises
     ------
@@ -397,12 +406,26 @@ def check_slicings(request: Request) -> None:
         try:
             if not slicing.as_thick:  # of which the part's own layers decide
                 request.case.check_layers(slicing.slicer)
+                _check_curved(request, slicing.slicer)
         except InputError as error:
-            if not request.named:
+            # What is read from files is what the request names, not what the part allows.
+            if not request.named or (slicing.slicer and always_curved(slicing.slicer)):
                 raise
             refused[name] = str(error)
     if len(refused) == len(request.slicings):
         raise _no_slicing(request, refused)
+
+
+def _check_curved(request: Request, slicer: Slicer | None) -> None:
+    """Refuse layers that are curved where no strategy plans on such."""
+    chosen = request.case.slicing if slicer is None else slicer
+    planners = request.strategies.values()
+    if always_curved(chosen) and all(getattr(s, "flat_layers_only", False) for s in planners):
+        raise InputError(
+            f"{', '.join(request.strategies)} plans on flat layers only, and those of "
+            f"{member_name(chosen)} are curved: choose a planar slicing, or a strategy for curved "
+            "layers"
+        )
 
 
 def _no_slicing(request: Request, refused: Mapping[str, str]) -> InputError:

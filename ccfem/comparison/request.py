@@ -13,9 +13,13 @@ from typing import Any
 from ccfem.base.arrays import freeze
 from ccfem.base.checks import check_instance, check_known, check_number, member_name
 from ccfem.base.errors import InputError, known_names, shown
+from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases.case import Case
 from ccfem.cases.load_cases import asks_for_all
 from ccfem.cases.reading import read
+from ccfem.fem.elasticity.solvers import check_backend
+from ccfem.fem.elasticity.stress_field import GivenStress
+from ccfem.fem.stress_files.stress_file import read_stress
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.paths.planning.equal_fibre import check_wanted
 from ccfem.paths.planning.given_paths import GivenPaths
@@ -23,7 +27,7 @@ from ccfem.paths.planning.strategy import Strategy
 from ccfem.printing.before_solving import check_print, check_support
 from ccfem.printing.course import WITHOUT_HALT, Course
 from ccfem.slicing.layers.layer import plane_frame
-from ccfem.slicing.layers.slicer import Slicer
+from ccfem.slicing.layers.slicer import Slicer, check_field
 from ccfem.slicing.slicers import as_slicer, from_text
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
@@ -62,6 +66,11 @@ class ForeignStress:
     array: str | None = None
     step: int | None = None
     components: str | None = None
+
+    def on(self, mesh: TetMesh, held_or_loaded: tuple[str, ...] = ()) -> GivenStress:
+        """Read the stress onto a mesh, with the names of the patches that are held or loaded."""
+        about = (self.unit, self.array, held_or_loaded, self.step, self.components)
+        return read_stress(self.path, mesh, *about)
 
 
 @dataclass(frozen=True)
@@ -266,6 +275,7 @@ class Request:
         elif self.course:
             raise InputError("pauses and a first layer are of a print: add --gcode (print_plans)")
         self._check_load_case()
+        check_backend(self.backend)
 
     def _check_print(self) -> None:
         """Refuse a print that cannot be made whatever is planned, before anything is solved."""
@@ -273,8 +283,10 @@ class Request:
         (slicing,) = self.slicings.values()
         layers = case.known_layers(slicing.slicer)
         check_print(case.problem.mesh, case.build, case.machine, layers, case.bed)
-        if self.support and layers:
-            check_support(case.problem.mesh, layers, case.machine)
+        if self.support:
+            check_field(case.slicing if slicing.slicer is None else slicing.slicer)
+            if layers:
+                check_support(case.problem.mesh, layers, case.machine)
 
     def _check_load_case(self) -> None:
         known = self.case.problem.cases

@@ -3,29 +3,7 @@
 import re
 
 import pytest
-
-PART = """
-title = "Strip, 60 mm"
-material = "pla"
-[planform]
-outline = [[0, 0], [60, 0], [60, 20], [0, 20]]
-height = 5
-edge_length = 5
-[patches.foot]
-rule = "plane"
-normal = "x"
-offset = "min"
-[patches.end]
-rule = "plane"
-normal = "x"
-offset = "max"
-[[supports]]
-patch = "foot"
-[[loads.pull]]
-kind = "force"
-patch = "end"
-vector = [100, 0, 0]
-"""
+from strip_part import PART
 
 
 def test_check_says_and_draws(ccfem, tmp_path):

@@ -27,7 +27,7 @@ from ccfem.fem.elasticity.plausibility import (
     on_quadratic,
 )
 from ccfem.fem.elasticity.problem import Problem
-from ccfem.fem.elasticity.solvers import LARGEST_DIRECT, Solver, direct_backend
+from ccfem.fem.elasticity.solvers import LARGEST_DIRECT, Solver, check_backend, direct_backend
 from ccfem.fem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.fem.elasticity.support_kinds import AnySupport
 from ccfem.fem.elasticity.system import prepare
@@ -194,6 +194,7 @@ def solve(
         When a solution is not accepted; the message names what makes the equations ill-conditioned.
         Also when reactions do not balance the loads.
     """
+    check_backend(backend)
     fields: dict[str, StressField] = {}
     sets = support_sets(problem)
     for subproblem in sets:

@@ -307,12 +307,17 @@ def factorise(
     if backend == "auto":
         order = 1 if parents is None else 2
         backend, because = choose(matrix.shape[0], order, solves, _mean_neighbours(matrix))
-    check_known("backend", backend, ["auto", *BACKENDS])
-    if backend in _MODULES and find_spec(_MODULES[backend]) is None:
-        raise InputError(f"backend '{backend}' is not installed: {_CURES[backend]}")
+    check_backend(backend)
     make = _maker(backend, matrix, points, parents, solves)
     exact = backend in DIRECT and not (backend == "superlu" and solves >= _OFTEN)
     return Solver(backend, matrix, make(matrix), exact, make, because)
+
+
+def check_backend(backend: str) -> None:
+    """Refuse a backend that is unknown or not installed."""
+    check_known("backend", backend, ["auto", *BACKENDS])
+    if backend in _MODULES and find_spec(_MODULES[backend]) is None:
+        raise InputError(f"backend '{backend}' is not installed: {_CURES[backend]}")
 
 
 def _mean_neighbours(matrix: sp.bsr_array) -> float:

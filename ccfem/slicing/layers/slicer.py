@@ -21,6 +21,10 @@ class Slicer(Protocol):
     Each module of `ccfem.slicing.slicers` is one slicer. The name of the module is its name on the
     command line and in part files; the class has the same name in capitals (``load_oriented``
     holds ``LoadOriented``).
+
+    What it refuses whatever the stress is, as files that are missing, it says in a method
+    ``check(mesh, build, machine)`` too, which is called before the part is solved. One whose layers
+    are never flat has a class variable ``curved = True``.
     """
 
     def __call__(self, stress: PartStress, build: Vector, machine: Machine) -> tuple[Layer, ...]:
@@ -52,6 +56,24 @@ _DOWN = 1e-3
 def has_field(slicer: Slicer) -> bool:
     """Whether the layers of a slicer are the levels of a field, which `slice` returns: curved."""
     return hasattr(slicer, "slice")
+
+
+def always_curved(slicer: Slicer) -> bool:
+    """Whether the layers of a slicer are curved, whatever the part and its stress are."""
+    return bool(getattr(slicer, "curved", False))
+
+
+NO_FIELD = (
+    "support continues the field whose levels the layers are, and these layers were given without "
+    "one: leave out support, or choose --slicing load_oriented or spatial"
+)
+"""What is said where support is wanted below curved layers that are no levels."""
+
+
+def check_field(slicer: Slicer) -> None:
+    """Refuse support below layers that are curved and not the levels of a field."""
+    if always_curved(slicer) and not has_field(slicer):
+        raise InputError(NO_FIELD)
 
 
 def standing(layers: Sequence[Layer], build: Vector) -> Vector:

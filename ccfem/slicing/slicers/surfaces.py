@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.checks import check_fields
 from ccfem.base.errors import InputError
 from ccfem.body.files.layer_files import layer_files, read_layer
@@ -39,16 +40,35 @@ class Surfaces:
     thickness: float = 0.5
     tolerance: float = 1.0
 
+    curved: ClassVar[bool] = True
+
     def __post_init__(self) -> None:
         check_fields(self, "thickness", "tolerance", above=0.0, unit="mm")
 
     def __call__(self, stress: PartStress, build: Vector, machine: Machine) -> tuple[Layer, ...]:
         """Read the layers, whichever side of their triangles is up; the stress does not matter."""
-        sheets = facing_up([read_layer(file) for file in layer_files(self.folder)], build)
+        sheets = facing_up(self._sheets(), build)
         return tuple(
             layer_from_surface(stress.mesh, *sheet, k, self.thickness, self.tolerance)
             for k, sheet in enumerate(sheets)
         )
+
+    def check(self, mesh: TetMesh, build: Vector, machine: Machine) -> None:
+        """Refuse files that cannot be read, and layers that miss the box of a part.
+
+        Raises
+        ------
+        InputError
+            As `layer_from_surface`.
+        """
+        low, high = mesh.bounds
+        for k, (points, triangles) in enumerate(self._sheets()):
+            corners = points[np.unique(triangles)]
+            outside = (corners < low - self.tolerance) | (corners > high + self.tolerance)
+            _check_outside(outside.any(axis=1), k, self.tolerance)
+
+    def _sheets(self) -> list[Sheet]:
+        return [read_layer(file) for file in layer_files(self.folder)]
 
 
 def facing_up(sheets: Sequence[Sheet], build: Vector) -> list[Sheet]:
@@ -90,6 +110,19 @@ def _chords_of(mesh: TetMesh, wall: int) -> float:
     return float(np.abs(off).max(initial=0.0))
 
 
+_OUTSIDE = 0.01
+"""Share of the points of a layer that may lie outside the part."""
+
+
+def _check_outside(outside: BoolArray, index: int, tolerance: float) -> None:
+    """Refuse a layer too many of whose points (n,) lie outside the part."""
+    if outside.mean() > _OUTSIDE:
+        raise InputError(
+            f"{100 * outside.mean():.0f} % of the points of layer {index} lie more than "
+            f"{tolerance:g} mm outside the part: is it in mm, and in the frame of the mesh?"
+        )
+
+
 def layer_from_surface(
     mesh: TetMesh,
     points: FloatArray,
@@ -122,11 +155,7 @@ def layer_from_surface(
     points, triangles = points[used], triangles.reshape(-1, 3)
     holder, weights = locate(mesh.points, mesh.corners, points, tolerance)
     outside = holder < 0
-    if outside.mean() > 0.01:
-        raise InputError(
-            f"{100 * outside.mean():.0f} % of the points of layer {index} lie more than "
-            f"{tolerance:g} mm outside the part: is it in mm, and in the frame of the mesh?"
-        )
+    _check_outside(outside, index, tolerance)
     kept = ~outside[triangles].any(axis=1)
     used, triangles = np.unique(triangles[kept], return_inverse=True)
     points, triangles = points[used], triangles.reshape(-1, 3)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -54,6 +55,8 @@ class ThroughStrands:
     thickness: float | None = None
     reach: float = 2.0
 
+    curved: ClassVar[bool] = True
+
     def __post_init__(self) -> None:
         check_fields(self, "thickness", "reach", above=0.0, unit="mm")
 
@@ -65,19 +68,42 @@ class ThroughStrands:
         InputError
             For strands of fewer than two layers, and for a layer without strands in the part.
         """
-        files = [strands for strands in read_strand_files(self.folder) if strands]
-        if len(files) < 2:
-            raise InputError(
-                "layers are rebuilt from the strands of two or more, which tell the side on which "
-                f"material is added; got {len(files)}: name the folder of all"
-            )
-        clouds = [resample(*pack(strands), _STEP)[0] for strands in files]
+        clouds = self._clouds()
         sheets = [_sheet(stress.mesh, clouds, k, self.reach) for k in range(len(clouds))]
         thickness = self.thickness or _pitch(sheets)
         return tuple(
             layer_from_surface(stress.mesh, *sheet, k, thickness)
             for k, sheet in enumerate(facing_up(sheets, build))
         )
+
+    def check(self, mesh: TetMesh, build: Vector, machine: Machine) -> None:
+        """Refuse files that cannot be read, and layers whose strands miss the box of a part.
+
+        Raises
+        ------
+        InputError
+            As when layers are cut.
+        """
+        low, high = mesh.bounds[0] - self.reach, mesh.bounds[1] + self.reach
+        for k, cloud in enumerate(self._clouds()):
+            if not ((cloud >= low) & (cloud <= high)).all(axis=1).any():
+                raise _misses(k)
+
+    def _clouds(self) -> list[FloatArray]:
+        """Points on the strands of each layer."""
+        files = [strands for strands in read_strand_files(self.folder) if strands]
+        if len(files) < 2:
+            raise InputError(
+                "layers are rebuilt from the strands of two or more, which tell the side on which "
+                f"material is added; got {len(files)}: name the folder of all"
+            )
+        return [resample(*pack(strands), _STEP)[0] for strands in files]
+
+
+def _misses(k: int) -> InputError:
+    return InputError(
+        f"no strand of layer {k} lies in the part: are they in mm, and in the frame of the mesh?"
+    )
 
 
 def _pitch(sheets: list[Sheet]) -> float:
@@ -108,10 +134,7 @@ def _sheet(mesh: TetMesh, clouds: list[FloatArray], k: int, reach: float) -> She
     kept = np.isfinite(tree.query(middle, distance_upper_bound=reach)[0])
     kept &= np.linalg.norm(across, axis=1) > 0.0
     if not kept.any():
-        raise InputError(
-            f"no strand of layer {k} lies in the part: are they in mm, and in the frame of the "
-            "mesh?"
-        )
+        raise _misses(k)
     # Slivers where the surface passes close by nodes of the mesh.
     triangles, free = triangles[kept], np.zeros(len(points), dtype=np.bool_)
     triangles, _ = clean(points, triangles, np.arange(len(triangles)), free, _SHORTEST, _SAG)
