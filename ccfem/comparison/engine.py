@@ -7,7 +7,7 @@ its own.
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from inspect import signature
@@ -58,6 +58,8 @@ from ccfem.comparison.stages import (
     with_breaking_load,
     with_test,
 )
+from ccfem.fem.elasticity.plausibility import on_quadratic
+from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.stress_field import GivenStress, PartStress, StressField, WeightedCases
 from ccfem.judging.virtual_testing.progressive_failure import BreakingLoad, breaking_load
@@ -190,7 +192,7 @@ def solved(
     foreign = request.stress
     with timed(seconds, "solve"):
         problem = case.printed_problem(request.only_slicer)
-        given = None if foreign is None else foreign.on(problem.mesh, problem.held_or_loaded)
+        given = None if foreign is None else _stress_on(foreign, problem)
         progress(f"solving {case.name}", 0.0)
         fields = solve(problem, backend=backend)
         if request.all_cases:
@@ -200,9 +202,9 @@ def solved(
             cases = WeightedCases.of({name: fields[name]})
     field = cases.heaviest
     if foreign is not None:  # quadratic cells may have been solved instead
-        again = given is None or field.mesh is not given.mesh
-        read = foreign.on(field.mesh, field.held_or_loaded) if again else given
-        given = replace(read, material=field.material)
+        if given is None or field.mesh is not given.mesh:
+            given = foreign.on(field.mesh, field.held_or_loaded)
+        given = replace(given, material=field.material)
     about = (request.every_layer, request.longest_test, request.course)
     if strand is None:
         return Solved(case, cases, given, None, *about)
@@ -215,6 +217,17 @@ def solved(
             specimens(cases, backend)  # one factorisation for all
         tests = Tests.of(field, alternative, strand, backend)
     return Solved(case, cases, given, tests, *about)
+
+
+def _stress_on(foreign: ForeignStress, problem: Problem) -> GivenStress:
+    """Stress of another program on the cells of a problem, or on quadratic ones made of them."""
+    try:
+        return foreign.on(problem.mesh, problem.held_or_loaded)
+    except InputError:
+        if problem.order != 1 and problem.mesh.order == 1:
+            with suppress(InputError):
+                return foreign.on(on_quadratic(problem).mesh, problem.held_or_loaded)
+        raise
 
 
 def otherwise_held(case: Case, field: StressField, backend: str) -> StressField:
