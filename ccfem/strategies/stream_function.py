@@ -80,8 +80,9 @@ class StreamFunction:
     layers form groups over the height with one field each. The fields are designed for slightly too
     much fibre; of their isocurves, the stretches that are worth most are kept. `stripes`,
     `isocurve`, straight rows along the mean tension and contours are cut to the same length and
-    tested too, and the best is taken. The load is that of the stress given to the strategy. Fibre
-    is taken to carry tension only.
+    tested too, and the best is taken. If it was cut from much more fibre or for several load cases,
+    it takes over stretches of the others where there is room and it becomes stiffer. The load is
+    that of the stress given to the strategy. Fibre is taken to carry tension only.
 
     On curved layers the field is one of space, of which each layer has the values along its
     surface: neighbouring layers get about the same strands. Rows and contours are left out there.

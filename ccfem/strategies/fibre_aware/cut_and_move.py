@@ -6,10 +6,12 @@ the strength as asked for, and for half of that.
 """
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Protocol
 
 import numpy as np
 
+from ccfem.base.arrays import FloatArray
 from ccfem.base.parallel import in_processes
 from ccfem.judging.virtual_testing import Specimen, Strand
 from ccfem.machine.machine import Machine
@@ -18,6 +20,7 @@ from ccfem.paths.planning.plan import plan_layers
 from ccfem.paths.planning.strategy import WholePart
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
+from ccfem.strategies.fibre_aware.exchange import exchanged
 from ccfem.strategies.fibre_aware.judges import (
     Goal,
     Judge,
@@ -38,6 +41,9 @@ _ALL_WAYS = 2
 _FOR_BOTH = (False, True)
 """Whether moves follow the strength too: tried once for the stiffness alone, and once for both."""
 
+_MUCH = 1.12
+"""Fibre of a plan over the length wanted from which the last of its cuts is a large step."""
+
 _ROUGH, _EXACT = 1e-4, 1e-6
 """Relative residuals of the tests, and of the last one of moved paths, which gain little."""
 
@@ -49,6 +55,13 @@ class _Cut(Protocol):
         self, toolpaths: Toolpaths, share: float, tests: int, least: Judged | None = None
     ) -> Toolpaths:
         """Cut, given the weight of the strength, the number of tests and the others."""
+
+
+class _Exchange(Protocol):
+    """Exchanges stretches of a plan for others."""
+
+    def __call__(self, kept: Toolpaths, source: Toolpaths, near: Sequence[FloatArray]) -> Toolpaths:
+        """Make a plan better, given what it was cut from and its displacements."""
 
 
 def prune_and_move(
@@ -68,10 +81,12 @@ def prune_and_move(
     """Cut fibre to a length, mm in all, move the rest, and cut it again to the length.
 
     Each candidate is cut, and the best one is moved: the stiffest, or with strength the one of
-    highest value. With strength it is moved once for the stiffness and once for both, and a test
-    chooses. Parameters as in `ccfem.strategies.fibre_aware.prune.prune` and
-    `ccfem.strategies.fibre_aware.strand_moves.moved`; `fold` is whether strands may fold,
-    and `last` the goal on the cells of the last test, by which moved paths are taken or not.
+    highest value. Before that the stiffest takes over stretches of the others (`exchanged`), if it
+    was cut from much more fibre or for several load cases. With strength it is moved once for the
+    stiffness and once for both, and a test chooses. Parameters as in
+    `ccfem.strategies.fibre_aware.prune.prune` and
+    `ccfem.strategies.fibre_aware.strand_moves.moved`; `fold` is whether strands may fold, and
+    `last` the goal on the cells of the last test, by which moved paths are taken or not.
     """
     goal = Goal.of(part)
 
@@ -87,7 +102,14 @@ def prune_and_move(
         return tuple(strength_judge(*how, for_both, tolerance) for for_both in _FOR_BOTH)
 
     judges = judges_of(goal, _ROUGH)
-    kept = best_cut(candidates, cut, judges[0], strength, rounds)
+
+    def exchange(kept: Toolpaths, source: Toolpaths, near: Sequence[FloatArray]) -> Toolpaths:
+        if len(goal.parts) == 1 and fibre_length(source) < _MUCH * length:
+            return kept
+        cut_again = partial(cut, share=0.0)
+        return exchanged(kept, candidates, goal.mesh, machine, judges[0], cut_again, near)
+
+    kept = best_cut(candidates, cut, judges[0], strength, rounds, exchange)
     if not moves:
         return kept
     radius, offered = kept_radius(machine, tight), [kept]
@@ -109,7 +131,12 @@ def prune_and_move(
 
 
 def best_cut(
-    candidates: Sequence[Toolpaths], cut: _Cut, judge: Judge, strength: float, rounds: int
+    candidates: Sequence[Toolpaths],
+    cut: _Cut,
+    judge: Judge,
+    strength: float,
+    rounds: int,
+    exchange: _Exchange | None = None,
 ) -> Toolpaths:
     """Cut candidates, and return the result of highest value.
 
@@ -125,12 +152,14 @@ def best_cut(
         Weight of the load at first failure; at 0 each candidate is cut once.
     rounds : int
         Tests of each cut.
+    exchange : callable, optional
+        Makes the stiffest result of several better still, where strength does not count.
     """
     filled = [paths for paths in candidates if len(paths)]
     if not filled:
         return candidates[0]
     if not strength:
-        return _stiffest_cut(filled, cut, judge, rounds)
+        return _stiffest_cut(filled, cut, judge, rounds, exchange)
     paths, shares = zip(
         *(
             (paths, share * strength)
@@ -143,7 +172,11 @@ def best_cut(
 
 
 def _stiffest_cut(
-    candidates: Sequence[Toolpaths], cut: _Cut, judge: Judge, rounds: int
+    candidates: Sequence[Toolpaths],
+    cut: _Cut,
+    judge: Judge,
+    rounds: int,
+    exchange: _Exchange | None,
 ) -> Toolpaths:
     """Cut candidates for the stiffness, the first in any case, and return the stiffest result.
 
@@ -154,9 +187,17 @@ def _stiffest_cut(
         return first
     least = judge(first)
 
-    def contender(paths: Toolpaths) -> tuple[Toolpaths, float]:
+    def contender(paths: Toolpaths) -> tuple[Toolpaths, float, tuple[FloatArray, ...]]:
         kept = cut(paths, 0.0, rounds, least)
-        return kept, judge(kept).value if len(kept) else -np.inf
+        if not len(kept):
+            return kept, -np.inf, ()
+        tested = judge(kept)
+        return kept, tested.value, tested.displacements
 
-    others = [(first, least.value), *in_processes(contender, candidates[1:], shared=[candidates])]
-    return others[int(np.argmax([value for _, value in others]))][0]
+    tried = [
+        (first, least.value, least.displacements),
+        *in_processes(contender, candidates[1:], shared=[candidates]),
+    ]
+    best = int(np.argmax([value for _, value, _ in tried]))
+    kept, _, near = tried[best]
+    return kept if exchange is None else exchange(kept, candidates[best], near)
