@@ -2,7 +2,7 @@
 
     python -m benchmarks.studies.cheats [cantilever|bracket ...] [--files FOLDER]
 
-A cantilever of 100 x 14 x 6 mm, held at its root, with 20 N down at its tip, is given twelve sets
+A cantilever of 100 x 14 x 6 mm, held at its root, with 20 N down at its tip, is given fifteen sets
 of paths of 588 mm a layer that should not win, and six honest straight rows, by ``ccfem compare
 --paths``. Beside what the command says of each stand the rules for strands of
 `benchmarks.print_checks.strand_rules`, which share nothing with ccfem. A set that is ranked as
@@ -20,6 +20,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -175,6 +176,31 @@ def _short() -> list[Line]:
     ]
 
 
+def _with_loops(corners: Sequence[Sequence[float]], radius: float, every: float) -> Line:
+    """Polyline with a small loop to its right at even distances."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 25)
+    points = [np.array(corners[:1], dtype=float)]
+    for first, last in pairwise(np.array(corners, dtype=float)):
+        size = float(np.linalg.norm(last - first))
+        ahead = (last - first) / size
+        aside = np.array([ahead[1], -ahead[0]])
+        for at in np.arange(every, size - 0.5 * every, every):
+            loop = np.outer(at + radius * np.sin(turn), ahead)
+            points.append(first + loop + radius * np.outer(1.0 - np.cos(turn), aside))
+        points.append(last[None])
+    return np.concatenate(points)
+
+
+def _rings() -> list[Line]:
+    """Round the upper half, one in the other, with loops everywhere."""
+    strands = []
+    for row in range(3):
+        top, right, low = TOP - 0.5 - row, 97.5 - row, 7.5 + row
+        corners = [(0.0, top), (right, top), (right, low), (row, low), (row, top - 1.0)]
+        strands.append(_cut(_with_loops(corners, 0.4, 16.0), 2.0 * LENGTH))
+    return strands
+
+
 def sets() -> dict[str, list[Line]]:
     """Paths of one layer by what they try; honest rows first, then the three of old."""
     half, low = TOP - 0.5, TOP - 0.5 - np.arange(6.0)
@@ -184,6 +210,8 @@ def sets() -> dict[str, list[Line]]:
         _serpentines(47.5, TOP - 4.0)[0],
         _woven(TOP - 4.0)[1],
     ]
+    fold = [_cut([(0.0, y), (49.0, y), (0.0, y - 1e-3)]) for y in (TOP - 1.05, TOP - 2.05)]
+    rows = [(0.0, y) for y in low]
     return {
         "honest_rows": _rows(low),
         "rows_on_border": _rows(TOP - np.arange(6.0)),
@@ -198,6 +226,9 @@ def sets() -> dict[str, list[Line]]:
         "two_corners": _two_corners(),
         "short_pieces": _short(),
         "bit_of_each": mixed,
+        "outside_folded_woven": [*_rows([TOP - 0.05]), *fold, *_woven(TOP - 2.55, 3)],
+        "loops": [_cut(_with_loops([row, (LENGTH, row[1])], 0.6, 14.0)) for row in rows],
+        "rings_with_loops": _rings(),
     }
 
 

@@ -260,6 +260,9 @@ NAMED = {
     "bulbs": "have no 42 mm free of turns",
     "short_pieces": "no strand is left to print",
     "bit_of_each": "lie outside the part",
+    "outside_folded_woven": "lie outside the part by more than 5% of their width; the worst by 40%",
+    "loops": "have no 42 mm free of turns",
+    "rings_with_loops": "have no 42 mm free of turns",
     "link_on_border": "lie outside the part by more than 5% of their width; the worst by 50%",
 }
 """What is said of the sets of `benchmarks.studies.cheats`, of 588 mm a layer."""
