@@ -125,7 +125,7 @@ def _price(paths: Toolpaths, known: Judged, mesh: TetMesh) -> float:
     """Worth per mm above the share `_CHEAPEST` of the fibre."""
     strands, pieces = _pieces(paths, mesh)
     worth = _worth(known, pieces)
-    order = np.argsort(worth)
+    order = np.argsort(worth, kind="stable")
     before = np.cumsum(strands.length[order])
     return float(worth[order][np.searchsorted(before, _CHEAPEST * before[-1])])
 
