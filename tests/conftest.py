@@ -50,7 +50,7 @@ def build_box():
     return make_box
 
 
-def pytest_configure():
+def pytest_configure(config):
     """Give each process of the tests one processor: they share those that there are.
 
     More threads wait for each other, busily. This runs before the processes are started.
@@ -58,11 +58,19 @@ def pytest_configure():
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "CCFEM_THREADS"):
         os.environ.setdefault(name, "1")
     gc.disable()
+    config.addinivalue_line("markers", "slow: takes ten seconds and more; run with CCFEM_SLOW=1")
 
 
 def pytest_collection_modifyitems(items):
-    """Begin with the browser's tests, each module of which keeps one process busy for long."""
+    """Begin with the browser's tests, each module of which keeps one process busy for long.
+
+    Slow tests are left out, unless they are asked for.
+    """
     items.sort(key=lambda item: "browser" not in item.nodeid)
+    if not os.environ.get("CCFEM_SLOW"):
+        for item in items:
+            if item.get_closest_marker("slow"):
+                item.add_marker(pytest.mark.skip(reason="slow: set CCFEM_SLOW=1 to run it"))
 
 
 def pytest_collection_finish():

@@ -603,7 +603,7 @@ def test_results_are_the_same_for_any_number_of_processors(monkeypatch):
     results = []
     for count in ("1", "2"):
         monkeypatch.setenv("CCFEM_THREADS", count)
-        result = compare(strip(), strategies, layers=2, fibre_per_layer=400.0, print_plans=True)
+        result = compare(strip(), strategies, layers=2, fibre_per_layer=250.0, print_plans=True)
         for run in result.runs:
             assert run.tested.bracket.tension.unreinforced.mesh is result.stress.mesh
             assert not run.toolpaths.points.flags.writeable

@@ -31,7 +31,7 @@ STREAM = StreamFunction(evaluations=2, phases=1)
 @pytest.fixture(scope="module")
 def part():
     """Beam of 40 x 16 x 4 mm, pulled at its end or pushed sideways."""
-    mesh = box_mesh((40.0, 16.0, 4.0), (10, 4, 2))
+    mesh = box_mesh((40.0, 16.0, 4.0), (8, 3, 2))
     loads = {"pull": (Force("x_max", (200.0, 0.0, 0.0)),), "side": (Force("x_max", (0, 40.0, 0)),)}
     material = replace(printed_pla(), tensile_strength=40.0)
     problem = Problem(mesh, material, (Support("x_min"),), loads, order=1)

@@ -21,7 +21,7 @@ from ccfem.strategies.zigzag import Zigzag
 
 
 def case_of(loads=None, **options):
-    mesh = box_mesh((60.0, 24.0, 4.0), (20, 8, 2))
+    mesh = box_mesh((60.0, 24.0, 4.0), (15, 6, 2))
     given = {"pull": (Force("x_max", (300.0, 0.0, 0.0)),), "side": (Force("x_max", (0, 40.0, 0)),)}
     problem = Problem(mesh, printed_pla(), (Support("x_min"),), loads or given, order=1)
     machine = Machine(minimum_length=15.0)
@@ -31,7 +31,7 @@ def case_of(loads=None, **options):
 @pytest.fixture(scope="module")
 def compared():
     case = case_of(weights={"pull": 1.0, "side": 0.5})
-    strategies = {"stream": StreamFunction(evaluations=6, phases=1), "zigzag": Zigzag()}
+    strategies = {"stream": StreamFunction(evaluations=3, phases=1), "zigzag": Zigzag()}
     return compare(case, strategies, fibre_per_layer=500.0, load_case="all")
 
 

@@ -163,7 +163,7 @@ def compared(request):
     size = {"bar": 5.0, "open_hole": 6.0, "loop": 8.0, "m_shape": 8.0}[request.param]
     case = ccfem.read(request.param, element_size=size)
     strategies = ["isocurve", "concentric", "zigzag", "contour_zigzag"]
-    return ccfem.compare(case, strategies, layers=2, curve=False)
+    return ccfem.compare(case, strategies, layers=1, curve=False)
 
 
 def with_stiffness(run, tension, partial):

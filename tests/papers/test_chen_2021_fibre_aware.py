@@ -35,6 +35,7 @@ def test_pruned_isocurves(fibre_aware, most):
     assert found.bearing >= 2.71
 
 
+@pytest.mark.slow
 def test_designed_field(fibre_aware, most, monkeypatch):
     # The design alone, without the plain plans that it is tested against: none is stiffer here.
     monkeypatch.setattr(sys.modules[StreamFunction.__module__], "plain_plans", lambda *_: [])

@@ -283,6 +283,7 @@ def test_strands_along_a_block_lend_what_they_carry_in_compression():
 
 
 @pytest.mark.skipif(CHEN not in os.environ, reason="the authors' data is not here")
+@pytest.mark.slow
 def test_the_pushed_shell_as_an_independent_program_has_it():
     """A ratio of the first claim, within the 1 % that it states, and the length of table 2."""
     checks = {check.quantity: check for check in judged({}, page.EXPECTED)}

@@ -55,7 +55,7 @@ def two_bends():
     loads = {"tip": (Force("x_max", (0, 50, 0)),), "slant": (Force("x_max", (300, -40, 0)),)}
     problem = Problem(mesh, isotropic(3500.0, 0.35), (Support("x_min"),), loads, order=1)
     fields = solve(problem, tolerance=1e-10)
-    return WeightedCases.of(fields, {"tip": 2.0, "slant": 1.0}), Planar(count=4).cut(mesh)
+    return WeightedCases.of(fields, {"tip": 2.0, "slant": 1.0}), Planar(count=2).cut(mesh)
 
 
 @pytest.fixture(scope="session")
