@@ -284,6 +284,9 @@ def _length(planned: Planned) -> float:
 _LONGER = 1.05
 """Share of the length wanted that is asked for where the plan to the length itself lays less."""
 
+_IN_REACH = 0.9
+"""Share of the length wanted from which a plan may reach it by a longer one that is cut."""
+
 
 def _plans_at_lengths(
     strategy: LengthStrategy,
@@ -316,8 +319,11 @@ def _by_cutting(
 ) -> Planned:
     """Plan to somewhat more and cut that to the length; the plan itself if that does not reach it.
 
-    Strands that are worth all or nothing leave room that the next longer plan does not have.
+    Strands that are worth all or nothing leave room that the next longer plan does not have. A plan
+    far short of it lays its most, and a longer one would not be worth its time.
     """
+    if plan.length_per_layer < _IN_REACH * wanted:
+        return plan
     longer = _plans_at_lengths(strategy, layers, stress, machine, [_LONGER * wanted])[0]
     if longer.length_per_layer < wanted:
         return plan

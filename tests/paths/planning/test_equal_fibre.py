@@ -292,6 +292,8 @@ def test_close_plans_on_either_side_are_shared_out_without_a_search(plate):
 class WholeLines(Lines):
     """Whole lines of 60 mm on each layer, as many as a length holds: it takes the length itself."""
 
+    asked: ClassVar[list[float]] = []
+
     def natural_length(self, layers, machine):
         return LENGTH * int(WIDTH / self.spacing)
 
@@ -299,6 +301,7 @@ class WholeLines(Lines):
         return self
 
     def to_lengths(self, stress, layers, machine, lengths):
+        self.asked.extend(lengths)
         most = self.natural_length(layers, machine)
         spacings = [WIDTH / max(1, int(min(wanted, most) / LENGTH + 1e-9)) for wanted in lengths]
         return [(replace(self, spacing=spacing),) * 2 for spacing in spacings]
@@ -317,6 +320,15 @@ def test_a_longer_plan_is_cut_where_that_to_the_length_lays_less(plate):
     assert far.length_per_layer == pytest.approx(1000.0)
     assert most.length_per_layer == pytest.approx(2400.0)
     assert most.note == "lays 2400 of 2500 mm per layer: its most"
+
+
+def test_a_plan_far_below_its_length_is_not_made_again_for_more(plate):
+    """2,400 of 2,700 mm are less than nine tenths: a second plan, as long, would lay no more."""
+    stress, layers = plate
+    WholeLines.asked.clear()
+    most = plan_to_length(WholeLines(), layers, stress, MACHINE, 2700.0)
+    assert (most.length_per_layer, most.reached) == (pytest.approx(2400.0), False)
+    assert WholeLines.asked == [2700.0]
 
 
 def test_a_length_below_a_strand_is_not_called_the_most(plate):
