@@ -1,4 +1,4 @@
-"""Measure what `inspection.cost` estimates: CPU seconds and memory of a solve by its size.
+"""Measure what `ccfem.fem.elasticity.solve_cost` tells: CPU seconds and memory of solves by size.
 
 Run ``python benchmarks/speed/solve_cost.py``; one line a size, each in a process of its own.
 """

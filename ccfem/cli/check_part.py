@@ -9,11 +9,14 @@ from ccfem.base.errors import SolveError
 from ccfem.base.whole import check_writable, whole_file
 from ccfem.cases.case import Case
 from ccfem.cases.inspection import check
-from ccfem.cases.inspection.part_check import solve_costs
 from ccfem.cli.run import NOT_PRINTABLE, complain
 from ccfem.comparison.plot.canvas import check_picture, save
 from ccfem.comparison.plot.part_picture import part_page, part_picture
+from ccfem.fem.elasticity.plausibility import MOST_CELLS, why_quadratic
+from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.solve_cost import about_quadratic, solve_costs
+from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.judging.virtual_testing.pinned_joints import about_pins
 from ccfem.printing.build_directions import better_direction
 from ccfem.slicing.slicers.planar import Planar
@@ -63,8 +66,8 @@ _QUICK = 15.0
 def _of_a_solve(case: Case) -> list[str]:
     """Say what the first load case shows, solved on the cells that there are, if that is quick.
 
-    That is a build direction in which fibre would take much more, and a pin that tears out; of the
-    plastic as it is printed.
+    That is whether quadratic cells will be taken, a build direction in which fibre would take much
+    more, and a pin that tears out; of the plastic as it is printed.
     """
     slicing, problem = case.slicing, case.printed_problem()
     if solve_costs(problem)[0].seconds > _QUICK:
@@ -85,4 +88,13 @@ def _of_a_solve(case: Case) -> list[str]:
         ]
     turned = isinstance(slicing, Planar) and slicing.axis == "build"
     said = better_direction(stress, case.build, case.machine) if turned else ""
-    return [line for line in (said, about_pins(stress)) if line]
+    return [line for line in (_about_order(problem, stress), said, about_pins(stress)) if line]
+
+
+def _about_order(problem: Problem, rough: StressField) -> str:
+    """Say that quadratic cells will be taken by themselves, at which cost and why."""
+    linear = rough.mesh.order == 1
+    why = why_quadratic(problem, rough.record.error) if linear else ""
+    if not why or problem.order != "auto" or len(problem.mesh.cells) > MOST_CELLS:
+        return ""
+    return f"solved on {about_quadratic(problem, why)}"

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from ccfem.base.checks import check_known
+from ccfem.base.progress import progress_bar
 from ccfem.base.whole import check_writable
 from ccfem.cases.case import Case
 from ccfem.cli.screen import print_solution
@@ -19,7 +20,8 @@ def solve_part(case: Case, out: Path, load_case: str | None, backend: str) -> No
     files = {name: out if len(names) == 1 else result_path(out, name) for name in names}
     for file in files.values():
         check_writable(result_path(file))
-    fields = solve(case.printed_problem(), backend=backend)
+    with progress_bar(lines=True) as progress:
+        fields = solve(case.printed_problem(), backend=backend, progress=progress)
     for name, file in files.items():
         write_result(fields[name], file)
         print_solution(fields[name], case.findings, file)

@@ -177,7 +177,7 @@ def solved(
     seconds : dict of stage to float, optional
         Gets the time of each stage.
     progress : callable, optional
-        Hears of the solve when nothing is refused any more.
+        As of `ccfem.solve`; hears of the solve when nothing is refused any more.
 
     Raises
     ------
@@ -194,7 +194,7 @@ def solved(
         problem = case.printed_problem(request.only_slicer)
         given = None if foreign is None else _stress_on(foreign, problem)
         progress(f"solving {case.name}", 0.0)
-        fields = solve(problem, backend=backend)
+        fields = solve(problem, backend=backend, progress=progress)
         if request.all_cases:
             cases = weighted_cases(case, fields)
         else:

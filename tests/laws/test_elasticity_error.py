@@ -373,11 +373,17 @@ def sag_of_a_beam(size, nu=0.3):
 
 @pytest.mark.parametrize("size", [(100.0, 20.0, 1.0), (200.0, 20.0, 1.0), (300.0, 30.0, 1.0)])
 def test_slender_parts_are_right_by_default(size):
-    field = solve(beam(size, 2.0 if size[0] < 250 else 3.0))["tip"]
+    steps = []
+    problem = beam(size, 2.0 if size[0] < 250 else 3.0)
+    field = solve(problem, progress=lambda what, _: steps.append(what))["tip"]
     tip = -field.displacement[field.mesh.points[:, 0] > size[0] - 1e-6, 2].mean()
     assert tip == pytest.approx(sag_of_a_beam(size), rel=0.03)
     assert field.mesh.order == 2
     assert "linear ones leave an estimated error of" in field.record.order_because
+    # What it costs is said before it is paid, with the unknowns of the mesh that is then solved.
+    (step,) = steps
+    assert f"{3 * len(problem.mesh.quadratic().points):,} unknowns" in step
+    assert step.endswith(f"{field.record.order_because} (order = 1 keeps these)")
     assert not [line for line in field.findings if "where it peaks" not in line]
 
 

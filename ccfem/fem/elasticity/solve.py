@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.checks import KnownNames, check_number
 from ccfem.base.errors import InputError, SolveError
+from ccfem.base.progress import Progress, silent
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.bisection import bisected
 from ccfem.fem.elasticity.conjugate_gradient import Solution
@@ -23,10 +24,11 @@ from ccfem.fem.elasticity.plausibility import (
     MOST_CELLS,
     about_conditioning,
     check_size_of_motion,
-    linear_locks,
     on_quadratic,
+    why_quadratic,
 )
 from ccfem.fem.elasticity.problem import Problem
+from ccfem.fem.elasticity.solve_cost import about_quadratic
 from ccfem.fem.elasticity.solvers import LARGEST_DIRECT, Solver, check_backend, direct_backend
 from ccfem.fem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.fem.elasticity.support_kinds import AnySupport
@@ -156,7 +158,10 @@ hundredth of the discretisation error of the cells themselves."""
 
 
 def solve(
-    problem: Problem, backend: str = "auto", tolerance: float = 1e-8
+    problem: Problem,
+    backend: str = "auto",
+    tolerance: float = 1e-8,
+    progress: Progress = silent,
 ) -> dict[str, StressField]:
     """Solve a problem for all its load cases, with one factorisation for each set of supports.
 
@@ -175,6 +180,8 @@ def solve(
         Relative residual at which iterations stop. A solution is accepted if its residual is below
         this, or its backward error is rounding (`ccfem.fem.elasticity.conjugate_gradient`), and if
         the energy of its error is below 1e-4 of that of the displacement.
+    progress : callable, optional
+        Receives what quadratic cells that "auto" takes cost, and why, before they are solved.
 
     Returns
     -------
@@ -199,7 +206,7 @@ def solve(
     sets = support_sets(problem)
     for subproblem in sets:
         try:
-            fields |= _solved(subproblem, backend, tolerance)
+            fields |= _solved(subproblem, backend, tolerance, progress)
         except InputError as error:
             if len(sets) == 1:
                 raise
@@ -213,7 +220,9 @@ def solve(
     return KnownNames("load case", {case: fields[case] for case in problem.cases})
 
 
-def _solved(problem: Problem, backend: str, tolerance: float) -> dict[str, StressField]:
+def _solved(
+    problem: Problem, backend: str, tolerance: float, progress: Progress
+) -> dict[str, StressField]:
     """Solve a problem with one set of supports."""
     if problem.order != "auto" or problem.mesh.order == 2:
         wanted = on_quadratic(problem) if problem.order == 2 else problem
@@ -221,15 +230,14 @@ def _solved(problem: Problem, backend: str, tolerance: float) -> dict[str, Stres
     if len(problem.mesh.cells) > MOST_CELLS:
         why = f"more than {MOST_CELLS:,} cells"
         return _solved_as_it_is(replace(problem, order=1), backend, tolerance, why)
-    if linear_locks(problem):
-        why = "the material hardly changes its volume, where linear cells lock"
-        return _solved_as_it_is(on_quadratic(problem), backend, tolerance, why)
-    why = f"estimated error at most {LARGEST_ERROR:.0%}"
-    fields = _solved_as_it_is(replace(problem, order=1), backend, tolerance, why)
-    worst = max(field.record.error for field in fields.values())
-    if worst <= LARGEST_ERROR:
-        return fields
-    why = f"linear ones leave an estimated error of {worst:.0%}"
+    why = why_quadratic(problem)
+    if not why:
+        why = f"estimated error at most {LARGEST_ERROR:.0%}"
+        fields = _solved_as_it_is(replace(problem, order=1), backend, tolerance, why)
+        why = why_quadratic(problem, max(field.record.error for field in fields.values()))
+        if not why:
+            return fields
+    progress(f"solving on {about_quadratic(problem, why)}", 0.0)
     return _solved_as_it_is(on_quadratic(problem), backend, tolerance, why)
 
 

@@ -7,10 +7,10 @@ import ccfem
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import box_mesh
 from ccfem.cases.case import Case
-from ccfem.cases.inspection.part_check import solve_costs
 from ccfem.comparison.plot.part_picture import part_page, part_picture
 from ccfem.fem.elasticity import BodyForce, Force, Pressure, Problem, Support, Traction
 from ccfem.fem.elasticity.problem import PointForce
+from ccfem.fem.elasticity.solve_cost import solve_costs
 from ccfem.fem.materials import isotropic
 from ccfem.machine import Machine
 
