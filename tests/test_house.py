@@ -246,6 +246,7 @@ def test_equal_values_keep_their_order_on_every_processor():
 
 CLOCKS = {
     "ccfem.cli.run",
+    "ccfem.comparison.effort",
     "ccfem.comparison.files",
     "ccfem.comparison.stages",
     "ccfem.fem.elasticity.solve",

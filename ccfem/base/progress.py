@@ -39,9 +39,17 @@ def time_left(spent: float, share: float) -> str:
     >>> time_left(300.0, 0.25)
     'about 15 min left'
     """
-    if not _LEAST <= share < 1.0:
+    return _in_words(_seconds_left(spent, share))
+
+
+def _seconds_left(spent: float, share: float) -> float | None:
+    """Return seconds that work will still take; None where too little is done to tell."""
+    return spent * (1.0 - share) / share if _LEAST <= share < 1.0 else None
+
+
+def _in_words(left: float | None) -> str:
+    if left is None or left < 0.0:
         return ""
-    left = spent * (1.0 - share) / share
     return f"about {left:.0f} s left" if left < 120.0 else f"about {left / 60.0:.0f} min left"
 
 
@@ -64,22 +72,39 @@ def progress_bar(lines: bool = False) -> Iterator[Progress]:
     """
     from rich.console import Console
     from rich.markup import escape
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        ProgressColumn,
+        Task,
+        TextColumn,
+        TimeElapsedColumn as Elapsed,
+    )
+    from rich.text import Text
 
     console, start = Console(stderr=True), time.perf_counter()
     if not (console.is_terminal or console.is_jupyter):
         yield _log_steps(_line if lines else None)
         return
-    columns = (BarColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
+
+    class Left(ProgressColumn):
+        """Time that is left: what was told, less what has passed since."""
+
+        def render(self, task: Task) -> Text:
+            ends = task.fields["ends"]
+            return Text(_in_words(None if ends is None else ends - time.perf_counter()))
+
+    columns = (BarColumn(), Elapsed(), TextColumn("{task.description}"), Left())
     with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("", total=1.0)
+        task = bar.add_task("", total=1.0, ends=None)
         log = _log_steps(None)
 
         def tell(what: str, share: float) -> None:
             log(what, share)
-            left = time_left(time.perf_counter() - start, share)
-            said = f"{what} ({left})" if left else what
-            bar.update(task, description=escape(said), completed=share)
+            now = time.perf_counter()
+            left = _seconds_left(now - start, share)
+            ends = None if left is None else now + left
+            bar.update(task, description=escape(what), completed=share, ends=ends)
 
         yield tell
 

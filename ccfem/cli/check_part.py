@@ -10,6 +10,7 @@ from ccfem.base.whole import check_writable, whole_file
 from ccfem.cases.case import Case
 from ccfem.cases.inspection import check
 from ccfem.cli.run import NOT_PRINTABLE, complain
+from ccfem.comparison.effort import about_effort
 from ccfem.comparison.plot.canvas import check_picture, save
 from ccfem.comparison.plot.part_picture import part_page, part_picture
 from ccfem.fem.elasticity.plausibility import MOST_CELLS, why_quadratic
@@ -48,6 +49,9 @@ def check_part(read: Callable[[], Case], picture: Path | None) -> int:
     if not checked.mistakes and not checked.not_planned:
         for line in _of_a_solve(checked.case):
             print(f"remark: {line}")
+    if not checked.not_planned:
+        for line in about_effort(checked.case, checked.case.known_layers()):
+            print(f"expected: {line}")
     save(part_picture(checked), picture)
     with whole_file(page) as temporary:
         temporary.write_text(part_page(checked), encoding="utf-8")

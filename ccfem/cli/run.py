@@ -29,9 +29,6 @@ if TYPE_CHECKING:
 
 _STARTED = time.perf_counter()
 
-_SOLVED = 0.75
-"""Share of the progress bar at which the comparison is made and the pictures begin."""
-
 
 def elapsed() -> float:
     """Seconds since the program began."""
@@ -221,6 +218,7 @@ def run(
     from ccfem.cli.first_run import compiling_beside
     from ccfem.cli.screen import print_comparison
     from ccfem.comparison.engine import answer
+    from ccfem.comparison.expected import share_before_writing
     from ccfem.comparison.files import RESULT_FILES, write_results
 
     imported, text = time.perf_counter(), _text_of(name)  # it may change while this runs
@@ -233,9 +231,10 @@ def run(
         on_cluster(scheduler),
         progress_bar(lines=True) as progress,
     ):
-        comparison = answer(request, _part(progress, 0.0, _SOLVED))
+        written = share_before_writing(request)
+        comparison = answer(request, _part(progress, 0.0, written))
         _check(comparison)
-        command, rest = shlex.join(["ccfem", *sys.argv[1:]]), _part(progress, _SOLVED, 1.0)
+        command, rest = shlex.join(["ccfem", *sys.argv[1:]]), _part(progress, written, 1.0)
         about = (command, seconds, rest, output.pictures, text, output.drawings)
         write_results(comparison, folder, *about, cell=output.cell)
     print_comparison(comparison, where, elapsed(), output.details)

@@ -25,6 +25,8 @@ from ccfem.cases.load_cases import weighted_cases
 from ccfem.comparison.bounds import bounded, bounds_of
 from ccfem.comparison.curve import Curve
 from ccfem.comparison.curve_stages import along_curve
+from ccfem.comparison.effort import Counts, stage_effort
+from ccfem.comparison.expected import Schedule, curve_steps, expected_steps
 from ccfem.comparison.plan_to_stiffness import plan_to_stiffness
 from ccfem.comparison.ranking import off_length
 from ccfem.comparison.request import (
@@ -47,7 +49,6 @@ from ccfem.comparison.stages import (
     Tell,
     Tests,
     all_planned,
-    counted,
     judged,
     natural,
     planned,
@@ -276,8 +277,12 @@ def answer(
     if parts is None:
         with timed(seconds, "slice"):
             parts, refused = _cut(request, basis)
-    steps = (3 + request.breaking_load) * len(request.strategies) * len(parts) + 1
-    tell = counted(progress, 0.1, steps)
+    known_of = {
+        name: Counts.of(part.stress.mesh, part.layers, part.machine) for name, part in parts.items()
+    }
+    steps = expected_steps(request, known_of, len(basis.cases))
+    before = stage_effort("solve", next(iter(known_of.values()))) if known is None else 0.0
+    tell = Schedule(progress, steps, before)
     early = _Early(request, basis)
     parts, runs, wanted = _planned(request, basis, parts, tell, early)
     # One that is left alone has all processors for its layers.
@@ -563,7 +568,7 @@ def _curve(
     parts: Mapping[str, Part],
     runs: Sequence[Run],
     wanted: Wanted,
-    tell: Tell,
+    tell: Schedule,
     seconds: dict[str, float],
 ) -> Curve | None:
     """Compare at several lengths where that is asked for, or where one length suits not all."""
@@ -573,6 +578,7 @@ def _curve(
     if request.curve is None and not _misses(runs, wanted):
         return None
     part, held = parts[""], None if isinstance(wanted, InAll) else wanted
+    tell.expect(curve_steps(tell.steps, request.strategies))
     with timed(seconds, "curve"):
         unchanged = [
             replace(run, strategy=before.strategy)

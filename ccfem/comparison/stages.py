@@ -5,12 +5,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import count
 from typing import Any
 
 from ccfem.base.errors import InputError, SolveError
 from ccfem.base.parallel import give_back, has_room_beside, in_processes
-from ccfem.base.progress import Progress
 from ccfem.comparison.runs import Run, Tested
 from ccfem.comparison.tested_cases import in_all_cases
 from ccfem.fem.elasticity.stress_field import PartStress, StressField, WeightedCases
@@ -66,16 +64,6 @@ _MOST_LAYERS = 60
 
 _TOLERANCE = 1e-6
 """Relative residual of the virtual tests: the error of the stiffness is of its square."""
-
-
-def counted(progress: Progress, first: float, steps: int) -> Tell:
-    """Progress in steps of equal share, from the share `first` on."""
-    number = count()
-
-    def tell(what: str) -> None:
-        progress(what, min(first + (1.0 - first) * next(number) / steps, 1.0))
-
-    return tell
 
 
 @dataclass(frozen=True)

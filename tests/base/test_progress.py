@@ -1,4 +1,5 @@
 import logging
+import time
 
 import pytest
 
@@ -16,6 +17,18 @@ def test_a_terminal_shows_what_is_done(monkeypatch, capsys):
     with progress_bar() as progress:
         progress("half of it", 0.5)
     assert "half of it" in capsys.readouterr().err
+
+
+def test_on_a_terminal_the_time_left_runs_down(monkeypatch, capsys):
+    """Half of the work took 50 s, so 50 are left; 20 s later 30 are, though nothing was said."""
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    now = [0.0]
+    monkeypatch.setattr(time, "perf_counter", lambda: now[0])
+    with progress_bar() as progress:
+        now[0] = 50.0
+        progress("half of it", 0.5)
+        now[0] = 70.0
+    assert "about 30 s left" in capsys.readouterr().err
 
 
 def test_without_a_terminal_each_step_is_one_line(capsys):

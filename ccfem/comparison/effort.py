@@ -1,0 +1,184 @@
+"""Time and memory of whole commands on a part, told before it is solved.
+
+Each stage takes some seconds for a run, and some for each of what it grows with (`TERMS`). How many
+is measured by `python -m benchmarks.speed.effort` and stands in ``effort.toml``, with how long the
+machine that it ran on took for `pace`.
+"""
+
+import time
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from ccfem.body.mesh.tet_mesh import TetMesh
+from ccfem.cases.case import Case
+from ccfem.comparison.request import LONGEST_TEST, STRATEGIES
+from ccfem.fem.elasticity.solve_cost import solve_costs
+from ccfem.machine.machine import Machine
+from ccfem.slicing.layers.layer import Layer
+
+COEFFICIENTS = Path(__file__).with_suffix(".toml")
+"""What each term of each stage takes: CPU seconds, or gigabytes of memory."""
+
+FILLED = 0.45
+"""Share of the room that plans fill by default."""
+
+TERMS: dict[str, tuple[str, ...]] = {
+    "start": ("run", "unknowns"),
+    "solve": ("solved", "triangles"),
+    "plan stream_function": ("unknowns", "room"),
+    "plan zigzag": ("triangles", "room"),
+    "plan": ("triangles", "room"),
+    "judge": ("solved", "triangles", "room"),
+    "print": ("triangles", "volume"),
+    "judge untested": ("triangles", "room"),
+    "bound": ("unknowns", "triangles"),
+    "write": ("run", "room"),
+    "write a print": ("run", "volume"),
+    "report": ("run", "triangles"),
+    "memory of compare": ("run", "solved", "triangles", "room"),
+    "memory of plan": ("run", "solved", "triangles", "room"),
+    "memory of untested": ("run", "solved", "triangles", "room"),
+}
+"""What each stage grows with: attributes of `Counts`."""
+
+_PLANNED = {
+    "stream_function": "plan stream_function",
+    "contour_zigzag": "plan zigzag",
+    "zigzag": "plan zigzag",
+}
+"""Stages of planning by strategies."""
+
+
+@dataclass(frozen=True)
+class Counts:
+    """What the work on a part grows with.
+
+    Attributes
+    ----------
+    unknowns, solved : float
+        Before supports, on linear cells and on those that the part is solved on.
+    triangles : float
+        In which its layers with fibre cut the cells.
+    room : float, mm
+        Length of strands that would cover these layers once.
+    volume : float, mm^3
+    run : float
+        One.
+    """
+
+    unknowns: float
+    solved: float
+    triangles: float
+    room: float
+    volume: float
+    run: float = 1.0
+
+    @classmethod
+    def of(cls, mesh: TetMesh, layers: Sequence[Layer], machine: Machine) -> "Counts":
+        """Count a mesh, solved as it is, with the layers that get fibre."""
+        unknowns = 3.0 * len(np.unique(mesh.corners))
+        triangles = float(sum(len(layer.triangles) for layer in layers))
+        room = float(sum(layer.areas.sum() for layer in layers)) / machine.fibre_width
+        solved = 3.0 * len(mesh.points)
+        return cls(unknowns, solved, triangles, room, float(mesh.volumes.sum()))
+
+
+def counts(case: Case, layers: Sequence[Layer]) -> tuple[Counts, ...]:
+    """Count a part with the layers that get fibre, on each order of cells that it may come to."""
+    known = Counts.of(case.problem.mesh, layers, case.machine)
+    return tuple(replace(known, solved=cost.unknowns) for cost in solve_costs(case.problem))
+
+
+Coefficients = Mapping[str, Sequence[float]]
+"""Of the terms of each stage."""
+
+
+@cache
+def measured() -> dict[str, Any]:
+    """Coefficients, and what else the benchmark wrote: the pace there, and how well it tells."""
+    return tomllib.loads(COEFFICIENTS.read_text(encoding="utf-8"))
+
+
+def stage_effort(stage: str, known: Counts, coefficients: Coefficients | None = None) -> float:
+    """CPU seconds of a stage on a part, or gigabytes of memory."""
+    given = measured() if coefficients is None else coefficients
+    return float(np.dot([getattr(known, term) for term in TERMS[stage]], given[stage]))
+
+
+def planning_stage(strategy: str) -> str:
+    """Stage of planning by a strategy; those that are not measured take about as `isocurve`."""
+    return _PLANNED.get(strategy, "plan")
+
+
+def judging_stages(prints: bool, tested: bool) -> list[str]:
+    """Stages of judging a plan: with its print; untested, they are measured together."""
+    return ["judge", *["print"] * prints] if tested else ["judge untested"]
+
+
+def stages(strategies: Sequence[str], prints: bool, tested: bool = True) -> list[str]:
+    """Stages of `ccfem compare`, or of `ccfem plan --gcode` where it prints."""
+    planned = [planning_stage(strategy) for strategy in strategies]
+    judged = judging_stages(prints, tested) * len(strategies)
+    written = "write a print" if prints else "write"
+    return ["start", "solve", *planned, *judged, *["bound"] * tested, written, "report"]
+
+
+# What is said of a part.
+
+
+def pace() -> float:
+    """CPU seconds of a fixed piece of work, by which machines differ: the least of three."""
+    size = 60_000
+    matrix = sp.diags_array([np.ones(size)] * 27, offsets=range(-13, 14), shape=(size, size))
+    matrix, vector = matrix.tocsr(), np.ones(size)
+    taken = []
+    for _ in range(3):
+        start = time.process_time()
+        for _ in range(20):
+            matrix @ vector
+        total = 0
+        for k in range(600_000):
+            total += k & 3
+        taken.append(time.process_time() - start)
+    return min(taken)
+
+
+def about_effort(case: Case, layers: Sequence[Layer]) -> tuple[str, ...]:
+    """Say what commands will take on a part, a line for each order of cells that it may come to.
+
+    Nothing of a part whose layers depend on the stress.
+    """
+    if not layers:
+        return ()
+    lines, slower = [], pace() / measured()["pace"]
+    for known in counts(case, layers):
+        tested = FILLED * known.room <= LONGEST_TEST
+        planned = "plan" if tested else "untested"
+        told = []
+        for command, steps, used in (
+            ("compare", stages(STRATEGIES, prints=False), "compare"),
+            ("plan --gcode", stages(STRATEGIES[:1], True, tested), planned),
+        ):
+            seconds = slower * sum(stage_effort(stage, known) for stage in steps)
+            memory = stage_effort(f"memory of {used}", known)
+            told.append(f"{command} about {_in_words(seconds)} and {memory:.1f} GB")
+        kind = "linear" if known.solved <= known.unknowns else "quadratic"
+        lines.append(f"on {kind} cells and one processor: {', '.join(told)}")
+    compared, planned = (measured()["within"][command] for command in ("compare", "plan"))
+    return (
+        *lines,
+        f"these times, without a curve, were within a factor of 1.5 for {compared[0]} of "
+        f"{compared[1]} comparisons and {planned[0]} of {planned[1]} plans, and of "
+        f"{max(compared[2], planned[2])} for all",
+    )
+
+
+def _in_words(seconds: float) -> str:
+    return f"{seconds:.2g} s" if seconds < 100.0 else f"{seconds / 60.0:.2g} min"

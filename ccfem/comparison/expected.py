@@ -1,0 +1,104 @@
+"""Progress of a run, in shares of the time that its steps are expected to take."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from ccfem.base.progress import Progress
+from ccfem.comparison.effort import (
+    FILLED,
+    Counts,
+    counts,
+    judging_stages,
+    planning_stage,
+    stage_effort,
+)
+from ccfem.comparison.request import Request
+
+_POINTS = 5
+"""Lengths on a curve, at most."""
+
+_BREAKING = 10.0
+"""Time of a breaking load over that of judging: a guess, so that the bar moves on."""
+
+_UNKNOWN = 0.9
+"""Share of a run that is behind when its results are written, where its layers are not known."""
+
+
+@dataclass
+class Schedule:
+    """Tells progress what is done next, and the share of all expected time that is behind it.
+
+    Attributes
+    ----------
+    steps : dict of words to float, s
+        First words of each step that is expected, and its time. What else is done counts nothing.
+    behind : float, s
+        Expected time of what is done already.
+    begun : set of words
+        Steps of which the first words were said.
+    """
+
+    progress: Progress
+    steps: dict[str, float]
+    behind: float
+    begun: set[str] = field(default_factory=set)
+
+    def __call__(self, what: str) -> None:
+        """Say what is done next: what was said before is done."""
+        done = self.behind + sum(self.steps[step] for step in self.begun)
+        whole = self.behind + sum(self.steps.values())
+        self.progress(what, done / whole if whole else 0.0)
+        self.begun |= {step for step in self.steps if f"{what} ".startswith(f"{step} ")}
+
+    def expect(self, steps: Mapping[str, float]) -> None:
+        """Add steps that turned out to be needed."""
+        self.steps |= steps
+
+
+def expected_steps(request: Request, known: Mapping[str, Counts], cases: int) -> dict[str, float]:
+    """First words and seconds of the steps between solving and writing.
+
+    Parameters
+    ----------
+    known : mapping of slicing to Counts
+    cases : int
+        Load cases that are planned for.
+    """
+    steps: dict[str, float] = {}
+    for slicing, part in known.items():
+        tested = request.strand is not None and FILLED * part.room <= request.longest_test
+        judging = sum(
+            stage_effort(stage, part) for stage in judging_stages(request.print_plans, tested)
+        )
+        for name in request.strategies:
+            run = request.on_slicing(name, slicing)
+            steps[f"planning {run}"] = cases * stage_effort(planning_stage(name), part)
+            steps[f"judging {run}"] = cases * judging
+            if request.breaking_load:
+                steps[f"breaking {run}"] = _BREAKING * judging
+        if request.bound and tested and not slicing:
+            steps["bounding"] = cases * stage_effort("bound", part)
+    return steps
+
+
+def curve_steps(steps: Mapping[str, float], strategies: Iterable[str]) -> dict[str, float]:
+    """First words and seconds of the steps of a curve, by those of the comparison itself."""
+    curve: dict[str, float] = {}
+    for name in strategies:
+        planning, judging = steps[f"planning {name}"], steps[f"judging {name}"]
+        curve[f"planning the least and the most of {name}"] = 2.0 * planning
+        curve[f"planning {name} along the curve"] = _POINTS * (planning + judging)
+    return curve
+
+
+def share_before_writing(request: Request) -> float:
+    """Share of a run that is behind when its results are written, where that is known before."""
+    layers = () if request.named else request.case.known_layers(request.only_slicer)
+    if not layers:
+        return _UNKNOWN
+    part = counts(request.case, layers)[0]
+    steps = expected_steps(request, {"": part}, 1)
+    before = stage_effort("solve", part) + sum(steps.values())
+    written = "write a print" if request.print_plans else "write"
+    after = stage_effort(written, part) + stage_effort("report", part)
+    return before / (before + after)

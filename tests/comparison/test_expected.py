@@ -1,0 +1,62 @@
+"""What commands are expected to take, and the progress that is told by it."""
+
+import math
+import tomllib
+
+import pytest
+
+from benchmarks.speed import effort as benchmark
+from ccfem.body.mesh import box_mesh
+from ccfem.cases.case import Case
+from ccfem.comparison.effort import COEFFICIENTS, Counts, counts, stage_effort, stages
+from ccfem.comparison.expected import Schedule, curve_steps
+from ccfem.fem.elasticity import Force, Problem, Support
+from ccfem.fem.materials import isotropic
+from ccfem.machine import Machine
+from ccfem.slicing.slicers import Planar
+
+
+def test_a_box_is_counted():
+    mesh = box_mesh((40.0, 20.0, 10.0), (8, 4, 2))
+    loads = {"pull": (Force("x_max", (1.0, 0.0, 0.0)),)}
+    problem = Problem(mesh, isotropic(3500.0, 0.35), (Support("x_min"),), loads)
+    layers = Planar(count=3).cut(mesh)
+    machine = Machine(fibre_width=0.8)
+    linear, quadratic = counts(Case("box", "A box", problem, machine=machine), layers)
+    assert (linear.unknowns, linear.solved) == (3 * 9 * 5 * 3, 3 * 9 * 5 * 3)
+    assert quadratic.solved == 3 * len(mesh.quadratic().points)
+    assert linear.room == pytest.approx(3 * 40.0 * 20.0 / 0.8)
+    assert linear.volume == pytest.approx(8000.0)
+    assert Counts.of(mesh.quadratic(), layers, machine) == quadratic
+
+
+def test_coefficients_are_those_of_the_measurement():
+    """And tell what was measured at least as well as fits without each part did."""
+    rows, written = benchmark.lines(), tomllib.loads(COEFFICIENTS.read_text())
+    samples = benchmark.samples_of(rows)
+    for stage, found in benchmark.fitted(samples).items():
+        assert written[stage] == pytest.approx(found, rel=1e-2, abs=1e-12)
+    for command, (near, of, _) in written["within"].items():
+        own = [row for row in rows if row["command"] == command]
+        off = []
+        for row in own:
+            steps = stages(benchmark.PLANNED[command], command != "compare", command != "untested")
+            told = sum(stage_effort(step, benchmark.known_of(row)) for step in steps)
+            off.append(abs(math.log(told / sum(benchmark.seconds_of(row).values()))))
+        assert len(own) == of
+        assert sum(one <= math.log(1.5) for one in off) >= near
+
+
+def test_progress_is_the_share_of_the_time_that_is_behind():
+    """1 s is solved, 2 and 3 s are planned, 4 s judged: what was said before is done."""
+    told = []
+    steps = {"planning a": 2.0, "planning ab": 3.0, "judging a": 4.0}
+    tell = Schedule(lambda what, share: told.append((what, share)), steps, 1.0)
+    for what in ("planning ab to 5 mm", "planning a", "planning a to 5 mm", "judging a"):
+        tell(what)
+    assert [share for _, share in told] == pytest.approx([0.1, 0.4, 0.6, 0.6])
+    # A curve that turns out to be needed: 2 x 2 and 5 x (2 + 4) s more.
+    tell.expect(curve_steps(steps, ["a"]))
+    tell("planning the least and the most of a")
+    tell("planning a along the curve")
+    assert [share for _, share in told[4:]] == pytest.approx([10.0 / 44.0, 14.0 / 44.0])
