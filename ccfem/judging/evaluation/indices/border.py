@@ -8,7 +8,6 @@ import shapely
 from ccfem.base.arrays import FloatArray
 from ccfem.geometry.polylines import sample_midpoints
 from ccfem.geometry.shapes import INSIDE, section_places
-from ccfem.judging.evaluation.indices.containment import segments, to_edges
 from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, PlanePaths
 
 PLACE = 105
@@ -54,10 +53,9 @@ def sample_border(paths: PlanePaths, step: float = 1.0) -> BorderSamples:
     points, length = points[inside], length[inside]
     if not len(points):
         return BorderSamples(np.zeros(0), np.zeros(0))
-    start, end = segments(shapely.boundary(section))
-    tree = shapely.STRtree(shapely.linestrings(np.stack([start, end], axis=1)))
-    edge = tree.nearest(shapely.points(points))
-    return BorderSamples(to_edges(points, start[edge], end[edge]), length)
+    border = shapely.boundary(section)
+    shapely.prepare(border)
+    return BorderSamples(shapely.distance(border, shapely.points(points)), length)
 
 
 def sample(paths: LayerPaths) -> BorderSamples:
