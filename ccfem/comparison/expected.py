@@ -7,7 +7,6 @@ from ccfem.base.progress import Progress
 from ccfem.comparison.effort import (
     FILLED,
     Counts,
-    counts,
     judging_stages,
     planning_stage,
     stage_effort,
@@ -96,7 +95,7 @@ def share_before_writing(request: Request) -> float:
     layers = () if request.named else request.case.known_layers(request.only_slicer)
     if not layers:
         return _UNKNOWN
-    part = counts(request.case, layers)[0]
+    part = Counts.of(request.case.problem.mesh, layers, request.case.machine)
     steps = expected_steps(request, {"": part}, 1)
     before = stage_effort("solve", part) + sum(steps.values())
     written = "write a print" if request.print_plans else "write"
