@@ -40,7 +40,7 @@ from ccfem.comparison.effort import (
     stages,
 )
 from ccfem.comparison.request import STRATEGIES
-from ccfem.slicing.slicers import Planar
+from ccfem.slicing.slicers.planar import Planar
 
 MEASURED = Path(__file__).with_suffix(".csv")
 """A line a part and command: counts, gigabytes, CPU seconds of each stage."""
