@@ -82,8 +82,8 @@ def prune_and_move(
 
     Each candidate is cut, and the best one is moved: the stiffest, or with strength the one of
     highest value. Before that the stiffest takes over stretches of the others (`exchanged`), if it
-    was cut from much more fibre or for several load cases. With strength it is moved once for the
-    stiffness and once for both, and a test chooses. Parameters as in
+    was cut from much more fibre; for several load cases that gains next to nothing. With strength
+    it is moved once for the stiffness and once for both, and a test chooses. Parameters as in
     `ccfem.strategies.fibre_aware.prune.prune` and
     `ccfem.strategies.fibre_aware.strand_moves.moved`; `fold` is whether strands may fold, and
     `last` the goal on the cells of the last test, by which moved paths are taken or not.
@@ -104,7 +104,7 @@ def prune_and_move(
     judges = judges_of(goal, _ROUGH)
 
     def exchange(kept: Toolpaths, source: Toolpaths, near: Sequence[FloatArray]) -> Toolpaths:
-        if len(goal.parts) == 1 and fibre_length(source) < _MUCH * length:
+        if len(goal.parts) > 1 or fibre_length(source) < _MUCH * length:
             return kept
         cut_again = partial(cut, share=0.0)
         return exchanged(kept, candidates, goal.mesh, machine, judges[0], cut_again, near)

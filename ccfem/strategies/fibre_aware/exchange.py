@@ -28,7 +28,7 @@ _TIMES = 3
 """Exchanges at most."""
 
 _GAIN = 1e-3
-"""Share by which an exchange has to be better for another one to follow."""
+"""Share by which an exchange has to be better: less may be rounding, which turns with the part."""
 
 _FRESH = 0.08
 """Fibre that is taken from each plan, over the length of all."""
@@ -79,7 +79,7 @@ def exchanged(
     Returns
     -------
     Toolpaths
-        The given ones where nothing as long is stiffer.
+        The given ones where nothing as long is stiffer by more than a thousandth.
     """
     least = machine.shortest_strand
     length, known = fibre_length(paths), judge(paths, near)
@@ -96,12 +96,10 @@ def exchanged(
             return paths
         other = cut(Toolpaths.concatenate(taken.plans), tests=_TESTS)
         tested = judge(other, known.displacements)
-        if tested.value <= known.value or fibre_length(other) < (1.0 - 0.5 * TOLERANCE) * length:
+        better = tested.value > (1.0 + _GAIN) * known.value
+        if not better or fibre_length(other) < (1.0 - 0.5 * TOLERANCE) * length:
             return paths
-        last = tested.value < (1.0 + _GAIN) * known.value
         paths, known = other, tested
-        if last:
-            break
     return paths
 
 

@@ -62,15 +62,15 @@ def test_the_objective_least_serves_the_case_that_gains_least():
     # these bounds, tension is to gain more; measured by the part without fibre, no more than shear.
     case = read("two_load_plate", element_size=12.0)
     cases = weighted_cases(case, solve(case.problem))
-    layers = Planar(count=2).cut(cases.mesh)
+    layers = Planar(count=4).cut(cases.mesh)
     ratios = {}
     for objective in ("worst", "least"):
         strategy = create("pruned", {"objective": objective})
         paths = plan_cases(strategy, layers, cases, case.machine, 1500.0).toolpaths
         ratios[objective] = virtual_tests(paths, cases).ratios
-    assert ratios["worst"].max() > 1.25 * ratios["worst"].min()
+    assert ratios["worst"].max() > 1.4 * ratios["worst"].min()
     assert ratios["least"].min() > 1.08 * ratios["worst"].min()
-    most = upper_bound(cases, layers, 3000.0, case.machine, objective=LEAST).ratio
+    most = upper_bound(cases, layers, 6000.0, case.machine, objective=LEAST).ratio
     assert 0.9 * most < ratios["least"].min() <= most
 
 
