@@ -30,6 +30,9 @@ from ccfem.strategies.fibre_aware.heights import (
 _CAP = 60.0
 """Percentile of the stress at which isocurves lie side by side: more fibre than is kept."""
 
+_CLOSE_TO_TENSION = {"smooth": 4.0, "border": 5.0}
+"""Stripes that are cut down follow the tension more closely than those that cover a layer."""
+
 
 @dataclass(frozen=True)
 class StraightRows:
@@ -147,7 +150,7 @@ def plain_plans(
     if not curved_layers(layers):
         rings = Concentric().for_part(field, layers, machine)
         plans += [by(StraightRows("tension")), by(StraightRows("section")), by(rings)]
-    stripes = create("stripes")
+    stripes = create("stripes", _CLOSE_TO_TENSION)
     plans.append(in_all(lambda some, field: plan(stripes, some, field, machine)))
     if curves:
         isocurve = create("isocurve", {"cap": _CAP})
