@@ -58,7 +58,7 @@ def pytest_configure(config):
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "CCFEM_THREADS"):
         os.environ.setdefault(name, "1")
     gc.disable()
-    config.addinivalue_line("markers", "slow: takes ten seconds and more; run with CCFEM_SLOW=1")
+    config.addinivalue_line("markers", "slow: takes ten seconds or more; CCFEM_SLOW=1 runs it")
 
 
 def pytest_collection_modifyitems(items):

@@ -105,9 +105,7 @@ def test_a_stopped_run_leaves_no_process(tmp_path, monkeypatch, manner):
     assert run.state.code in (-signal.SIGTERM, -signal.SIGKILL)
 
 
-@pytest.mark.skipif(
-    not os.environ.get("CCFEM_SLOW"), reason="takes a minute: set CCFEM_SLOW=1 to run it"
-)
+@pytest.mark.slow
 def test_a_run_is_stopped_at_ten_moments(tmp_path):
     """Whatever it does then, reading to writing: nothing is left of it, and no results."""
     for share in np.linspace(0.0, 0.95, 10):

@@ -1,7 +1,5 @@
 """Three parts from their STEP and STL files to G-code, in a real browser, by clicks alone."""
 
-import os
-
 import pytest
 
 from benchmarks.clicking import browser_path, seconds, to_gcode, visited
@@ -39,9 +37,7 @@ def test_an_example_of_the_keystroke_level_model_takes_as_long_as_published():
     assert seconds("HPK" + "H" + "MK" + 5 * "K" + "MK", K=0.2) == pytest.approx(6.2)
 
 
-@pytest.mark.skipif(
-    not os.environ.get("CCFEM_SLOW"), reason="takes a minute: set CCFEM_SLOW=1 to run it"
-)
+@pytest.mark.slow
 @pytest.mark.parametrize("file", WANTED)
 def test_from_a_file_to_its_gcode(visit, file):
     load, bench, page = WANTED[file], visit.page.bench, visit.page
@@ -56,9 +52,7 @@ def test_from_a_file_to_its_gcode(visit, file):
     assert seconds(visit.operators) <= 180.0
 
 
-@pytest.mark.skipif(
-    not os.environ.get("CCFEM_SLOW"), reason="takes a minute: set CCFEM_SLOW=1 to run it"
-)
+@pytest.mark.slow
 def test_three_parts_are_printed_together(visit):
     """The last of them, with both others beside it, as they were set up above."""
     page = visit.page
@@ -83,9 +77,7 @@ def test_three_parts_are_printed_together(visit):
         visit.tab.get_by_role("row", name=name).wait_for(timeout=10_000)
 
 
-@pytest.mark.skipif(
-    not os.environ.get("CCFEM_SLOW"), reason="takes a minute: set CCFEM_SLOW=1 to run it"
-)
+@pytest.mark.slow
 def test_a_part_is_solved_and_its_support_taken_away(visit):
     page = visit.page
     page.act(page.open, "results/l_bracket.toml").result()
