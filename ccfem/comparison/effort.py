@@ -161,16 +161,16 @@ def about_effort(case: Case, layers: Sequence[Layer]) -> tuple[str, ...]:
     for known in counts(case, layers):
         tested = FILLED * known.room <= LONGEST_TEST
         planned = "plan" if tested else "untested"
-        told = []
+        expected = []
         for command, steps, used in (
             ("compare", stages(STRATEGIES, prints=False), "compare"),
             ("plan --gcode", stages(STRATEGIES[:1], True, tested), planned),
         ):
             seconds = slower * sum(stage_effort(stage, known) for stage in steps)
             memory = stage_effort(f"memory of {used}", known)
-            told.append(f"{command} about {_in_words(seconds)} and {memory:.1f} GB")
+            expected.append(f"{command} about {_in_words(seconds)} and {memory:.1f} GB")
         kind = "linear" if known.solved <= known.unknowns else "quadratic"
-        lines.append(f"on {kind} cells and one processor: {', '.join(told)}")
+        lines.append(f"on {kind} cells and one processor: {', '.join(expected)}")
     compared, planned = (measured()["within"][command] for command in ("compare", "plan"))
     return (
         *lines,
