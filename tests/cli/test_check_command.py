@@ -27,7 +27,9 @@ def test_check_and_solve_say_what_quadratic_cells_cost(ccfem, tmp_path):
     (tmp_path / "linear.toml").write_text(f"order = 1\n{bent}")
     code, out, _ = ccfem("check", "bent.toml")
     (said,) = [line for line in out.splitlines() if line.startswith("remark: solved on quadratic")]
-    assert re.search(r"[\d,]+ unknowns, about 1 s and 0.4 GB, for linear ones leave an est", said)
+    assert re.search(
+        r"[\d,]+ unknowns, about 1 s and 0.4 GB, because linear ones leave an est", said
+    )
     solved, _, err = ccfem("solve", "bent.toml", "--out", "bent.vtu")
     assert (code, solved) == (0, 0)
     assert said.removeprefix("remark: solved ") in err

@@ -66,4 +66,4 @@ def _cost(order: int, nodes: int) -> Cost:
 
 def about_quadratic(problem: Problem, why: str) -> str:
     """Say what the quadratic cells that "auto" takes cost, why, and how linear ones are kept."""
-    return f"{solve_costs(problem)[-1].about}, for {why} (order = 1 keeps these)"
+    return f"{solve_costs(problem)[-1].about}, because {why} (order = 1 keeps these)"
