@@ -17,6 +17,7 @@ from ccfem.cli.machines import MachineName, SetMachine
 from ccfem.cli.part_choices import SetPlastic
 
 if TYPE_CHECKING:
+    from ccfem.cases.case import Case
     from ccfem.comparison.request import Request
 
 _EACH = "once for all parts, or once for each in their order"
@@ -79,29 +80,17 @@ def bed(
     from ccfem.cli.screen import print_bed
     from ccfem.comparison.bed_files import BED_FILES, write_bed
     from ccfem.comparison.bed_print import needs_support, print_together
-    from ccfem.comparison.request import DEFAULT_STRAND, LONGEST_TEST, Request, named_strategies
     from ccfem.printing.course import Course
 
     where = out or Path("results") / "bed"
 
     def ask() -> "list[Request]":
         given = (strategy or ["stream_function"], layers, turn, centre, copies)
-        parameters = parameters_by_strategy(set_ or ())
-        requests = []
+        parameters, requests = parameters_by_strategy(set_ or ()), []
         for part, number in _counted(parts, *given).items():
             table = bed_table_of(part.turn and [part.turn], part.centre, number)
             case = load(part.case, None, False, machine, set_machine, None, table, set_plastic)
-            own = {name: values for name, values in parameters.items() if name == part.strategy}
-            request = Request.of(
-                case,
-                named_strategies(case, (part.strategy,), own),
-                part.layers,
-                natural=True,
-                strand=DEFAULT_STRAND if virtual_test is not False else None,
-                backend=backend,
-                print_plans=True,
-                longest_test=LONGEST_TEST if virtual_test is None else float("inf"),
-            )
+            request = _request(part, case, parameters, virtual_test, backend)
             requests.append(replace(request, support=support and needs_support(request)))
         return requests
 
@@ -128,6 +117,29 @@ class _Part(NamedTuple):
     layers: int | None
     turn: str | None
     centre: str | None
+
+
+def _request(
+    part: _Part,
+    case: "Case",
+    parameters: dict[str, dict[str, Any]],
+    test: bool | None,
+    backend: str,
+) -> "Request":
+    """Ask for one part with its natural amount of fibre; short tests unless they are named."""
+    from ccfem.comparison.request import DEFAULT_STRAND, LONGEST_TEST, Request, named_strategies
+
+    own = {name: values for name, values in parameters.items() if name == part.strategy}
+    return Request.of(
+        case,
+        named_strategies(case, (part.strategy,), own),
+        part.layers,
+        natural=True,
+        strand=DEFAULT_STRAND if test is not False else None,
+        backend=backend,
+        print_plans=True,
+        longest_test=LONGEST_TEST if test is None else float("inf"),
+    )
 
 
 def _counted(parts: Sequence[str], *given: Sequence[Any] | None) -> dict[_Part, str | None]:

@@ -205,12 +205,7 @@ def curved_plan(
     paths = replace(paths, points=points)
     axes, tops = poses(normals, _UP, machine), islands.tops @ frame.T - shift
     source = np.array([islands.layer[step[0]] for step, _, _ in steps])
-    level = replace(paths, layer=source[paths.layer])
-    before = touched_length(level, axes, Matter.of(tops, islands.layer[islands.owner]), machine)
-    when = np.full(len(islands), -1)
-    for number, (step, _, _) in enumerate(steps):
-        when[step] = number
-    leaned = cleared(paths, axes, Matter.of(tops, when[islands.owner]), machine)
+    before, leaned = _contact(paths, axes, tops, islands, [step for step, _, _ in steps], machine)
     upright = machine.kinematics.kind == "three_axes"
     owner = np.repeat(paths.layer, np.diff(paths.offsets))
     return PrintPlan(
@@ -227,6 +222,24 @@ def curved_plan(
             *_said(before, leaned.before, leaned.after, leaned.place),
         ),
     )
+
+
+def _contact(
+    paths: Toolpaths,
+    axes: FloatArray,
+    tops: FloatArray,
+    islands: Islands,
+    steps: Sequence[IntArray],
+    machine: Machine,
+) -> tuple[float, "Cleared"]:
+    """Length along which the head would touch layer by layer, and axes that clear these steps."""
+    source = np.array([islands.layer[step[0]] for step in steps])
+    level = replace(paths, layer=source[paths.layer])
+    before = touched_length(level, axes, Matter.of(tops, islands.layer[islands.owner]), machine)
+    when = np.full(len(islands), -1)
+    for number, step in enumerate(steps):
+        when[step] = number
+    return before, cleared(paths, axes, Matter.of(tops, when[islands.owner]), machine)
 
 
 def _steps(

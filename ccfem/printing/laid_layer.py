@@ -111,22 +111,15 @@ def with_flow(
     level = np.full(len(points), -1)
     level[start] = np.round(wanted / (_STEP * height)).astype(np.int64)
     level[way] = -2
-    keep = _begins_level(level, segment)
-    kept = np.flatnonzero(keep)
-    run = (np.cumsum(keep) - 1)[start]
-    long = np.bincount(run, length, len(kept))
-    share = np.bincount(run, wanted * length, len(kept)) / np.maximum(long, 1e-300)
+    kept, share, long = _in_runs(_begins_level(level, segment), start, wanted, length)
     if machine.gcode.compact:
         share = share.round(6)  # equal heights are exactly equal
     line = np.searchsorted(np.searchsorted(kept, offsets), np.arange(len(kept)), "right") - 1
     if shares is not None:
         share *= shares[line]
     scaled = np.ones(len(kept), dtype=bool) if sparse is None else ~sparse[line]
-    inside = shapely.length(shapely.intersection(strings(strands), section))
-    room = section.area * (height + below) - float(inside @ np.asarray(sections))
-    if sparse is not None and sparse.any():
-        overlap = _ends_inside(paths.select(sparse), section)
-        room -= machine.matrix_width * (height + below) * overlap
+    ends = None if sparse is None or not sparse.any() else paths.select(sparse)
+    room = _room(section, height + below, strands, sections, ends, machine)
     scale = room / (machine.matrix_width * (share * long)[scaled].sum())
     share[scaled] *= np.clip(scale, 1.0 / _SCALE, _SCALE)
     # No line thinner than the machine prints; those in gaps are narrower instead.
@@ -140,6 +133,33 @@ def with_flow(
         link=way[kept],
     )
     return fewer, share, warning
+
+
+def _in_runs(
+    keep: BoolArray, start: IntArray, wanted: FloatArray, length: FloatArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Points at which runs begin, and the mean of a height over each run, with its length."""
+    kept = np.flatnonzero(keep)
+    run = (np.cumsum(keep) - 1)[start]
+    long = np.bincount(run, length, len(kept))
+    mean = np.bincount(run, wanted * length, len(kept)) / np.maximum(long, 1e-300)
+    return kept, mean, long
+
+
+def _room(
+    section: Region,
+    height: float,
+    strands: Sequence[FloatArray],
+    sections: Sequence[float],
+    sparse: Toolpaths | None,
+    machine: Machine,
+) -> float:
+    """Volume, mm^3, that strands and the ends of sparse infill leave to the lines of a layer."""
+    inside = shapely.length(shapely.intersection(strings(strands), section))
+    room = section.area * height - float(inside @ np.asarray(sections))
+    if sparse is not None:
+        room -= machine.matrix_width * height * _ends_inside(sparse, section)
+    return room
 
 
 def _begins_level(level: IntArray, segment: IntArray) -> BoolArray:
