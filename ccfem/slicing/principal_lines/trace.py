@@ -15,6 +15,9 @@ from ccfem.fem.elasticity import cell_gradients
 
 LONGEST = 100.0
 """Longest half of a line, in mean edge lengths (Fang et al. 2024, section 2.2)."""
+_STEEP = 0.37
+"""Share of the steepest slope from which a corner decides a line's sense. Cells of regular meshes
+have slopes in simple ratios, so any value that is none of them serves."""
 _MOST = 2000
 """Cells that a half of a line crosses at most."""
 
@@ -93,12 +96,17 @@ class Tracer:
     def _field(self) -> "_Field":
         """The field as the walk reads it."""
         mesh, order = self.mesh, self._order
-        across = mesh.across[order]
+        across, gradient = mesh.across[order], cell_gradients(mesh)[order]
+        # Of two halves that meet, the first walked goes on: its sense follows the cell's corners,
+        # so that it turns with the part. An eigenvector's sign does not.
+        slope = np.einsum("mcd,md->mc", gradient, self.direction[order])
+        steep = np.abs(slope) > _STEEP * np.abs(slope).max(axis=1, keepdims=True)
+        decides = np.take_along_axis(slope, steep.argmax(axis=1)[:, None], axis=1)
         return _Field(
-            self.direction[order],
+            self.direction[order] * np.where(decides < 0.0, -1.0, 1.0),
             np.where(across >= 0, self._place_of_cell[across], -1),
             mesh.points[mesh.corners[order]].mean(axis=1),
-            cell_gradients(mesh)[order],
+            gradient,
             float(self.longest),
         )
 
