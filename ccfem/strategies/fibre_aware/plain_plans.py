@@ -33,6 +33,9 @@ _CAP = 60.0
 _CLOSE_TO_TENSION = {"smooth": 4.0, "border": 5.0}
 """Stripes that are cut down follow the tension more closely than those that cover a layer."""
 
+_ALIKE = 1e-6
+"""Share by which sizes, and angle by which directions, count as equal."""
+
 
 @dataclass(frozen=True)
 class StraightRows:
@@ -57,7 +60,9 @@ class StraightRows:
         size = layer.areas * np.where(tension.defined, tension.stress, 0.0)
         if not size.any() or room.is_empty:
             return Toolpaths.empty()
-        along = _longer_side(section) if self.along == "section" else _mean(tension, size)
+        along = _mean(tension, size)
+        if self.along == "section":
+            along = _longer_side(section, along)
         across = np.array([-along[1], along[0]])
         corners = shapely.get_coordinates(room)
         low, high = (corners @ across).min(), (corners @ across).max()
@@ -80,12 +85,23 @@ def _mean(tension: Tension, size: FloatArray) -> FloatArray:
     return np.array([np.cos(angle), np.sin(angle)])
 
 
-def _longer_side(section: Region) -> FloatArray:
-    """Return the direction (2,) of the longer side of the smallest rectangle round a section."""
-    corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(section))
-    sides = np.diff(corners, axis=0)[:2]
-    size = np.linalg.norm(sides, axis=1)
-    longest: FloatArray = (sides / size[:, None])[int(np.argmax(size))]
+def _longer_side(section: Region, near: FloatArray) -> FloatArray:
+    """Return the direction (2,) of the longer side of the smallest rectangle round a section.
+
+    Of rectangles as small as that, as round a section that is its own mirror image, the one whose
+    side is nearest to a direction counts, so that rounding does not decide.
+    """
+    corners = shapely.get_coordinates(section.convex_hull)
+    edges = np.diff(corners, axis=0)
+    sides = edges / np.linalg.norm(edges, axis=1)[:, None]
+    sides = np.concatenate([sides, np.stack([-sides[:, 1], sides[:, 0]], axis=1)])
+    long = np.ptp(sides @ corners.T, axis=1)
+    wide = np.roll(long, len(edges))
+    least = (long * wide <= (long * wide).min() * (1.0 + _ALIKE)) & (long >= wide * (1.0 - _ALIKE))
+    sides = sides[least]
+    angle = np.arctan(sides @ [-near[1], near[0]] / (sides @ near))
+    alike = np.flatnonzero(np.abs(angle) <= np.abs(angle).min() + _ALIKE)
+    longest: FloatArray = sides[alike[np.argmax(angle[alike])]]
     return longest
 
 

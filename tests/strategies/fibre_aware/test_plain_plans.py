@@ -1,6 +1,8 @@
 """Rows, contours and isocurves that cost little: planned once for layers that are alike."""
 
 import numpy as np
+import pytest
+import shapely
 
 from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity.problem import Force, Problem, Support
@@ -9,7 +11,7 @@ from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.fem.materials import isotropic
 from ccfem.machine.machine import Machine
 from ccfem.slicing.slicers.planar import Planar
-from ccfem.strategies.fibre_aware.plain_plans import plain_plans
+from ccfem.strategies.fibre_aware.plain_plans import _longer_side, plain_plans
 
 MACHINE = Machine(minimum_length=15.0)
 
@@ -54,3 +56,25 @@ def test_each_layer_is_planned_for_its_own_load_case():
     for layer, case in zip(layers, (0, 1, 0, 1), strict=True):
         expected = in_plane(alone[case], layer)
         np.testing.assert_allclose(in_plane(paths, layer), expected, atol=0.02)
+
+
+@pytest.mark.parametrize("rectangle", [False, True])
+def test_the_longer_side_of_a_section_turns_with_it(rectangle):
+    """Two rectangles round an ellipse are smallest, one the other's mirror image.
+
+    Round a polygon of 48 points on it they lie along the edges nearest to the longer axis.
+    """
+    angles = 2.0 * np.pi * np.arange(48) / 48
+    points = np.stack([38.0 * np.cos(angles), 28.0 * np.sin(angles)], axis=1)
+    if rectangle:
+        points = shapely.get_coordinates(shapely.box(-38.0, -28.0, 38.0, 28.0))[:-1]
+    tension = np.array([np.cos(0.3), np.sin(0.3)])
+    for turn in np.radians(np.arange(0.0, 360.0, 7.0)):
+        turned = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+        along = _longer_side(shapely.Polygon(points @ turned), tension @ turned) @ turned.T
+        if rectangle:
+            np.testing.assert_allclose(np.abs(along), [1.0, 0.0], atol=1e-9)
+        else:
+            # Of the chords at the end of the shorter axis that which rises with the tension.
+            exact = points[12] - points[13]
+            np.testing.assert_allclose(along / along[0], exact / exact[0], atol=1e-9)
