@@ -107,13 +107,11 @@ def test_evaluator_accepts_the_paths(name):
 
 @pytest.mark.parametrize("name", CURVED)
 def test_neither_the_load_nor_another_run_changes_the_paths(name):
-    stress, layers = part()
+    """A load of a power of two scales all that is computed without rounding."""
+    stress, layers = part(load=2.0**-10)
     again = plan(create(name, QUICK.get(name)), layers, stress, MACHINE)
+    np.testing.assert_array_equal(again.offsets, paths_of(name).offsets)
     np.testing.assert_array_equal(again.points, paths_of(name).points)
-    stress, layers = part(load=1e-3)
-    scaled = plan(create(name, QUICK.get(name)), layers, stress, MACHINE)
-    np.testing.assert_array_equal(scaled.offsets, paths_of(name).offsets)
-    np.testing.assert_allclose(scaled.points, paths_of(name).points, atol=1e-3)
 
 
 @pytest.mark.parametrize("name", FREE)
