@@ -57,6 +57,8 @@ def pytest_configure(config):
     """
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "CCFEM_THREADS"):
         os.environ.setdefault(name, "1")
+    # Programs that tests start share what Python compiled, also where it is not to be kept.
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     gc.disable()
     config.addinivalue_line("markers", "slow: takes ten seconds or more; CCFEM_SLOW=1 runs it")
 
