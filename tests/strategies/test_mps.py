@@ -338,23 +338,27 @@ def test_mps_under_mirrored_tension_is_mirrored():
     assert laid.symmetric_difference(mirrored).area < 0.01 * section.area
 
 
-@pytest.mark.parametrize("shells", [0, 1])
-def test_guides_that_circle_a_hole_go_round_once(shells):
-    """Streamlines round the loop never quite close: of each turn but one no strand is laid."""
+@pytest.fixture(scope="module")
+def loop():
+    """The loop, the stress on it, and one layer."""
     case = create_case("loop", element_size=6.0)
     stress = solve(case.problem)["pull"]
-    layers = Planar(count=1).cut(case.problem.mesh, case.build)
+    return case, stress, Planar(count=1).cut(case.problem.mesh, case.build)
+
+
+@pytest.mark.parametrize("shells", [0, 1])
+def test_guides_that_circle_a_hole_go_round_once(loop, shells):
+    """Streamlines round the loop never quite close: of each turn but one no strand is laid."""
+    case, stress, layers = loop
     paths = plan_part(create("mps", {"shells": shells}), layers, stress, case.machine)
     total = evaluate(paths, layers, stress, case.machine).total
     assert total["spacing_below"] < 0.1
     assert total["on_fibre"] < 0.02
 
 
-def test_halves_of_the_loop_get_the_same_fibre():
+def test_halves_of_the_loop_get_the_same_fibre(loop):
     """Part and load are symmetric about x = 0; the mesh is not, nor is the place of a seed."""
-    case = create_case("loop", element_size=4.0)
-    stress = solve(case.problem)["pull"]
-    layers = Planar(count=1).cut(case.problem.mesh, case.build)
+    case, stress, layers = loop
     points = np.concatenate(list(plan_part(create("mps"), layers, stress, case.machine)))
     lugs = points[np.abs(points[:, 1]) > 50.0]
     assert (lugs[:, 0] > 0.0).mean() == pytest.approx(0.5, abs=0.05)
