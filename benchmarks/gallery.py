@@ -14,7 +14,7 @@ import ccfem
 from benchmarks.studies.confirmed_gain import LAYERS, posed
 from ccfem.base.errors import InputError
 from ccfem.cases import named_cases
-from ccfem.comparison.fibre_front import fibre_front
+from ccfem.comparison.front_plans import fibre_front
 from ccfem.comparison.plot.canvas import png
 from ccfem.comparison.plot.fields import tension_picture
 from ccfem.comparison.plot.part_picture import part_picture

@@ -23,8 +23,8 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from ccfem.base import display
+from ccfem.base.lazy_modules import imported
 from ccfem.base.moved import MOVED, find_moved
-from ccfem.base.submodules import imported
 
 if TYPE_CHECKING:
     from ccfem.cases.case import Case

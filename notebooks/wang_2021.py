@@ -30,7 +30,7 @@ from ccfem.judging.evaluation.indices.matching import THRESHOLDS, matching_rate
 from ccfem.judging.evaluation.layer_paths import plane_paths
 from ccfem.judging.virtual_testing.equilibrium import BONDED
 from ccfem.judging.virtual_testing.strand import RHO, Strand
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.paths.planning import plan
 from ccfem.strategies import create

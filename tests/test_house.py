@@ -1,6 +1,8 @@
 """The house: no import circle, a room stands above all that it imports, few and short files."""
 
 import ast
+import importlib
+import inspect
 import re
 from collections import defaultdict
 from functools import cache
@@ -12,7 +14,6 @@ PACKAGE = ROOT / "ccfem"
 
 TWICE = {
     "problem": "in space and in the plane",
-    "solve": "in space and in the plane",
 }
 """Names of modules that occur twice, since they are the same idea for two kinds of thing."""
 
@@ -132,6 +133,17 @@ def test_no_name_twice_for_two_ideas():
     assert {stem for stem, those in named.items() if len(those) > 1} == set(TWICE)
 
 
+def test_no_module_is_hidden_by_a_function_of_its_name():
+    """``ccfem.fem.elasticity.solve`` is a function: no one would find a module of that name."""
+    for name, path in modules().items():
+        if path.stem == "__init__":
+            face = importlib.import_module(name)
+            inside = {module.removeprefix(f"{name}.") for module in modules()}
+            known = inside & {*vars(face), *getattr(face, "__all__", ())}
+            hidden = {stem for stem in known if not inspect.ismodule(getattr(face, stem))}
+            assert not hidden, name
+
+
 def test_only_pickles_of_processes_of_its_own_are_read():
     """What comes through pipes of its own, or from the cluster named; nothing from a folder."""
     loading = {"pickle", "cloudpickle", "dill", "joblib", "shelve", "marshal"}
@@ -249,10 +261,10 @@ CLOCKS = {
     "ccfem.comparison.effort",
     "ccfem.comparison.files",
     "ccfem.comparison.stages",
-    "ccfem.fem.elasticity.solve",
+    "ccfem.fem.elasticity.statics",
     "ccfem.base.progress",
     "ccfem.comparison.studies.running",
-    "ccfem.judging.virtual_testing.virtual_test",
+    "ccfem.judging.virtual_testing.stiffness_test",
 }
 """Modules that read a clock: to record the seconds of a stage, or to say how long it will take."""
 

@@ -17,10 +17,10 @@ from time import process_time
 
 from benchmarks.studies.table import with_strategies
 from ccfem.base.toml import assignment
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strands import cut_strands
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine.machine import Machine
 from ccfem.papers.chen_2021.loop import LAYERS_TABLE_2, authors_loop
 from ccfem.papers.chen_2021.virtual_test import authors_paths

@@ -23,10 +23,10 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.body.meshing import extrude
 from ccfem.cases.bodies import loop_mesh
 from ccfem.fem.elasticity.problem import Force, Problem, Support
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.materials import printed_pla
 from ccfem.judging.virtual_testing.specimen import Specimen
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.equal_fibre import plan_to_length
 from ccfem.paths.planning.strategy import full_length

@@ -10,7 +10,7 @@ import sys
 from dataclasses import replace
 
 from ccfem.cases import create_case
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.machine import Kinematics
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.curved_plan import curved_plan

@@ -18,8 +18,8 @@ from ccfem.cases import create_case
 from ccfem.fem.elasticity import solve
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strength import first_failure
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine
 from ccfem.paths.planning.equal_fibre import plan_to_length
 from ccfem.slicing.layers import Layer

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from benchmarks.studies.strand_losses import posed
 from benchmarks.studies.table import print_table
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.paths.planning.equal_fibre import plan_to_length
 from ccfem.paths.planning.strategy import full_length
 from ccfem.strategies.stream_function import StreamFunction

@@ -13,9 +13,9 @@ from pathlib import Path
 
 from benchmarks.studies.confirmed_gain import COVERAGE, LAYERS, PARTS, posed
 from benchmarks.studies.table import print_table
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strand import Strand
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.equal_fibre import plan_to_length
 from ccfem.paths.planning.strategy import full_length

@@ -44,7 +44,7 @@ from ccfem.fem.elasticity import (
 )
 from ccfem.fem.elasticity.assembly import cell_gradients
 from ccfem.fem.elasticity.held import Held
-from ccfem.fem.elasticity.solve import EXPECTED, find_contact, solve
+from ccfem.fem.elasticity.statics import EXPECTED, find_contact, solve
 from ccfem.fem.materials import isotropic
 from ccfem.paths.fields import scalar
 from ccfem.paths.planning import plan

@@ -37,8 +37,8 @@ from ccfem.comparison import compare
 from ccfem.fem.elasticity import Bearing, Force, Problem, Support, solve
 from ccfem.fem.materials import printed_pla
 from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.stiffness_test import virtual_bracket
 from ccfem.judging.virtual_testing.strands import cut_strands
-from ccfem.judging.virtual_testing.virtual_test import virtual_bracket
 
 __all__ = ["PARTS", "Part", "changes", "meshed", "ratios"]
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from benchmarks.studies.table import with_strategies
 from ccfem.cases import create_case
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.judging.virtual_testing.several_cases import cases_failure, virtual_tests
 from ccfem.paths.planning.equal_fibre import plan_to_length

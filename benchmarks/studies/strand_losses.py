@@ -20,8 +20,8 @@ from benchmarks.studies import confirmed_gain
 from ccfem.base.arrays import FloatArray
 from ccfem.base.tensor import largest_in_plane
 from ccfem.fem.elasticity.stress_field import StressField, solved
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strand import Strand
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine.machine import Machine
 from ccfem.papers.chen_2021.loop import authors_loop
 from ccfem.paths.fields.tensile import Tension

@@ -18,10 +18,10 @@ from benchmarks.studies.confirmed_gain import LAYERS, PARTS, posed
 from benchmarks.studies.table import print_table
 from ccfem.base.errors import InputError
 from ccfem.cases import create_case
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.judging.evaluation import evaluate
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning import plan
 from ccfem.slicing.slicers.planar import Planar

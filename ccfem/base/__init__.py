@@ -1,6 +1,6 @@
 """What every wing stands on: arrays, tensors, checks, errors, files written whole."""
 
-from ccfem.base.submodules import submodules
+from ccfem.base.lazy_modules import submodules
 
 __all__: list[str] = []
 

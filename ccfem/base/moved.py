@@ -11,16 +11,21 @@ from types import ModuleType
 from typing import Any
 
 _LINES = Path(__file__).with_name("moved.txt").read_text(encoding="utf-8").splitlines()[1:]
-MOVED = {old: new for new, *names in map(str.split, _LINES) for old in names}
+_NAMES = {old: new for new, *names in map(str.split, _LINES) for old in names}
+MOVED = {old: new for old, new in _NAMES.items() if not old.endswith("!")}
 """New name of each package and module by its old one, both below ``ccfem``."""
 
 GONE = {
+    old.rstrip("!"): f"use ccfem.{new}, for a function of its package has the old name"
+    for old, new in _NAMES.items()
+    if old.endswith("!")
+} | {
     "papers.layer_traction": (
         "use ccfem.judging.virtual_testing.failure_laws.interlayer.layer_traction, which returns "
         "the averaged stress too: opening, sliding, tensor"
     )
 }
-"""What replaces modules whose functions changed when they moved."""
+"""What replaces modules that are found under no other name."""
 
 
 class _Finder(MetaPathFinder):

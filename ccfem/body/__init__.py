@@ -1,6 +1,6 @@
 """From a file to tetrahedra with named patches."""
 
-from ccfem.base.submodules import submodules
+from ccfem.base.lazy_modules import submodules
 
 __all__: list[str] = []
 

@@ -15,8 +15,8 @@ from ccfem.comparison.plot.canvas import check_picture, save
 from ccfem.comparison.plot.part_picture import part_page, part_picture
 from ccfem.fem.elasticity.plausibility import MOST_CELLS, why_quadratic
 from ccfem.fem.elasticity.problem import Problem
-from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.solve_cost import about_quadratic, solve_costs
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.judging.virtual_testing.pinned_joints import about_pins
 from ccfem.printing.build_directions import better_direction

@@ -77,7 +77,7 @@ def support(
     from ccfem.base.whole import check_writable, whole_file
     from ccfem.body.files.surface import write_stl
     from ccfem.cli.run import layers_of, load
-    from ccfem.fem.elasticity.solve import solve
+    from ccfem.fem.elasticity.statics import solve
     from ccfem.printing.export.vtk import write_paths
     from ccfem.printing.support import slice_with_support, support_paths
     from ccfem.slicing.layers.layer import plane_frame

@@ -121,7 +121,7 @@ def front(
     from ccfem.base.progress import progress_bar
     from ccfem.base.result_folder import whole_folder
     from ccfem.cli.run import load
-    from ccfem.comparison.fibre_front import front_of
+    from ccfem.comparison.front_plans import front_of
     from ccfem.comparison.request import Request, named_strategies
 
     parameters = parameters_by_strategy(set_ or (), strategy)

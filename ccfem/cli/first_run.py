@@ -72,7 +72,7 @@ def rehearse() -> None:
     from ccfem.fem.materials import printed_pla
     from ccfem.judging.evaluation import evaluate
     from ccfem.judging.evaluation.strand_rules import strand_verdict
-    from ccfem.paths.planning.plan import plan
+    from ccfem.paths.planning.layer_plans import plan
     from ccfem.slicing.slicers.planar import Planar
     from ccfem.strategies import create
     from ccfem.strategies.stream_function import StreamFunction

@@ -108,7 +108,7 @@ def _refuse_body(name: str) -> None:
 
 def _refined(case: "Case") -> "Case":
     """Case on cells that are fine enough by the estimated error; a finding says how many."""
-    from ccfem.fem.elasticity.solve import refine
+    from ccfem.fem.elasticity.statics import refine
 
     problem = refine(case.problem)
     before, after = (len(solved.mesh.cells) for solved in (case.problem, problem))

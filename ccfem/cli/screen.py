@@ -24,7 +24,7 @@ from ccfem.comparison.runs import Printed
 from ccfem.comparison.shown import file_stem
 from ccfem.comparison.table import FIRST_REMARKS, Cell, Row, Table as Values, load_cases_table
 from ccfem.fem.elasticity.stress_field import StressField, about_cells
-from ccfem.judging.virtual_testing.virtual_test import HONEST_PROMISE, IN_SHORT
+from ccfem.judging.virtual_testing.stiffness_test import HONEST_PROMISE, IN_SHORT
 from ccfem.printing.export.gcode import clock
 
 Item = typing.TypeVar("Item")

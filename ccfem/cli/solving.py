@@ -7,7 +7,7 @@ from ccfem.base.progress import progress_bar
 from ccfem.base.whole import check_writable
 from ccfem.cases.case import Case
 from ccfem.cli.screen import print_solution
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.printing.export.vtu_result import result_path, write_result
 
 

@@ -1,10 +1,10 @@
 """Comparison of strategies on one part: runs, ranking, pictures, report and files."""
 
-from ccfem.base.submodules import submodules
+from ccfem.base.lazy_modules import submodules
 from ccfem.comparison.citations import bibtex, cited
 from ccfem.comparison.engine import answer, compare
-from ccfem.comparison.fibre_front import fibre_front
 from ccfem.comparison.files import save
+from ccfem.comparison.front_plans import fibre_front
 from ccfem.comparison.front_points import FibreFront
 from ccfem.comparison.request import Request
 from ccfem.comparison.result import Comparison

@@ -61,7 +61,7 @@ from ccfem.comparison.stages import (
 )
 from ccfem.fem.elasticity.plausibility import on_quadratic
 from ccfem.fem.elasticity.problem import Problem
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.elasticity.stress_field import GivenStress, PartStress, StressField, WeightedCases
 from ccfem.judging.virtual_testing.progressive_failure import BreakingLoad, breaking_load
 from ccfem.judging.virtual_testing.several_cases import specimens

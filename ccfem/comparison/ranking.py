@@ -8,7 +8,7 @@ from ccfem.comparison.headline import HEADLINE, TEST_COLUMNS, cell_text, headlin
 from ccfem.comparison.request import InAll, Wanted
 from ccfem.comparison.runs import Run
 from ccfem.judging.virtual_testing.equilibrium import IN_COMPRESSION, PARTIAL, TENSION
-from ccfem.judging.virtual_testing.virtual_test import FIRST, RESOLUTION, SAME, SECOND, UNDECIDED
+from ccfem.judging.virtual_testing.stiffness_test import FIRST, RESOLUTION, SAME, SECOND, UNDECIDED
 from ccfem.paths.planning.equal_fibre import TOLERANCE
 
 _SAME = TOLERANCE * (1.0 + 1e-9)

@@ -25,7 +25,7 @@ from ccfem.judging.evaluation.layer_paths import plane_paths
 from ccfem.judging.evaluation.open_places import open_places
 from ccfem.judging.virtual_testing.equilibrium import BONDED
 from ccfem.judging.virtual_testing.pinned_joints import said_of_pins
-from ccfem.judging.virtual_testing.virtual_test import RESOLUTION, SAME, UNDECIDED
+from ccfem.judging.virtual_testing.stiffness_test import RESOLUTION, SAME, UNDECIDED
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.upper_bound import LEAST, LOOSE, UpperBound
 

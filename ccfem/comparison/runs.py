@@ -13,8 +13,8 @@ from ccfem.judging.evaluation.strand_rules import StrandVerdict
 from ccfem.judging.virtual_testing.pinned_joints import PinnedJoint
 from ccfem.judging.virtual_testing.progressive_failure import BreakingLoad
 from ccfem.judging.virtual_testing.scatter import RatioScatter
+from ccfem.judging.virtual_testing.stiffness_test import Bracket
 from ccfem.judging.virtual_testing.strength import FirstFailure
-from ccfem.judging.virtual_testing.virtual_test import Bracket
 from ccfem.paths.planning.strategy import Strategy
 from ccfem.paths.splitting.printed_strands import PrintedStrands
 from ccfem.paths.toolpaths import Toolpaths

@@ -18,10 +18,10 @@ from ccfem.judging.virtual_testing.pinned_joints import pinned_joints, pins_not_
 from ccfem.judging.virtual_testing.progressive_failure import breaking_load
 from ccfem.judging.virtual_testing.scatter import DEFAULT_SCATTER, Scatter, ratio_scatter
 from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.stiffness_test import virtual_bracket
 from ccfem.judging.virtual_testing.strand import Limits, Strand
 from ccfem.judging.virtual_testing.strands import Strands, carrying_strands
 from ccfem.judging.virtual_testing.strength import first_failure, matrix_peak
-from ccfem.judging.virtual_testing.virtual_test import virtual_bracket
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.equal_fibre import (
     TOLERANCE,
@@ -31,7 +31,7 @@ from ccfem.paths.planning.equal_fibre import (
     sampled_length,
 )
 from ccfem.paths.planning.given_paths import GivenPaths, pattern_that_folds
-from ccfem.paths.planning.plan import plan
+from ccfem.paths.planning.layer_plans import plan
 from ccfem.paths.planning.strategy import LengthStrategy, Planned
 from ccfem.paths.plastic.plastic import SOLID, Plastic
 from ccfem.paths.splitting.printed_strands import printed_strands

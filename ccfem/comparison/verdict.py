@@ -21,7 +21,7 @@ from ccfem.comparison.ranking import (
 from ccfem.comparison.request import InAll, Wanted
 from ccfem.comparison.runs import Run
 from ccfem.judging.virtual_testing.equilibrium import PARTIAL, TENSION
-from ccfem.judging.virtual_testing.virtual_test import FIRST, RESOLUTION, SAME
+from ccfem.judging.virtual_testing.stiffness_test import FIRST, RESOLUTION, SAME
 
 
 def verdict(runs: Sequence[Run], wanted: Wanted) -> str:

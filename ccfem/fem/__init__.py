@@ -1,6 +1,6 @@
 """Finite elements: materials, elasticity, plates, topology optimisation."""
 
-from ccfem.base.submodules import submodules
+from ccfem.base.lazy_modules import submodules
 
 __all__: list[str] = []
 

@@ -1,6 +1,6 @@
 """Geometry of polylines, isocontours, offsets and hatches in the plane."""
 
-from ccfem.base.submodules import submodules
+from ccfem.base.lazy_modules import submodules
 
 __all__: list[str] = []
 

@@ -1,6 +1,6 @@
 """Indices of paths, and the virtual test of the part that holds them."""
 
-from ccfem.base.submodules import submodules
+from ccfem.base.lazy_modules import submodules
 
 __all__: list[str] = []
 

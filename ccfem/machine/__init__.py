@@ -1,6 +1,6 @@
 """The printer: its limits for paths, how it prints, and the G-code that its firmware expects."""
 
-from ccfem.base.submodules import submodules
+from ccfem.base.lazy_modules import submodules
 from ccfem.machine.gcode_profile import FeedAxes, GcodeProfile
 from ccfem.machine.kinematics import Kinematics
 from ccfem.machine.limits import Limits

@@ -1,6 +1,6 @@
 """Toolpaths, and what plans them on layers."""
 
-from ccfem.base.submodules import submodules
+from ccfem.base.lazy_modules import submodules
 
 __all__: list[str] = []
 

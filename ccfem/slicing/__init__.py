@@ -1,6 +1,6 @@
 """Layers, flat and curved, and the slicers that cut a part into them."""
 
-from ccfem.base.submodules import submodules
+from ccfem.base.lazy_modules import submodules
 
 __all__: list[str] = []
 

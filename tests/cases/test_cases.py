@@ -15,7 +15,7 @@ from ccfem.cases.part_file import read_part
 from ccfem.cases.part_writing import part_text
 from ccfem.cases.stored import data_folder, manifest, stored_mesh
 from ccfem.cases.storing import store
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 
 NAMES = ("bar", "loop", "open_hole")
 SIZES = {

@@ -13,7 +13,7 @@ from ccfem.body.meshing import extrude
 from ccfem.cases.inspection import check
 from ccfem.cases.part_file import read_part
 from ccfem.fem.elasticity.problem import Bearing, Force, PointForce, Pressure, Support, Traction
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.elasticity.support_kinds import PressingSupport
 from ccfem.slicing.slicers.planar import Planar
 

@@ -46,7 +46,7 @@ from ccfem.fem.elasticity import (
     prepare,
     solve,
 )
-from ccfem.fem.elasticity.solve import support_sets
+from ccfem.fem.elasticity.statics import support_sets
 
 EXAMPLE = Path(ccfem.__file__).parent / "cases" / "examples" / "loads_and_supports.toml"
 

@@ -7,11 +7,11 @@ from ccfem.cases.case import Case
 from ccfem.cases.reading import read
 from ccfem.comparison.engine import compare
 from ccfem.fem.elasticity.problem import Force, Problem, Support
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.materials import isotropic
 from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strands import carrying_strands
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.equal_fibre import plan_to_length
 from ccfem.slicing.slicers.planar import Planar

@@ -9,7 +9,7 @@ import pytest
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
-from ccfem.comparison.fibre_front import fibre_front, front_of
+from ccfem.comparison.front_plans import fibre_front, front_of
 from ccfem.comparison.front_points import FibreFront, FrontPoint
 from ccfem.comparison.plan_to_stiffness import counts_to_try
 from ccfem.comparison.request import Request

@@ -9,14 +9,14 @@ import pytest
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
-from ccfem.comparison.fibre_front import fibre_front
 from ccfem.comparison.front_cases import PointCases
+from ccfem.comparison.front_plans import fibre_front
 from ccfem.comparison.front_points import FibreFront, FrontPoint
 from ccfem.fem.elasticity import Force, Problem, Support, solve
 from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.fem.elasticity.support_kinds import PressingSupport
 from ccfem.fem.materials import printed_pla
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.slicers.planar import Planar

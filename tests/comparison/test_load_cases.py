@@ -10,10 +10,10 @@ from ccfem.cases.load_cases import weighted_cases
 from ccfem.comparison.engine import compare
 from ccfem.comparison.files import write_results
 from ccfem.fem.elasticity.problem import Force, Problem, Support
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.materials import printed_pla
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strands import cut_strands
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies.stream_function import StreamFunction

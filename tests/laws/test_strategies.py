@@ -13,7 +13,7 @@ import shapely
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity.problem import Force, Problem, Support
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.materials import isotropic
 from ccfem.judging.evaluation import evaluate
 from ccfem.machine import Machine

@@ -10,9 +10,9 @@ import pytest
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cli.commands import reproduce
 from ccfem.fem.elasticity.problem import Force, Problem, Support
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.materials import isotropic
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.papers.contents import Contents, judged
 from ccfem.papers.evidence import contents as page
 from ccfem.papers.evidence.prints import (

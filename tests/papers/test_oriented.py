@@ -7,7 +7,7 @@ from ccfem.base.errors import InputError
 from ccfem.base.tensor import rotate_stiffness, to_voigt
 from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity.problem import Force, Problem, Support
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.materials import Material, isotropic, transversely_isotropic
 from ccfem.judging.virtual_testing.strands import cut_strands
 from ccfem.papers.chen_2021.virtual_test import (

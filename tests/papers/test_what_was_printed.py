@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from ccfem.judging.virtual_testing.virtual_test import HONEST_PROMISE
+from ccfem.judging.virtual_testing.stiffness_test import HONEST_PROMISE
 from ccfem.papers.chen_2021.study import PARTS_AT_HAND
 from ccfem.papers.chen_2021.virtual_test import PHYSICAL
 

@@ -9,7 +9,7 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
 from ccfem.comparison.engine import solved
-from ccfem.comparison.fibre_front import front_of
+from ccfem.comparison.front_plans import front_of
 from ccfem.comparison.request import Request
 from ccfem.comparison.studies import Study
 from ccfem.comparison.studies.jobs import jobs_of

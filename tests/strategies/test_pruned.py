@@ -8,7 +8,7 @@ from ccfem.base.errors import InputError
 from ccfem.cases import create_case
 from ccfem.fem.elasticity import solve
 from ccfem.judging.virtual_testing.specimen import Specimen
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.paths.planning import plan
 from ccfem.paths.planning.equal_fibre import plan_to_length
 from ccfem.slicing.slicers.planar import Planar

@@ -9,7 +9,7 @@ import pytest
 from ccfem.body.files import read_mesh
 from ccfem.body.mesh.patches import Cylinder, patches_from_rules
 from ccfem.fem.elasticity.problem import Force, Problem, Support
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.materials import isotropic
 from ccfem.judging.evaluation import evaluate
 from ccfem.machine import Machine

@@ -7,10 +7,10 @@ import pytest
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity.problem import Force, Problem, Support, Traction
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.materials import isotropic
 from ccfem.judging.evaluation import evaluate
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.machine import Machine
 from ccfem.paths.planning import plan
 from ccfem.slicing.slicers.planar import Planar

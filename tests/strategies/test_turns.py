@@ -10,11 +10,11 @@ import shapely
 from ccfem.body.mesh.patches import Box, patches_from_rules
 from ccfem.body.meshing import extrude
 from ccfem.fem.elasticity.problem import Force, Problem, Support
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.materials import isotropic
 from ccfem.geometry.polylines import line_length
 from ccfem.judging.evaluation import evaluate
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.machine import Machine
 from ccfem.paths.planning import plan
 from ccfem.paths.planning.infill import with_turns

@@ -28,8 +28,8 @@ from ccfem.fem.elasticity.load_kinds import (
 from ccfem.fem.elasticity.loads import load_case, nodal_forces, volume_forces
 from ccfem.fem.elasticity.plausibility import about_problem, held_share
 from ccfem.fem.elasticity.problem import Problem
-from ccfem.fem.elasticity.solve import support_sets
 from ccfem.fem.elasticity.solve_cost import solve_costs
+from ccfem.fem.elasticity.statics import support_sets
 from ccfem.fem.elasticity.supports import held
 from ccfem.fem.elasticity.system import prepare
 from ccfem.geometry.facets import connected, facet_keys

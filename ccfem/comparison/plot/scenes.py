@@ -20,7 +20,7 @@ from ccfem.cases.inspection.part_check import Check
 from ccfem.comparison.plot.colours import SECTION
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.stress_field import StressField
-from ccfem.judging.virtual_testing.virtual_test import VirtualTest
+from ccfem.judging.virtual_testing.stiffness_test import VirtualTest
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
 

@@ -27,7 +27,7 @@ from ccfem.comparison.plot.scenes import show as show
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.judging.evaluation.evaluation import Evaluation
-from ccfem.judging.virtual_testing.virtual_test import VirtualTest
+from ccfem.judging.virtual_testing.stiffness_test import VirtualTest
 from ccfem.paths.fields.chart import flat_view
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer, LayerStress

@@ -13,7 +13,7 @@ from ccfem.comparison.ranking import stiffness_ratio
 from ccfem.comparison.runs import Run
 from ccfem.judging.evaluation.indices.matching import THRESHOLDS, along_fibre, matching_curve
 from ccfem.judging.evaluation.layer_paths import pool
-from ccfem.judging.virtual_testing.virtual_test import RESOLUTION
+from ccfem.judging.virtual_testing.stiffness_test import RESOLUTION
 
 _LEAST, _MOST = 0.01, 10.0
 """Ends, 1/mm, of the scale of curvature; what is straighter counts at its left end."""

@@ -40,7 +40,7 @@ from ccfem.comparison.table import (
 from ccfem.fem.elasticity.stress_field import StressField, about_cells
 from ccfem.judging.evaluation import COLUMNS
 from ccfem.judging.virtual_testing.progressive_failure import WORTH
-from ccfem.judging.virtual_testing.virtual_test import HONEST_PROMISE
+from ccfem.judging.virtual_testing.stiffness_test import HONEST_PROMISE
 
 
 class CaseRecord(TypedDict, total=False):

@@ -16,7 +16,7 @@ from ccfem.comparison.stages import Part as CutPart, Tests, timed
 from ccfem.comparison.studies.fingerprint import fingerprint
 from ccfem.comparison.studies.jobs import Job, Outcome, Part
 from ccfem.comparison.studies.transport import Parted, packed, parted, unpacked
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.elasticity.stress_field import StressField, WeightedCases
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.paths.planning.strategy import Strategy

@@ -18,8 +18,8 @@ from ccfem.fem.elasticity.load_kinds import (
 )
 from ccfem.fem.elasticity.problem import Problem, Region
 from ccfem.fem.elasticity.recovery import cell_stress, nodal_stress
-from ccfem.fem.elasticity.solve import refine, solve
 from ccfem.fem.elasticity.solvers import BACKENDS, Solver, factorise, preconditioned_cg
+from ccfem.fem.elasticity.statics import refine, solve
 from ccfem.fem.elasticity.stress_field import GivenStress, PartStress, SolveRecord, StressField
 from ccfem.fem.elasticity.support_kinds import (
     EdgeSupport,

@@ -13,8 +13,8 @@ from ccfem.fem.elasticity import Solver, SolveRecord, factorise, pattern
 from ccfem.fem.elasticity.assembly import Pattern
 from ccfem.fem.elasticity.held import Held
 from ccfem.fem.elasticity.loads import load_cases
-from ccfem.fem.elasticity.solve import solve_system
 from ccfem.fem.elasticity.solvers import DIRECT, choose_direct
+from ccfem.fem.elasticity.statics import solve_system
 from ccfem.fem.elasticity.supports import held
 from ccfem.fem.plates.mesh import PlaneMesh
 from ccfem.fem.plates.problem import PlaneProblem, strain_in_axes, stress_in_axes

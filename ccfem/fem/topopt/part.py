@@ -18,7 +18,7 @@ from ccfem.fem.materials import Material
 from ccfem.fem.plates.mesh import PlaneMesh, raster_image
 from ccfem.fem.plates.problem import PlaneProblem
 from ccfem.fem.topopt.design import Design, anchors
-from ccfem.fem.topopt.outline import outline
+from ccfem.fem.topopt.design_outline import outline
 from ccfem.fem.topopt.tet_part import part_mesh
 from ccfem.geometry.facets import are_among
 

@@ -18,8 +18,8 @@ from ccfem.fem.elasticity.load_kinds import patches_in_use, patches_of
 from ccfem.fem.elasticity.problem import Support
 from ccfem.fem.elasticity.support_kinds import AnySupport
 from ccfem.fem.topopt.design import Design, anchors, sheet
+from ccfem.fem.topopt.design_outline import outline
 from ccfem.fem.topopt.flat_part import FlatPart
-from ccfem.fem.topopt.outline import outline
 from ccfem.geometry.symmetry import mirror_image, mirrors_of
 
 _IN_PLANE = np.ix_([0, 1, 5], [0, 1, 5])

@@ -2,15 +2,15 @@
 
 from ccfem.judging.virtual_testing.several_cases import specimens
 from ccfem.judging.virtual_testing.specimen import Specimen
-from ccfem.judging.virtual_testing.strand import RHO, Strand
-from ccfem.judging.virtual_testing.strands import Strands, cut_strands
-from ccfem.judging.virtual_testing.strength import first_failure
-from ccfem.judging.virtual_testing.virtual_test import (
+from ccfem.judging.virtual_testing.stiffness_test import (
     Bracket,
     VirtualTest,
     virtual_bracket,
     virtual_test,
 )
+from ccfem.judging.virtual_testing.strand import RHO, Strand
+from ccfem.judging.virtual_testing.strands import Strands, cut_strands
+from ccfem.judging.virtual_testing.strength import first_failure
 
 __all__ = [
     "RHO",

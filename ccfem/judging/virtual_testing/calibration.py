@@ -24,10 +24,10 @@ from ccfem.fem.elasticity import Problem, StressField, solve
 from ccfem.fem.materials import Material, isotropic
 from ccfem.judging.virtual_testing.equilibrium import TENSION
 from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.judging.virtual_testing.strands import cut_strands
 from ccfem.judging.virtual_testing.strength import matrix_peak
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.paths.toolpaths import Toolpaths
 
 # Force-displacement curves of physical tests.

@@ -14,7 +14,7 @@ from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.curved_cells import gradients_at
 from ccfem.fem.elasticity import cell_gradients, preconditioned_cg
 from ccfem.fem.elasticity.held import Held
-from ccfem.fem.elasticity.solve import check_pressed
+from ccfem.fem.elasticity.statics import check_pressed
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strands import Strands
 

@@ -12,8 +12,8 @@ from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.fem.elasticity.supports import soft_supports, spring_forces
 from ccfem.geometry.locate import locate
 from ccfem.judging.virtual_testing.equilibrium import IN_COMPRESSION, bars
+from ccfem.judging.virtual_testing.stiffness_test import VirtualTest
 from ccfem.judging.virtual_testing.strands import Strands
-from ccfem.judging.virtual_testing.virtual_test import VirtualTest
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ from ccfem.base.arrays import FloatArray, in_brief
 from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.judging.virtual_testing.equilibrium import TENSION
 from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.stiffness_test import VirtualTest, virtual_test
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.judging.virtual_testing.strands import Strands, cut_strands
 from ccfem.judging.virtual_testing.strength import FirstFailure, first_failure
-from ccfem.judging.virtual_testing.virtual_test import VirtualTest, virtual_test
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers import Layer

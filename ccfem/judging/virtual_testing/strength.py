@@ -17,8 +17,8 @@ from ccfem.judging.virtual_testing import failure_laws
 from ccfem.judging.virtual_testing.failure_laws.fibre import fibre_peak as fibre_peak
 from ccfem.judging.virtual_testing.failure_laws.interlayer import layer_normals
 from ccfem.judging.virtual_testing.failure_laws.matrix import matrix_peak as matrix_peak
+from ccfem.judging.virtual_testing.stiffness_test import VirtualTest
 from ccfem.judging.virtual_testing.strand import Failure, Limits, Strand
-from ccfem.judging.virtual_testing.virtual_test import VirtualTest
 from ccfem.slicing.layers import Layer
 
 

@@ -18,9 +18,13 @@ from ccfem.cases.case import Case
 from ccfem.fem.elasticity import StressField, solve
 from ccfem.fem.elasticity.problem import Bearing
 from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.stiffness_test import (
+    HONEST_PROMISE,
+    virtual_bracket,
+    virtual_test,
+)
 from ccfem.judging.virtual_testing.strands import cut_strands
 from ccfem.judging.virtual_testing.strength import first_failure
-from ccfem.judging.virtual_testing.virtual_test import HONEST_PROMISE, virtual_bracket, virtual_test
 from ccfem.papers.chen_2021.authors import TABLE_2
 from ccfem.papers.chen_2021.loop import LAYERS_TABLE_2, authors_loop
 from ccfem.papers.chen_2021.virtual_test import MATRIX_STRENGTH, authors_paths

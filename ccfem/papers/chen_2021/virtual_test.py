@@ -21,10 +21,7 @@ from ccfem.fem.elasticity.problem import Bearing
 from ccfem.fem.materials import Material, named_material
 from ccfem.judging.virtual_testing.equilibrium import bar_stiffness
 from ccfem.judging.virtual_testing.specimen import Specimen
-from ccfem.judging.virtual_testing.strand import Strand
-from ccfem.judging.virtual_testing.strands import Strands, cut_strands
-from ccfem.judging.virtual_testing.strength import first_failure, matrix_peak
-from ccfem.judging.virtual_testing.virtual_test import (
+from ccfem.judging.virtual_testing.stiffness_test import (
     FIRST,
     HONEST_PROMISE,
     SECOND,
@@ -32,6 +29,9 @@ from ccfem.judging.virtual_testing.virtual_test import (
     virtual_bracket,
     virtual_test,
 )
+from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.judging.virtual_testing.strands import Strands, cut_strands
+from ccfem.judging.virtual_testing.strength import first_failure, matrix_peak
 from ccfem.papers.chen_2021.authors import PATHS
 from ccfem.papers.chen_2021.loop import LAYERS_TABLE_2, authors_folder, authors_loop
 from ccfem.paths.toolpaths import Toolpaths
@@ -158,7 +158,7 @@ def oriented_problem(problem: Problem, strands: Strands, fibre: Material, area: 
     Returns
     -------
     Problem
-        Solve it as any other: `ccfem.fem.elasticity.solve.solve`.
+        Solve it as any other: `ccfem.fem.elasticity.statics.solve`.
     """
     volumes = problem.mesh.volumes
     share = fibre_share(strands, volumes, area)

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from ccfem.judging.virtual_testing.stiffness_test import RESOLUTION
 from ccfem.judging.virtual_testing.strand import RHO
-from ccfem.judging.virtual_testing.virtual_test import RESOLUTION
 
 STIFFNESS, BREAKING = "stiffness ratio", "ratio of breaking loads"
 SLOPE, LOAD = "slope, kN/mm", "breaking load, kN"

@@ -20,8 +20,8 @@ from ccfem.cases.bodies import T_BRACKET_HOLES
 from ccfem.fem.elasticity import PartStress, StressField
 from ccfem.judging.evaluation import evaluate
 from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strands import carrying_strands
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine
 from ccfem.papers.contents import Contents, WhenAsked, table, write_claims
 from ccfem.papers.fang_2024.authors import (

@@ -2,7 +2,7 @@
 
 from ccfem.paths.planning.equal_fibre import length_per_layer, plan_to_length
 from ccfem.paths.planning.given_paths import GivenPaths
-from ccfem.paths.planning.plan import plan
+from ccfem.paths.planning.layer_plans import plan
 from ccfem.paths.planning.strategy import Amount, LayerStrategy, PartStrategy, Planned, Strategy
 
 __all__ = [

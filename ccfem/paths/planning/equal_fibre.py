@@ -17,8 +17,8 @@ from ccfem.fem.elasticity import PartStress
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.bracketing import around, close_in, interpolated
 from ccfem.paths.planning.infill import about_short_pieces
+from ccfem.paths.planning.layer_plans import check_layers, plan, plan_layers
 from ccfem.paths.planning.mixing import cut_to_length, layer_lengths, mixed
-from ccfem.paths.planning.plan import check_layers, plan, plan_layers
 from ccfem.paths.planning.strategy import LengthStrategy, Planned, Strategy
 from ccfem.paths.planning.unfolding import may_fold
 from ccfem.paths.toolpaths import FIBRE, Toolpaths

@@ -1,13 +1,13 @@
 """Guidance field: a scalar field on the part whose level surfaces are its layers."""
 
-from ccfem.slicing.guidance.guidance_field import (
+from ccfem.slicing.guidance.joints import Joint, joint_of
+from ccfem.slicing.guidance.scalar_guidance import (
     FieldQuality,
     GuidanceField,
     Weights,
     field_quality,
     guidance_field,
 )
-from ccfem.slicing.guidance.joints import Joint, joint_of
 
 __all__ = [
     "FieldQuality",

@@ -6,7 +6,7 @@ from ccfem.slicing.principal_lines.critical import (
     critical_region,
     strongest_stress,
 )
-from ccfem.slicing.principal_lines.trace import Traced, Tracer, trace
+from ccfem.slicing.principal_lines.tracing import Traced, Tracer, trace
 
 __all__ = [
     "CriticalRegion",

@@ -13,7 +13,7 @@ import numpy as np
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, read_only
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import TetMesh
-from ccfem.slicing.principal_lines.trace import Traced, Tracer
+from ccfem.slicing.principal_lines.tracing import Traced, Tracer
 
 Keep = Literal["joining", "touching", "all"]
 

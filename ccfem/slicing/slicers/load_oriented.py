@@ -21,7 +21,7 @@ from ccfem.slicing.guidance.stress_regions import StressRegions, stress_regions
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.slicer import Vector
 from ccfem.slicing.layers.sublayers import layers_within
-from ccfem.slicing.principal_lines.trace import mean_edge
+from ccfem.slicing.principal_lines.tracing import mean_edge
 
 # Share of the tension that acts across layers, where they are weakest.
 

@@ -16,7 +16,8 @@ from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
 from ccfem.fem.elasticity import PartStress
 from ccfem.machine.machine import Machine
-from ccfem.slicing.guidance.guidance_field import (
+from ccfem.slicing.guidance.joints import Joint, joint_lines, joints_of
+from ccfem.slicing.guidance.scalar_guidance import (
     FieldQuality,
     GuidanceField,
     JointForm,
@@ -24,12 +25,11 @@ from ccfem.slicing.guidance.guidance_field import (
     field_quality,
     guidance_field,
 )
-from ccfem.slicing.guidance.joints import Joint, joint_lines, joints_of
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.level_surfaces import level_surfaces
 from ccfem.slicing.layers.slicer import Vector
 from ccfem.slicing.principal_lines.critical import CriticalRegion, Keep
-from ccfem.slicing.principal_lines.trace import mean_edge
+from ccfem.slicing.principal_lines.tracing import mean_edge
 from ccfem.slicing.slicers.planar import Planar
 
 _THICKNESS = 0.5

@@ -16,7 +16,7 @@ from ccfem.base.parallel import in_processes
 from ccfem.judging.virtual_testing import Specimen, Strand
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.equal_fibre import TOLERANCE
-from ccfem.paths.planning.plan import plan_layers
+from ccfem.paths.planning.layer_plans import plan_layers
 from ccfem.paths.planning.strategy import WholePart
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer

@@ -13,7 +13,7 @@ from ccfem.geometry.shapes import Region, open_lines
 from ccfem.machine.machine import Machine
 from ccfem.paths.fields.tensile import Tension, layer_tension
 from ccfem.paths.planning.infill import long_enough
-from ccfem.paths.planning.plan import plan, plan_layers
+from ccfem.paths.planning.layer_plans import plan, plan_layers
 from ccfem.paths.planning.strategy import LayerPlanner
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer, LayerStress, curved_layers

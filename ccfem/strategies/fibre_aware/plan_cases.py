@@ -14,7 +14,7 @@ from ccfem.judging.virtual_testing import Strand, specimens
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning import Planned, Strategy, length_per_layer, plan, plan_to_length
 from ccfem.paths.planning.equal_fibre import TOLERANCE, about_shortfall, plan_to_lengths
-from ccfem.paths.planning.plan import check_layers, plan_layers
+from ccfem.paths.planning.layer_plans import check_layers, plan_layers
 from ccfem.paths.planning.strategy import CasesStrategy, LengthStrategy
 from ccfem.paths.planning.unfolding import may_fold
 from ccfem.paths.toolpaths import Toolpaths

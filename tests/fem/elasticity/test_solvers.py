@@ -14,8 +14,8 @@ from ccfem.fem.elasticity import solvers
 from ccfem.fem.elasticity.assembly import assemble
 from ccfem.fem.elasticity.direct import supernodes
 from ccfem.fem.elasticity.problem import Force, Problem, Support
-from ccfem.fem.elasticity.solve import solve
 from ccfem.fem.elasticity.solvers import BACKENDS, choose, factorise, preconditioned_cg
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.elasticity.system import prepare
 from ccfem.fem.materials import isotropic, transversely_isotropic
 

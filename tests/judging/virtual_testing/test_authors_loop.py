@@ -4,12 +4,12 @@ import os
 
 import pytest
 
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.judging.virtual_testing.strands import cut_strands
 from ccfem.judging.virtual_testing.strength import first_failure, matrix_peak
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
 
 pytestmark = pytest.mark.skipif(
     "CCFEM_CHEN2021" not in os.environ, reason="the authors' data is not here"

@@ -8,12 +8,12 @@ import pytest
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity.problem import Force, Problem, Support, Traction
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.materials import isotropic, named_material
 from ccfem.judging.virtual_testing.failure_laws.interlayer import interlayer, layer_normals
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.judging.virtual_testing.strength import first_failure
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.slicers import Planar
 

@@ -9,7 +9,7 @@ from ccfem.body.meshing import extrude
 from ccfem.comparison.tested_cases import in_all_cases
 from ccfem.fem.elasticity import Bearing, Temperature
 from ccfem.fem.elasticity.problem import Force, Problem, Support
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.fem.elasticity.system import prepare
 from ccfem.fem.materials import isotropic

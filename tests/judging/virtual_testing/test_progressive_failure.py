@@ -8,15 +8,15 @@ import pytest
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity.problem import Force, Problem, Support
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.materials import isotropic
 from ccfem.judging.virtual_testing.progressive_failure import (
     _largest_principal,
     band_width,
     breaking_load,
 )
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strand import Strand
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.paths.toolpaths import Toolpaths
 
 LENGTH, AREA, MODULUS = 20.0, 16.0, 2000.0

@@ -9,13 +9,13 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity import Foundation
 from ccfem.fem.elasticity.problem import Force, Problem, Support
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.materials import isotropic
 from ccfem.judging.virtual_testing.scatter import Scatter, ratio_scatter
 from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.judging.virtual_testing.strands import cut_strands
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.paths.toolpaths import Toolpaths
 
 MODULUS, RHO = 2000.0, 4.0

@@ -10,14 +10,14 @@ from ccfem.base.errors import InputError
 from ccfem.base.tensor import von_mises
 from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity.problem import Force, PointForce, Problem, Support
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.materials import isotropic
 from ccfem.judging.virtual_testing import failure_laws
 from ccfem.judging.virtual_testing.failure_laws import fibre, matrix
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strand import Failure, Strand
 from ccfem.judging.virtual_testing.strands import Strands, Windows
 from ccfem.judging.virtual_testing.strength import fibre_peak, first_failure, matrix_peak
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.paths.toolpaths import Toolpaths
 
 SIZE = (20.0, 4.0, 4.0)

@@ -11,7 +11,7 @@ from ccfem.base.errors import InputError, SolveError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity import Displacement
 from ccfem.fem.elasticity.problem import Force, PointForce, Problem, Support
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.materials import isotropic
 from ccfem.judging.virtual_testing import equilibrium as equilibrium_module
 from ccfem.judging.virtual_testing.equilibrium import (
@@ -22,9 +22,7 @@ from ccfem.judging.virtual_testing.equilibrium import (
     equilibrium,
 )
 from ccfem.judging.virtual_testing.specimen import Specimen
-from ccfem.judging.virtual_testing.strand import Strand
-from ccfem.judging.virtual_testing.strands import cut_strands
-from ccfem.judging.virtual_testing.virtual_test import (
+from ccfem.judging.virtual_testing.stiffness_test import (
     FIRST,
     RESOLUTION,
     SAME,
@@ -34,6 +32,8 @@ from ccfem.judging.virtual_testing.virtual_test import (
     virtual_bracket,
     virtual_test,
 )
+from ccfem.judging.virtual_testing.strand import Strand
+from ccfem.judging.virtual_testing.strands import cut_strands
 from ccfem.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 

@@ -10,11 +10,11 @@ import shapely
 
 from ccfem.base.errors import InputError
 from ccfem.cases import create_case
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning import plan
 from ccfem.paths.planning.infill import Infill, long_enough
-from ccfem.paths.planning.plan import in_even_steps
+from ccfem.paths.planning.layer_plans import in_even_steps
 from ccfem.paths.planning.unfolding import may_fold, unfolded_paths
 from ccfem.paths.raster.patterns import grid_regions
 from ccfem.paths.toolpaths import Toolpaths

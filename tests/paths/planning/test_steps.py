@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ccfem.paths.planning.plan import in_even_steps
+from ccfem.paths.planning.layer_plans import in_even_steps
 from ccfem.paths.toolpaths import Toolpaths
 
 

@@ -15,7 +15,7 @@ from ccfem.geometry.tight_bends import tight_bends
 from ccfem.machine import Machine
 from ccfem.paths.folds import WINDOW, folds, folds_in
 from ccfem.paths.linking.joining import Joined
-from ccfem.paths.planning.plan import plan_layers
+from ccfem.paths.planning.layer_plans import plan_layers
 from ccfem.paths.planning.strategy import Amount
 from ccfem.paths.planning.unfolding import may_fold, part_of_line, unfolded, unfolded_paths
 from ccfem.paths.toolpaths import Toolpaths

@@ -10,7 +10,7 @@ from ccfem.body.mesh import box_mesh
 from ccfem.fem.elasticity import cell_gradients
 from ccfem.slicing.guidance import Joint, Weights, field_quality, guidance_field, joint_of
 from ccfem.slicing.guidance.energies import alignment_energy, gradient_energy, smoothness_energy
-from ccfem.slicing.guidance.guidance_field import equal_value_energy, slabs
+from ccfem.slicing.guidance.scalar_guidance import equal_value_energy, slabs
 
 WEIGHTS = Weights(stress=1.0, smoothness=0.01, joints=1.0, length=3.0)
 
@@ -249,7 +249,7 @@ def test_nothing_to_follow_is_refused(plate):
 
 
 def test_many_joints_are_flipped_in_turn():
-    from ccfem.slicing.guidance.guidance_field import _best_signs, _energies
+    from ccfem.slicing.guidance.scalar_guidance import _best_signs, _energies
 
     rng = np.random.default_rng(8)
     factor = rng.normal(size=(13, 13))

@@ -8,7 +8,7 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh import box_mesh
 from ccfem.body.meshing import extrude
 from ccfem.slicing.principal_lines import Tracer, critical_region, strongest_stress, trace
-from ccfem.slicing.principal_lines.trace import ENDS
+from ccfem.slicing.principal_lines.tracing import ENDS
 
 
 def constant(mesh, vector):

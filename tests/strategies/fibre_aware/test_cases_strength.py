@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from ccfem.base.errors import InputError
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.judging.virtual_testing.equilibrium import equilibrium
 from ccfem.judging.virtual_testing.several_cases import cases_failure, specimens, virtual_tests
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strand import Limits, Strand
 from ccfem.judging.virtual_testing.strands import cut_strands
 from ccfem.judging.virtual_testing.strength import first_failure
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.strategies.fibre_aware.judges import Goal, strength_judge

@@ -9,7 +9,7 @@ from scipy import sparse
 from ccfem.base.tensor import rotate_stiffness
 from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity.problem import Force, Problem, Support
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.materials import isotropic
 from ccfem.geometry.polylines import line_length
 from ccfem.machine import Machine

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.studies import confirmed_gain
 from ccfem.fem.elasticity.problem import Force, Problem, Support
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.materials import printed_pla
 from ccfem.machine import Machine
 from ccfem.slicing.slicers.planar import Planar

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ccfem.judging.virtual_testing import Strand
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.strategies.fibre_aware import cut_and_move

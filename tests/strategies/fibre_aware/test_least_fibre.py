@@ -5,9 +5,9 @@ from ccfem.base.errors import InputError
 from ccfem.cases.load_cases import weighted_cases
 from ccfem.cases.reading import read
 from ccfem.comparison.plan_to_stiffness import for_every_case, least_fibre
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.judging.virtual_testing.several_cases import virtual_tests
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.machine import Machine
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create

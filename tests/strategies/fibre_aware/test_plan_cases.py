@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ccfem.base.errors import InputError
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.judging.virtual_testing.several_cases import specimens, virtual_tests
 from ccfem.machine import Machine

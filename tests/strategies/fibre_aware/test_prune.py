@@ -10,8 +10,8 @@ from ccfem.body.mesh import box_mesh
 from ccfem.fem.elasticity import Force, Problem, Support, solve
 from ccfem.fem.materials import isotropic
 from ccfem.judging.virtual_testing import Strand
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strands import cut_strands
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine
 from ccfem.paths.planning import plan
 from ccfem.paths.toolpaths import MATRIX, Toolpaths

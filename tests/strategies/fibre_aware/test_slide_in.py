@@ -7,10 +7,10 @@ import shapely
 from ccfem.body.mesh.patches import Cylinder, Plane, patches_from_rules
 from ccfem.body.meshing import extrude
 from ccfem.fem.elasticity.problem import Force, Problem, Support
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.materials import isotropic
 from ccfem.machine.machine import Machine
-from ccfem.paths.planning.plan import plan
+from ccfem.paths.planning.layer_plans import plan
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies.fibre_aware.stream_paths import lines_to_slide_in, slid_in

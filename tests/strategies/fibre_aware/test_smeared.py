@@ -5,7 +5,7 @@ import pytest
 
 from ccfem.base.tensor import rotate_stiffness
 from ccfem.fem.elasticity.problem import Support
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.strategies.fibre_aware.smeared import SmearedPart, on_linear_cells
 
 ANGLE = 0.3

@@ -12,9 +12,9 @@ from ccfem.base.errors import InputError
 from ccfem.judging.virtual_testing.equilibrium import bars
 from ccfem.judging.virtual_testing.several_cases import specimens
 from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.judging.virtual_testing.strands import cut_strands
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import FIBRE, TRAVEL, Toolpaths
 from ccfem.strategies import create

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 
 from ccfem.base.errors import InputError
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.judging.virtual_testing import failure_laws
 from ccfem.judging.virtual_testing.equilibrium import bars, equilibrium
 from ccfem.judging.virtual_testing.near_failure import nearness
 from ccfem.judging.virtual_testing.specimen import Specimen
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strand import Limits, Strand
 from ccfem.judging.virtual_testing.strands import Windows, cut_strands
 from ccfem.judging.virtual_testing.strength import first_failure
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine
-from ccfem.paths.planning.plan import plan_layers
+from ccfem.paths.planning.layer_plans import plan_layers
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.strategies.fibre_aware import cut_and_move, judges, strength_value
 from ccfem.strategies.fibre_aware.cut_and_move import best_cut, prune_and_move

@@ -8,14 +8,14 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh import TetMesh, box_mesh
 from ccfem.body.mesh.patches import Box, patches_from_rules
 from ccfem.fem.elasticity.problem import Force, Problem, Support
-from ccfem.fem.elasticity.solve import solve
+from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.fem.materials import isotropic
+from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strand import Strand
-from ccfem.judging.virtual_testing.virtual_test import virtual_test
 from ccfem.machine import Machine
 from ccfem.paths.planning import plan
-from ccfem.paths.planning.plan import plan_layers
+from ccfem.paths.planning.layer_plans import plan_layers
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.slicers import Planar
 from ccfem.strategies.fibre_aware.heights import room_for_fibre

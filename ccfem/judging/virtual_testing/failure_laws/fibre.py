@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
+from ccfem.judging.virtual_testing.stiffness_test import VirtualTest
 from ccfem.judging.virtual_testing.strand import Failure, Limits
 from ccfem.judging.virtual_testing.strands import AVERAGING_LENGTH, Windows
-from ccfem.judging.virtual_testing.virtual_test import VirtualTest
 from ccfem.slicing.layers import Layer
 
 

@@ -21,8 +21,8 @@ from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity import StressField
 from ccfem.fem.elasticity.zone import BALL, ZONE, ball_averages, distance_from_patches
 from ccfem.fem.materials import Material
+from ccfem.judging.virtual_testing.stiffness_test import VirtualTest
 from ccfem.judging.virtual_testing.strand import Failure, Limits
-from ccfem.judging.virtual_testing.virtual_test import VirtualTest
 from ccfem.slicing.layers import Layer
 
 ZONES = (ZONE, 0.5 * ZONE, 0.0)

@@ -6,8 +6,8 @@ from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
 from ccfem.fem.elasticity import StressField
 from ccfem.fem.elasticity.zone import ZONE, averaged_mises
+from ccfem.judging.virtual_testing.stiffness_test import VirtualTest
 from ccfem.judging.virtual_testing.strand import Failure, Limits
-from ccfem.judging.virtual_testing.virtual_test import VirtualTest
 from ccfem.slicing.layers import Layer
 
 

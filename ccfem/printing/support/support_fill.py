@@ -14,7 +14,7 @@ from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
 from ccfem.paths.fields.chart import Chart
 from ccfem.paths.toolpaths import MATRIX, Toolpaths
-from ccfem.printing.support.support_layers import SupportLayers
+from ccfem.printing.support.matched_layers import SupportLayers
 from ccfem.slicing.layers.layer import Layer, Plane, plane_frame
 
 _ON = 1e-6

@@ -11,12 +11,12 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity.stress_field import PartStress
 from ccfem.machine.machine import Machine
-from ccfem.printing.support.column_mesh import ColumnMesh, column_mesh
-from ccfem.printing.support.support_field import SupportField, support_field
+from ccfem.printing.support.continued_field import SupportField, support_field
+from ccfem.printing.support.meshed_columns import ColumnMesh, column_mesh
 from ccfem.slicing.layers.layer import Layer, curved_layers
 from ccfem.slicing.layers.slicer import Slicer, Vector, standing
 from ccfem.slicing.layers.sublayers import layers_within
-from ccfem.slicing.principal_lines.trace import mean_edge
+from ccfem.slicing.principal_lines.tracing import mean_edge
 
 _CARRIED = 45.0
 """Degrees from upright up to which flat layers carry themselves."""

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from ccfem.base.arrays import FloatArray, freeze
 from ccfem.fem.elasticity.assembly import cell_gradients
 from ccfem.fem.elasticity.direct import superlu
-from ccfem.printing.support.column_mesh import ColumnMesh
+from ccfem.printing.support.meshed_columns import ColumnMesh
 from ccfem.slicing.guidance.bounded_gradient import Bounds, bounded
 from ccfem.slicing.guidance.energies import gradient_energy
 
