@@ -18,7 +18,7 @@ import time
 from collections.abc import Callable
 
 PAPER_SECONDS = 130.862
-"""Planning of Loop in paper 000, Table 1, finite elements not included."""
+"""Planning of Loop in Chen et al. 2021, Table 1, finite elements not included."""
 
 _COLD = "from benchmarks.speed.line import {part}, timed; timed({part})"
 
@@ -38,7 +38,7 @@ def fine_loop() -> object:
 
 
 def authors_loop() -> object:
-    """Loop of the authors of paper 000, on their mesh."""
+    """Loop of Chen et al. 2021, on their mesh."""
     from ccfem.papers.chen_2021.loop import authors_loop
 
     return authors_loop()

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
+from ccfem.base.errors import InputError
 from ccfem.cli.arguments import path_of
 from ccfem.cli.options import Backend, CasePath, Refine, SetCase
 
@@ -89,9 +90,18 @@ def _cite(
     ] = None,
 ) -> None:
     """Print BibTeX of ccfem, and of the papers whose methods a result used."""
-    from ccfem.cli.citing import cite
+    from ccfem.base.checks import check_known
+    from ccfem.comparison.citations import METHODS, bibtex, cited, methods_of_results
 
-    cite(whats or ())
+    methods: list[str] = []
+    for what in whats or ():
+        path = Path(what)
+        if path.suffix == ".json" or path.is_dir():
+            methods += methods_of_results(path / "results.json" if path.is_dir() else path)
+        else:
+            check_known("method or folder of results", what, sorted(METHODS))
+            methods.append(what)
+    print(bibtex(cited(methods)))
 
 
 def _mesh(
@@ -115,9 +125,29 @@ def _mesh(
     ] = "auto",
 ) -> None:
     """Mesh a surface or CAD file, faces as patches (face_1, or their names), or curved layers."""
-    from ccfem.cli.mesh_body import mesh_file
+    from ccfem.base.whole import check_writable
+    from ccfem.body.files import surface
+    from ccfem.body.files.mesh_file import check_mesh_name, write_mesh
+    from ccfem.body.mesh.check import in_metres
+    from ccfem.body.meshing import cad
+    from ccfem.body.meshing.meshed_body import mesh_body
 
-    mesh_file(body, size, out, scale, mesher)
+    check_mesh_name(out)
+    check_writable(out)
+    if not body.is_dir() and not surface.is_surface(body) and not cad.is_cad(body):
+        *others, last = (*surface.SUFFIXES, *cad.SUFFIXES)
+        names = f"{', '.join(others)} or {last}"
+        raise InputError(
+            f"cannot mesh {body}: its name must end in {names}, or be that of a folder of layers"
+        )
+    kind: Any = mesher
+    mesh, findings = mesh_body(body, size, scale, kind)
+    write_mesh(mesh, out)
+    for line in findings:
+        print(line)
+    if doubt := in_metres(mesh.points):
+        print(f"warning: {doubt}")
+    print(f"{out}: {len(mesh.cells):,} cells, patches {mesh.patch_list}")
 
 
 def _solve(
@@ -142,10 +172,27 @@ def _solve(
     refine: Refine = False,
 ) -> None:
     """Solve a part and write displacement, strain, stress, reactions and error for ParaView."""
+    from ccfem.base.checks import check_known
+    from ccfem.base.progress import progress_bar
+    from ccfem.base.whole import check_writable
     from ccfem.cli.run import load
-    from ccfem.cli.solving import solve_part
+    from ccfem.cli.screen import print_solution
+    from ccfem.fem.elasticity.statics import solve
+    from ccfem.printing.export.vtu_result import result_path, write_result
 
-    solve_part(load(case, set_case, refine), out, load_case, backend)
+    part = load(case, set_case, refine)
+    names = part.problem.cases
+    if load_case is not None:
+        check_known("load case", load_case, names)
+        names = (load_case,)
+    files = {name: out if len(names) == 1 else result_path(out, name) for name in names}
+    for file in files.values():
+        check_writable(result_path(file))
+    with progress_bar(lines=True) as progress:
+        fields = solve(part.printed_problem(), backend=backend, progress=progress)
+    for name, file in files.items():
+        write_result(fields[name], file)
+        print_solution(fields[name], part.findings, file)
 
 
 _COMMANDS: dict[str, Callable[..., None]] = {

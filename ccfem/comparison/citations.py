@@ -1,10 +1,14 @@
 """What to cite: the papers whose methods a result used, as BibTeX."""
 
+import json
 import re
 from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
+
+from ccfem.base.errors import InputError
 
 METHODS: dict[str, tuple[str, ...]] = {
     "concentric": (),
@@ -51,6 +55,20 @@ def methods_of(record: Mapping[str, Any]) -> list[str]:
     solver = record.get("solver", {})
     methods += [str(solver.get("backend", "")), "error" if solver.get("error") is not None else ""]
     return [method for method in dict.fromkeys(methods) if method]
+
+
+def methods_of_results(file: Path) -> list[str]:
+    """Return the methods that a file ``results.json`` names."""
+    try:
+        return methods_of(json.loads(file.read_text(encoding="utf-8")))
+    except OSError:
+        raise InputError(
+            f"{file.parent} holds no results.json: name a folder that ccfem compare wrote"
+        ) from None
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise InputError(
+            f"{file} is no record of ccfem compare: name a folder that it wrote"
+        ) from None
 
 
 def cited(methods: Iterable[str]) -> list[str]:

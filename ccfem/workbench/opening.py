@@ -15,8 +15,6 @@ from ccfem.workbench.bench import Bench
 if TYPE_CHECKING:
     from ccfem.workbench.page import Page
 
-__all__ = ["Workbench", "open", "serve"]
-
 
 class Workbench:
     """A page that is being served; in a notebook it shows the link that opens it.

@@ -1,4 +1,4 @@
-"""The speed table of paper 001: its limits, paths worked out by hand, and its place in files."""
+"""The speed table of Wang et al. 2021: limits, paths by hand, and its place in files."""
 
 from dataclasses import replace
 from itertools import pairwise

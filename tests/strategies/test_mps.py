@@ -100,7 +100,7 @@ def agreement(lines, section, tensor):
     return 100.0 * (1.0 - np.abs((turn + 90.0) % 180.0 - 90.0).mean() / 90.0)
 
 
-# The plates of paper 004: one hole, and five.
+# The plates of Plocher et al. 2022: one hole, and five.
 ONE = shapely.box(-100.8, -18, 100.8, 18) - shapely.Point(0, 0).buffer(6, quad_segs=32)
 FIVE = shapely.box(-18, -54, 18, 54) - shapely.union_all(
     [
@@ -126,7 +126,7 @@ def test_plates_with_holes_are_filled(name, part):
 
 
 def test_mps_fills_the_plate_along_the_stress():
-    """Polyline chain of paper 004 on its first plate: agreement 95 %, gaps 2 %, overlap 1.6 %."""
+    """Chain of Plocher et al. 2022, first plate: agreement 95 %, gaps 2 %, overlap 1.6 %."""
     lines, section = plan(PATTERNS["mps"], ONE, kirsch)
     gaps, overlap = shares(lines, section)
     assert gaps < 0.02

@@ -1,4 +1,4 @@
-"""mps on the plates of paper 004: filled along the stress, and steady under rounding."""
+"""mps on the plates of Plocher et al. 2022: filled along the stress, and steady under rounding."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The contour_zigzag baseline beside the zigzag-contour paths published with paper 000."""
+"""The contour_zigzag baseline beside the zigzag-contour paths published with Chen et al. 2021."""
 
 import os
 from pathlib import Path

@@ -386,7 +386,7 @@ def test_writing_whole_or_not_at_all(tmp_path, box):
 
 @pytest.mark.skipif("CCFEM_CHEN2021" not in os.environ, reason="the authors' data is not here")
 def test_the_published_meshes_read():
-    """Sizes by paper 000, Table 1 (Loop: 32,473 cells, 140 mm) and the files' own headers."""
+    """Sizes by Chen et al. 2021, Table 1 (Loop: 32,473 cells, 140 mm) and the files' headers."""
     folder = Path(os.environ["CCFEM_CHEN2021"])
     loop = read_mesh(folder / "Loop" / "Loop.tet")
     assert (len(loop.points), len(loop.cells)) == (6677, 32473)

@@ -7,7 +7,7 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh import box_mesh
 from ccfem.body.meshing import mesh_body
 from ccfem.body.meshing.volume import fidelity
-from ccfem.cli.mesh_body import mesh_file
+from ccfem.cli.part_commands import _mesh as mesh_file
 from ccfem.slicing.slicers import Planar
 
 BOX = box_mesh((12.0, 8.0, 4.0), (4, 3, 2))

@@ -1,5 +1,5 @@
 """Nastran bulk data (``.nas``): read by Gmsh."""
 
-from ccfem.body.files.formats.msh import read_by_gmsh as read
+from ccfem.body.files.formats import msh
 
-__all__ = ["read"]
+read = msh.read_by_gmsh

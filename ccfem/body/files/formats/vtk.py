@@ -1,5 +1,5 @@
 """Legacy VTK files (``.vtk``) of unstructured grids, as those in XML."""
 
-from ccfem.body.files.formats.vtu import read
+from ccfem.body.files.formats import vtu
 
-__all__ = ["read"]
+read = vtu.read

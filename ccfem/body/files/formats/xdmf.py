@@ -1,5 +1,5 @@
 """XDMF meshes (``.xdmf``) of DOLFINx and others, with numbers in XML or HDF5: read by VTK."""
 
-from ccfem.body.files.formats.vtu import read
+from ccfem.body.files.formats import vtu
 
-__all__ = ["read"]
+read = vtu.read
