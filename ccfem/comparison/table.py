@@ -20,6 +20,7 @@ from ccfem.comparison.ranking import best_values, stiffness_ratios
 from ccfem.comparison.request import Wanted
 from ccfem.comparison.runs import Run
 from ccfem.judging.evaluation import COLUMNS
+from ccfem.judging.virtual_testing.progressive_failure import BreakingLoad
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -222,6 +223,37 @@ def load_cases_table(ranking: Sequence[Run]) -> Table | None:
         cells.append("–" if failure is None else f"{failure.factor:.2f} ({failure.case})")
         rows.append((name, tuple(map(Cell, cells)), ""))
     return Table(tuple(map(Head, titles)), tuple(rows))
+
+
+_BREAKING = (
+    Head("fails first", "What fails first, and at which load."),
+    Head("highest load, N", "In brackets its band."),
+    Head("at, mm", "Displacement at the highest load: work over load."),
+    Head("cells cracked then"),
+    Head("strand broken then, mm"),
+    Head("first strand breaks at, N", "A dash where no strand breaks."),
+    Head("left in the end, N", "What the part still carries at the end of its curve."),
+)
+
+
+def breaking_table(broken: Mapping[str, BreakingLoad]) -> Table:
+    """Table of what broke first and how it went on."""
+    rows = []
+    for name, load in broken.items():
+        curve, (low, high) = load.curve, load.band
+        peak, torn = int(curve.force.argmax()), curve.broken_at[curve.broken_at >= 0]
+        band = f"{number(low)} to {number(high)}" if high > low else ""
+        cells = (
+            Cell(f"{curve.first}, {number(curve.force[1])} N", value=float(curve.force[1])),
+            Cell(number(load.load), band, load.load),
+            _numbered(curve.displacement[peak]),
+            _numbered(curve.cracks[peak]),
+            _numbered(curve.broken[peak]),
+            _numbered(curve.force[torn.min()] if len(torn) else np.nan),
+            _numbered(curve.force[-1]),
+        )
+        rows.append((name, cells, ""))
+    return Table(_BREAKING, tuple(rows))
 
 
 def _percent(value: float, digits: int) -> str:

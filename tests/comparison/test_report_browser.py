@@ -13,11 +13,23 @@ from ccfem.comparison.engine import compare
 from ccfem.comparison.files import write_results
 from ccfem.fem.elasticity.problem import Force, Problem, Support
 from ccfem.fem.materials import isotropic
+from ccfem.judging.virtual_testing.progressive_failure import BreakingCurve, BreakingLoad
+from ccfem.judging.virtual_testing.strand import Limits
+from ccfem.judging.virtual_testing.strands import Strands
 from ccfem.machine import Machine
 from ccfem.slicing.slicers import Planar
 from ccfem.strategies import Concentric, Zigzag
 
 EVIL = "<script>window.broken = 1</script>"
+
+
+def broken(cells: int) -> BreakingLoad:
+    """Break a part at two steps: two cells crack at the first, one more at the second."""
+    cracked = np.full(cells, -1)
+    cracked[:3] = [1, 1, 2]
+    columns = [0.0, 900.0, 1000.0, 600.0], [0.0, 0.1, 0.2, 0.2], [0, 0, 2, 3], np.zeros(4)
+    curve = BreakingCurve(*columns, cracked, np.zeros(0), "matrix", np.zeros(3), 3)
+    return BreakingLoad(curve, None, None, Strands.none(), Limits(105.0, 50.0), 13.4)
 
 
 @pytest.fixture(scope="session")
@@ -32,8 +44,10 @@ def report(tmp_path_factory):
     strategies = {EVIL: Zigzag(spacing=3.0), "rings": Concentric(spacing=3.0)}
     result = compare(case, strategies, natural=True, print_plans=True)
     failed = replace(result.runs[0], name="late", evaluation=None, tested=None, failure=EVIL)
+    first = replace(result.runs[0], broken=broken(len(mesh.cells)))
     folder = tmp_path_factory.mktemp("report")
-    write_results(replace(result, runs=(*result.runs, failed)), folder, f"ccfem {EVIL}", {},
+    runs = (first, *result.runs[1:], failed)
+    write_results(replace(result, runs=runs), folder, f"ccfem {EVIL}", {},
                   part_file=f'title = "{EVIL}"')  # fmt: skip
     return folder / "report.html"
 
@@ -181,7 +195,7 @@ CONTRASTS = """(() => {
 
 def test_paper_shows_the_views(page):
     page.wait_for_selector("body[data-printable]", state="attached", timeout=60_000)
-    assert page.locator("img.printed").count() == 3 + page.locator(".chart").count() > 4
+    assert page.locator("img.printed").count() == 4 + page.locator(".chart").count() > 4
     page.emulate_media(media="print")
     try:
         assert page.locator(".scene:visible, .chart:visible, .controls:visible").count() == 0
@@ -228,4 +242,20 @@ def test_the_print_is_drawn_layer_by_layer(page):
     page.locator("#print-alone").check()
     assert "fibre" not in page.evaluate(drawn)  # the lowest layer is matrix
     assert page.locator("#print-top-said").inner_text().startswith("1 of ")
+    assert page.said == []
+
+
+def test_a_slider_goes_through_the_steps_of_the_breaking_load(page):
+    drawn = (
+        "document.getElementById('breaking-view').data.map((trace) => [trace.name, trace.x.length])"
+    )
+    page.locator("#breaking-view").scroll_into_view_if_needed()
+    page.wait_for_function("document.getElementById('breaking-view').data", timeout=60_000)
+    said = page.locator("#breaking-step-said")
+    assert said.inner_text().startswith("2 of 3: 1000 N at 0.2 mm; before it 2 cells")
+    assert page.evaluate(drawn)[1:] == [["cracked before", 2], ["cracks now", 1]]
+    page.locator("#breaking-step").fill("1")
+    assert page.evaluate(drawn)[1:] == [["cracks now", 2]]
+    row = page.locator("#breaking tbody tr").first.inner_text()
+    assert "matrix, 900 N" in row
     assert page.said == []

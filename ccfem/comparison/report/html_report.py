@@ -21,6 +21,7 @@ from ccfem.comparison.plot.breaking_curves import breaking_picture
 from ccfem.comparison.plot.colours import palette
 from ccfem.comparison.plot.part_picture import coloured, drawn_arrows, load_arrows, support_marks
 from ccfem.comparison.plot.values import image
+from ccfem.comparison.report.breaking_view import breaking_views
 from ccfem.comparison.report.charts import curve_charts, fronts, spreads
 from ccfem.comparison.report.deformed_view import deformed
 from ccfem.comparison.report.layer_view import layer_views
@@ -32,6 +33,7 @@ from ccfem.comparison.table import (
     Table,
     against_each_other,
     all_indices,
+    breaking_table,
     curve_table,
     headline_table,
     load_cases_table,
@@ -79,7 +81,7 @@ def bed_html(bed: BedPrint, record: Record, left_out: list[str]) -> str:
     """
     runs = bed.runs
     data: dict[str, Any] = {"part": None, "layers": {"stacks": []}, "print": {"runs": []}}
-    data |= {"charts": {}, "table": dataclasses.asdict(bed.table)}
+    data |= {"charts": {}, "breaking": [], "table": dataclasses.asdict(bed.table)}
     with spared("view of the print", left_out):
         data["print"] = print_views([bed])
     named = [replace(run, name=name) for name, run in runs.items()]
@@ -127,7 +129,7 @@ def report_html(comparison: Comparison, record: Record, part_file: str = "") -> 
     left_out = record["left_out"]
     charts: dict[str, Any] = {"curve": [], "fronts": [], "spreads": []}
     data: dict[str, Any] = {"part": None, "layers": {"stacks": []}, "charts": charts}
-    data |= {"print": {"runs": []}, "part_file": part_file}
+    data |= {"print": {"runs": []}, "breaking": [], "part_file": part_file}
     headline = headline_table(comparison.ranking, comparison.wanted, several)
     data["table"] = dataclasses.asdict(headline.first)
     with spared("view of the part", left_out):
@@ -136,6 +138,8 @@ def report_html(comparison: Comparison, record: Record, part_file: str = "") -> 
         data["layers"] = layer_views(comparison.slicings, strategies)
     with spared("view of the print", left_out):
         data["print"] = print_views(ranked)
+    with spared("steps of the breaking load", left_out):
+        data["breaking"] = breaking_views(comparison.broken, comparison.stress.mesh.centres)
     with spared("curve", left_out):
         charts["curve"] = curve_charts(curve, colours)
     with spared("fronts", left_out):
@@ -224,7 +228,7 @@ def _about_curve(comparison: Comparison) -> str:
 def _breaking(
     comparison: Comparison, colours: Mapping[str, str], left_out: list[str]
 ) -> dict[str, Any]:
-    """Picture of the breaking loads, what is said of them and their worth; empty without any."""
+    """Picture and table of breaking loads, what is said of them, their worth; empty without any."""
     broken = comparison.broken
     if not broken:
         return {}
@@ -232,7 +236,7 @@ def _breaking(
     with spared("picture of the breaking load", left_out):
         picture = image(breaking_picture(broken, colours))
     said = [f"{name}: {load.said}" for name, load in broken.items()]
-    return {"picture": picture, "said": said, "worth": WORTH}
+    return {"picture": picture, "said": said, "worth": WORTH, "table": breaking_table(broken)}
 
 
 def _parameters(comparison: Comparison) -> list[tuple[str, list[tuple[str, str, bool]]]]:

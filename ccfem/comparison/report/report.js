@@ -1,5 +1,5 @@
 "use strict";
-// Draws the report from the data in it. Order: data, table, part, layers, space, charts, start.
+// Draws the report from the data in it. Order: data, table, part, layers, space, print, breaking, charts, start.
 
 const byId = (id) => document.getElementById(id);
 const SCALES = {
@@ -670,6 +670,49 @@ function printScene(given) {
   whenSeen(view, draw);
 }
 
+// ---- breaking load ----------------------------------------------------------------------------
+
+// What has failed before a step, and what fails at it.
+const CRACKED = "#e58646";
+function breakingScene(part, given) {
+  const view = byId("breaking-view"), choice = byId("breaking-run"), step = byId("breaking-step");
+  given.forEach((run, k) => choice.add(new Option(run.name, k)));
+  const run = () => given[+choice.value];
+  const begin = () => {
+    step.max = run().force.length - 1;
+    step.value = run().force.indexOf(Math.max(...run().force));
+  };
+  const t = [0, 1, 2].map((c) => Array.from({ length: part.triangles.length / 3 }, (_, k) => part.triangles[3 * k + c]));
+  const body = { type: "mesh3d", x: part.points[0], y: part.points[1], z: part.points[2], i: t[0], j: t[1], k: t[2],
+    color: "#9aa4b1", opacity: 0.14, hoverinfo: "skip", ...MATT };
+  const marks = (failed, chosen, name, marker) => {
+    const kept = [...failed.row.keys()].filter((k) => chosen(failed.row[k]));
+    const [x, y, z] = failed.points.map((column) => kept.map((k) => column[k]));
+    return { type: "scatter3d", mode: "markers", name, hoverinfo: "skip", x, y, z, marker };
+  };
+  function draw() {
+    const { cells, strands, force, displacement, cracks, broken } = run(), at = +step.value;
+    const traces = [body,
+      marks(cells, (row) => row < at, "cracked before", { size: 2.5, color: CRACKED, opacity: 0.6 }),
+      marks(strands, (row) => row < at, "broken before", { size: 4, color: INK, symbol: "square" }),
+      marks(cells, (row) => row === at, "cracks now", { size: 4, color: RED }),
+      marks(strands, (row) => row === at, "breaks now", { size: 5, color: RED, symbol: "square" }),
+    ].filter((trace) => trace.x.length);
+    byId("breaking-step-said").textContent = `${at} of ${force.length - 1}: ${short(force[at])} N at ${short(displacement[at])} mm; ` +
+      `before it ${cracks[at]} cells cracked, ${short(broken[at])} mm of strand broken`;
+    return Plotly.react(view, traces, scene(view, [], traces), CONFIG);
+  }
+  const legend = [["cell cracked before", CRACKED], ["strand broken before", INK], ["fails at this step", RED]];
+  byId("breaking-legend").innerHTML = legend.map(([what, colour]) =>
+    `<span class="legend"><i class="short" style="background:${colour}"></i>${what}</span>`).join(" ");
+  begin();
+  choice.onchange = () => { begin(); draw(); };
+  step.oninput = draw;
+  for (const each of [choice, step]) each.addEventListener("change", () => printed(view));
+  byId("breaking-steps").hidden = false;
+  whenSeen(view, draw);
+}
+
 // ---- charts -----------------------------------------------------------------------------------
 
 function chart(element, given) {
@@ -724,6 +767,7 @@ async function start() {
   if (data.part) {
     partScene(data.part);
     if (!byId("layers").hidden) spaceScene(data.part, data.layers);
+    if (data.breaking.length) breakingScene(data.part, data.breaking);
   } else if (byId("part-view")) byId("part-view").hidden = true;
   if (data.print.runs.length) printScene(data.print);
   charts(data.charts);
