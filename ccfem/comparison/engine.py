@@ -376,7 +376,10 @@ def _broken(
     try:
         with timed(seconds, "breaking load without fibre"):
             specimen = Specimen.of(on_linear_cells(basis.field, request.backend))
-            bare = breaking_load(None, specimen, request.strand)
+            # Without fibre the part has no layers of its own: those of the runs, if they are one's.
+            (first, *others) = parts.values()
+            layers = () if others else first.layers
+            bare = breaking_load(None, specimen, request.strand, layers=layers)
     except (InputError, SolveError) as error:
         return [replace(run, unbroken=str(error)) for run in runs], None
     test = partial(with_breaking_load, specimen=specimen, strand=request.strand)

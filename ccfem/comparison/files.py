@@ -353,14 +353,18 @@ def results_rows(comparison: Comparison) -> list[dict[str, Any]]:
     return rows
 
 
-_BREAKING = ("curve", "displacement_mm", "load_N", "cells_cracked", "fibre_broken_mm")
+_BREAKING = (
+    *("curve", "displacement_mm", "load_N"),
+    *("cells_cracked", "fibre_broken_mm", "cells_parted"),
+)
 
 
-def breaking_rows(broken: BreakingLoad) -> Iterator[tuple[str, float, float, int, float]]:
+def breaking_rows(broken: BreakingLoad) -> Iterator[tuple[str, float, float, int, float, int]]:
     """Rows of load over displacement of an experiment: "middle", "low" and "high" of its band."""
     for name, curve in (("middle", broken.curve), ("low", broken.low), ("high", broken.high)):
         if curve is not None:
-            columns = (curve.displacement, curve.force, curve.cracks, curve.broken)
+            lost = curve.cracks, curve.broken, curve.parted
+            columns = (curve.displacement, curve.force, *lost)
             for row in zip(*(column.tolist() for column in columns), strict=True):
                 yield name, *row
 

@@ -542,7 +542,7 @@ def with_breaking_load(run: Run, part: Part, specimen: Specimen, strand: Strand)
         mesh = specimen.unreinforced.mesh
         about = (run.strategy, part.layers, mesh, part.machine, run.strand_verdict.parts)
         strands = carrying_strands(run.toolpaths, *about)
-        return replace(run, broken=breaking_load(strands, specimen, strand))
+        return replace(run, broken=breaking_load(strands, specimen, strand, layers=part.layers))
 
     return _stage(run, "breaking load", work, reason="unbroken")
 

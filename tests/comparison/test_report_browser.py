@@ -27,8 +27,9 @@ def broken(cells: int) -> BreakingLoad:
     """Break a part at two steps: two cells crack at the first, one more at the second."""
     cracked = np.full(cells, -1)
     cracked[:3] = [1, 1, 2]
-    columns = [0.0, 900.0, 1000.0, 600.0], [0.0, 0.1, 0.2, 0.2], [0, 0, 2, 3], np.zeros(4)
-    curve = BreakingCurve(*columns, cracked, np.zeros(0), "matrix", np.zeros(3), 3)
+    columns = [0.0, 900.0, 1000.0, 600.0], [0.0, 0.1, 0.2, 0.2], [0, 0, 2, 3], *np.zeros((2, 4))
+    rows = cracked, np.zeros(0), np.full(cells, -1)
+    curve = BreakingCurve(*columns, *rows, "matrix", np.zeros(3), 0.0, 3)
     return BreakingLoad(curve, None, None, Strands.none(), Limits(105.0, 50.0), 13.4)
 
 

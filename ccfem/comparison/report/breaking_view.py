@@ -25,8 +25,9 @@ def breaking_views(broken: Mapping[str, BreakingLoad], centres: FloatArray) -> l
     Returns
     -------
     list of dict
-        Of each part its ``name``, the columns of its curve, and the places of ``cells`` that crack
-        and of pieces of ``strands`` that break, with the rows at which they do.
+        Of each part its ``name``, the columns of its curve, and the places of ``cells`` that crack,
+        of pieces of ``strands`` that break and of ``layers`` that part, with the rows at which they
+        do.
     """
     return [
         {
@@ -35,8 +36,10 @@ def breaking_views(broken: Mapping[str, BreakingLoad], centres: FloatArray) -> l
             "displacement": load.curve.displacement,
             "cracks": load.curve.cracks,
             "broken": load.curve.broken,
+            "parted": load.curve.parted,
             "cells": _failed(centres, load.curve.cracked_at),
             "strands": _failed(load.strands.middle, load.curve.broken_at),
+            "layers": _failed(centres, load.curve.parted_at),
         }
         for name, load in broken.items()
     ]

@@ -691,18 +691,21 @@ function breakingScene(part, given) {
     return { type: "scatter3d", mode: "markers", name, hoverinfo: "skip", x, y, z, marker };
   };
   function draw() {
-    const { cells, strands, force, displacement, cracks, broken } = run(), at = +step.value;
+    const { cells, strands, layers, force, displacement, cracks, broken, parted } = run(), at = +step.value;
     const traces = [body,
       marks(cells, (row) => row < at, "cracked before", { size: 2.5, color: CRACKED, opacity: 0.6 }),
+      marks(layers, (row) => row < at, "parted before", { size: 3.5, color: LINK, symbol: "diamond" }),
       marks(strands, (row) => row < at, "broken before", { size: 4, color: INK, symbol: "square" }),
       marks(cells, (row) => row === at, "cracks now", { size: 4, color: RED }),
+      marks(layers, (row) => row === at, "parts now", { size: 5, color: RED, symbol: "diamond" }),
       marks(strands, (row) => row === at, "breaks now", { size: 5, color: RED, symbol: "square" }),
     ].filter((trace) => trace.x.length);
     byId("breaking-step-said").textContent = `${at} of ${force.length - 1}: ${short(force[at])} N at ${short(displacement[at])} mm; ` +
-      `before it ${cracks[at]} cells cracked, ${short(broken[at])} mm of strand broken`;
+      `before it ${cracks[at]} cells cracked, ${short(broken[at])} mm of strand broken` +
+      (parted[at] ? `, layers of ${parted[at]} cells parted` : "");
     return Plotly.react(view, traces, scene(view, [], traces), CONFIG);
   }
-  const legend = [["cell cracked before", CRACKED], ["strand broken before", INK], ["fails at this step", RED]];
+  const legend = [["cell cracked before", CRACKED], ["strand broken before", INK], ["layers parted before", LINK], ["fails at this step", RED]];
   byId("breaking-legend").innerHTML = legend.map(([what, colour]) =>
     `<span class="legend"><i class="short" style="background:${colour}"></i>${what}</span>`).join(" ");
   begin();

@@ -1,9 +1,9 @@
-"""The load that breaks a part: matrix that softens and strands that break, step by step.
+"""The load that breaks a part: matrix that softens, strands that break, layers that part.
 
 Sequentially linear analysis (Rots, Belletti and Invernizzi, Engineering Fracture Mechanics 75,
 2008, 590-614): the part is linear elastic between events. An event is a cell that cracks, or cracks
-further, or a strand that breaks. Each lowers a stiffness; the part is solved again, and the load at
-which the next event comes follows by scaling.
+further, a strand that breaks, or layers that part. Each lowers a stiffness; the part is solved
+again, and the load at which the next event comes follows by scaling.
 
 Matrix: isotropic damage in steps, by the largest principal stress. A cell falls to a share of 0.4,
 0.4^2 ... of its stiffness at stresses on a line that softens with strain. The line is made so that
@@ -15,7 +15,8 @@ size.
 Strands carry tension only. One breaks where its force, averaged over a length, reaches its
 strength. It then carries nothing over that length.
 
-Layers that part are not modelled.
+Layers part where the traction of the averaged stress on them reaches the strength of their bond
+(`ccfem.judging.virtual_testing.parting`), if the layers and that strength are known.
 """
 
 from collections.abc import Sequence
@@ -35,11 +36,14 @@ from ccfem.fem.elasticity.recovery import cell_strain, times
 from ccfem.fem.elasticity.solvers import LARGEST_DIRECT, direct_backend
 from ccfem.fem.elasticity.zone import ZONE, distance_from_patches
 from ccfem.judging.virtual_testing.equilibrium import Equilibrium, bar_stiffness, equilibrium
+from ccfem.judging.virtual_testing.failure_laws.interlayer import layer_normals
+from ccfem.judging.virtual_testing.parting import parted_stiffness, parting_factors
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import Limits, Strand
 from ccfem.judging.virtual_testing.strands import Strands, Windows, cut_strands
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers import Layer
 
 SOFTENING = 13.4
 """Length G_f E / f_t^2, mm, of the matrix: its energy of fracture per area over its strength."""
@@ -117,26 +121,30 @@ class Damage:
         Of cells that have cracked; 1 in others.
     intact : (s,) array in [0, 1]
         Share of each piece of fibre that is not broken.
+    parted : (m,) bool array
+        Cells whose layers have parted.
     """
 
     events: IntArray
     ductility: FloatArray
     intact: FloatArray
+    parted: BoolArray
 
     def __post_init__(self) -> None:
-        freeze(self, events=int, ductility=float, intact=float)
+        freeze(self, events=int, ductility=float, intact=float, parted=bool)
 
     @classmethod
     def none(cls, model: "_Model") -> "Damage":
         """Return a part with no damage."""
         cells, pieces = len(model.specimen.unreinforced.mesh.cells), len(model.windows.strands)
-        return cls(np.zeros(cells, dtype=np.int64), np.ones(cells), np.ones(pieces))
+        none = np.zeros(cells, dtype=np.int64)
+        return cls(none, np.ones(cells), np.ones(pieces), none.astype(bool))
 
 
 class _Response(NamedTuple):
     """A damaged part under the load of its case, and how much more takes it to the next events.
 
-    `cells` (m,) and `windows` (w,) are the factors on the load at which each fails.
+    `cells` (m,), `layers` (m,) and `windows` (w,) are the factors on the load at which each fails.
     """
 
     balanced: Equilibrium
@@ -144,12 +152,19 @@ class _Response(NamedTuple):
     force: float
     displacement: float
     cells: FloatArray
+    layers: FloatArray
     windows: FloatArray
 
     @property
     def factor(self) -> float:
         """Factor on the load at the next event."""
-        return float(min(self.cells.min(initial=np.inf), self.windows.min(initial=np.inf)))
+        return min(self.factors.values())
+
+    @property
+    def factors(self) -> dict[str, float]:
+        """Factor on the load at which each kind of event comes next."""
+        kinds = {"matrix": self.cells, "fibre": self.windows, "layers": self.layers}
+        return {kind: float(values.min(initial=np.inf)) for kind, values in kinds.items()}
 
 
 @dataclass(frozen=True)
@@ -161,6 +176,7 @@ class _Model:
     strand: Strand
     limits: Limits
     softening: float
+    layers: Sequence[Layer] = ()
 
     def at(self, strength: float, softening: float) -> "_Model":
         """Return the same with strength of strands and softening length by these factors."""
@@ -187,6 +203,21 @@ class _Model:
         return stiffness if problem.density is None else problem.density[:, None, None] * stiffness
 
     @cached_property
+    def normal(self) -> FloatArray:
+        """Unit normals (m, 3) of the layers in the cells."""
+        return layer_normals(self.layers, self.specimen.unreinforced.mesh.centres)
+
+    def left(self, damage: Damage) -> FloatArray:
+        """Stiffness (m, 6, 6) or (6, 6) of cells without cracks: within layers once parted."""
+        parted = np.flatnonzero(damage.parted)
+        if not len(parted):
+            return self.stiffness
+        cells = len(damage.parted)
+        stiffness = np.array(np.broadcast_to(self.stiffness, (cells, 6, 6)))
+        stiffness[parted] = parted_stiffness(stiffness[parted], self.normal[parted])
+        return stiffness
+
+    @cached_property
     def gradients(self) -> FloatArray:
         """Gradients (m, 4, 3) of the shape functions of the cells, 1/mm."""
         return cell_gradients(self.specimen.unreinforced.mesh)
@@ -201,47 +232,58 @@ class _Model:
     def response(self, damage: Damage, solver: Solver, near: FloatArray) -> _Response:
         """Solve the damaged part under the load of its case."""
         specimen, left = self.specimen, _LEFT[damage.events]
-        problem = specimen.system.problem
-        density = left if problem.density is None else left * problem.density
-        weak = specimen.weakened(specimen.system.assemble(density=density), solver)
+        problem, whole = specimen.system.problem, self.left(damage)
+        weak = specimen.weakened(specimen.system.assemble(whole, left), solver)
         strands = replace(self.windows.strands, share=self.windows.strands.share * damage.intact)
         balanced = equilibrium(weak, strands, self.axial, known=(near,), tolerance=_TOLERANCE)
         internal = (balanced.matrix @ balanced.displacement.reshape(-1)).reshape(-1, 3)
         force = specimen.force(internal - specimen.forces)
         moved = force / specimen.stiffness(balanced.displacement, 0.5 * balanced.work)
         strain = cell_strain(problem.mesh, balanced.displacement)
-        stress = problem.in_material(left[:, None] * times(self.stiffness, strain))
+        stress = problem.in_material(left[:, None] * times(whole, strain))
         pull = self.axial * balanced.carried * balanced.strain * damage.intact
         largest, means = _largest_principal(stress), self.windows.means(pull)
         largest[largest <= _ROUNDING * np.abs(stress).max()] = 0.0
         with np.errstate(divide="ignore"):
             cells = self.strength(damage) / np.maximum(largest, 0.0)
             windows = self.limits.fibre / np.maximum(means, 0.0)
-        return _Response(balanced, stress, force, moved, cells, windows)
+        most = _CASCADE * min(cells.min(), windows.min(initial=np.inf))
+        layers = self.parting(damage, stress, most)
+        return _Response(balanced, stress, force, moved, cells, layers, windows)
+
+    def parting(self, damage: Damage, stress: FloatArray, most: float = np.inf) -> FloatArray:
+        """Factors (m,) on the load at which layers part, up to the largest that is asked for."""
+        if not self.layers or self.limits.bond is None:
+            return np.full(len(stress), np.inf)
+        judged = np.flatnonzero(self.judged & ~damage.parted)
+        mesh = self.specimen.unreinforced.mesh
+        return parting_factors(mesh, stress, self.limits, self.normal, judged, most)
 
     def solver(self, damage: Damage, response: _Response) -> Solver:
         """Factorise the damaged part with the fibre that carries."""
         specimen, strands = self.specimen, self.windows.strands
         share = response.balanced.carried * damage.intact * strands.share
         added = bar_stiffness(strands, specimen.system.problem.mesh.volumes, share)
-        whole = _LEFT[damage.events, None, None] * self.stiffness + self.axial * added
+        whole = _LEFT[damage.events, None, None] * self.left(damage) + self.axial * added
         matrix = specimen.system.assemble(whole, np.ones(len(whole)))
         backend, known = direct_backend(), specimen.backend
         if specimen.held.unknowns > LARGEST_DIRECT:
             backend = known
         return specimen.system.factorise(matrix, backend, _SOLVES, held=specimen.held)
 
-    def lost(self, damage: Damage) -> tuple[int, float]:
-        """Count cells that have cracked, and length of strand that is broken, mm."""
+    def lost(self, damage: Damage) -> tuple[int, float, int]:
+        """Count cells that have cracked, mm of strand that are broken, and parted cells."""
         broken = (1.0 - damage.intact) @ self.windows.strands.length
-        return int(np.count_nonzero(damage.events)), float(broken)
+        counts = np.count_nonzero(damage.events), np.count_nonzero(damage.parted)
+        return int(counts[0]), float(broken), int(counts[1])
 
     def first(self, response: _Response) -> tuple[str, FloatArray]:
         """Say what fails first, and its place (3,)."""
-        if response.windows.min(initial=np.inf) < response.cells.min():
-            return "fibre", self.windows.middle(int(response.windows.argmin()))
-        centres = self.specimen.unreinforced.mesh.centres
-        return "matrix", centres[int(response.cells.argmin())]
+        what = min(response.factors, key=response.factors.__getitem__)
+        if what == "fibre":
+            return what, self.windows.middle(int(response.windows.argmin()))
+        factors = response.cells if what == "matrix" else response.layers
+        return what, self.specimen.unreinforced.mesh.centres[int(factors.argmin())]
 
     def damaged(self, damage: Damage, response: _Response, most: float) -> Damage:
         """Damage after the events up to a factor on the load."""
@@ -257,7 +299,7 @@ class _Model:
         for window in self._weakest(response.windows, most):
             pieces, share = self.windows.overlap(window)
             intact[pieces] *= 1.0 - share
-        return Damage(events, ductile, intact)
+        return Damage(events, ductile, intact, damage.parted | (response.layers <= most))
 
     def _weakest(self, factors: FloatArray, most: float) -> list[int]:
         """Weakest window of each strand that breaks up to a factor: its others are relieved."""
@@ -317,14 +359,20 @@ class BreakingCurve:
         Cells that have cracked before.
     broken : (k,) array, mm
         Length of strand that carries nothing any more.
+    parted : (k,) int array
+        Cells whose layers have parted before.
     cracked_at : (m,) int array
         Row at which each cell first cracked; -1 where it did not.
     broken_at : (s,) int array
         Row at which each piece of fibre broke; -1 where it did not.
+    parted_at : (m,) int array
+        Row at which the layers of each cell parted; -1 where they did not.
     first : str
-        What failed first: "matrix" or "fibre".
+        What failed first: "matrix", "fibre" or "layers".
     where : (3,) array, mm
         Place of that.
+    bond : float
+        How near layers are to parting at the highest load, 1 where they do; 0 if not judged.
     steps : int
         Solves of the damaged part.
     """
@@ -333,17 +381,20 @@ class BreakingCurve:
     displacement: FloatArray
     cracks: IntArray
     broken: FloatArray
+    parted: IntArray
     cracked_at: IntArray
     broken_at: IntArray
+    parted_at: IntArray
     first: str
     where: FloatArray
+    bond: float
     steps: int
 
     __repr__ = in_brief
 
     def __post_init__(self) -> None:
         freeze(self, force=float, displacement=float, cracks=int, broken=float, where=float)
-        freeze(self, cracked_at=int, broken_at=int)
+        freeze(self, parted=int, cracked_at=int, broken_at=int, parted_at=int)
 
     @property
     def load(self) -> float:
@@ -358,6 +409,10 @@ class BreakingCurve:
             f"{self.first} first at {self.force[1]:.4g} N; at the highest load, {self.load:.4g} N "
             f"at {self.displacement[peak]:.3g} mm, {self.cracks[peak]} cells had cracked"
         )
+        if self.parted[peak]:
+            said += f" and layers had parted in {self.parted[peak]} cells"
+        elif self.bond:
+            said += f", with the bond between layers at {self.bond:.0%} of its strength"
         if not len(fibre):
             return f"{said}; no strand broke"
         if self.broken[peak] > 0.0:
@@ -370,9 +425,11 @@ def _curve(model: _Model, stop: float) -> BreakingCurve:
     specimen, strands = model.specimen, model.windows.strands
     damage = Damage.none(model)
     solver, near = specimen.solver, specimen.unreinforced.displacement
-    rows = [(0.0, 0.0, 0, 0.0)]
+    rows = [(0.0, 0.0, 0, 0.0, 0)]
     cracked, broken = np.full(len(damage.events), -1), np.full(len(strands), -1)
+    parted = np.array(cracked)
     what, where = "", np.full(3, np.nan)
+    highest = (damage, np.zeros((len(cracked), 6)), 0.0)
     for step in range(_MOST):
         response = model.response(damage, solver, near)
         near = response.balanced.displacement
@@ -384,18 +441,24 @@ def _curve(model: _Model, stop: float) -> BreakingCurve:
         holds = held if factor > _NEXT * max(held, _NONE) and len(rows) > 1 else max(factor, held)
         if holds * response.force < stop * max(row[0] for row in rows) or np.isinf(factor):
             rows.append((held * response.force, rows[-1][1], *model.lost(damage)))
-            return BreakingCurve(*_columns(rows), cracked, broken, what, where, step)
+            before, stress, at = highest
+            bond = at / float(model.parting(before, stress).min())
+            events = cracked, broken, parted
+            return BreakingCurve(*_columns(rows), *events, what, where, min(bond, 1.0), step)
         if step == 0:
             what, where = model.first(response)
         most = _TOGETHER * factor
         if factor > held:
             balance = (factor * response.force, factor * response.displacement)
+            if balance[0] > max(row[0] for row in rows):
+                highest = damage, response.stress, factor
             rows.append((*balance, *model.lost(damage)))
         else:
             most = max(most, min(held, _CASCADE * factor))
         after = model.damaged(damage, response, most)
         cracked[(after.events > 0) & (damage.events == 0)] = len(rows) - 1
         broken[(after.intact < 1.0) & (damage.intact == 1.0)] = len(rows) - 1
+        parted[after.parted & ~damage.parted] = len(rows) - 1
         damage = after
     raise SolveError(
         f"breaking load: the load has not fallen to {stop:g} of the highest after {_MOST} steps"
@@ -403,16 +466,16 @@ def _curve(model: _Model, stop: float) -> BreakingCurve:
 
 
 def _columns(
-    rows: Sequence[tuple[float, float, int, float]],
-) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
+    rows: Sequence[tuple[float, float, int, float, int]],
+) -> tuple[FloatArray, FloatArray, IntArray, FloatArray, IntArray]:
     """Columns of the rows of a curve; an error where nothing failed."""
     if len(rows) == 2:
         raise InputError(
             "nothing breaks under this load: no cell away from loads and supports, and no strand, "
             "is stretched; turn the load round"
         )
-    force, displacement, cracks, broken = np.array(rows).T
-    return force, displacement, cracks.astype(np.int64), broken
+    force, displacement, cracks, broken, parted = np.array(rows).T
+    return force, displacement, cracks.astype(np.int64), broken, parted.astype(np.int64)
 
 
 # The breaking load with its band.
@@ -477,8 +540,8 @@ EXPERIMENT = "experiment"
 """Stands beside every number of this module, until two meshes agree within 5 %."""
 
 WORTH = (
-    "An experiment: a sequentially linear analysis in which the matrix softens and strands break. "
-    "It depends on the mesh, and layers that part are not modelled."
+    "An experiment: a sequentially linear analysis in which the matrix softens, strands break and "
+    "layers part. It depends on the mesh, and strands do not come loose from the matrix."
 )
 """What its numbers are worth; to be shown wherever they are."""
 
@@ -492,6 +555,7 @@ def breaking_load(
     machine: Machine | None = None,
     band: bool = True,
     stop: float = STOP,
+    layers: Sequence[Layer] = (),
 ) -> BreakingLoad:
     """Break a part with its fibres under its load case: an experiment.
 
@@ -518,6 +582,9 @@ def breaking_load(
         Also with strands 15 % weaker and half the softening length, and with both more.
     stop : float in [0, 1), default 0.65
         Share of the highest load at which the curve ends.
+    layers : sequence of Layer, optional
+        As they are printed. They part where the material of the part has a strength between layers
+        (`interlayer_tensile`, `interlayer_shear`); default: they never do.
 
     Raises
     ------
@@ -540,7 +607,7 @@ def breaking_load(
     strand = Strand() if strand is None else strand
     limits = Limits.of(specimen.system.problem.material, strand, matrix_strength)
     _check_softening(softening * (SOFTENINGS[0] if band else 1.0), mesh)
-    middle = _Model(specimen, Windows(strands), strand, limits, softening)
+    middle = _Model(specimen, Windows(strands), strand, limits, softening, layers)
     low, high = (
         _curve(middle.at(*factors), _STOP_OF_BAND) if band else None
         for factors in zip((1.0 - SPREAD, 1.0 + SPREAD), SOFTENINGS, strict=True)
