@@ -145,7 +145,7 @@ HEADLINE = (
     Headline("displacement", "displacement, mm", "low", "{:.3g}"),
     Headline("first_failure_load", "first failure, N", "high", "{:.0f}"),
     Headline("first_failure_load_alternative", "first failure, other supports, N", "", "{:.0f}"),
-    Headline("pinned_joint_load", "pin, matrix alone, N", "", "{:.0f}"),
+    Headline("pinned_joint_load", "pin tears out, N", "", "{:.0f}"),
     Headline("interlayer_load", "delamination load, N", "", "{:.0f}"),
     Headline("fibre_per_layer", "fibre, mm a layer", "", "{:.0f}"),
     Headline("fibre_mass", "fibre, g", "", "{:.3g}"),

@@ -24,7 +24,7 @@ from ccfem.judging.evaluation.evaluation import Evaluation
 from ccfem.judging.evaluation.layer_paths import plane_paths
 from ccfem.judging.evaluation.open_places import open_places
 from ccfem.judging.virtual_testing.equilibrium import BONDED
-from ccfem.judging.virtual_testing.pinned_joints import said_of_pins
+from ccfem.judging.virtual_testing.pinned_joints import COUNTED, said_of_pins
 from ccfem.judging.virtual_testing.stiffness_test import RESOLUTION, SAME, UNDECIDED
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.upper_bound import LEAST, LOOSE, UpperBound
@@ -189,7 +189,7 @@ def _about_scatter(tested: Sequence[Run]) -> list[str]:
 
 
 def _about_joints(tested: Sequence[Run]) -> list[str]:
-    """Say at which load a pin tears out of the best run, by the matrix alone: all are alike."""
+    """Say at which load a pin tears out of the best run."""
     best = tested[0].tested if tested else None
     if best is None:
         return []
@@ -417,7 +417,7 @@ def cases_remarks(
         factor, case, joint = pin
         texts.append(
             f"pins in holes, over all cases: {joint.about} in '{case}', {factor:.2f} times its "
-            "load, by the matrix alone; strands round a hole are not counted"
+            f"load, by {COUNTED}"
         )
     if bound is None:
         return texts

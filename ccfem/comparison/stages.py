@@ -14,6 +14,7 @@ from ccfem.comparison.tested_cases import in_all_cases
 from ccfem.fem.elasticity.stress_field import PartStress, StressField, WeightedCases
 from ccfem.judging.evaluation import evaluate
 from ccfem.judging.evaluation.strand_rules import StrandVerdict, strand_verdict, why_not
+from ccfem.judging.virtual_testing.anchorage import Anchorage
 from ccfem.judging.virtual_testing.pinned_joints import pinned_joints, pins_not_judged
 from ccfem.judging.virtual_testing.progressive_failure import breaking_load
 from ccfem.judging.virtual_testing.scatter import DEFAULT_SCATTER, Scatter, ratio_scatter
@@ -503,7 +504,7 @@ def with_test(run: Run, part: Part, tests: Tests) -> Run:
         tests_done = [_test(strands, *model, tests.strand, part) for model in tests.models]
         both = replace(tests_done[0], alternative=[*tests_done[1:], None][0])
         if part.several_cases:
-            every = in_all_cases(strands, part.cases, tests.strand, part.layers)
+            every = in_all_cases(strands, part.cases, tests.strand, part.layers, part.machine)
             both = replace(both, cases=every)
         return replace(run, tested=both)
 
@@ -528,7 +529,7 @@ def _test(
         failure,
         matrix_before=before,
         scatter=scatter,
-        joints=pinned_joints(*pins, limits),
+        joints=pinned_joints(*pins, limits, Anchorage.of(strands, part.machine)),
         pins_not_judged=pins_not_judged(*pins),
     )
 

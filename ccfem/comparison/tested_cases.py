@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from ccfem.base.arrays import FloatArray, in_brief
 from ccfem.base.errors import InputError
 from ccfem.fem.elasticity.stress_field import WeightedCases
+from ccfem.judging.virtual_testing.anchorage import Anchorage
 from ccfem.judging.virtual_testing.equilibrium import IN_COMPRESSION, TENSION
 from ccfem.judging.virtual_testing.pinned_joints import PinnedJoint, pinned_joints
 from ccfem.judging.virtual_testing.several_cases import (
@@ -17,6 +18,7 @@ from ccfem.judging.virtual_testing.several_cases import (
 )
 from ccfem.judging.virtual_testing.strand import Limits, Strand
 from ccfem.judging.virtual_testing.strands import Strands
+from ccfem.machine import Machine
 from ccfem.slicing.layers import Layer
 from ccfem.strategies.fibre_aware.upper_bound import UpperBound
 
@@ -105,7 +107,11 @@ class TestedCases:
 
 
 def in_all_cases(
-    strands: Strands, cases: WeightedCases, strand: Strand, layers: Sequence[Layer]
+    strands: Strands,
+    cases: WeightedCases,
+    strand: Strand,
+    layers: Sequence[Layer],
+    machine: Machine,
 ) -> TestedCases:
     """Test strands under all cases, in every mode."""
     parts = specimens(cases)
@@ -119,8 +125,9 @@ def in_all_cases(
     except InputError:  # the strength of matrix or strand is unknown: `Tested.note` says so
         return TestedCases(modes[0], modes[1], modes[2], None)
     limits = Limits.of(parts[0].unreinforced.material, strand)
+    anchorage = Anchorage.of(strands, machine)
     joints = tuple(
-        pinned_joints(test.solution, part.forces, test.force, limits)
+        pinned_joints(test.solution, part.forces, test.force, limits, anchorage)
         for test, part in zip(modes[0].tests, parts, strict=True)
     )
     return TestedCases(modes[0], modes[1], modes[2], failure, joints)

@@ -9,11 +9,14 @@ and lugs: by mean stresses on the areas that would part, which are measured in t
   infill only the share counts that is filled, up to a radius ahead of the wall: a few lines round
   a hole are crushed with what does not hold them;
 * net section: the material beside the hole breaks, ``F / ((W - d) t)`` against the tensile one;
+* strand pull-out: where strands cross the net section, they go on holding when the matrix there has
+  cracked, until they break or are pulled out (`ccfem.judging.virtual_testing.anchorage`). The joint
+  parts beside the hole at the larger of the two;
 * shear-out: what lies ahead of the pin is pushed out between two planes that touch the hole along
   the force, ``F / (2 e t)`` against the tensile strength over the root of 3 (von Mises).
 
-The strengths are those of the matrix. Strands, also those that ring the hole, are not counted: no
-strength of printed ones in such a joint is known here.
+All other strengths are those of the matrix. Strands ahead of the pin are not counted: no strength
+of printed ones in such a joint is known here.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,11 +32,13 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.fem.elasticity import StressField
 from ccfem.fem.elasticity.load_kinds import patches_in_use
 from ccfem.geometry.facets import connected, facet_keys
+from ccfem.judging.virtual_testing.anchorage import Anchorage
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import Limits
 from ccfem.judging.virtual_testing.strands import cut_steps
 
 BEARING, NET_SECTION, SHEAR_OUT = "bearing", "net section", "shear-out"
+PULL_OUT = "strand pull-out"
 
 _HEIGHTS = 5
 """Places along the axis at which a hole's surroundings are measured."""
@@ -71,7 +76,8 @@ class PinnedJoint:
         Of the material beside the hole across the force, and of both planes of shear-out.
     loads : mapping of mode to float, N
         Load of the part at which each mode happens. Infinite for the net section where it is
-        pressed; none of a mode without material that could part.
+        pressed; none of a mode without material that could part. That of strands in the net
+        section is there where they hold anything.
     """
 
     patch: str
@@ -88,8 +94,11 @@ class PinnedJoint:
 
     @property
     def mode(self) -> str:
-        """The mode that happens first."""
-        return min(self.loads, key=self.loads.__getitem__)
+        """The mode that happens first: of matrix and strands beside the hole the later one."""
+        spared = set()
+        if PULL_OUT in self.loads and NET_SECTION in self.loads:
+            spared = {min((PULL_OUT, NET_SECTION), key=self.loads.__getitem__)}
+        return min(self.loads.keys() - spared, key=self.loads.__getitem__)
 
     @property
     def load(self) -> float:
@@ -109,7 +118,11 @@ class PinnedJoint:
 
 
 def pinned_joints(
-    stress: StressField, forces: FloatArray, size: float, limits: Limits
+    stress: StressField,
+    forces: FloatArray,
+    size: float,
+    limits: Limits,
+    anchorage: Anchorage | None = None,
 ) -> tuple[PinnedJoint, ...]:
     """Judge every hole whose wall carries a load or a support, the weakest first.
 
@@ -123,9 +136,11 @@ def pinned_joints(
         Of the load of the part; loads at failure are in its terms.
     limits : Limits
         Its strength of the matrix is the tensile one.
+    anchorage : Anchorage, optional
+        Strands, and how they are held; default: none are counted.
     """
     joints = [
-        _joint(stress, hole.face, hole.patch, hole.facets, hole.force, size, limits)
+        _joint(stress, hole.face, hole.patch, hole.facets, hole.force, size, limits, anchorage)
         for hole in _holes(stress, forces, size)
         if hole.face is not None
     ]
@@ -215,13 +230,17 @@ def about_pins(stress: StressField) -> str:
     return said_of_pins(joints, pins_not_judged(stress, specimen.forces, size))
 
 
+COUNTED = "the matrix, and strands beside a hole; those ahead of a pin are not counted"
+"""What the loads of joints rest on."""
+
+
 def said_of_pins(joints: Sequence[PinnedJoint], besides: str = "") -> str:
     """Remark on the weakest of some joints, which comes first, and `pins_not_judged` besides."""
     if not joints:
         return besides
     said = (
         f"pins in holes, not part of first failure: {joints[0].about}, of {len(joints)} "
-        f"hole{'s' * (len(joints) > 1)}, by the matrix alone; strands round a hole are not counted"
+        f"hole{'s' * (len(joints) > 1)}, by {COUNTED}"
     )
     return "; ".join(filter(None, [said, besides]))
 
@@ -242,6 +261,7 @@ def _joint(
     force: FloatArray,
     size: float,
     limits: Limits,
+    anchorage: Anchorage | None,
 ) -> PinnedJoint:
     """Measure the surroundings of one hole, and judge them."""
     mesh, axis, radius = stress.mesh, wall.direction, wall.radius
@@ -275,6 +295,11 @@ def _joint(
         NET_SECTION: limits.matrix * net_area if stretched > 0.0 else np.inf,
         SHEAR_OUT: limits.matrix / np.sqrt(3.0) * shear_area,
     }
+    if anchorage is not None and stretched > 0.0:
+        wide = [radius + float(ray.length.sum()) / _HEIGHTS for ray in beside]
+        rows = [(radius, wide[0], low, low + thickness), (-wide[1], -radius, low, low + thickness)]
+        frame = np.array([ahead, aside, axis])
+        strengths[PULL_OUT] = anchorage.held(wall.centre, frame, np.array(rows), limits.fibre)
     return PinnedJoint(
         patch,
         centre=wall.centre + (low + 0.5 * thickness) * axis,

@@ -1,5 +1,7 @@
 """Pinned joints against lugs whose areas and loads are known in closed form."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -13,9 +15,11 @@ from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.fem.elasticity.system import prepare
 from ccfem.fem.materials import isotropic
-from ccfem.judging.virtual_testing.pinned_joints import about_pins, pinned_joints
+from ccfem.judging.virtual_testing.anchorage import PULL_OUT_STRENGTH, Anchorage
+from ccfem.judging.virtual_testing.pinned_joints import PinnedJoint, about_pins, pinned_joints
 from ccfem.judging.virtual_testing.strand import Limits, Strand
 from ccfem.judging.virtual_testing.strands import cut_strands
+from ccfem.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 
 WIDTH, DIAMETER, THICKNESS, END = 20.0, 8.0, 4.0, 12.0
@@ -162,7 +166,7 @@ def test_over_several_cases_the_least_multiple_of_a_load_counts():
     up = np.array([[0.0, 0.0, 1.0]] * 2)
     paths = Toolpaths(line, up, np.array([0, 2]), none, none, none.astype(bool))
     cases = WeightedCases.of(solve(problem))
-    tested = in_all_cases(cut_strands(paths, problem.mesh), cases, Strand(), ())
+    tested = in_all_cases(cut_strands(paths, problem.mesh), cases, Strand(), (), Machine())
     crushed = CRUSHING * DIAMETER * THICKNESS
     values = tested.values()
     for name in loads:
@@ -178,3 +182,47 @@ def test_a_remark_on_the_part_without_fibre_names_the_weakest_pin():
     assert "bearing of 'hole' at 1920 N (net section 2400, shear-out 2771), of 1 hole," in said
     bare = Problem(lug(), isotropic(3000.0, 0.35), (Support("root"),), loads, order=1)
     assert about_pins(solve(bare)["pull"]) == ""  # no strength, nothing to say
+
+
+def fibre(*lines):
+    """Straight strands in the middle of the height, from and to places of the plane."""
+    points = np.array([[(*end, THICKNESS / 2) for end in line] for line in lines]).reshape(-1, 3)
+    none = np.zeros(len(lines), dtype=int)
+    normals = np.broadcast_to([0.0, 0.0, 1.0], points.shape)
+    return Toolpaths(points, normals, 2 * np.arange(len(lines) + 1), none, none, none.astype(bool))
+
+
+FLOW = PULL_OUT_STRENGTH * 2.0 * (1.0 + 0.11)
+"""Force, N/mm, that a strand 1 mm wide takes up from the matrix."""
+
+
+@pytest.mark.parametrize(
+    ("line", "held"),
+    [
+        (((-25.0, 7.0), (10.0, 7.0)), 105.0),  # broken
+        (((-25.0, -7.0), (1.2, -7.0)), 1.2 * FLOW),  # pulled out of what lies ahead
+        (((-0.8, 7.0), (10.0, 7.0)), 0.8 * FLOW),  # and of what lies behind
+        (((-6.0, 9.0), (6.0, 5.0)), 105.0 * 12.0 / np.hypot(12.0, 4.0)),  # at a slant
+        (((-25.0, 7.0), (-0.5, 7.0)), 0.0),  # ends before the net section
+        (((6.0, -8.0), (6.0, 8.0)), 0.0),  # across the force
+    ],
+)
+def test_strands_beside_a_hole_hold_until_they_break_or_pull_out(line, held):
+    mesh, machine = lug(), Machine()
+    problem = Problem(
+        mesh, MATERIAL, (Support("root"),), {"pull": (Bearing("hole", (100.0, 0.0, 0.0)),)}, order=1
+    )
+    stress, limits = solve(problem)["pull"], Limits.of(MATERIAL, Strand(strength=105.0))
+    forces = prepare(problem).forces_in("pull")
+    anchorage = Anchorage.of(cut_strands(fibre(line), mesh), machine)
+    (joint,) = pinned_joints(stress, forces, 100.0, limits, anchorage)
+    assert joint.loads.get("strand pull-out", 0.0) == pytest.approx(held, rel=0.03)
+    assert joint.mode == "bearing"  # the matrix beside the hole holds more than one strand
+
+
+def test_a_hole_parts_where_matrix_and_strands_beside_it_have_gone():
+    loads = {"bearing": 5.0, "net section": 2.0, "strand pull-out": 3.0, "shear-out": 4.0}
+    joint = PinnedJoint("hole", np.zeros(3), np.ones(3), 8.0, 4.0, 1.0, 1.0, loads)
+    assert (joint.mode, joint.load) == ("strand pull-out", 3.0)
+    fewer = replace(joint, loads=loads | {"strand pull-out": 1.0})
+    assert (fewer.mode, fewer.load) == ("net section", 2.0)
