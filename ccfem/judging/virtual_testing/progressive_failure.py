@@ -13,7 +13,9 @@ all steps together take the energy of fracture per area of a crack band as wide 
 size.
 
 Strands carry tension only. One breaks where its force, averaged over a length, reaches its
-strength. It then carries nothing over that length.
+strength. It then carries nothing over that length. Where the bond of a strand to the matrix is
+given as a force, strands come loose from their ends on (`ccfem.judging.virtual_testing.
+strand_ends`).
 
 Layers part where the traction of the averaged stress on them reaches the strength of their bond
 (`ccfem.judging.virtual_testing.parting`), if the layers and that strength are known.
@@ -40,6 +42,7 @@ from ccfem.judging.virtual_testing.failure_laws.interlayer import layer_normals
 from ccfem.judging.virtual_testing.parting import parted_stiffness, parting_factors
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import Limits, Strand
+from ccfem.judging.virtual_testing.strand_ends import Ends, StrandEnds
 from ccfem.judging.virtual_testing.strands import Strands, Windows, cut_strands
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
@@ -120,7 +123,7 @@ class Damage:
     ductility : (m,) array
         Of cells that have cracked; 1 in others.
     intact : (s,) array in [0, 1]
-        Share of each piece of fibre that is not broken.
+        Share of each piece of fibre that has not broken or come loose.
     parted : (m,) bool array
         Cells whose layers have parted.
     """
@@ -144,7 +147,8 @@ class Damage:
 class _Response(NamedTuple):
     """A damaged part under the load of its case, and how much more takes it to the next events.
 
-    `cells` (m,), `layers` (m,) and `windows` (w,) are the factors on the load at which each fails.
+    `cells` (m,), `layers` (m,), `windows` (w,) and `loose` (e,), of the ends of strands, are the
+    factors on the load at which each fails.
     """
 
     balanced: Equilibrium
@@ -154,6 +158,8 @@ class _Response(NamedTuple):
     cells: FloatArray
     layers: FloatArray
     windows: FloatArray
+    ends: Ends
+    loose: FloatArray
 
     @property
     def factor(self) -> float:
@@ -164,6 +170,7 @@ class _Response(NamedTuple):
     def factors(self) -> dict[str, float]:
         """Factor on the load at which each kind of event comes next."""
         kinds = {"matrix": self.cells, "fibre": self.windows, "layers": self.layers}
+        kinds["bond"] = self.loose
         return {kind: float(values.min(initial=np.inf)) for kind, values in kinds.items()}
 
 
@@ -177,6 +184,7 @@ class _Model:
     limits: Limits
     softening: float
     layers: Sequence[Layer] = ()
+    bond: float | None = None
 
     def at(self, strength: float, softening: float) -> "_Model":
         """Return the same with strength of strands and softening length by these factors."""
@@ -249,7 +257,12 @@ class _Model:
             windows = self.limits.fibre / np.maximum(means, 0.0)
         most = _CASCADE * min(cells.min(), windows.min(initial=np.inf))
         layers = self.parting(damage, stress, most)
-        return _Response(balanced, stress, force, moved, cells, layers, windows)
+        ends, loose = Ends.none(), np.zeros(0)
+        if self.bond is not None:
+            ends = StrandEnds(self.windows.strands).at(pull, damage.intact)
+            with np.errstate(divide="ignore"):
+                loose = self.bond / np.maximum(ends.force, 0.0)
+        return _Response(balanced, stress, force, moved, cells, layers, windows, ends, loose)
 
     def parting(self, damage: Damage, stress: FloatArray, most: float = np.inf) -> FloatArray:
         """Factors (m,) on the load at which layers part, up to the largest that is asked for."""
@@ -282,6 +295,9 @@ class _Model:
         what = min(response.factors, key=response.factors.__getitem__)
         if what == "fibre":
             return what, self.windows.middle(int(response.windows.argmin()))
+        if what == "bond":
+            end = int(response.loose.argmin())
+            return what, self.windows.strands.middle[response.ends.first[end]]
         factors = response.cells if what == "matrix" else response.layers
         return what, self.specimen.unreinforced.mesh.centres[int(factors.argmin())]
 
@@ -299,6 +315,8 @@ class _Model:
         for window in self._weakest(response.windows, most):
             pieces, share = self.windows.overlap(window)
             intact[pieces] *= 1.0 - share
+        for end in np.flatnonzero(response.loose <= most):
+            intact[response.ends.first[end] : response.ends.stop[end]] = 0.0
         return Damage(events, ductile, intact, damage.parted | (response.layers <= most))
 
     def _weakest(self, factors: FloatArray, most: float) -> list[int]:
@@ -358,17 +376,17 @@ class BreakingCurve:
     cracks : (k,) int array
         Cells that have cracked before.
     broken : (k,) array, mm
-        Length of strand that carries nothing any more.
+        Length of strand that has broken or come loose, and carries nothing any more.
     parted : (k,) int array
         Cells whose layers have parted before.
     cracked_at : (m,) int array
         Row at which each cell first cracked; -1 where it did not.
     broken_at : (s,) int array
-        Row at which each piece of fibre broke; -1 where it did not.
+        Row at which each piece of fibre broke or came loose; -1 where it did not.
     parted_at : (m,) int array
         Row at which the layers of each cell parted; -1 where they did not.
     first : str
-        What failed first: "matrix", "fibre" or "layers".
+        What failed first: "matrix", "fibre", "layers" or the "bond" of a strand.
     where : (3,) array, mm
         Place of that.
     bond : float
@@ -556,6 +574,7 @@ def breaking_load(
     band: bool = True,
     stop: float = STOP,
     layers: Sequence[Layer] = (),
+    bond: float | None = None,
 ) -> BreakingLoad:
     """Break a part with its fibres under its load case: an experiment.
 
@@ -585,6 +604,9 @@ def breaking_load(
     layers : sequence of Layer, optional
         As they are printed. They part where the material of the part has a strength between layers
         (`interlayer_tensile`, `interlayer_shear`); default: they never do.
+    bond : float, N, optional
+        Axial force, averaged over the 5 mm before an end of a strand, at which that comes loose
+        from the matrix; default: strands never do.
 
     Raises
     ------
@@ -607,7 +629,9 @@ def breaking_load(
     strand = Strand() if strand is None else strand
     limits = Limits.of(specimen.system.problem.material, strand, matrix_strength)
     _check_softening(softening * (SOFTENINGS[0] if band else 1.0), mesh)
-    middle = _Model(specimen, Windows(strands), strand, limits, softening, layers)
+    if bond is not None:
+        check_number("bond of a strand", bond, above=0.0, unit="N")
+    middle = _Model(specimen, Windows(strands), strand, limits, softening, layers, bond)
     low, high = (
         _curve(middle.at(*factors), _STOP_OF_BAND) if band else None
         for factors in zip((1.0 - SPREAD, 1.0 + SPREAD), SOFTENINGS, strict=True)

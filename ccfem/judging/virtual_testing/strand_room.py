@@ -141,7 +141,7 @@ def strand_parts(
             plane = _in_plane(layer, parts.middle[mine], parts.direction[mine])
             inside[mine] = width_inside(*plane, machine.fibre_width, _section(layer))
     folds = folds_in(fibre, machine)
-    return StrandParts(parts, link, inside, folds, _folded(folds, parts.line, arc))
+    return StrandParts(parts, link, inside, folds, in_folds(folds, parts.line, arc))
 
 
 def joined_parts(of: Sequence[StrandParts]) -> StrandParts:
@@ -180,8 +180,8 @@ def _in_plane(
     return chart.flat.plane.project(image), chart.flat.plane.project(turned)
 
 
-def _folded(folds: Folds, line: IntArray, arc: FloatArray) -> BoolArray:
-    """Places on strands that lie in a fold."""
+def in_folds(folds: Folds, line: IntArray, arc: FloatArray) -> BoolArray:
+    """Places on strands that lie in a fold: by their paths, which increase, and arc lengths."""
     folded = np.zeros(len(line), dtype=bool)
     size = folds.lengths[folds.line]
     for k, start, stop, total in zip(
