@@ -230,8 +230,8 @@ _BREAKING = (
     Head("highest load, N", "In brackets its band."),
     Head("at, mm", "Displacement at the highest load: work over load."),
     Head("cells cracked then"),
-    Head("strand broken then, mm"),
-    Head("first strand breaks at, N", "A dash where no strand breaks."),
+    Head("strand gone then, mm", "Broken, or loose from the matrix."),
+    Head("first strand gives way at, N", "A dash where none does."),
     Head("left in the end, N", "What the part still carries at the end of its curve."),
 )
 

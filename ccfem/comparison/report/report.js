@@ -701,11 +701,11 @@ function breakingScene(part, given) {
       marks(strands, (row) => row === at, "breaks now", { size: 5, color: RED, symbol: "square" }),
     ].filter((trace) => trace.x.length);
     byId("breaking-step-said").textContent = `${at} of ${force.length - 1}: ${short(force[at])} N at ${short(displacement[at])} mm; ` +
-      `before it ${cracks[at]} cells cracked, ${short(broken[at])} mm of strand broken` +
+      `before it ${cracks[at]} cells cracked, ${short(broken[at])} mm of strand gone` +
       (parted[at] ? `, layers of ${parted[at]} cells parted` : "");
     return Plotly.react(view, traces, scene(view, [], traces), CONFIG);
   }
-  const legend = [["cell cracked before", CRACKED], ["strand broken before", INK], ["layers parted before", LINK], ["fails at this step", RED]];
+  const legend = [["cell cracked before", CRACKED], ["strand broken or loose before", INK], ["layers parted before", LINK], ["fails at this step", RED]];
   byId("breaking-legend").innerHTML = legend.map(([what, colour]) =>
     `<span class="legend"><i class="short" style="background:${colour}"></i>${what}</span>`).join(" ");
   begin();

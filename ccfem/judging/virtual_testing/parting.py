@@ -48,7 +48,7 @@ def parting_factors(
     if alone is None:
         return factors
     # The index is convex: a mean over a ball never exceeds the largest in it.
-    hot = alone * most >= 1.0
+    hot = alone >= 1.0 / most
     if not hot.any():
         return factors
     centres = mesh.centres

@@ -432,10 +432,10 @@ class BreakingCurve:
         elif self.bond:
             said += f", with the bond between layers at {self.bond:.0%} of its strength"
         if not len(fibre):
-            return f"{said}; no strand broke"
+            return f"{said}; no strand gave way"
         if self.broken[peak] > 0.0:
-            return f"{said} and strands broken over {self.broken[peak]:.3g} mm"
-        return f"{said}; strands broke after it"
+            return f"{said}; strands carried nothing any more over {self.broken[peak]:.3g} mm"
+        return f"{said}; strands gave way after it"
 
 
 def _curve(model: _Model, stop: float) -> BreakingCurve:
@@ -559,7 +559,8 @@ EXPERIMENT = "experiment"
 
 WORTH = (
     "An experiment: a sequentially linear analysis in which the matrix softens, strands break and "
-    "layers part. It depends on the mesh, and strands do not come loose from the matrix."
+    "layers part. It depends on the mesh, and strands do not come loose from the matrix unless a "
+    "force is given at which they do."
 )
 """What its numbers are worth; to be shown wherever they are."""
 
