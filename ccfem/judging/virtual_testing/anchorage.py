@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.judging.virtual_testing.strands import Strands
 from ccfem.machine.machine import Machine
 
@@ -64,7 +64,7 @@ class Anchorage:
         step = at[first + 1] - at[first]
         place = (at[first] + share[:, None] * step)[:, None, 1:]
         low, high = reach[None, :, ::2], reach[None, :, 1::2]
-        inside = ((place > low) & (place < high)).all(axis=2).any(axis=1)
+        inside = np.any(np.all((place > low) & (place < high), axis=2), axis=1)
         along = np.abs(step[:, 0]) / np.linalg.norm(step, axis=1)
         arc = strands.arc[first] + share * (strands.arc[first + 1] - strands.arc[first])
         begin, end = self._runs(first)
@@ -80,7 +80,7 @@ class Anchorage:
         return first, height[first] / (height[first] - height[first + 1])
 
     @property
-    def _carrying(self) -> FloatArray:
+    def _carrying(self) -> BoolArray:
         return np.asarray(self.strands.share > 0.0)
 
     def _runs(self, pieces: IntArray) -> tuple[FloatArray, FloatArray]:
