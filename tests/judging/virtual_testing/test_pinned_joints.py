@@ -192,6 +192,14 @@ def fibre(*lines):
     return Toolpaths(points, normals, 2 * np.arange(len(lines) + 1), none, none, none.astype(bool))
 
 
+@pytest.fixture(scope="module")
+def pulled():
+    """The lug pulled by its hole, and its forces."""
+    load = {"pull": (Bearing("hole", (100.0, 0.0, 0.0)),)}
+    problem = Problem(lug(), MATERIAL, (Support("root"),), load, order=1)
+    return solve(problem)["pull"], prepare(problem).forces_in("pull")
+
+
 FLOW = PULL_OUT_STRENGTH * 2.0 * (1.0 + 0.11)
 """Force, N/mm, that a strand 1 mm wide takes up from the matrix."""
 
@@ -207,14 +215,10 @@ FLOW = PULL_OUT_STRENGTH * 2.0 * (1.0 + 0.11)
         (((6.0, -8.0), (6.0, 8.0)), 0.0),  # across the force
     ],
 )
-def test_strands_beside_a_hole_hold_until_they_break_or_pull_out(line, held):
-    mesh, machine = lug(), Machine()
-    problem = Problem(
-        mesh, MATERIAL, (Support("root"),), {"pull": (Bearing("hole", (100.0, 0.0, 0.0)),)}, order=1
-    )
-    stress, limits = solve(problem)["pull"], Limits.of(MATERIAL, Strand(strength=105.0))
-    forces = prepare(problem).forces_in("pull")
-    anchorage = Anchorage.of(cut_strands(fibre(line), mesh), machine)
+def test_strands_beside_a_hole_hold_until_they_break_or_pull_out(pulled, line, held):
+    stress, forces = pulled
+    limits = Limits.of(MATERIAL, Strand(strength=105.0))
+    anchorage = Anchorage.of(cut_strands(fibre(line), stress.mesh), Machine())
     (joint,) = pinned_joints(stress, forces, 100.0, limits, anchorage)
     assert joint.loads.get("strand pull-out", 0.0) == pytest.approx(held, rel=0.03)
     assert joint.mode == "bearing"  # the matrix beside the hole holds more than one strand
