@@ -100,7 +100,8 @@ def _without_folds(lines: Toolpaths, field: StressField) -> Strands:
 
 def curves_picture(part: str, curves: Mapping[str, BreakingCurve]) -> "Figure":
     """Draw load over displacement; dashed the measured slope, up to the measured highest load."""
-    figure, axes = axes_below(f"{part}, pulled ({EXPERIMENT})", "displacement, mm", "load, kN")
+    heading = part if "," in part else f"{part}, pulled"
+    figure, axes = axes_below(f"{heading} ({EXPERIMENT})", "displacement, mm", "load, kN")
     colours = {NONE: INK} | palette([name for name in curves if name != NONE])
     bare = curves[NONE]
     stiffness = 1e-3 * bare.force[1] / bare.displacement[1]
