@@ -38,6 +38,15 @@ def imported(tree: ast.Module, known: dict[str, ast.Module]) -> Iterator[str]:
                 yield inner if inner in known else node.module
 
 
+def faces(tree: ast.Module) -> list[str]:
+    """Names that a package imports from modules of these names, which they hide."""
+    taken = {
+        alias.asname or alias.name: node.module
+        for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names
+    }  # fmt: skip
+    return [name for name, source in taken.items() if str(source).endswith(f".{name}")]
+
+
 def counts(root: Path) -> dict[str, int]:
     """Return the counts of one checkout."""
     trees = modules(root)
@@ -76,7 +85,14 @@ def counts(root: Path) -> dict[str, int]:
         ),
         "tests of `cases is None`": len(re.findall(r"\bcases is (?:not )?None", whole)),
         "tests of `flat is None`": len(re.findall(r"\bflat is (?:not )?None", whole)),
-        "dict[str, Any] in signatures": len(re.findall(r": (?:dict|Mapping)\[str, Any\]", whole)),
+        "dict[str, Any] in signatures": sum(
+            bool(re.match(r"(dict|Mapping)\[str, Any\]", ast.unparse(a.annotation)))
+            for f in functions for a in (*f.args.args, *f.args.kwonlyargs) if a.annotation
+        ),
+        "modules hidden by a function": sum(
+            f"{name}.{given}" in trees
+            for name, tree in trees.items() for given in faces(tree)
+        ),
         "words of the README": len((root / "README.md").read_text(encoding="utf-8").split()),
         "words of the changelog": len((root / "CHANGELOG.md").read_text(encoding="utf-8").split()),
     }  # fmt: skip
