@@ -141,7 +141,7 @@ def _in_runs(
     """Points at which runs begin, and the mean of a height over each run, with its length."""
     kept = np.flatnonzero(keep)
     run = (np.cumsum(keep) - 1)[start]
-    long = np.bincount(run, length, len(kept))
+    long = np.asarray(np.bincount(run, length, len(kept)), dtype=np.float64)
     mean = np.bincount(run, wanted * length, len(kept)) / np.maximum(long, 1e-300)
     return kept, mean, long
 

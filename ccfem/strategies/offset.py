@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
 import shapely
 
 from ccfem.base.arrays import FloatArray
@@ -67,10 +68,16 @@ class Offset:
 
 
 def _level_sets(section: Region, first: float, spacing: float) -> list[FloatArray]:
-    """Find the closed curves (k, 2), mm, at `first`, `first + spacing`, ... inside a section."""
+    """Find the closed curves (k, 2), mm, at `first`, `first + spacing`, ... inside a section.
+
+    Each begins where it is nearest to the first point of the section, which turns with the part:
+    of cuts that are worth the same the first one counts.
+    """
     curves: list[FloatArray] = []
-    distance = first
+    distance, origin = first, shapely.get_coordinates(section)[0]
     while level := rings(shapely.buffer(section, -distance, quad_segs=_QUARTER)):
-        curves += level
+        for ring in level:
+            start = int(np.linalg.norm(ring[:-1] - origin, axis=1).argmin())
+            curves.append(np.concatenate([ring[start:-1], ring[: start + 1]]))
         distance += spacing
     return curves

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import shapely
+import shapely.affinity
 
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
@@ -66,6 +67,24 @@ def test_offset_rings_break_apart_at_a_neck_and_are_round_at_a_notch() -> None:
         samples = shapely.get_coordinates(shapely.segmentize(shapely.LineString(line), 0.2))
         distance = shapely.distance(border, shapely.points(samples))
         np.testing.assert_allclose(distance, level, atol=0.002 * level)
+
+
+@pytest.mark.parametrize("degrees", [33.0, 100.0, 217.0])
+def test_offset_rings_begin_at_the_same_place_however_the_section_lies(degrees) -> None:
+    """Where a ring begins decides which of two equal turns is cut."""
+    hole = shapely.Point(4.0, 2.0).buffer(5.0)
+    section = shapely.affinity.scale(shapely.Point(0.0, 0.0).buffer(20.0), 1.4).difference(hole)
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    turn = np.array([[c, -s], [s, c]])
+    turned = shapely.transform(section, lambda points: points @ turn.T)
+    begins, others = (
+        np.array(sorted(line[0].tolist() for line in lines))
+        for lines in (
+            _level_sets(section, 0.5, 2.0),
+            [line @ turn for line in _level_sets(turned, 0.5, 2.0)],
+        )
+    )
+    np.testing.assert_allclose(others, begins, atol=1e-6)
 
 
 def test_streamlines_of_a_bar_run_along_the_pull(bar) -> None:
