@@ -48,8 +48,8 @@ def discovered(package: str, group: str) -> dict[str, Any]:
 def modules(package: str, group: str) -> dict[str, ModuleType]:
     """Every module of a package by name, and those of entry points of a group."""
     names = [info.name for info in pkgutil.iter_modules(importlib.import_module(package).__path__)]
-    own = {name: importlib.import_module(f"{package}.{name}") for name in names}
-    return own | {entry.name: entry.load() for entry in entries(group)}
+    shipped = {name: importlib.import_module(f"{package}.{name}") for name in names}
+    return shipped | {entry.name: entry.load() for entry in entries(group)}
 
 
 def create(

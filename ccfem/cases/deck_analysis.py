@@ -135,7 +135,7 @@ def read_analysis(path: Path, scale: float = 1.0, step: str | None = None) -> De
         materials = materials.with_expansion()
     first = next(iter(cases.values()))[0]
     shared = tuple(s for s in first if all(s in supports for supports, _ in cases.values()))
-    own = {
+    special = {
         name: tuple(s for s in supports if s not in shared) for name, (supports, _) in cases.items()
     }
     mesh = conversion.mesh
@@ -143,7 +143,7 @@ def read_analysis(path: Path, scale: float = 1.0, step: str | None = None) -> De
         TetMesh(mesh.points * scale, mesh.cells, mesh.patches),
         materials,
         shared,
-        {name: supports for name, supports in own.items() if supports},
+        {name: supports for name, supports in special.items() if supports},
         {name: loads for name, (_, loads) in cases.items()},
         tuple(reading.remarks),
     )
@@ -276,8 +276,8 @@ class _Conversion:
         if inside.any():
             places = self._places(inside)
             axes = () if local is None else local.at(self.mesh.points[inside]).swapaxes(1, 2)
-            own = tuple(((*a,), (*b,), (*c,)) for a, b, c in np.asarray(axes).tolist())
-            yield NodeSupport(title, places, letters, (x, y, z), own)
+            frames = tuple(((*a,), (*b,), (*c,)) for a, b, c in np.asarray(axes).tolist())
+            yield NodeSupport(title, places, letters, (x, y, z), frames)
 
     def _coupled(self, coupling: Coupling, held: Mapping[str, float]) -> Iterator[AnySupport]:
         """Support of the faces of a coupling whose reference node is held at values by degree."""
@@ -349,9 +349,9 @@ class _Conversion:
         if len(loaded):
             vectors = force[loaded, :3]
             for k, system in enumerate(self.constraints.systems):
-                own = np.flatnonzero(self.constraints.system_of[loaded] == k)
-                axes = system.at(self.mesh.points[loaded[own]])
-                vectors[own] = np.einsum("kij,kj->ki", axes, vectors[own])
+                turned = np.flatnonzero(self.constraints.system_of[loaded] == k)
+                axes = system.at(self.mesh.points[loaded[turned]])
+                vectors[turned] = np.einsum("kij,kj->ki", axes, vectors[turned])
             yield load_kinds.NodeForces(
                 self._places(loaded), tuple((x, y, z) for x, y, z in vectors.tolist())
             )

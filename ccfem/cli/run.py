@@ -244,9 +244,9 @@ def run(
 def plan_code(comparison: "Comparison", force: bool) -> int:
     """Exit code of a plan: `NOT_PRINTABLE`, with a line on standard error, unless it is forced."""
     refused = [run for run in comparison.succeeded if not run.printable]
-    for each in refused:
+    for run in refused:
         accepted = "" if force else " (--force accepts the plan as it is)"
-        print(f"ccfem: not printable as planned: {each.why_not}{accepted}", file=sys.stderr)
+        print(f"ccfem: not printable as planned: {run.why_not}{accepted}", file=sys.stderr)
     return NOT_PRINTABLE if refused and not force else 0
 
 
@@ -313,9 +313,9 @@ def _check(comparison: "Comparison") -> None:
     if not comparison.succeeded:
         reasons = "; ".join(f"{run.name}: {run.failure}" for run in comparison.runs)
         raise InputError(f"no strategy could plan '{comparison.case.name}': {reasons}")
-    for each in comparison.runs:
-        if each.unprinted and comparison.request.print_plans:
-            raise InputError(each.unprinted)
+    for run in comparison.runs:
+        if run.unprinted and comparison.request.print_plans:
+            raise InputError(run.unprinted)
 
 
 def _part(progress: Progress, first: float, last: float) -> Progress:

@@ -447,7 +447,7 @@ def alike(layers: Sequence[Layer], stress: PartStress) -> dict[int, Layer]:
     representatives: dict[int, Layer] = {}
     for group in _same_sections(layers):
         left = [stress_on(layer, stress) for layer in group] if len(group) > 1 else []
-        sizes = [_mean_size(each) for each in left]
+        sizes = [_mean_size(field) for field in left]
         if len(group) == 1:
             representatives[group[0].index] = group[0]
         while left:

@@ -202,9 +202,9 @@ def _axis_of_hole(mesh: TetMesh, facets: IntArray) -> tuple[FloatArray, bool]:
 
 def _end_ahead(mesh: TetMesh, facets: IntArray, force: FloatArray) -> tuple[Face | None, IntArray]:
     """Round end of a slot against which a force presses a pin, and its facets; None without."""
-    own, boundary = facet_keys(facets, mesh.boundary)
+    keys, boundary = facet_keys(facets, mesh.boundary)
     order = np.argsort(boundary, kind="stable")
-    wall_of = mesh.wall_of[order[np.searchsorted(boundary, own, sorter=order)]]
+    wall_of = mesh.wall_of[order[np.searchsorted(boundary, keys, sorter=order)]]
     for wall in np.unique(wall_of[wall_of >= 0]).tolist():
         end = facets[wall_of == wall]
         (face,) = given_faces(mesh.points, end, [np.arange(len(end))])

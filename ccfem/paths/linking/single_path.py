@@ -434,8 +434,8 @@ def _order(cost: FloatArray, offsets: IntArray) -> IntArray:
     order = []
     for a, b in order_clusters(Clusters(cost, visit, offsets), exact=_EXACT_GROUPS).tolist():
         span = next(span for span in spans if span.start <= a < span.stop)
-        own = order_clusters(strands(cost[span, span], a - span.start, b - span.start))
-        order.append((own[:, 0] + span.start) // 2)
+        within = order_clusters(strands(cost[span, span], a - span.start, b - span.start))
+        order.append((within[:, 0] + span.start) // 2)
     return improved_order(np.concatenate(order), strands(cost), _ROUNDS)
 
 

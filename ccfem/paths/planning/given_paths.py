@@ -171,7 +171,7 @@ class GivenPaths:
 
         few = np.minimum(size, _FEW)
         share = np.concatenate([np.linspace(0.0, 1.0, count) for count in few])
-        first, length = (np.repeat(each, few) for each in (paths.offsets[:-1], size - 1))
+        first, length = (np.repeat(values, few) for values in (paths.offsets[:-1], size - 1))
         sample = first + np.rint(share * length).astype(np.int64)
         roughly = np.stack([away(layer, sample, few) for layer in layers])
         mean = np.full(roughly.shape, np.inf)

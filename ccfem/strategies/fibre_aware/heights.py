@@ -348,7 +348,7 @@ def middle(numbers: IntArray) -> int:
 def middle_layers(layers: Sequence[Layer], group: IntArray) -> list[Layer]:
     """Return the middle layer of each group, from the group (layers,) of every layer."""
     numbers = [np.flatnonzero(group == k) for k in range(int(group.max()) + 1)]
-    return [layers[int(own[len(own) // 2])] for own in numbers]
+    return [layers[middle(members)] for members in numbers]
 
 
 def layer_counts(weights: FloatArray, count: int) -> IntArray:

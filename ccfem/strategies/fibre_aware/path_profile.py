@@ -48,9 +48,9 @@ class Profile:
         """
         least = self.least(minimum)
         keep = np.empty(len(self.value), dtype=np.bool_)
-        each = (self.value - price) * self.step
-        equal = _EQUAL * float(np.abs(each).max())
-        gain = _best_stretches(each, least, cut_cost * price, equal, keep)
+        worth = (self.value - price) * self.step
+        equal = _EQUAL * float(np.abs(worth).max())
+        gain = _best_stretches(worth, least, cut_cost * price, equal, keep)
         return keep, float(gain)
 
 
