@@ -175,8 +175,10 @@ EveryLayer = Annotated[
     bool,
     typer.Option(
         "--every-layer",
-        help="Take every index on all layers; by default those that some layers tell (angles, "
-        "distances, coverage) on 60, evenly spread, where there are more.",
+        help="Plan all layers, and take every index on them; by default, where there are more than "
+        "60, layers of equal section under stress within 1 % are planned once by strategies that "
+        "plan layer by layer, and indices that some layers tell (angles, distances, coverage) are "
+        "taken on 60, evenly spread.",
     ),
 ]
 Refine = Annotated[

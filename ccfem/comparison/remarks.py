@@ -26,6 +26,7 @@ from ccfem.judging.evaluation.open_places import open_places
 from ccfem.judging.virtual_testing.equilibrium import BONDED
 from ccfem.judging.virtual_testing.pinned_joints import COUNTED, said_of_pins
 from ccfem.judging.virtual_testing.stiffness_test import RESOLUTION, SAME, UNDECIDED
+from ccfem.paths.planning.alike import ALIKE
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.upper_bound import LEAST, LOOSE, UpperBound
 
@@ -125,6 +126,11 @@ def _about(run: Run, wanted: Wanted, bounded: bool) -> list[str]:
         lines.append(
             f"angles, distances and coverage are those of {some} of {count} layers, evenly "
             "spread: --every-layer takes all"
+        )
+    if run.planned_layers:
+        lines.append(
+            f"planned on {run.planned_layers} layers, whose paths the others take: equal sections "
+            f"under stress that differs by less than {ALIKE:.0%}; --every-layer plans all"
         )
     if run.note:
         placed = ", so it is placed below those that lay it" if off_length(run, wanted) else ""

@@ -220,7 +220,8 @@ class Request:
         Where the file of a print begins and halts.
     every_layer : bool, default False
         Take all indices on every layer. By default those that some layers tell are taken on 60
-        layers, evenly spread, where there are more.
+        layers, evenly spread, where there are more; of these, layers that are alike are planned
+        once (`ccfem.paths.planning.alike`).
     longest_test : float, mm, default infinite
         Length of fibre above which a plan is not tested virtually.
     breaking_load : bool, default False

@@ -139,6 +139,8 @@ class Run:
         although one was asked for; else empty.
     slicing : str
         Name of the slicing; empty where slicings are not compared.
+    planned_layers : int
+        Number of layers that were planned, where the others take their paths; else 0.
     seconds : mapping of stage to float
     """
 
@@ -164,6 +166,7 @@ class Run:
     broken: BreakingLoad | None = None
     unbroken: str = ""
     slicing: str = ""
+    planned_layers: int = 0
     seconds: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

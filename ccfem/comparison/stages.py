@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+from ccfem.base.arrays import IntArray
 from ccfem.base.errors import InputError, SolveError
 from ccfem.base.parallel import give_back, has_room_beside, in_processes
 from ccfem.comparison.runs import Run, Tested
@@ -24,6 +25,7 @@ from ccfem.judging.virtual_testing.strand import Limits, Strand
 from ccfem.judging.virtual_testing.strands import Strands, carrying_strands
 from ccfem.judging.virtual_testing.strength import first_failure, matrix_peak
 from ccfem.machine.machine import Machine
+from ccfem.paths.planning.alike import alike_layers
 from ccfem.paths.planning.equal_fibre import (
     TOLERANCE,
     length_per_layer,
@@ -32,8 +34,8 @@ from ccfem.paths.planning.equal_fibre import (
     sampled_length,
 )
 from ccfem.paths.planning.given_paths import GivenPaths, pattern_that_folds
-from ccfem.paths.planning.layer_plans import plan
-from ccfem.paths.planning.strategy import LengthStrategy, Planned
+from ccfem.paths.planning.layer_plans import plan, plans_alike
+from ccfem.paths.planning.strategy import LengthStrategy, Planned, Strategy
 from ccfem.paths.plastic.plastic import SOLID, Plastic
 from ccfem.paths.splitting.printed_strands import printed_strands
 from ccfem.paths.toolpaths import Toolpaths
@@ -61,7 +63,8 @@ _AHEAD = 4
 """Runs that are judged while others are being planned: it takes about as long."""
 
 _MOST_LAYERS = 60
-"""Layers on which indices are taken that some of more layers tell."""
+"""Layers on which indices are taken that some of more layers tell; of more layers those that are
+alike are planned once."""
 
 _TOLERANCE = 1e-6
 """Relative residual of the virtual tests: the error of the stiffness is of its square."""
@@ -88,7 +91,7 @@ class Part:
     propped : bool
         Whether support is printed below what flat layers would lay in air.
     every_layer : bool
-        Whether all indices are taken on every layer.
+        Whether all indices are taken on every layer, and every layer is planned.
     longest_test : float, mm
         Length of fibre above which a run is not tested virtually.
     remarks : tuple of str
@@ -132,6 +135,13 @@ class Part:
         layers = () if self.propped else self.flat_layers
         air = in_air(self.stress.mesh, self.machine, layers)
         return tuple(filter(None, (self.refusal, air)))
+
+    @cached_property
+    def alike(self) -> IntArray | None:
+        """Position of the layer whose paths each may take; None where every layer is planned."""
+        if self.every_layer or len(self.layers) <= _MOST_LAYERS or self.several_cases:
+            return None
+        return alike_layers(self.layers, self.stress)
 
     def tests(self, run: Run) -> bool:
         """Whether a run is tested virtually."""
@@ -181,11 +191,13 @@ def planned(
         elif part.several_cases:
             outcome = plan_cases(run.strategy, layers, part.cases, machine, wanted, part.strand)
         elif wanted is None:
-            paths = plan(run.strategy, layers, stress, machine)
+            paths = plan(run.strategy, layers, stress, machine, part.alike)
             outcome = Planned(run.strategy, paths, length_per_layer(paths, layers))
         else:
             outcome = plan_to_length(
-                run.strategy, layers, stress, machine, wanted, start, sampled=run.sampled
+                *(run.strategy, layers, stress, machine, wanted, start),
+                sampled=run.sampled,
+                alike=part.alike,
             )
         return with_plan(run, outcome, part)
 
@@ -206,6 +218,7 @@ def with_plan(run: Run, plan: Planned, part: Part) -> Run:
         strand_verdict=StrandVerdict(),
         unprinted="",
         note=plan.note,
+        planned_layers=_planned_layers(plan.strategy, part),
     )
     if not len(plan.toolpaths):
         return run
@@ -218,6 +231,14 @@ def with_plan(run: Run, plan: Planned, part: Part) -> Run:
         return run
     length = length_per_layer(strands.fibre, part.layers)
     return replace(run, toolpaths=strands.fibre, length_per_layer=length)
+
+
+def _planned_layers(strategy: Strategy, part: Part) -> int:
+    """Count the layers that are planned, where others take their paths; else 0."""
+    if part.alike is None or not plans_alike(strategy):
+        return 0
+    count = len(set(part.alike.tolist()))
+    return count if count < len(part.layers) else 0
 
 
 def attempted(run: Run, work: Callable[[], Run]) -> Run:
@@ -247,7 +268,9 @@ def planned_to_lengths(
             plans.extend(plan_cases_to_lengths(*about))
         else:
             plans.extend(
-                plan_to_lengths(run.strategy, layers, part.stress, machine, lengths, known)
+                plan_to_lengths(
+                    *(run.strategy, layers, part.stress, machine, lengths, known), alike=part.alike
+                )
             )
         return run
 

@@ -73,6 +73,7 @@ class Eqs:
 
     amount: ClassVar[Amount] = SPACING
     in_plane: ClassVar[bool] = True
+    by_layer: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"seed": {"seed": (0.0, 0.0)}}
 
     def __post_init__(self) -> None:

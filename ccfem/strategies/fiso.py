@@ -228,6 +228,7 @@ class Fiso:
 
     amount: ClassVar[Amount] = SPACING
     in_plane: ClassVar[bool] = True
+    by_layer: ClassVar[bool] = True
     folds: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "apart": {"closest": 1.0},

@@ -299,6 +299,7 @@ class Isocurve:
         "density", most=4.0, least=0.05, beyond=(("floor", 0.0), ("cap", 40.0))
     )
     in_plane: ClassVar[bool] = True
+    by_layer: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "literal": _LITERAL,
         "border": {"inset": 0.0},

@@ -57,6 +57,7 @@ class Streamline:
 
     amount: ClassVar[Amount] = SPACING
     in_plane: ClassVar[bool] = True
+    by_layer: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         check_fill(self)

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ccfem.base.arrays import IntArray
 from ccfem.base.checks import check_number
 from ccfem.fem.elasticity import PartStress
 from ccfem.machine.machine import Machine
@@ -183,6 +184,7 @@ def plan_to_length(
     start: Planned | None = None,
     tolerance: float = TOLERANCE,
     sampled: float | None = None,
+    alike: IntArray | None = None,
 ) -> Planned:
     """Plan to a wanted length of fibre.
 
@@ -205,6 +207,8 @@ def plan_to_length(
         Share by which less may be laid.
     sampled : float, mm, optional
         Length on a few layers with the strategy's own value (`sampled_length`), if known.
+    alike : (n,) int array, optional
+        As of `plan`.
 
     Raises
     ------
@@ -213,7 +217,8 @@ def plan_to_length(
     """
     known = () if start is None else (start,)
     lengths = (wanted,)
-    return plan_to_lengths(strategy, layers, stress, machine, lengths, known, tolerance, sampled)[0]
+    about = (known, tolerance, sampled, alike)
+    return plan_to_lengths(strategy, layers, stress, machine, lengths, *about)[0]
 
 
 def sampled_length(
@@ -236,6 +241,7 @@ def plan_to_lengths(
     known: Sequence[Planned] = (),
     tolerance: float = TOLERANCE,
     sampled: float | None = None,
+    alike: IntArray | None = None,
 ) -> list[Planned]:
     """Plan to several lengths of fibre, mm per layer, reusing the plans for one for the others.
 
@@ -248,7 +254,7 @@ def plan_to_lengths(
         Plans of the strategy with its own value or at its extremes, if there are any.
     tolerance : float, default 0.01
         Share by which less may be laid.
-    sampled : float, mm, optional
+    sampled, alike
         As in `plan_to_length`.
     """
     for wanted in lengths:
@@ -261,7 +267,7 @@ def plan_to_lengths(
             plan if plan.reached else _by_cutting(strategy, plan, *part, wanted)
             for plan, wanted in zip(plans, lengths, strict=True)
         ]
-    search = _Search(Dial(strategy), layers, stress, machine, tolerance)
+    search = _Search(Dial(strategy), layers, stress, machine, tolerance, alike)
     search.learn(known)
     if sampled is not None:
         search.sampled[search.dial.own] = sampled
@@ -388,6 +394,7 @@ class _Search:
     stress: PartStress
     machine: Machine
     tolerance: float = TOLERANCE
+    alike: IntArray | None = None
     tried: dict[float, Planned] = field(default_factory=dict)
     sampled: dict[float, float] = field(default_factory=dict)
 
@@ -412,7 +419,7 @@ class _Search:
             if same:  # a parameter of whole numbers
                 self.tried[turn] = same[0]
             else:
-                paths = plan(strategy, self.layers, self.stress, self.machine)
+                paths = plan(strategy, self.layers, self.stress, self.machine, self.alike)
                 length = length_per_layer(paths, self.layers)
                 self.tried[turn] = Planned(strategy, paths, length)
         return self.tried[turn]

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ccfem.base.arrays import IntArray
 from ccfem.base.checks import check_instance
 from ccfem.base.errors import InputError
 from ccfem.base.parallel import in_processes, in_threads
@@ -12,6 +13,7 @@ from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.even_steps import OFF, even_steps
 from ccfem.machine.machine import Machine
 from ccfem.paths.fields.chart import chart_of, flat_view
+from ccfem.paths.planning.alike import on_layer
 from ccfem.paths.planning.strategy import LayerPlanner, PartStrategy, Strategy
 from ccfem.paths.planning.unfolding import may_fold, unfolded_paths
 from ccfem.paths.toolpaths import Toolpaths
@@ -20,7 +22,11 @@ from ccfem.slicing.layers.slicer import check_pitch
 
 
 def plan(
-    strategy: Strategy, layers: Sequence[Layer], stress: PartStress, machine: Machine
+    strategy: Strategy,
+    layers: Sequence[Layer],
+    stress: PartStress,
+    machine: Machine,
+    alike: IntArray | None = None,
 ) -> Toolpaths:
     """Plan the paths of a whole part, several layers at a time.
 
@@ -32,6 +38,9 @@ def plan(
         Called from several processes, each time with a layer of its own.
     stress : PartStress
         A `StressField`, or a `GivenStress` for strategies that do not solve the part again.
+    alike : (n,) int array, optional
+        Position of the layer whose paths each layer takes (`ccfem.paths.planning.alike`), of use
+        for strategies that plan `by_layer`. Default: all layers are planned.
 
     Returns
     -------
@@ -46,6 +55,14 @@ def plan(
     """
     check_instance("strategy", strategy)
     check_layers(strategy, layers, machine)
+    if alike is not None and plans_alike(strategy):
+        chosen, number = np.unique(alike, return_inverse=True)
+        some = [layers[k] for k in chosen.tolist()]
+        paths = plan(strategy, some, stress, machine)
+        of_layer = [paths.on_layer(layer.index) for layer in some]
+        return Toolpaths.concatenate(
+            on_layer(of_layer[k], layer) for k, layer in zip(number.tolist(), layers, strict=True)
+        )
     in_plane = getattr(strategy, "in_plane", False)
     views: Sequence[Layer] = layers
     if in_plane:
@@ -55,6 +72,11 @@ def plan(
     else:
         planner = strategy
     return plan_layers(planner, layers, views, stress, machine, may_fold(strategy))
+
+
+def plans_alike(strategy: Strategy) -> bool:
+    """Whether layers that are alike get the same paths of a strategy."""
+    return bool(getattr(strategy, "by_layer", False))
 
 
 def plan_layers(

@@ -64,6 +64,9 @@ class LayerStrategy(Protocol):
         The parameter, in degrees, that sets a direction independent of the stress.
     ignores_stress : bool, default False
         Whether its paths are the same under any load.
+    by_layer : bool, default False
+        Whether its paths follow from the section, the patches and the stress of a layer alone: of
+        many layers those that are alike are then planned once (`ccfem.paths.planning.alike`).
     crosses : bool, default False
         Whether strands cross each other on purpose.
     folds : bool, default False

@@ -1,7 +1,6 @@
 """Layers over the height of a part: their cells, how they differ, and the case that each serves."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +12,7 @@ from ccfem.base.tensor import in_plane
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.locate import Buckets, barycentric_maps, bucket, locate
 from ccfem.machine.machine import Machine
-from ccfem.paths.toolpaths import Toolpaths
+from ccfem.paths.planning.alike import EQUAL
 from ccfem.slicing.layers.layer import Layer, curved_layers
 from ccfem.strategies.fibre_aware.layer_axes import NearestLayers
 from ccfem.strategies.fibre_aware.smeared import SmearedPart
@@ -201,9 +200,6 @@ _ALIKE = 0.8
 
 _MOST_GROUPS = 6
 
-_EQUAL = 1e-6
-"""Distance, mm, up to which two sections are equal: paths drawn on one are those of the other."""
-
 
 def nearest_layer(part: SmearedPart, layers: Sequence[Layer]) -> IntArray:
     """Position in `layers` of the one nearest to each cell, (m,); of flat ones in height."""
@@ -304,7 +300,7 @@ def grouped_by_stress(
 
 
 def layers_of_one_kind(
-    layers: Sequence[Layer], group: IntArray, distance: float = _EQUAL
+    layers: Sequence[Layer], group: IntArray, distance: float = EQUAL
 ) -> list[IntArray]:
     """Numbers of the layers of each kind: they share a group, and a section up to a distance, mm.
 
@@ -316,7 +312,7 @@ def layers_of_one_kind(
     """
     if curved_layers(layers):
         kind_of = np.arange(len(layers))
-        if distance > _EQUAL:
+        if distance > EQUAL:
             kind_of = group * len(layers) + group_layers(layers, _MOST_GROUPS)
         return [np.flatnonzero(kind_of == k) for k in np.unique(kind_of)]
     kinds: list[list[int]] = []
@@ -330,14 +326,6 @@ def layers_of_one_kind(
         else:
             kinds.append([k])
     return [np.array(kind) for kind in kinds]
-
-
-def on_layer(paths: Toolpaths, layer: Layer) -> Toolpaths:
-    """Paths of a layer with the same section, drawn on another; those of a curved layer itself."""
-    if layer.flat is None:
-        return paths
-    points = layer.plane.to_space(layer.plane.project(paths.points))
-    return replace(paths, points=points, layer=np.full(len(paths), layer.index))
 
 
 def middle(numbers: IntArray) -> int:

@@ -12,6 +12,7 @@ from ccfem.fem.elasticity.stress_field import StressField, WeightedCases
 from ccfem.geometry.shapes import Region, open_lines
 from ccfem.machine.machine import Machine
 from ccfem.paths.fields.tensile import Tension, layer_tension
+from ccfem.paths.planning.alike import on_layer
 from ccfem.paths.planning.infill import long_enough
 from ccfem.paths.planning.layer_plans import plan, plan_layers
 from ccfem.paths.planning.strategy import LayerPlanner
@@ -24,7 +25,6 @@ from ccfem.strategies.fibre_aware.heights import (
     layers_by_case,
     layers_of_one_kind,
     middle,
-    on_layer,
 )
 
 _CAP = 60.0

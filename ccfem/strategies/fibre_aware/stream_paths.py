@@ -26,10 +26,11 @@ from ccfem.paths.linking.finishing import (
     trim_to_clearance,
 )
 from ccfem.paths.linking.joining import Joined
+from ccfem.paths.planning.alike import on_layer
 from ccfem.paths.planning.unfolding import unfolded, unfolded_paths
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
-from ccfem.strategies.fibre_aware.heights import layers_of_one_kind, middle, on_layer
+from ccfem.strategies.fibre_aware.heights import layers_of_one_kind, middle
 from ccfem.strategies.fibre_aware.hole_wraps import LEVELS, led_round_holes
 from ccfem.strategies.fibre_aware.path_profile import Profile, least_price
 from ccfem.strategies.fibre_aware.prune import profiles

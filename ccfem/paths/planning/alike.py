@@ -1,0 +1,91 @@
+"""Layers of equal section under alike stress, which are planned once."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import shapely
+
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.fem.elasticity import PartStress
+from ccfem.geometry.locate import locate
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
+
+ALIKE = 0.01
+"""Root mean square of the difference of alike stress, over that of the stress. Our choice: a tenth
+of what solutions miss on the meshes that are usual."""
+
+EQUAL = 1e-6
+"""Distance, mm, up to which two sections are equal: paths drawn on one are those of the other."""
+
+_PATCH = 0.01
+"""Share by which the length of a patch along equal sections may differ: chords of round walls."""
+
+
+def alike_layers(layers: Sequence[Layer], stress: PartStress) -> IntArray:
+    """Position of the layer whose paths each layer may take, (n,); its own where no other is alike.
+
+    From the first layer on, those that follow one another with its section, under stress that is
+    alike, form a run; the middle one of a run stands for all. Curved layers stand for themselves.
+    """
+    source = np.arange(len(layers))
+    first = 0
+    for k in range(1, len(layers) + 1):
+        if k < len(layers) and _alike(layers[first], layers[k], stress.nodal):
+            continue
+        source[first:k] = (first + k) // 2
+        first = k
+    return source
+
+
+def on_layer(paths: Toolpaths, layer: Layer) -> Toolpaths:
+    """Paths of a layer with the same section, drawn on another; those of a curved layer itself."""
+    if layer.flat is None:
+        return paths
+    points = layer.plane.to_space(layer.plane.project(paths.points))
+    return replace(paths, points=points, layer=np.full(len(paths), layer.index))
+
+
+def _alike(one: Layer, other: Layer, nodal: FloatArray) -> bool:
+    return _equal(one, other) and _apart(one, other, nodal) <= ALIKE
+
+
+def _equal(one: Layer, other: Layer) -> bool:
+    """Whether two flat layers have equal sections, and the same patches along them."""
+    if one.flat is None or other.flat is None:
+        return False
+    if not np.array_equal(one.flat.frame, other.flat.frame):
+        return False
+    if abs(one.thickness - other.thickness) > EQUAL:
+        return False
+    borders = [shapely.boundary(layer.plane.polygon) for layer in (one, other)]
+    if not shapely.hausdorff_distance(*borders) < EQUAL:
+        return False
+    a, b = _along_patches(one), _along_patches(other)
+    return a.keys() == b.keys() and all(
+        abs(a[name] - b[name]) <= _PATCH * max(a[name], b[name]) for name in a
+    )
+
+
+def _along_patches(layer: Layer) -> dict[str, float]:
+    """Length, mm, of the border that lies on each patch."""
+    ends = {name: layer.points[edges] for name, edges in layer.patches.items() if len(edges)}
+    return {
+        name: float(np.linalg.norm(each[:, 1] - each[:, 0], axis=1).sum())
+        for name, each in ends.items()
+    }
+
+
+def _apart(one: Layer, other: Layer, nodal: FloatArray) -> float:
+    """Difference of the stress on two layers of equal section, over the stress on the first."""
+    middles = other.plane.points[other.triangles].mean(axis=1)
+    triangle, weights = locate(one.plane.points, one.triangles, middles)
+    found = triangle >= 0
+    there = one.interpolate(nodal)[one.triangles[triangle[found]]]
+    first = np.einsum("tk,tkij->tij", weights[found], there)
+    second = other.interpolate(nodal)[other.triangles[found]].mean(axis=1)
+    area = other.areas[found]
+    size = float(area @ (first**2).sum(axis=(1, 2)))
+    difference = float(area @ ((second - first) ** 2).sum(axis=(1, 2)))
+    return float(np.sqrt(difference / size)) if size > 0.0 else float("inf")
