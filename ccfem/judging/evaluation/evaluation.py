@@ -17,7 +17,7 @@ from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity import PartStress
 from ccfem.fem.materials import Material, named_material
 from ccfem.geometry.locate import nearest_on_triangles
-from ccfem.geometry.shapes import Region
+from ccfem.geometry.shapes import Region, corners_only
 from ccfem.judging.evaluation import indices, layer_paths
 from ccfem.judging.evaluation.indices.alignment import AlignmentSamples
 from ccfem.judging.evaluation.indices.curvature import CurvatureSamples
@@ -25,6 +25,7 @@ from ccfem.judging.evaluation.sensitivity import strand_lamina
 from ccfem.judging.virtual_testing import Strand
 from ccfem.machine.machine import Machine
 from ccfem.paths.fields.chart import chart_of
+from ccfem.paths.repeated import repeated_layers
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer, stress_on
 from ccfem.slicing.slicers.planar import Planar
@@ -193,36 +194,71 @@ def _rows(
     area = np.array([float(layer.areas.sum()) for layer in layers])
     sampled = 1.0 if whole.all() else float(area[whole].sum() / area.sum())
 
-    shared = [toolpaths, stress, machine, stack]
+    below = list(
+        in_processes(lambda k: _below(k, layers, stress.mesh, machine), layers, shared=[layers])
+    )
+    behind = [int(np.count_nonzero(late == layer.index)) for layer in layers]
+    more = [
+        (count, under and corners_only(under)) for count, under in zip(behind, below, strict=True)
+    ]
+    source = repeated_layers(toolpaths, layers, more)
+    shared = [toolpaths, stress, machine, stack, below]
     rows: list[dict[str, float]] = [{} for _ in layers]
     total: dict[str, float] = {}
     along_fibre: list[FibreSamples] = []
     for kinds in _passes(len(layers)):
+        origin = _origins(kinds, source, whole)
 
         def measured(
-            layer: Layer, every: bool, kinds: Mapping[str, ModuleType] = kinds
-        ) -> tuple[dict[str, Any], dict[str, float]]:
-            taken = {name: kind for name, kind in kinds.items() if every or not _on_some(kind)}
-            if not taken:
-                return {}, {}
-            behind = int(np.count_nonzero(late == layer.index))
-            on_layer = toolpaths.on_layer(layer.index)
-            below = _below(layer, layers, stress.mesh, machine)
-            view = _view(on_layer, layer, stress, machine, below, behind, stack, upright)
-            samples = {name: kind.sample(view) for name, kind in taken.items()}
-            return samples, _indices(samples, basis)
+            k: int,
+            kinds: Mapping[str, ModuleType] = kinds,
+            origin: Sequence[Mapping[str, int]] = origin,
+        ) -> dict[str, tuple[Any, dict[str, float]]]:
+            own = [name for name, at in origin[k].items() if at == k]
+            if not own:
+                return {}
+            on_layer = toolpaths.on_layer(layers[k].index)
+            about = (stress, machine, below[k], behind[k], stack, upright)
+            view = _view(on_layer, layers[k], *about)
+            samples = {name: kinds[name].sample(view) for name in own}
+            return {
+                name: (taken, _indices({name: taken}, basis)) for name, taken in samples.items()
+            }
 
         pools = {name: layer_paths.Pool() for name in kinds}
-        results = in_processes(measured, layers, whole.tolist(), shared=shared)
-        for row, every, (samples, values) in zip(rows, whole.tolist(), results, strict=True):
-            row |= values
-            for name, of_layer in samples.items():
-                pools[name].add(of_layer)
-            if every and "alignment" in samples:
+        again = {(name, at) for k, of in enumerate(origin) for name, at in of.items() if at < k}
+        kept: dict[tuple[str, int], tuple[Any, dict[str, float]]] = {}
+        results = in_processes(measured, range(len(layers)), shared=[layers, *shared])
+        for k, taken in enumerate(results):
+            kept |= {(name, k): one for name, one in taken.items() if (name, k) in again}
+            samples = {}
+            for name, at in origin[k].items():
+                samples[name], values = taken[name] if at == k else kept[name, at]
+                rows[k] |= values
+                pools[name].add(samples[name])
+            if "alignment" in samples:
                 along_fibre.append(FibreSamples(samples["curvature"], samples["alignment"]))
+        del kept
         for name, pooled in pools.items():  # one kind at a time: each fills memory
             total |= _indices({name: pooled.samples()}, replace(basis, sampled=sampled))
     return [*rows, total], along_fibre
+
+
+def _origins(
+    kinds: Mapping[str, ModuleType], source: IntArray, whole: BoolArray
+) -> list[dict[str, int]]:
+    """Position of the layer that each one has its samples of, by their kind: its own, or earlier.
+
+    Some are only taken where `whole` is set.
+    """
+    origin: list[dict[str, int]] = [{} for _ in source]
+    for name, kind in kinds.items():
+        first: dict[int, int] = {}
+        for k, group in enumerate(source.tolist()):
+            if whole[k] or not _on_some(kind):
+                by_paths = getattr(kind, "BY_PATHS", False)
+                origin[k][name] = first.setdefault(group, k) if by_paths else k
+    return origin
 
 
 def _spread_over(count: int, most: int | None) -> BoolArray:

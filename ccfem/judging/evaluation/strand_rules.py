@@ -21,6 +21,7 @@ from ccfem.geometry.polylines import point_at
 from ccfem.judging.virtual_testing.strand_room import StrandParts, joined_parts, strand_parts
 from ccfem.machine.machine import Machine
 from ccfem.paths.folds import WINDOW, Folds, joined_folds
+from ccfem.paths.repeated import repeated_layers
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
@@ -158,16 +159,29 @@ def _looked_at(
         return one(fibre, layers)
     own = [layer for layer in layers if layer.index in fibre.layer]
     own.sort(key=lambda layer: layer.index)
-    each = [fibre.on_layer(layer.index) for layer in own]
-    looked = list(in_processes(one, each, [[layer] for layer in own], shared=[fibre]))
-    if not looked:
+    if not own:
         return one(fibre, layers)
+    # Layers that repeat others are looked at once, where nothing is kept of the strands themselves.
+    source = np.arange(len(own)) if with_parts else repeated_layers(fibre, own)
+    first = np.unique(source).tolist()
+    each = [fibre.on_layer(own[k].index) for k in first]
+    results = in_processes(one, each, [[own[k]] for k in first], shared=[fibre])
+    known = dict(zip(first, results, strict=True))
+    looked = [_at_height(known[at], own[at], own[k]) for k, at in enumerate(source.tolist())]
     kept = [strands.parts for strands in looked if strands.parts is not None]
     return _Strands(
         joined_folds([strands.folds for strands in looked]),
         np.concatenate([strands.outside for strands in looked]),
         np.concatenate([strands.place for strands in looked]),
         joined_parts(kept) if with_parts else None,
+    )
+
+
+def _at_height(strands: _Strands, layer: Layer, other: Layer) -> _Strands:
+    """Return what was found on a flat layer for another one that repeats it."""
+    rise = (other.plane.height - layer.plane.height) * layer.plane.frame[2]
+    return strands._replace(
+        place=strands.place + rise * (strands.place != 0.0).any(axis=1)[:, None]
     )
 
 

@@ -11,8 +11,10 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.box import box_mesh
 from ccfem.judging.evaluation import COLUMNS, evaluate, evaluation
+from ccfem.judging.evaluation.indices import room
 from ccfem.judging.virtual_testing import Strand
 from ccfem.machine import Machine
+from ccfem.paths.repeated import repeated_layers
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.slicers.planar import Planar
 
@@ -303,6 +305,25 @@ def test_fibre_over_a_gap_lies_on_nothing(make_part):
         )
     on_bed = part.paths([[5.0, 20.0], [55.0, 20.0]])
     assert evaluate(on_bed, part.layers, part.stress, MACHINE).total["free_span"] == 0.0
+
+
+def test_layers_that_repeat_others_have_the_samples_that_they_would_take(make_part, monkeypatch):
+    """Equal paths in equal sections are measured once."""
+    part = make_part(bent, count=5)
+    lines = [[WAVE, RING], [WAVE, RING], [SHORT], [WAVE, RING], [SHORT]]
+    paths = Toolpaths.concatenate(part.paths(*some, layer=k) for k, some in enumerate(lines))
+    about = (paths, part.layers, part.stress, MACHINE)
+    taken, sample = [], room.sample
+    monkeypatch.setattr(room, "sample", lambda view: taken.append(view.layer) or sample(view))
+    found = repeated_layers(paths, part.layers)
+    assert found.tolist() == [0, 0, 2, 0, 2]
+    repeated = evaluate(*about)
+    monkeypatch.setattr(evaluation, "repeated_layers", lambda *_: np.arange(5))
+    every = evaluate(*about)
+    # The lowest lies on the bed, its equal on fibre.
+    assert len(taken) == 3 + 5
+    for name in NAMES:
+        np.testing.assert_allclose(repeated.values[name], every.values[name], rtol=1e-12)
 
 
 def test_of_many_layers_some_tell_angles_and_distances(make_part):

@@ -8,6 +8,8 @@ A module has
 * ``indices(samples, basis)``, the value of each index by name, of one layer or of all together;
 * ``ON_SOME_LAYERS``, true where they are means and quantiles that some layers of many tell, and no
   limit of a machine bounds them; default false;
+* ``BY_PATHS``, true where the samples follow from the paths in the plane of a flat layer, its
+  section and what is below it: layers that repeat another have those of that one; default false;
 * ``LARGE``, true where the samples of a layer take megabytes: those of many layers are then taken
   alone; default false;
 * ``PLACE``, a number that says where its columns stand in tables; default behind all others.

@@ -13,6 +13,9 @@ from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, Plan
 PLACE = 105
 """Of these columns in tables: the smaller, the farther to the left."""
 
+BY_PATHS = True
+"""Equal paths in equal sections have the same samples."""
+
 ON_SOME_LAYERS = True
 """Of a stack of many layers some are enough."""
 

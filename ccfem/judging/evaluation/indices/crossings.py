@@ -136,6 +136,9 @@ def _crosses(i: IntArray, j: IntArray, points: FloatArray, following: IntArray) 
 PLACE = 130
 """Of these columns in tables: the smaller, the farther to the left."""
 
+BY_PATHS = True
+"""Equal paths in equal sections have the same samples."""
+
 
 COLUMNS = (
     Column(

@@ -13,6 +13,9 @@ from ccfem.machine.machine import Machine
 PLACE = 30
 """Of these columns in tables: the smaller, the farther to the left."""
 
+BY_PATHS = True
+"""Equal paths in equal sections have the same samples."""
+
 
 _TURNS = (45, 90)
 """Turns, degrees, that are counted."""

@@ -11,6 +11,9 @@ from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, Plan
 PLACE = 120
 """Of these columns in tables: the smaller, the farther to the left."""
 
+BY_PATHS = True
+"""Equal paths in equal sections have the same samples."""
+
 
 _PLACES = {
     "link_inside": (INSIDE, "in the section of their layer"),

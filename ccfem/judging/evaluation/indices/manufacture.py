@@ -14,6 +14,9 @@ from ccfem.paths.toolpaths import FIBRE, TRAVEL, Toolpaths
 PLACE = 10
 """Of these columns in tables: the smaller, the farther to the left."""
 
+BY_PATHS = True
+"""Equal paths in equal sections have the same samples."""
+
 
 _LENGTH = ">= 0; NaN without fibre"
 _SHARE = "0 to 1, 1 is best; NaN without fibre"

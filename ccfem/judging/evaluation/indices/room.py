@@ -16,6 +16,9 @@ from ccfem.machine.machine import Machine
 PLACE = 80
 """Of these columns in tables: the smaller, the farther to the left."""
 
+BY_PATHS = True
+"""Equal paths in equal sections have the same samples."""
+
 
 _BANDS = (
     "a strand is a band one fibre width wide; links outside the section or over a void are left out"

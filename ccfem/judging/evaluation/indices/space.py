@@ -20,6 +20,9 @@ PLACE = 140
 LARGE = True
 """Its samples take megabytes a layer."""
 
+ON_SOME_LAYERS = True
+"""Means and quantiles that some layers of many tell."""
+
 
 _ANGLES = (10, 20, 30)
 _REACH = 10.0
@@ -76,8 +79,6 @@ COLUMNS = (
         "mean over strands by length.",
         ">= 0; NaN without fibre",
     ),
-    Column("thickness_5", "mm", "5th percentile by area of the layers' thickness.", "> 0"),
-    Column("thickness_95", "mm", "95th percentile by area of the layers' thickness.", "> 0"),
 )
 
 
@@ -93,9 +94,8 @@ class SpaceSamples(LayerSamples):
     curvature : (c,) array, 1/mm
     strand, linked : (k,) arrays
         Length of each strand, mm, and number of patches near it.
-    area, thickness, across, tension : (t,) arrays
-        Of each triangle: mm^2, mm, normal stress and largest principal stress, MPa, 0 where
-        negative.
+    area, across, tension : (t,) arrays
+        Of each triangle: mm^2, normal stress and largest principal stress, MPa, 0 where negative.
     """
 
     length: FloatArray
@@ -105,7 +105,6 @@ class SpaceSamples(LayerSamples):
     strand: FloatArray
     linked: FloatArray
     area: FloatArray
-    thickness: FloatArray
     across: FloatArray
     tension: FloatArray
 
@@ -138,7 +137,6 @@ def sample(paths: LayerPaths) -> SpaceSamples:
         fibre.lengths,
         _linked(fibre, layer, stress.held_or_loaded, _REACH * step),
         layer.areas,
-        layer.local_thickness[layer.triangles].mean(axis=1),
         np.maximum(normal, 0.0),
         np.maximum(np.linalg.eigvalsh(cells)[:, 2], 0.0),
     )
@@ -181,7 +179,6 @@ def indices(samples: SpaceSamples, _: Basis) -> dict[str, float]:
     for a in _ANGLES:
         values[f"space_aligned_{a}"] = _mean((angle < a).astype(np.float64), length)
     bend = samples.curvature
-    low, high = _quantiles(samples.thickness, samples.area)
     tension = float(samples.area @ samples.tension)
     return {
         **values,
@@ -190,21 +187,9 @@ def indices(samples: SpaceSamples, _: Basis) -> dict[str, float]:
         ),
         "across_tension": float(samples.area @ samples.across) / tension if tension else np.nan,
         "joints_linked": _mean(samples.linked, samples.strand),
-        "thickness_5": low,
-        "thickness_95": high,
     }
 
 
 def _mean(values: FloatArray, weight: FloatArray) -> float:
     total = float(weight.sum())
     return float(weight @ values) / total if total > 0.0 else float("nan")
-
-
-def _quantiles(values: FloatArray, weight: FloatArray) -> tuple[float, float]:
-    """5th and 95th percentile by weight."""
-    if not weight.sum() > 0.0:
-        return float("nan"), float("nan")
-    order = np.argsort(values, kind="stable")
-    below = np.cumsum(weight[order]) / weight.sum()
-    low, high = np.minimum(np.searchsorted(below, (0.05, 0.95)), len(values) - 1)
-    return float(values[order[low]]), float(values[order[high]])

@@ -15,6 +15,9 @@ from ccfem.machine.machine import Machine
 PLACE = 70
 """Of these columns in tables: the smaller, the farther to the left."""
 
+BY_PATHS = True
+"""Equal paths in equal sections have the same samples."""
+
 LARGE = True
 """Its samples take megabytes a layer."""
 

@@ -1,0 +1,54 @@
+"""Layers that repeat others: the same paths in the same section, at another height."""
+
+import hashlib
+from collections.abc import Hashable, Sequence
+
+import numpy as np
+
+from ccfem.base.arrays import IntArray
+from ccfem.geometry.shapes import corners_only
+from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.layers.layer import Layer
+
+_DECIMALS = 9
+"""Of coordinates, mm, in which paths that are the same agree: only rounding differs."""
+
+
+def repeated_layers(
+    toolpaths: Toolpaths, layers: Sequence[Layer], more: Sequence[Hashable] | None = None
+) -> IntArray:
+    """Position of the first layer that each one repeats, (n,); its own where it repeats none.
+
+    Parameters
+    ----------
+    more : sequence of hashable, optional
+        What else has to be the same, for each layer.
+
+    Returns
+    -------
+    (n,) int array
+        Curved layers repeat none.
+    """
+    source, known = np.arange(len(layers)), dict[Hashable, int]()
+    for k, layer in enumerate(layers):
+        if layer.flat is not None:
+            section, thickness = layer.plane.polygon, round(layer.thickness, _DECIMALS)
+            about = (thickness, corners_only(section), more[k] if more else None)
+            source[k] = known.setdefault((_digest(toolpaths, layer), *about), k)
+    return source
+
+
+def _digest(toolpaths: Toolpaths, layer: Layer) -> bytes:
+    """Digest of the paths on a flat layer, in its frame."""
+    assert layer.flat is not None
+    paths, digest = toolpaths.on_layer(layer.index), hashlib.sha256(layer.flat.frame.tobytes())
+    places = paths.points @ layer.flat.frame.T - [0.0, 0.0, layer.flat.height]
+    for column in (
+        places.round(_DECIMALS) + 0.0,
+        paths.offsets,
+        paths.kind,
+        paths.closed,
+        paths.link,
+    ):
+        digest.update(np.ascontiguousarray(column).tobytes())
+    return digest.digest()
