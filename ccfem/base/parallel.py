@@ -14,7 +14,7 @@ import sys
 import threading
 import traceback
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -141,6 +141,37 @@ def in_processes(
         yield from forks.results()
     finally:
         forks.end()
+
+
+def repeating(
+    work: Callable[[int], Result],
+    what: Sequence[Hashable],
+    again: Callable[[Result, int], Result],
+    shared: Sequence[Any] = (),
+) -> Iterator[Result]:
+    """Yield results of a function for the numbers 0, 1 and so on, like ones made once.
+
+    Parameters
+    ----------
+    work : callable
+        Called with a number, as by `in_processes`.
+    what : sequence of hashable
+        Of each number; the work is the same where it is equal.
+    again : callable
+        Makes the result for a later number of that for the first.
+    shared : sequence, optional
+        As of `in_processes`.
+    """
+    first: dict[Hashable, int] = {}
+    source = [first.setdefault(one, number) for number, one in enumerate(what)]
+    last = {at: number for number, at in enumerate(source)}
+    made = in_processes(work, list(first.values()), shared=shared)
+    kept: dict[int, Result] = {}
+    for number, at in enumerate(source):
+        if at == number:
+            kept[at] = next(made)
+        result = kept[at] if last[at] > number else kept.pop(at)
+        yield result if at == number else again(result, number)
 
 
 @contextmanager

@@ -32,8 +32,7 @@ def repeated_layers(
     source, known = np.arange(len(layers)), dict[Hashable, int]()
     for k, layer in enumerate(layers):
         if layer.flat is not None:
-            section, thickness = layer.plane.polygon, round(layer.thickness, _DECIMALS)
-            about = (thickness, corners_only(section), more[k] if more else None)
+            about = (corners_only(layer.plane.polygon), more[k] if more else None)
             source[k] = known.setdefault((_digest(toolpaths, layer), *about), k)
     return source
 

@@ -332,6 +332,16 @@ class LaidLayer:
     outside: float = 0.0
     trims: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
 
+    def at(self, number: int, height: float) -> "LaidLayer":
+        """Lay the same at another height, mm, as the layer of this number."""
+        paths = self.paths
+        points = paths.points.copy()
+        points[:, 2] = round(height, COORDINATE_DIGITS)
+        trims = self.trims.copy()
+        trims[:, 0] = number
+        layer = np.full(len(paths), number)
+        return replace(self, paths=replace(paths, points=points, layer=layer), trims=trims)
+
 
 def matrix_layer(
     fill: MatrixFill,
@@ -366,7 +376,6 @@ def matrix_layer(
         matrix, heights = Toolpaths.concatenate([matrix, pad]), np.append(heights, high)
         room = np.append(room, np.ones(len(pad)))
         sparse = np.append(sparse, np.zeros(len(pad), dtype=bool))
-    warning = f"at {height:.4g} mm {warning}" if warning else ""
     return LaidLayer(matrix, heights, room, np.zeros(len(matrix), dtype=bool), sparse, warning)
 
 

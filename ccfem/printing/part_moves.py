@@ -1,5 +1,7 @@
 """From a plan to all actions of the machine: one sequence for every file that is written."""
 
+import hashlib
+from collections.abc import Hashable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -7,7 +9,7 @@ import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.errors import InputError
-from ccfem.base.parallel import in_processes
+from ccfem.base.parallel import repeating
 from ccfem.geometry.polylines import along_line, line_length, points_along, turning_angles
 from ccfem.machine.machine import Machine
 from ccfem.machine.speeds import step_curvatures, table_speeds
@@ -69,7 +71,11 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
             if len(mine):
                 site.printed(float(plan.top[number]), mine == FIBRE)
     numbers = [k for k in numbers if k >= plan.first]
-    prepared = in_processes(lambda number: _prepared(plan, number, lowest, machine), numbers)
+    prepared = repeating(
+        lambda k: _prepared(plan, numbers[k], lowest, machine),
+        [_what(plan, number, lowest) for number in numbers],
+        lambda lines, k: _at_height(lines, float(plan.paths.points[_first(plan, numbers[k]), 2])),
+    )
     for number, lines in zip(numbers, prepared, strict=True):
         top, thickness = float(plan.top[number]), float(plan.thickness[number])
         begin_layer(recorder, number, top, below[number], machine)
@@ -133,6 +139,35 @@ def _prepared(
         speed = _speed(bool(lowest[k]), machine)
         lines.append(matrix_steps(line, normals, heights, what, machine, speed, room))
     return lines
+
+
+def _at_height(
+    lines: "Sequence[Steps | StrandSteps]", height: float
+) -> "list[Steps | StrandSteps]":
+    """Lay the lines of a flat layer at another height, mm."""
+    return [line.at(height) for line in lines]
+
+
+def _first(plan: PrintPlan, number: int) -> int:
+    """Find the first point of a layer."""
+    return int(plan.paths.offsets[int((plan.paths.layer == number).argmax())])
+
+
+def _what(plan: PrintPlan, number: int, lowest: BoolArray) -> Hashable:
+    """Digest of all on a layer that its moves follow from, but for its height if it is flat."""
+    paths, mine = plan.paths, np.flatnonzero(plan.paths.layer == number)
+    own = slice(mine[0], mine[-1] + 1)
+    ends = paths.offsets[mine[0] : mine[-1] + 2]
+    points = slice(ends[0], ends[-1])
+    places, normals = paths.points[points], paths.normals[points]
+    if len(mine) != own.stop - own.start or np.ptp(places[:, 2]) or (normals[:, 2] != 1.0).any():
+        return number
+    digest = hashlib.sha256(plan.thickness[number].tobytes())
+    about = (paths.kind, paths.closed, plan.short, plan.sparse, plan.room, lowest)
+    columns = (places[:, :2], ends - ends[0], plan.laid[points], *(column[own] for column in about))
+    for column in columns:
+        digest.update(np.ascontiguousarray(column).tobytes())
+    return digest.digest()
 
 
 def _pause(recorder: Recorder, number: int, machine: Machine) -> None:
@@ -433,6 +468,13 @@ class StrandSteps(NamedTuple):
     laid: Steps | None
     dragged: Steps | None
     ironed: Steps | None
+
+    def at(self, height: float) -> "StrandSteps":
+        """Move alike at another height, mm."""
+        parts = (part and part.at(height) for part in (self.laid, self.dragged, self.ironed))
+        laid, dragged, ironed = parts
+        start = np.append(self.start[:2], height)
+        return self._replace(start=start, laid=laid, dragged=dragged, ironed=ironed)
 
 
 def strand_steps(

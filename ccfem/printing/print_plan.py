@@ -1,6 +1,6 @@
 """A whole part as it is printed: layers of matrix below, between and above the layers of fibre."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,7 +17,7 @@ from ccfem.base.arrays import (
     shared_rows,
 )
 from ccfem.base.errors import InputError
-from ccfem.base.parallel import in_processes
+from ccfem.base.parallel import in_processes, repeating
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.offsets import offset_rings
@@ -228,10 +228,13 @@ def plan_print(
 
     borders = {index: seen(section) for index, section in sections_of(used, mesh).items()}
     placed = _Strands(strands, frame[:2], origin, borders)
+    same = strands.repeated(used)
+    first = sorted(set(same.values()))
     above = in_processes(
-        lambda index: height_over(placed.lines(index), borders[index], machine), list(borders)
+        lambda index: height_over(placed.lines(index), borders[index], machine), first
     )
-    over = dict(zip(borders, above, strict=True))
+    height_of = dict(zip(first, above, strict=True))
+    over = {index: height_of[same[index]] for index in borders}
     slabs = slabs_of(used, float(lowest[2]), float(highest[2]), machine, over)
     turned = spun(machine, spin)
     fills = matrix_fills(slabs, layers, mesh, frame, origin, turned, plastic)
@@ -239,7 +242,7 @@ def plan_print(
     in_air = _NONE
     if hanging is not None:
         in_air = seen(hanging.region)
-    layers_laid = _layers(slabs, fills, placed, in_air, float(lowest[2]), machine)
+    layers_laid = _layers(slabs, fills, placed, same, in_air, float(lowest[2]), machine)
     plan = _joined(layers_laid, slabs, float(lowest[2]), strands, machine)
     check_bed(plan, machine)
     return plan
@@ -279,26 +282,35 @@ class _Strands:
 
     def below(self, slabs: Sequence[Slab], number: int, machine: Machine) -> Below:
         """Fibre layers between a layer of matrix and the one below it."""
-        first = number
-        while first and slabs[first - 1].fibre is not None:
-            first -= 1
         below = Below()
-        for slab in slabs[first:number]:
-            assert slab.fibre is not None
-            about = (self.fibre(slab.fibre), self.short(slab.fibre))
-            below = below.under(*about, slab.upper - slab.lower, machine)
+        for index, height in fibre_under(slabs, number):
+            below = below.under(self.fibre(index), self.short(index), height, machine)
         return below
+
+
+def fibre_under(slabs: Sequence[Slab], number: int) -> list[tuple[int, float]]:
+    """Fibre layers, and their heights, mm, between a layer of matrix and the one below it."""
+    under: list[tuple[int, float]] = []
+    for slab in slabs[:number][::-1]:
+        if slab.fibre is None:
+            break
+        under.append((slab.fibre, slab.height))
+    return under[::-1]
 
 
 def _layers(
     slabs: Sequence[Slab],
     fills: Sequence[MatrixFill | None],
     strands: _Strands,
+    same: Mapping[int, int],
     in_air: Region,
     bottom: float,
     machine: Machine,
 ) -> Iterator[LaidLayer]:
-    """All layers, from the bed to the top, several at a time."""
+    """All layers, from the bed to the top, several at a time; what repeats is laid once.
+
+    Layers of fibre by their index repeat those that `same` names.
+    """
     sections = [fill and fill.section for fill in fills]
     lines = [strands.lines(slab.fibre) for slab in slabs]
     levels = [(slab.lower, slab.upper) for slab in slabs]
@@ -307,7 +319,7 @@ def _layers(
 
     def laid(number: int) -> LaidLayer:
         slab, fill = slabs[number], fills[number]
-        size = (number, slab.upper - bottom, slab.upper - slab.lower, machine)
+        size = (number, slab.upper - bottom, slab.height, machine)
         if slab.fibre is not None:
             k = slab.fibre
             return fibre_layer(strands.fibre(k), strands.short(k), strands.borders[k], *size)
@@ -315,7 +327,17 @@ def _layers(
         below = strands.below(slabs, number, machine)
         return matrix_layer(fill, pad_lines(*pads[number], machine), below, *size)
 
-    return in_processes(laid, range(len(slabs)))
+    def what(number: int) -> Hashable:
+        slab, fill = slabs[number], fills[number]
+        if slab.fibre is not None:
+            return slab.height, same[slab.fibre]
+        under = tuple((same[k], height) for k, height in fibre_under(slabs, number))
+        return slab.height, id(fill), tuple(map(shapely.to_wkb, pads[number])), under
+
+    def again(layer: LaidLayer, number: int) -> LaidLayer:
+        return layer.at(number, slabs[number].upper - bottom)
+
+    return repeating(laid, [what(number) for number in range(len(slabs))], again)
 
 
 def _joined(
@@ -338,10 +360,11 @@ def _joined(
 
     def paths() -> Iterator[Toolpaths]:
         nonlocal outside
-        for layer in layers:
+        for layer, slab in zip(layers, slabs, strict=True):
             for name, column in columns.items():
                 column.append(getattr(layer, name))
-            warnings.extend(filter(None, [layer.warning]))
+            if layer.warning:
+                warnings.append(f"at {slab.upper - bottom:.4g} mm {layer.warning}")
             outside += layer.outside
             yield layer.paths
 
@@ -350,7 +373,7 @@ def _joined(
     return PrintPlan(
         joined,
         np.array([round(slab.upper - bottom, COORDINATE_DIGITS) for slab in slabs]),  # as lines are
-        np.array([slab.upper - slab.lower for slab in slabs]),
+        np.array([slab.height for slab in slabs]),
         dropped=strands.dropped,
         outside=outside,
         warnings=(*warnings, *check_cover(slabs, machine)),

@@ -49,6 +49,12 @@ class Steps(NamedTuple):
     normal: FloatArray
     top: float
 
+    def at(self, height: float) -> "Steps":
+        """Move alike at another height, mm."""
+        rows = self.rows.copy()
+        rows[:, 3] = height
+        return Steps(rows, np.append(self.start[:2], height), self.normal, height)
+
 
 def steps_along(
     line: FloatArray,

@@ -9,7 +9,14 @@ import pytest
 
 from ccfem.base.arrays import is_shared, read_only, shared_rows
 from ccfem.base.errors import InputError
-from ccfem.base.parallel import beside, done_elsewhere, in_processes, in_threads, processors
+from ccfem.base.parallel import (
+    beside,
+    done_elsewhere,
+    in_processes,
+    in_threads,
+    processors,
+    repeating,
+)
 
 
 @pytest.fixture
@@ -191,3 +198,15 @@ def test_the_number_of_processors_is_a_whole_number(monkeypatch, wanted):
         processors()
     monkeypatch.setenv("CCFEM_THREADS", "")
     assert processors() == len(os.sched_getaffinity(0))
+
+
+def test_what_repeats_is_made_once_and_comes_in_order(two):
+    def made(number):
+        return f"{number} by {os.getpid()}"
+
+    results = list(repeating(made, "abacbda", lambda result, number: (result, number)))
+    first = {word: results["abacbda".index(word)] for word in "abcd"}
+    assert [first[word].split()[0] for word in "abcd"] == ["0", "1", "3", "5"]
+    for number, word in enumerate("abacbda"):
+        again = number != "abacbda".index(word)
+        assert results[number] == ((first[word], number) if again else first[word])

@@ -40,6 +40,8 @@ COLUMNS: tuple[layer_paths.Column, ...] = tuple(
 
 _ROUNDING = 1e-3
 """Rounding, mm, of coordinates in path files."""
+_DECIMALS = 9
+"""Of the thickness, mm, in which layers that repeat others agree."""
 _DOWN = 0.01
 """Least cosine to the way down of a face that looks down: upright walls are bent by rounding."""
 
@@ -199,7 +201,8 @@ def _rows(
     )
     behind = [int(np.count_nonzero(late == layer.index)) for layer in layers]
     more = [
-        (count, under and corners_only(under)) for count, under in zip(behind, below, strict=True)
+        (round(layer.thickness, _DECIMALS), count, under and corners_only(under))
+        for layer, count, under in zip(layers, behind, below, strict=True)
     ]
     source = repeated_layers(toolpaths, layers, more)
     shared = [toolpaths, stress, machine, stack, below]

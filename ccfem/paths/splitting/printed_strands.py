@@ -21,6 +21,7 @@ from ccfem.geometry.polylines import along_line, between, is_closed, line_length
 from ccfem.geometry.shapes import Region, strings
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.unfolding import part_of_line
+from ccfem.paths.repeated import repeated_layers
 from ccfem.paths.splitting.slabs import LOW, Slab, StrandDensity, slabs_of
 from ccfem.paths.toolpaths import FIBRE, MATRIX, Toolpaths
 from ccfem.slicing.layers import Layer
@@ -66,6 +67,12 @@ class PrintedStrands:
     def layers(self) -> set[int]:
         """Indices of the layers that anything lies on."""
         return {*self.fibre.layer.tolist(), *self.short.layer.tolist()}
+
+    def repeated(self, layers: Sequence[Layer]) -> dict[int, int]:
+        """Index of the first of some layers that each one repeats at its own height."""
+        fibre = repeated_layers(self.fibre, layers).tolist()
+        source = repeated_layers(self.short, layers, fibre)
+        return {layer.index: layers[k].index for layer, k in zip(layers, source, strict=True)}
 
 
 def printed_strands(

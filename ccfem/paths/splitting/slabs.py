@@ -19,6 +19,10 @@ _SAME = 1e-6
 """Heights closer than this, mm, are the same."""
 
 
+_DECIMALS = 9
+"""Of heights, mm."""
+
+
 @dataclass(frozen=True)
 class Slab:
     """A layer to print: its extent along the build direction, and its fibre layer if it is one."""
@@ -26,6 +30,11 @@ class Slab:
     lower: float
     upper: float
     fibre: int | None = None
+
+    @property
+    def height(self) -> float:
+        """Its height, mm: equal ones are exactly equal."""
+        return round(self.upper - self.lower, _DECIMALS)
 
 
 def slabs_of(
