@@ -132,8 +132,21 @@ def ball_averages(
         Points whose averages are wanted.
     radius : float, mm
     """
-    boxes, result = _boxes(points, weights, radius), np.zeros((len(judged), values.shape[1]))
-    _average(boxes, values[boxes.order], points[judged], boxes.number[judged], result)
+    result = np.zeros((len(judged), values.shape[1]))
+    apart = float(np.cbrt(np.prod(np.ptp(points, axis=0)) / len(points)))
+    parts = int(np.clip(radius / max(_IN_BOX * apart, 1e-300), 1.0, _MOST_PARTS))
+    boxes = _boxes(points, weights, radius, parts)
+    values = values[boxes.order]
+    # Balls beside each other, one after the other, hold the same points.
+    turn = np.argsort(boxes.number[judged], kind="stable")
+    centres, own = points[judged[turn]], np.zeros_like(result)
+    if parts == 1:
+        _average(boxes, values, centres, boxes.number[judged[turn]], own)
+    else:
+        columns = np.column_stack([boxes.weights, boxes.weights[:, None] * values])
+        until = np.concatenate([np.zeros((1, columns.shape[1])), np.cumsum(columns, axis=0)])
+        _average_of_sums(boxes, columns, until, centres, own)
+    result[turn] = own
     return result
 
 
@@ -162,11 +175,12 @@ def ball_shares(
 
 
 class _Boxes(NamedTuple):
-    """Points in boxes of a grid, whose size is the radius of the ball or more.
+    """Points in boxes of a grid, whose size is the radius of the ball or more, or part of it.
 
     `points` (n, 3), mm, and `weights` (n,) in the order of the boxes, `order` (n,); `number` (n,)
     of the box of each in the order that they were given in; `offsets` where each box begins;
-    `shape` (3,), boxes along each axis, numbered with the last axis fastest.
+    `shape` (3,), boxes along each axis, numbered with the last axis fastest; `corner` (3,) of the
+    first, mm, and the `size` of each, mm.
     """
 
     points: FloatArray
@@ -176,22 +190,31 @@ class _Boxes(NamedTuple):
     offsets: IntArray
     shape: IntArray
     radius: float
+    corner: FloatArray
+    size: float
 
 
 _MOST_BOXES = 10_000_000
 """Number of boxes above which they are larger than the ball: about 80 MB."""
 
 
-def _boxes(points: FloatArray, weights: FloatArray, radius: float) -> _Boxes:
+_IN_BOX = 1.5
+"""Least size of a box, in distances of points: three or four of them are in it."""
+_MOST_PARTS = 8
+"""Boxes along the radius of a ball, at most."""
+
+
+def _boxes(points: FloatArray, weights: FloatArray, radius: float, parts: int = 1) -> _Boxes:
     """Sort points into boxes for a ball, with a margin of empty boxes on every side."""
     first = points.min(axis=0)
-    size = max(radius, float(np.cbrt(np.prod(np.ptp(points, axis=0)) / _MOST_BOXES)))
+    size = max(radius / parts, float(np.cbrt(np.prod(np.ptp(points, axis=0)) / _MOST_BOXES)))
     box = np.floor((points - first) / size).astype(np.int64) + 1
     shape = box.max(axis=0) + 2
     number = (box[:, 0] * shape[1] + box[:, 1]) * shape[2] + box[:, 2]
     order = np.argsort(number, kind="stable")
     offsets = np.searchsorted(number[order], np.arange(int(np.prod(shape)) + 1))
-    return _Boxes(points[order], weights[order], order, number, offsets, shape, float(radius))
+    about = (order, number, offsets, shape, float(radius), first - size, size)
+    return _Boxes(points[order], weights[order], *about)
 
 
 @njit(cache=True)
@@ -229,6 +252,67 @@ def _average(
             weight += weights[p]
         for c in range(values.shape[1]):
             result[k, c] /= weight
+
+
+_INNER = 1.0 - 1e-9
+"""Share of the radius up to which boxes count as wholly inside: rounding lets no point slip."""
+
+
+@njit(cache=True)
+def _average_of_sums(
+    boxes: _Boxes, columns: FloatArray, until: FloatArray, centres: FloatArray, result: FloatArray
+) -> None:  # pragma: no cover
+    """Averages where many points lie in a ball: those of boxes wholly inside by their sums.
+
+    `columns` (n, 1 + c) are the weight of each point and its weighted values, `until` (n + 1,
+    1 + c) their sums over all points before. Boxes along the last axis follow one another.
+    """
+    points, shape, offsets, corner = boxes.points, boxes.shape, boxes.offsets, boxes.corner
+    size, square = boxes.size, boxes.radius * boxes.radius
+    count, total = columns.shape[1], np.empty(columns.shape[1])
+    low, high = np.empty(2, np.int64), np.empty(2, np.int64)
+    for k in range(len(centres)):
+        total[:] = 0.0
+        for d in range(2):
+            low[d] = max(int((centres[k, d] - boxes.radius - corner[d]) / size), 0)
+            high[d] = min(int((centres[k, d] + boxes.radius - corner[d]) / size), shape[d] - 1)
+        z = centres[k, 2] - corner[2]
+        for i in range(low[0], high[0] + 1):
+            nearest_x, farthest_x = _reach(centres[k, 0] - corner[0] - i * size, size)
+            for j in range(low[1], high[1] + 1):
+                nearest_y, farthest_y = _reach(centres[k, 1] - corner[1] - j * size, size)
+                outer = square - nearest_x * nearest_x - nearest_y * nearest_y
+                if outer < 0.0:
+                    continue
+                row, half = (i * shape[1] + j) * shape[2], np.sqrt(outer)
+                start = offsets[row + max(int((z - half) / size), 0)]
+                stop = offsets[row + min(int((z + half) / size), shape[2] - 1) + 1]
+                inner = square * _INNER - farthest_x * farthest_x - farthest_y * farthest_y
+                first = last = stop
+                if inner > 0.0:
+                    half = np.sqrt(inner)
+                    from_box = max(int(np.ceil((z - half) / size)), 0)
+                    to_box = min(int(np.floor((z + half) / size)), shape[2])
+                    if to_box > from_box:
+                        first, last = offsets[row + from_box], offsets[row + to_box]
+                        for c in range(count):
+                            total[c] += until[last, c] - until[first, c]
+                for begin, end in ((start, first), (last, stop)):
+                    for p in range(begin, end):
+                        x = points[p, 0] - centres[k, 0]
+                        y = points[p, 1] - centres[k, 1]
+                        height = points[p, 2] - centres[k, 2]
+                        if x * x + y * y + height * height <= square:
+                            for c in range(count):
+                                total[c] += columns[p, c]
+        for c in range(1, count):
+            result[k, c - 1] = total[c] / total[0]
+
+
+@njit(cache=True)
+def _reach(place: float, size: float) -> tuple[float, float]:  # pragma: no cover
+    """Least and largest distance of a place from an interval that begins at 0."""
+    return max(0.0, -place, place - size), max(place, size - place)
 
 
 @njit(cache=True)

@@ -180,6 +180,17 @@ def test_averages_over_balls_of_parts_of_any_size(size):
     np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
+@pytest.mark.parametrize("size", [0.5, 2.0, 6.0])
+def test_averages_over_balls_that_hold_many_boxes(size):
+    rng = np.random.default_rng(11)
+    points, weights = size * rng.random((900, 3)), 0.1 + rng.random(900)
+    values, judged = 1.0 + rng.random((900, 2)), rng.permutation(900)[:300]
+    near = np.linalg.norm(points[judged][:, None] - points, axis=2) <= 1.5
+    expected = (near * weights) @ values / (near @ weights)[:, None]
+    found = ball_averages(points, values, weights, judged, 1.5)
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
 def test_the_largest_index_counts_most_and_equal_ones_alike():
     zero = np.zeros((1, 3))
     factors = {"fibre": 2.0, "matrix": 1.0}
