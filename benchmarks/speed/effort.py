@@ -31,6 +31,7 @@ from ccfem.cases.case import Case
 from ccfem.cases.reading import read
 from ccfem.comparison.effort import (
     COEFFICIENTS,
+    MOST,
     TERMS,
     Coefficients,
     Counts,
@@ -315,6 +316,10 @@ def main() -> None:
         text = [f'"{stage}" = {values}' for stage, values in fitted(samples).items()]
         text += [f"pace = {pace_there}", "[within]"]
         text += [f"{command} = {values}" for command, values in within.items()]
+        text += ["[most]"]
+        for command in within:
+            known = [known_of(row) for row in rows if row["command"] == command]
+            text += [f"{command} = {[max(getattr(one, name) for one in known) for name in MOST]}"]
         head = "# Written by python -m benchmarks.speed.effort --write"
         COEFFICIENTS.write_text("\n".join([head, *text, ""]), encoding="utf-8")
 

@@ -48,6 +48,10 @@ TERMS: dict[str, tuple[str, ...]] = {
 }
 """What each stage grows with: attributes of `Counts`."""
 
+MOST = ("unknowns", "solved", "triangles", "room", "volume")
+"""Counts whose largest measured values the benchmark writes, for each command: beyond these what is
+told is extrapolated."""
+
 _PLANNED = {
     "stream_function": "plan stream_function",
     "contour_zigzag": "plan zigzag",
@@ -150,6 +154,10 @@ def pace() -> float:
     return min(taken)
 
 
+_BEYOND = 1.05
+"""Times the largest part that was measured, in any count, from which it is said. Our choice."""
+
+
 def about_effort(case: Case, layers: Sequence[Layer]) -> tuple[str, ...]:
     """Say what commands will take on a part, a line for each order of cells that it may come to.
 
@@ -157,7 +165,7 @@ def about_effort(case: Case, layers: Sequence[Layer]) -> tuple[str, ...]:
     """
     if not layers:
         return ()
-    lines, slower = [], pace() / measured()["pace"]
+    lines, slower, far = [], pace() / measured()["pace"], dict[str, float]()
     for known in counts(case, layers):
         tested = FILLED * known.room <= LONGEST_TEST
         planned = "plan" if tested else "untested"
@@ -168,10 +176,17 @@ def about_effort(case: Case, layers: Sequence[Layer]) -> tuple[str, ...]:
         ):
             seconds = slower * sum(stage_effort(stage, known) for stage in steps)
             memory = stage_effort(f"memory of {used}", known)
+            size = np.array([getattr(known, name) for name in MOST])
+            by = float((size / measured()["most"][used]).max())
+            if by > _BEYOND:
+                far[command] = by
             expected.append(f"{command} about {_in_words(seconds)} and {memory:.1f} GB")
         kind = "linear" if known.solved <= known.unknowns else "quadratic"
         lines.append(f"on {kind} cells and one processor: {', '.join(expected)}")
     compared, planned = (measured()["within"][command] for command in ("compare", "plan"))
+    beyond = " and ".join(f"{command}, {by:.3g} times" for command, by in far.items())
+    if beyond:
+        lines.append(f"extrapolated beyond the largest part that was measured: {beyond}")
     return (
         *lines,
         f"these times, without a curve, were within a factor of 1.5 for {compared[0]} of "

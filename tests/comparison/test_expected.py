@@ -8,7 +8,14 @@ import pytest
 from benchmarks.speed import effort as benchmark
 from ccfem.body.mesh import box_mesh
 from ccfem.cases.case import Case
-from ccfem.comparison.effort import COEFFICIENTS, Counts, counts, stage_effort, stages
+from ccfem.comparison.effort import (
+    COEFFICIENTS,
+    Counts,
+    about_effort,
+    counts,
+    stage_effort,
+    stages,
+)
 from ccfem.comparison.expected import Schedule, curve_steps
 from ccfem.fem.elasticity import Force, Problem, Support
 from ccfem.fem.materials import isotropic
@@ -28,6 +35,23 @@ def test_a_box_is_counted():
     assert linear.room == pytest.approx(3 * 40.0 * 20.0 / 0.8)
     assert linear.volume == pytest.approx(8000.0)
     assert Counts.of(mesh.quadratic(), layers, machine) == quadratic
+
+
+@pytest.mark.parametrize(
+    ("sides", "times"), [((40.0, 20.0, 10.0), 0.0), ((100.0, 50.0, 25.0), 2.0)]
+)
+def test_a_part_beyond_those_that_were_measured_is_told_by_extrapolation(sides, times):
+    """The largest that was compared has 62.6 cm^3 by the lines of the benchmark."""
+    mesh = box_mesh(sides, (8, 4, 2))
+    loads = {"pull": (Force("x_max", (1.0, 0.0, 0.0)),)}
+    problem = Problem(mesh, isotropic(3500.0, 0.35), (Support("x_min"),), loads, order=1)
+    rows = [row for row in benchmark.lines() if row["command"] == "compare"]
+    largest = max(float(row["volume"]) for row in rows)
+    assert math.prod(sides) / largest == pytest.approx(times, abs=0.2)
+    lines = about_effort(Case("box", "A box", problem), Planar(count=3).cut(mesh))
+    said = [line for line in lines if line.startswith("extrapolated beyond the largest part")]
+    assert len(said) == (times > 1.0)
+    assert all(f"compare, {math.prod(sides) / largest:.3g} times" in line for line in said)
 
 
 def test_coefficients_are_those_of_the_measurement():
