@@ -291,7 +291,9 @@ def _write_paths(comparison: Comparison, folder: Path, cell: bool) -> None:
     number = np.repeat(np.arange(float(len(runs))), [len(run.toolpaths) for run in runs])
 
     def write_all_paths() -> None:
-        every = Toolpaths.concatenate(run.toolpaths for run in runs)
+        # One plan is not copied: those of large prints fill memory.
+        alone = runs[0].toolpaths if len(runs) == 1 else None
+        every = alone or Toolpaths.concatenate(run.toolpaths for run in runs)
         write_paths(every, folder / "paths.vtp", path_data={"strategy": number})
 
     files: list[_Write] = []

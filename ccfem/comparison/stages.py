@@ -411,6 +411,7 @@ def judged(run: Run, part: Part, prints: bool, tests: "Tests | None") -> Run:
     if run.evaluation is not None:
         return run
     run = evaluated(run, part)
+    give_back()
     run = with_print(run, part) if prints else run
     return run if tests is None else with_test(run, part, tests)
 
@@ -460,12 +461,15 @@ def with_print(run: Run, part: Part) -> Run:
             if curved
             else plan_print(*what, part.propped, spin, part.plastic)
         )
+        give_back()
         plan = on_course(arranged([plan], [part.layout], part.machine), part.course, part.machine)
+        # Before there are moves: this takes as much memory for a moment.
+        share = plan.volume(part.machine) / (plan.copies * float(part.stress.mesh.volumes.sum()))
         moves = part_moves(plan, part.machine)
+        give_back()
     except InputError as error:
         why = "; ".join(filter(None, (str(error), run.why_not)))
         return replace(run, unprinted=str(error), why_not=why)
-    share = plan.volume(part.machine) / (plan.copies * float(part.stress.mesh.volumes.sum()))
     totals = print_totals(moves, part.machine)
     plan = replace(plan, warnings=(*plan.warnings, *totals.words))
     return replace(run, print_plan=plan, moves=moves, print_totals=totals, printed_volume=share)

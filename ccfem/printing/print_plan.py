@@ -312,10 +312,11 @@ def _layers(
     Layers of fibre by their index repeat those that `same` names.
     """
     sections = [fill and fill.section for fill in fills]
-    lines = [strands.lines(slab.fibre) for slab in slabs]
+    of_layer = {index: strands.lines(index) for index in set(same.values())}
+    lines = [[] if slab.fibre is None else of_layer[same[slab.fibre]] for slab in slabs]
     levels = [(slab.lower, slab.upper) for slab in slabs]
     pads = pad_regions(sections, lines, machine, in_air, levels)
-    del lines  # as large as all strands
+    del lines, of_layer  # as large as all strands
 
     def laid(number: int) -> LaidLayer:
         slab, fill = slabs[number], fills[number]

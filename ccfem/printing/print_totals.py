@@ -180,6 +180,8 @@ def part_totals(
     A row belongs to the part whose line or strand it lays, or leads to.
     """
     names = list(dict.fromkeys(spot.name for spot in standing))
+    if not names:
+        return ()
     owner = np.full(len(moves), -1)
     for spot in standing:
         low, high = np.array(spot.low) - _ROUNDING, np.array(spot.high) + _ROUNDING

@@ -84,7 +84,7 @@ def _file_lines(
     if field:
         yield "<FieldData>\n"
         for name, values in field.items():
-            yield _array(name, values, f' NumberOfTuples="{len(np.asarray(values))}"')
+            yield from _array(name, values, f' NumberOfTuples="{len(np.asarray(values))}"')
         yield "</FieldData>\n"
     numbers = " ".join(f'NumberOf{name}="{count}"' for name, count in counts.items())
     yield f"<Piece {numbers}>\n"
@@ -92,25 +92,34 @@ def _file_lines(
         yield f"<{tag}>\n"
         for name, values in arrays.items():
             titles = enumerate(components.get(name, ()))
-            yield _array(name, values, "".join(f' ComponentName{k}="{s}"' for k, s in titles))
+            yield from _array(name, values, "".join(f' ComponentName{k}="{s}"' for k, s in titles))
         yield f"</{tag.partition(' ')[0]}>\n"
     yield f"</Piece>\n</{kind}>\n</VTKFile>\n"
 
 
-def _array(name: str, values: ArrayLike, more: str = "") -> str:
-    """One DataArray: one block of zlib with its sizes in bytes before it."""
+_ROWS = 500_000
+"""Rows that are packed, and triples of bytes that are written, at a time: some fill memory."""
+
+
+def _array(name: str, values: ArrayLike, more: str = "") -> Iterator[str]:
+    """Yield one DataArray: one block of zlib with its sizes in bytes before it."""
     values = np.asarray(values)
     size, name_of_type = _TYPES.get(values.dtype.kind, ("i8", "Int64"))
     if values.dtype == np.uint8:
         size, name_of_type = _TYPES["b"]
-    data = np.ascontiguousarray(values, dtype=f"<{size}").tobytes()
-    packed = zlib.compress(data, _EFFORT) if data else b""
+    packer, packed, count = zlib.compressobj(_EFFORT), bytearray(), 0
+    for first in range(0, len(values), _ROWS):
+        data = np.ascontiguousarray(values[first : first + _ROWS], dtype=f"<{size}").tobytes()
+        packed += packer.compress(data)
+        count += len(data)
+    packed += packer.flush() if count else b""
     # Number of blocks, size of a block, of a last one that is shorter, and of each when packed.
-    sizes = [1, len(data), 0, len(packed)] if data else [0, 0, 0]
-    header = np.array(sizes, dtype="<u8").tobytes()
-    text = (base64.b64encode(header) + base64.b64encode(packed)).decode("ascii")
+    sizes = [1, count, 0, len(packed)] if count else [0, 0, 0]
     columns = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
-    return (
-        f'<DataArray type="{name_of_type}" Name={quoteattr(name)}{columns}{more} '
-        f'format="binary">{text}</DataArray>\n'
+    yield (
+        f'<DataArray type="{name_of_type}" Name={quoteattr(name)}{columns}{more} format="binary">'
     )
+    yield base64.b64encode(np.array(sizes, dtype="<u8").tobytes()).decode("ascii")
+    for first in range(0, len(packed), 3 * _ROWS):  # whole groups of three bytes
+        yield base64.b64encode(packed[first : first + 3 * _ROWS]).decode("ascii")
+    yield "</DataArray>\n"
