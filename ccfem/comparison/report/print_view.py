@@ -11,7 +11,7 @@ from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.comparison.report.packing import Rounded
 from ccfem.comparison.runs import Printed
 from ccfem.printing.export.thumbnail import LINE_COLOURS
-from ccfem.printing.moves import LAY, ROLES, TRAVEL, Moves
+from ccfem.printing.moves import LAY, ROLES, TRAVEL, Moves, is_any
 
 KINDS = ("contour", "matrix", "fibre", "support and pads", "beside the part", "travel")
 """What the lines of a print are drawn as."""
@@ -67,11 +67,12 @@ def print_views(runs: Sequence[Printed]) -> dict[str, Any]:
 
 def _drawn(moves: Moves, top: FloatArray) -> dict[str, Any]:
     """Layers of one print."""
-    rows = np.flatnonzero((moves.event == LAY) | (moves.event == TRAVEL))
-    bounds = np.searchsorted(moves.layer[rows], np.arange(len(top) + 1))
-    chosen = _spread(len(top), len(rows), _ROWS)
+    moving = is_any(moves.event, LAY, TRAVEL)
+    bounds = np.searchsorted(moves.layer, np.arange(len(top) + 1))
+    chosen = _spread(len(top), int(np.count_nonzero(moving)), _ROWS)
+    rows = {k: bounds[k] + np.flatnonzero(moving[bounds[k] : bounds[k + 1]]) for k in chosen}
     for tolerance in _COARSE:
-        layers = {k: _lines(moves, rows[bounds[k] : bounds[k + 1]], tolerance) for k in chosen}
+        layers = {k: _lines(moves, rows[k], tolerance) for k in chosen}
         count = sum(len(points) for points, _, _ in layers.values())
         if count <= _POINTS:
             break
