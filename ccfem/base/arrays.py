@@ -75,6 +75,10 @@ _SMALL, _ALONE = 1_000_000, 2**25 + 4096
 grow where they are and leave no holes."""
 
 
+_MOVED = 100_000
+"""Rows that are moved at a time."""
+
+
 class RowBuffer:
     """Rows that come block by block, in one array that grows where it is.
 
@@ -123,7 +127,10 @@ class RowBuffer:
         self._reserve(self._count)
         for number in range(len(places))[::-1]:
             at = places[number]
-            self._rows[at + number + 1 : count + number + 1] = self._rows[at:count]
+            # In pieces: rows that are moved onto themselves are copied first.
+            for end in range(count, at, -_MOVED):
+                begin = max(at, end - _MOVED)
+                self._rows[begin + number + 1 : end + number + 1] = self._rows[begin:end]
             self._rows[at + number] = rows[number]
             count = at
 
