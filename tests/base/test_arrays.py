@@ -82,7 +82,8 @@ def test_equal_rows_share_one_in_memory_unless_a_zero_has_another_sign():
 
 
 @pytest.mark.parametrize("last", [1.0, 2.0])
-def test_rows_that_come_block_by_block_are_as_joined_and_inserted_at_once(last):
+def test_rows_that_come_block_by_block_are_as_joined_and_inserted_at_once(last, monkeypatch):
+    monkeypatch.setattr(arrays, "_MOVED", 2)
     blocks = [np.ones((3, 2)), np.zeros((0, 2)), np.ones((4, 2)), np.full((2, 2), last)]
     buffer = RowBuffer(float, 2)
     for block in blocks:

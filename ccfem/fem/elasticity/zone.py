@@ -272,7 +272,8 @@ def _average_of_sums(
     count, total = columns.shape[1], np.empty(columns.shape[1])
     low, high = np.empty(2, np.int64), np.empty(2, np.int64)
     for k in range(len(centres)):
-        total[:] = 0.0
+        for c in range(count):
+            total[c] = 0.0
         for d in range(2):
             low[d] = max(int((centres[k, d] - boxes.radius - corner[d]) / size), 0)
             high[d] = min(int((centres[k, d] + boxes.radius - corner[d]) / size), shape[d] - 1)

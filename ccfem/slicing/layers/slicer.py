@@ -1,7 +1,8 @@
 """The protocol that slicers follow, and what holds for the layers of them all."""
 
-from collections.abc import Sequence
-from typing import Protocol, runtime_checkable
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Protocol, TypeVar, cast, runtime_checkable
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer, curved_layers
 
 Vector = tuple[float, float, float]
+Content = TypeVar("Content")
 
 
 @runtime_checkable
@@ -130,3 +132,20 @@ def check_heights(heights: FloatArray, machine: Machine) -> None:
             f"(machine.fibre_height, or filament_area over fibre_width); got {gaps[k]:.4g} mm "
             f"between those at {heights[k]:.6g} and {heights[k + 1]:.6g} mm: use fewer layers"
         )
+
+
+def read_once(slicer: object, folder: str, read: Callable[[], Content]) -> Content:
+    """Read what a slicer takes of a folder, once for its check and the layers cut afterwards.
+
+    Files that changed between are read again.
+    """
+    if not Path(folder).is_dir():
+        return read()
+    stats = [(file, file.stat()) for file in sorted(Path(folder).iterdir())]
+    now = [(file, stat.st_mtime_ns, stat.st_size) for file, stat in stats]
+    before, known = vars(slicer).pop("_read", (None, None))
+    if before == now:
+        return cast(Content, known)
+    content = read()
+    vars(slicer)["_read"] = now, content
+    return content

@@ -18,7 +18,7 @@ from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.level_cut import chain
 from ccfem.slicing.layers.level_surfaces import along_walls
-from ccfem.slicing.layers.slicer import Vector
+from ccfem.slicing.layers.slicer import Vector, read_once
 
 Sheet = tuple[FloatArray, IntArray]
 """Points (n, 3), mm, and triangles (t, 3) of a layer of another program."""
@@ -68,7 +68,10 @@ class Surfaces:
             _check_outside(outside.any(axis=1), k, self.tolerance)
 
     def _sheets(self) -> list[Sheet]:
-        return [read_layer(file) for file in layer_files(self.folder)]
+        def read() -> list[Sheet]:
+            return [read_layer(file) for file in layer_files(self.folder)]
+
+        return read_once(self, self.folder, read)
 
 
 def facing_up(sheets: Sequence[Sheet], build: Vector) -> list[Sheet]:

@@ -18,7 +18,7 @@ from ccfem.geometry.polylines import pack, resample
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.level_surfaces import clean
-from ccfem.slicing.layers.slicer import Vector
+from ccfem.slicing.layers.slicer import Vector, read_once
 from ccfem.slicing.slicers.surfaces import Sheet, facing_up, layer_from_surface
 
 _STEP = 0.5
@@ -91,7 +91,8 @@ class ThroughStrands:
 
     def _clouds(self) -> list[FloatArray]:
         """Points on the strands of each layer."""
-        files = [strands for strands in read_strand_files(self.folder) if strands]
+        read = read_once(self, self.folder, lambda: read_strand_files(self.folder))
+        files = [strands for strands in read if strands]
         if len(files) < 2:
             raise InputError(
                 "layers are rebuilt from the strands of two or more, which tell the side on which "

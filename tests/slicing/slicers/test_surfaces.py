@@ -8,7 +8,7 @@ from ccfem.body.mesh import box_mesh
 from ccfem.fem.elasticity import GivenStress
 from ccfem.machine import Machine
 from ccfem.slicing.layers import stress_on
-from ccfem.slicing.slicers import create
+from ccfem.slicing.slicers import create, surfaces
 
 MESH = box_mesh((20.0, 10.0, 10.0), (10, 5, 5))
 UP = (0.0, 0.0, 1.0)
@@ -64,6 +64,20 @@ def test_layers_face_the_next_one_whichever_way_their_triangles_turn(tmp_path):
     (tmp_path / "2.obj").unlink()
     (alone,) = slicer(stress(), UP, Machine())
     assert alone.normals[:, 2].min() > 0.9
+
+
+def test_files_are_read_once_for_the_check_and_the_cut_unless_they_change(tmp_path, monkeypatch):
+    write(tmp_path, "1.obj")
+    read, read_layer = [], surfaces.read_layer
+    monkeypatch.setattr(surfaces, "read_layer", lambda file: read.append(file) or read_layer(file))
+    slicer = create("surfaces", {"folder": str(tmp_path)})
+    slicer.check(MESH, UP, Machine())
+    assert len(slicer(stress(), UP, Machine())) == 1
+    assert len(read) == 1
+    slicer.check(MESH, UP, Machine())
+    write(tmp_path, "2.obj", 1.0)
+    assert len(slicer(stress(), UP, Machine())) == 2
+    assert len(read) == 1 + 1 + 2
 
 
 def test_points_that_each_triangle_has_of_its_own_are_one(tmp_path):
