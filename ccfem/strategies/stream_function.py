@@ -7,6 +7,7 @@ compliance of the part with the fibre that its isocurves lay.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain
 from typing import Any, ClassVar, Literal, Protocol, TypeVar
 
@@ -50,6 +51,8 @@ from ccfem.strategies.fibre_aware.stream_design import (
     StreamProblem,
     design,
     designed_in_steps,
+    first_step,
+    in_two_steps,
 )
 from ccfem.strategies.fibre_aware.stream_paths import Extraction, refined
 from ccfem.strategies.fibre_aware.stream_start import plane_axes, start_fields
@@ -67,6 +70,8 @@ _GO_ON = 0.5
 
 _PLAIN_INSET = 0.5
 """Distance of plain plans from the border, in strand widths: none are tested above it."""
+
+_Result = TypeVar("_Result")
 
 _WIDE = {"tight": 0.0, "cut": 1.3}
 """Radius, in machine radii, below which bends of the field have a cost."""
@@ -189,7 +194,8 @@ class StreamFunction:
         """
         cases = WeightedCases.of(solved(stress, "stream_function"))
         length = self.natural_length(layers, machine)
-        return WholePart(self._cut_to_lengths(cases, layers, machine, (length,))[0])
+        common = _Common(self, cases, tuple(layers), machine)
+        return WholePart(self._cut_to_lengths(common, (length,))[0])
 
     def to_lengths(
         self,
@@ -232,36 +238,34 @@ class StreamFunction:
             When no layer has a tensile direction in any case.
         """
         least = 1.0 if len(cases) == 1 else _CASES_OVERFILL
+        common = _Common(self, cases, tuple(layers), machine)
+        if len(lengths) > 1:
+            # Before each is designed for in a process of its own: what at least two need.
+            full = full_length(layers, machine)
+            second = replace(self, coverage=min(sorted(lengths)[-2] / full, 1.0))
+            common.beside_plain(lambda: second._known_first(common, second._posed(common)[0]))
         return designed_to_lengths(
             replace(self, overfill=max(self.overfill, least)),
             layers,
             machine,
             lengths,
-            lambda strategy, some, whole: strategy._cut_to_lengths(
-                cases, layers, machine, some, whole
-            ),
+            lambda strategy, some, whole: strategy._cut_to_lengths(common, some, whole),
             again=self.turns == "tight",
         )
 
     def _cut_to_lengths(
-        self,
-        cases: WeightedCases,
-        layers: Sequence[Layer],
-        machine: Machine,
-        lengths: Sequence[float],
-        whole: bool = False,
+        self, common: "_Common", lengths: Sequence[float], whole: bool = False
     ) -> list[Toolpaths]:
         """Design for this coverage, and cut by tests of all cases to lengths, mm per layer.
 
         With `whole`, plans that lay the length go before stiffer ones that do not.
         """
+        cases, layers, machine = common.cases, common.layers, common.machine
         check_moves(self.moves, layers)
         _check_tension(cases.fields, layers)
         in_all, strand = [length * len(layers) for length in lengths], Strand(self.rho)
         bounds = measures(self.objective, cases, layers, max(in_all), machine, strand)
-        with beside(lambda: self._plain(cases, layers, machine), shared=[cases, layers]) as plain:
-            problem, group, designed = self.designed(cases, layers, machine, bounds)
-            plain_paths = plain()
+        problem, group, designed = common.beside_plain(lambda: self._designed(common, bounds))
         parts = tuple(part.specimen for part in problem.parts)
         goal = Goal(parts, cases.weights, bounds, self.objective)
         fields_of = layers_by_case(cases.weights, layers) * problem.model.groups + group
@@ -292,19 +296,13 @@ class StreamFunction:
         last = replace(goal, parts=specimens(cases)) if self.moves else None
         plans = []
         for some, length in zip(tried, in_all, strict=True):
-            offered = [*some, *plain_paths]
+            offered = [*some, *common.plain]
             enough = [paths for paths in offered if float(paths.lengths.sum()) >= _WHOLE * length]
             offered = enough if whole and enough else offered
             plans.append(
                 prune_and_move(offered, layers, goal, length, machine, strand, *cut_by, last=last)
             )
         return plans
-
-    def _plain(
-        self, cases: WeightedCases, layers: Sequence[Layer], machine: Machine
-    ) -> list[Toolpaths]:
-        """Plans that are tested beside the designed ones."""
-        return plain_plans(cases, layers, machine) if self.inset <= _PLAIN_INSET else []
 
     def extraction(
         self,
@@ -345,8 +343,28 @@ class StreamFunction:
         (`ccfem.strategies.fibre_aware.upper_bound.measures`), by default 1.
         """
         cases = WeightedCases.of(stress)
+        return self._designed(_Common(self, cases, tuple(layers), machine), bounds)
+
+    def _designed(
+        self, common: "_Common", bounds: FloatArray | None
+    ) -> tuple[StreamProblem, IntArray, StreamDesign]:
+        """Design as `designed` does, from a first step that is known."""
+        problem, group, start = self._posed(common, bounds)
+        first = self._known_first(common, problem)
+        found = designed_in_steps(problem, start, self.evaluations, self.coverage, first)
+        return problem, group, found
+
+    def _known_first(self, common: "_Common", problem: StreamProblem) -> StreamDesign | None:
+        """First step of a design in two steps; None for a design in one."""
+        return common.first if in_two_steps(problem, self.coverage) else None
+
+    def _posed(
+        self, common: "_Common", bounds: FloatArray | None = None
+    ) -> tuple[StreamProblem, IntArray, Callable[[StreamProblem], FloatArray]]:
+        """Return the problem, the group of each layer, and what makes the first fields."""
+        cases, layers = common.cases, common.layers
         parts = smeared_cases(cases.fields, frames_in_cells(cases.mesh.centres, layers))
-        model, group = self._model(parts, layers, machine)
+        model, group = self._model(parts, layers, common.machine)
         shares = layer_counts(cases.weights, len(layers)) / len(layers)
         measured = np.ones(len(cases)) if bounds is None else bounds
         power = DESIGN_POWERS[self.objective]
@@ -356,8 +374,7 @@ class StreamFunction:
         def start(posed: StreamProblem) -> FloatArray:
             return start_fields(posed, cases.fields, chosen, self.cap, self.tilt)
 
-        found = designed_in_steps(problem, start, self.evaluations, self.coverage)
-        return problem, group, found
+        return problem, group, start
 
     def _model(
         self, parts: Sequence[SmearedPart], layers: Sequence[Layer], machine: Machine
@@ -395,6 +412,38 @@ class StreamFunction:
             radius=0.0 if axes.curved else _WIDE[self.turns] * machine.minimum_radius,
         )
         return model, group
+
+
+@dataclass(frozen=True)
+class _Common:
+    """What designs for one part share, whatever their amount of fibre: each is made once."""
+
+    strategy: StreamFunction
+    cases: WeightedCases
+    layers: tuple[Layer, ...]
+    machine: Machine
+
+    @cached_property
+    def plain(self) -> list[Toolpaths]:
+        """Plans that are tested beside the designed ones."""
+        if self.strategy.inset > _PLAIN_INSET:
+            return []
+        return plain_plans(self.cases, self.layers, self.machine)
+
+    def beside_plain(self, work: Callable[[], _Result]) -> _Result:
+        """Do some work; where the plain plans are not known, another process makes them."""
+        if "plain" in self.__dict__:
+            return work()
+        with beside(lambda: self.plain, shared=[self.cases, self.layers]) as plain:
+            result = work()
+            self.__dict__["plain"] = plain()
+        return result
+
+    @cached_property
+    def first(self) -> StreamDesign:
+        """First step of all designs that take two."""
+        problem, _, start = self.strategy._posed(self)
+        return first_step(problem, start, self.strategy.evaluations)
 
 
 def _with_first(
@@ -499,20 +548,19 @@ def designed_to_lengths(
         ]
 
     # Lengths near the longest share its design; the others are designed for anew.
-    groups: list[list[int]] = []
-    for k in sorted(range(len(lengths)), key=lambda k: -lengths[k]):
-        if groups and lengths[k] >= _NEAR * lengths[groups[-1][0]]:
-            groups[-1].append(k)
+    groups: list[list[float]] = []
+    for length in sorted(set(lengths), reverse=True):
+        if groups and length >= _NEAR * groups[-1][0]:
+            groups[-1].append(length)
         else:
-            groups.append([k])
-    shared = [strategy, layers, machine]
-    of_groups = in_processes(designed, [[lengths[k] for k in own] for own in groups], shared=shared)
+            groups.append([length])
+    of_groups = in_processes(designed, groups, shared=[strategy, layers, machine])
     plan_of = {
-        k: plan
+        length: plan
         for group, plans in zip(groups, of_groups, strict=True)
-        for k, plan in zip(group, plans, strict=True)
+        for length, plan in zip(group, plans, strict=True)
     }
-    return [plan_of[k] for k in range(len(lengths))]
+    return [plan_of[length] for length in lengths]
 
 
 def _designed_for(strategy: Designed, coverage: float, designed: float) -> Designed:

@@ -590,11 +590,33 @@ def design(problem: StreamProblem, start: FloatArray, evaluations: int = 50) -> 
     return StreamDesign(field.reshape(len(problem.shares), -1), objective, ratios)
 
 
+def in_two_steps(problem: StreamProblem, coverage: float) -> bool:
+    """Whether `designed_in_steps` takes two; parameters as there."""
+    one_case, much = len(problem.parts) == 1, coverage > _USUAL
+    return one_case and much and problem.model.budget > _first_budget(problem)
+
+
+def _first_budget(problem: StreamProblem) -> float:
+    return _FIRST * float(problem.model.room.sum())
+
+
+def first_step(
+    problem: StreamProblem, start: Callable[[StreamProblem], FloatArray], evaluations: int
+) -> StreamDesign:
+    """Design for half of the room, whatever the budget of the problem.
+
+    Designs of one part for several amounts share this step. Parameters as in `designed_in_steps`.
+    """
+    less = replace(problem, model=replace(problem.model, budget=_first_budget(problem)))
+    return design(less, start(less), evaluations)
+
+
 def designed_in_steps(
     problem: StreamProblem,
     start: Callable[[StreamProblem], FloatArray],
     evaluations: int,
     coverage: float,
+    first: StreamDesign | None = None,
 ) -> StreamDesign:
     """Design fields for half of the room first, and for much fibre from there.
 
@@ -612,11 +634,11 @@ def designed_in_steps(
         times as many.
     coverage : float
         Share of the layers to be covered. The budget is larger, since some fibre is cut off later.
+    first : StreamDesign, optional
+        The first step, if it is known (`first_step`).
     """
-    most = _FIRST * float(problem.model.room.sum())
-    if len(problem.parts) > 1 or coverage <= _USUAL or problem.model.budget <= most:
+    if not in_two_steps(problem, coverage):
         return design(problem, start(problem), evaluations)
-    less = replace(problem, model=replace(problem.model, budget=most))
-    first = design(less, start(less), evaluations)
+    first = first_step(problem, start, evaluations) if first is None else first
     design_of = design(problem, first.fields.ravel(), int(np.ceil(_THEN * evaluations)))
     return replace(design_of, ratios=first.ratios + design_of.ratios)

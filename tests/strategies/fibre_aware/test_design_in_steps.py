@@ -10,9 +10,12 @@ from ccfem.fem.elasticity.problem import Force, Problem, Support
 from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.materials import printed_pla
 from ccfem.machine import Machine
+from ccfem.paths.planning.strategy import full_length
+from ccfem.slicing.layers.layer import stress_on
 from ccfem.slicing.slicers.planar import Planar
+from ccfem.strategies import stream_function
 from ccfem.strategies.fibre_aware.heights import middle_layers
-from ccfem.strategies.fibre_aware.stream_design import design, designed_in_steps
+from ccfem.strategies.fibre_aware.stream_design import design, designed_in_steps, first_step
 from ccfem.strategies.fibre_aware.stream_start import start_fields
 from ccfem.strategies.stream_function import StreamFunction
 
@@ -58,3 +61,26 @@ def test_usual_amounts_are_designed_in_one_step(lever):
     much = replace(problem, model=replace(problem.model, budget=2.0 * problem.model.budget))
     found, once = designed_in_steps(much, start, 2, 0.45), design(much, start(much), 2)
     np.testing.assert_array_equal(found.fields, once.fields)
+
+
+def test_designs_for_several_lengths_share_their_first_step(lever, monkeypatch):
+    stress, layers = lever
+    strategy, steps = StreamFunction(evaluations=2, phases=1, inset=0.6), []
+
+    def counted(*about):
+        steps.append(about)
+        return first_step(*about)
+
+    monkeypatch.setattr(stream_function, "first_step", counted)
+    full = full_length(layers, MACHINE)
+    lengths = [0.6 * full, 0.8 * full, 0.8 * full]
+    together = strategy.to_lengths(stress, layers, MACHINE, lengths)
+    assert len(steps) == 1
+    ((_, alone),) = strategy.to_lengths(stress, layers, MACHINE, lengths[:1])
+    (_, first), (_, most), (_, again) = together
+    for layer in layers:
+        view = stress_on(layer, stress)
+        paths = [planner(layer, view, MACHINE) for planner in (alone, first, most, again)]
+        np.testing.assert_array_equal(paths[0].points, paths[1].points)
+        assert not np.array_equal(paths[1].points, paths[2].points)  # from there on by itself
+        np.testing.assert_array_equal(paths[2].points, paths[3].points)
