@@ -12,7 +12,8 @@ from ccfem.base.checks import check_known, check_number
 from ccfem.base.errors import SolveError
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.curved_cells import gradients_at
-from ccfem.fem.elasticity import cell_gradients, preconditioned_cg
+from ccfem.fem.elasticity import cell_gradients
+from ccfem.fem.elasticity.conjugate_gradient import conjugate_gradient
 from ccfem.fem.elasticity.held import Held
 from ccfem.fem.elasticity.statics import check_pressed
 from ccfem.judging.virtual_testing.specimen import Specimen
@@ -345,9 +346,10 @@ def equilibrium(
             check_pressed(held, (matrix @ u.reshape(-1)).reshape(u.shape) - forces, forces)
             return Equilibrium(u, matrix, strain, carried, update, total, residual)
         goal = max(0.5 * tolerance / residual, 0.0 if mode == BONDED else _PROGRESS)
-        step = preconditioned_cg(reduced, rest, specimen.solver, tolerance=min(goal, 0.5))
-        total += step.iterations
-        x = x + step.values
+        goal, apply = 0.5 * min(goal, 0.5), specimen.solver.apply
+        step, count, _ = conjugate_gradient(reduced, rest, apply, tolerance=goal)
+        total += count
+        x = x + step
         u = held.expand(x)
         before = carried
         strain, carried = _state(pieces, u, mode)
