@@ -12,7 +12,7 @@ from ccfem.comparison.runs import Run
 from ccfem.comparison.stages import Part, Tell, Tests, timed
 from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.fem.elasticity.support_kinds import PressingSupport
-from ccfem.strategies.fibre_aware.upper_bound import UpperBound, upper_bound
+from ccfem.strategies.fibre_aware.upper_bound import LOOSE, UpperBound, upper_bound
 
 _SAME_BOUND, _SAME_CASES_BOUND = 1.002, 1.01
 """Largest length over the shortest for which one bound is taken, that of the largest; a bound of
@@ -58,8 +58,12 @@ def bounds_of(
     lengths = [length for length in lengths if length not in known]
     with timed(seconds, "bound"):
         about = (part.machine, strand)
+        # Those between the runs are there for the curve alone.
+        gaps = [None if length in laid or several else LOOSE for length in lengths]
         results = in_processes(
-            lambda length: upper_bound(cases, part.layers, length, *about), lengths
+            lambda length, gap: upper_bound(cases, part.layers, length, *about, gap=gap),
+            lengths,
+            gaps,
         )
         for length in lengths:
             tell(f"bounding what any paths of {1e-3 * length:.3g} m could reach{of}")

@@ -513,7 +513,8 @@ def designed_to_lengths(
     Parameters
     ----------
     lengths : sequence of float, mm per layer
-        Lengths that need more than the largest coverage are reduced to that coverage.
+        Lengths that need more than the largest coverage are reduced to that coverage, of which the
+        stiffest plan is taken, however much it lays.
     cut : callable
         Designs for the coverage of a strategy and cuts the paths to each of the lengths, given
         whether plans that lay a length go before stiffer ones that do not.
@@ -534,7 +535,8 @@ def designed_to_lengths(
         asked = replace(strategy, coverage=longest / full)
         plans = cut(asked, near, False)
         longest_plan = max(float(paths.lengths.sum()) for paths in plans) / len(layers)
-        short_of = 0.0 < longest_plan < _ENOUGH * longest
+        # At the largest coverage the stiffest plan counts, however much of that it lays.
+        short_of = longest < most and 0.0 < longest_plan < _ENOUGH * longest
         if again and short_of and strategy.overfill * asked.coverage < DENSEST:
             overfill = min(_MORE * longest / longest_plan, 2.0) * strategy.overfill
             more = replace(asked, overfill=overfill)

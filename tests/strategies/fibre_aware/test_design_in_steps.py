@@ -11,6 +11,7 @@ from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.materials import printed_pla
 from ccfem.machine import Machine
 from ccfem.paths.planning.strategy import full_length
+from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import stress_on
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import stream_function
@@ -84,3 +85,20 @@ def test_designs_for_several_lengths_share_their_first_step(lever, monkeypatch):
         np.testing.assert_array_equal(paths[0].points, paths[1].points)
         assert not np.array_equal(paths[1].points, paths[2].points)  # from there on by itself
         np.testing.assert_array_equal(paths[2].points, paths[3].points)
+
+
+def test_only_lengths_within_the_largest_coverage_are_designed_for_again(lever):
+    _, layers = lever
+    short = Toolpaths.from_plane([np.array([[0.0, 0.0], [50.0, 0.0]])], layers[0])
+    asked = []
+
+    def cut(strategy, lengths, whole):
+        asked.append(whole)
+        return len(lengths) * [short]
+
+    full = full_length(layers, MACHINE)
+    stream_function.designed_to_lengths(StreamFunction(), layers, MACHINE, [0.6 * full], cut)
+    assert asked == [False, True]
+    asked.clear()
+    stream_function.designed_to_lengths(StreamFunction(), layers, MACHINE, [0.9 * full], cut)
+    assert asked == [False]  # more than that would lay them side by side, and soften the part
