@@ -25,7 +25,7 @@ _SHOWN = 15
 """Functions that are printed."""
 
 
-class _Compilations(event.Listener):
+class _Compilations(event.Listener):  # type: ignore[misc]
     """Hears of every function that is compiled, and keeps its processor seconds."""
 
     def __init__(self) -> None:

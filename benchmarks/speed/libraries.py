@@ -81,6 +81,14 @@ def conjugate_gradient() -> Rivals:
     )
 
 
+def block_product() -> Rivals:
+    """Product of a matrix of 3 x 3 blocks and a vector."""
+    from ccfem.fem.elasticity.block_product import times
+
+    matrix, _, load = stiffness()
+    return Rivals("scipy.sparse", lambda: times(matrix, load), lambda: matrix @ load)
+
+
 def supernodes() -> Rivals:
     """One solve with a factor of SuperLU, which ours stores in another way once."""
     from ccfem.fem.elasticity.direct import superlu
@@ -194,7 +202,16 @@ def orient() -> Rivals:
     return Rivals("scipy csgraph", lambda: ours(direction, pairs), graph)
 
 
-TOOLS = (conjugate_gradient, supernodes, skyline, locate, locate_in_space, find_crossings, orient)
+TOOLS = (
+    conjugate_gradient,
+    block_product,
+    supernodes,
+    skyline,
+    locate,
+    locate_in_space,
+    find_crossings,
+    orient,
+)
 
 
 def seconds(call: Callable[[], Any]) -> float:

@@ -16,6 +16,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -39,7 +40,7 @@ def built(folder: str) -> tuple[ctypes.CDLL, float]:
     return ctypes.CDLL(str(library)), sum(os.times()[2:4]) - before
 
 
-def _native(function: object, *arguments: object) -> None:
+def _native(function: object, *arguments: Any) -> None:
     """Call a function of the extension with arrays and whole numbers."""
     given = [
         one.ctypes.data_as(ctypes.c_void_p) if isinstance(one, np.ndarray) else ctypes.c_int64(one)

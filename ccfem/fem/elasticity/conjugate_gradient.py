@@ -8,6 +8,7 @@ from scipy.linalg import eigvalsh_tridiagonal
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import SolveError
+from ccfem.fem.elasticity.block_product import times
 
 _LANCZOS = 6
 """Steps after which the highest eigenvalue is accurate to about six per cent."""
@@ -75,7 +76,7 @@ def _iterate(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Solution, and the lengths and ratios of the steps."""
     x = np.zeros_like(rhs) if x0 is None else np.array(x0, dtype=np.float64)
-    residual = rhs - matrix @ x if x0 is not None else rhs.copy()
+    residual = rhs - times(matrix, x) if x0 is not None else rhs.copy()
     target = tolerance**2 * product(rhs, rhs)
     direction = np.zeros_like(rhs)
     previous, old = residual, 1.0
@@ -88,7 +89,7 @@ def _iterate(
         new = product(residual, z)
         beta = (new - product(previous, z)) / old if iteration else 0.0
         direction = z + beta * direction
-        image = matrix @ direction
+        image = times(matrix, direction)
         curvature = product(direction, image)
         if not curvature > 0.0:  # not positive definite, or no direction left
             break
@@ -169,7 +170,7 @@ def judged(
     lowest: float = 1.0,
 ) -> Solution:
     """Solution with its residual and its backward error, `size` being the norm of the matrix."""
-    rest, load = norm(rhs - matrix @ x), norm(rhs)
+    rest, load = norm(rhs - times(matrix, x)), norm(rhs)
     scale = size * norm(x) + load
     return Solution(x, iterations, rest / (load or 1.0), rest / (scale or 1.0), lowest)
 

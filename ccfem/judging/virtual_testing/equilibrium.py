@@ -13,6 +13,7 @@ from ccfem.base.errors import SolveError
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.curved_cells import gradients_at
 from ccfem.fem.elasticity import cell_gradients
+from ccfem.fem.elasticity.block_product import times
 from ccfem.fem.elasticity.conjugate_gradient import conjugate_gradient
 from ccfem.fem.elasticity.held import Held
 from ccfem.fem.elasticity.statics import check_pressed
@@ -198,7 +199,7 @@ class Reinforced:
     def __matmul__(self, displacement: FloatArray) -> FloatArray:
         """Return the forces (3n,), N, of a displacement (3n,), mm."""
         fibres = self.bars.forces(self.stiffness, displacement.reshape(-1, 3))
-        fibres += (self.part @ displacement).reshape(-1, 3)
+        fibres += times(self.part, displacement).reshape(-1, 3)
         return fibres.reshape(-1)
 
 
@@ -219,7 +220,7 @@ class Reduced:
     def __matmul__(self, x: FloatArray) -> FloatArray:
         """Return the forces (3k,), N, of a solution (3k,), mm."""
         fibres = self.whole.bars.forces(self.whole.stiffness, self.held.motion(x))
-        return self.part @ x + self.held.project(fibres)
+        return times(self.part, x) + self.held.project(fibres)
 
 
 TENSION, PARTIAL, BONDED = "tension", "partial", "bonded"

@@ -19,6 +19,7 @@ from ccfem.base.arrays import FloatArray, IntArray, freeze, in_brief, read_only
 from ccfem.base.errors import SolveError
 from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity import StressField, cell_gradients, preconditioned_cg, solve
+from ccfem.fem.elasticity.block_product import times
 from ccfem.fem.elasticity.conjugate_gradient import conjugate_gradient
 from ccfem.judging.virtual_testing import Specimen
 from ccfem.strategies.fibre_aware.layer_axes import LayerAxes
@@ -260,7 +261,7 @@ class SmearedPart:
         iterations, residual = 0, np.inf
         for _ in range(_UPDATES):
             packed = self.pack(fibre(strain))
-            internal = (matrix @ u.reshape(-1)).reshape(-1, 3) + self._force(packed, u)
+            internal = times(matrix, u.reshape(-1)).reshape(-1, 3) + self._force(packed, u)
             rest = held.project(specimen.forces - internal)
             residual = float(np.linalg.norm(rest)) / size
             if residual <= tolerance:
@@ -311,7 +312,7 @@ class _Operator:
     def __matmul__(self, x: FloatArray) -> FloatArray:
         held = self.part.specimen.held
         fibre = self.part._force(self.packed, self.expand(x))
-        return np.asarray(self.part._reduced @ x) + held.project(fibre)
+        return times(self.part._reduced, x) + held.project(fibre)
 
 
 def smeared_cases(fields: Sequence[StressField], frame: FloatArray) -> tuple[SmearedPart, ...]:
