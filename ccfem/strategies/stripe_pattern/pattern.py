@@ -27,6 +27,8 @@ _ROUNDING = 1e-9
 """Relative difference of lengths below which rounding must not decide."""
 _POWERS = 8
 """Inverse iterations for the pattern."""
+_PULL = 0.15
+"""How much the border counts in each iteration, over the pattern before."""
 _SHIFT = 1e-6
 """Added to the diagonal of the pattern's energy, over its mean: that of a parallel field is 0."""
 
@@ -220,7 +222,9 @@ class Pattern:
     same: FloatArray
 
 
-def stripe_pattern(cells: Cells, angle: FloatArray, pitch: float, seed: int = 0) -> Pattern:
+def stripe_pattern(
+    cells: Cells, angle: FloatArray, pitch: float, seed: int = 0, rim: BoolArray | None = None
+) -> Pattern:
     """Find a pattern whose phase grows by a turn over the pitch across the directions.
 
     Minimises ``sum w |conj^s psi_j - exp(i omega) psi_i|^2`` over the edges, with the growth omega
@@ -234,6 +238,9 @@ def stripe_pattern(cells: Cells, angle: FloatArray, pitch: float, seed: int = 0)
     pitch : float, mm
     seed : int, default 0
         Of the random numbers: others give branches at other places.
+    rim : (e,) bool array, optional
+        Edges of the border that draw the pattern so that they lie half way between two curves, as
+        far as directions are along them.
     """
     a, b = cells.edges.T
     across = np.column_stack([-np.sin(angle), np.cos(angle)])
@@ -245,15 +252,30 @@ def stripe_pattern(cells: Cells, angle: FloatArray, pitch: float, seed: int = 0)
     w = cells.weights
     full = np.asarray(np.bincount(a, w, count) + np.bincount(b, w, count), dtype=np.float64)
     solve = _factor(cells, omega, same, full + _SHIFT * float(full.mean()))
-    x = np.zeros((count, 2))
+    x, at_rim = np.zeros((count, 2)), np.zeros((count, 2))
     x[:, 0] = np.random.default_rng(seed).standard_normal(count)
+    if rim is not None:
+        at_rim[:, 0] = _half_way(cells, angle, rim)
+        at_rim *= _PULL / max(float(np.linalg.norm(at_rim)), 1e-300)
     for _ in range(_POWERS):
-        x = solve(cells.areas[:, None] * x)
-        x = x / np.linalg.norm(x)
+        x = cells.areas[:, None] * x
+        x = solve(x / np.linalg.norm(x) + at_rim)
     psi = x[:, 0] + 1j * x[:, 1]
     other = np.where(same > 0.0, psi[b], np.conj(psi[b]))
     growth = omega + np.angle(other * np.conj(np.exp(1j * omega) * psi[a]))
     return Pattern(cells, np.angle(psi), growth, same)
+
+
+def _half_way(cells: Cells, angle: FloatArray, rim: BoolArray) -> FloatArray:
+    """Minus the length, (n,), of the rim at each point where the direction is along it.
+
+    Numbers of phase pi, which the signs of directions leave alone: half way between two curves.
+    """
+    ends = cells.edges[rim]
+    step = cells.points[ends[:, 1]] - cells.points[ends[:, 0]]
+    turned = angle[ends] - np.arctan2(step[:, 1], step[:, 0])[:, None]
+    share = np.hypot(*step.T)[:, None] * np.maximum(np.cos(2.0 * turned), 0.0) ** 2
+    return -np.bincount(ends.ravel(), share.ravel(), len(cells.points)).astype(np.float64)
 
 
 def _factor(cells: Cells, omega: FloatArray, same: FloatArray, diagonal: FloatArray) -> Any:

@@ -10,6 +10,7 @@ from scipy.linalg import solveh_banded
 from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.geometry.facets import connected
 from ccfem.geometry.offsets import rings
 from ccfem.geometry.polylines import (
     farthest_point,
@@ -363,6 +364,10 @@ def _blend(start: FloatArray, way: FloatArray, end: FloatArray, onward: FloatArr
 
 _CORNER = 2.5
 """Largest gap between two ends that are joined by a corner, in widths."""
+_FOLDED = 3.0
+"""Length of a strand, in widths, that carries nothing where it is folded."""
+_TIE = 1e-6
+"""Least gain of other links, in least lengths."""
 _BESIDE = 0.7
 """Least cosine of the angle between the ways in which two such ends leave their lines."""
 
@@ -375,7 +380,7 @@ def corners(lines: Sequence[FloatArray], width: float, least: float) -> list[Joi
     lines : sequence of (k, 2) arrays, mm
         In steps as of `even_points`.
     least : float, mm
-        Chains of lines that are as long are not joined to each other.
+        Links are chosen that make most of the length of lines as long as that.
     """
     ends = _ends(lines, width)
     if len(ends.number) < 2:
@@ -394,20 +399,67 @@ def corners(lines: Sequence[FloatArray], width: float, least: float) -> list[Joi
     )
     crossed = np.zeros(len(a), dtype=bool)
     crossed[met] = True
-    chain, size = np.arange(len(lines)), np.array([line_length(line) for line in lines])
-    taken: set[int] = set()
-    joints = []
-    for k in np.lexsort((a, np.round(gap, 6))).tolist():
-        first, second = int(ends.number[a[k]]), int(ends.number[b[k]])
-        one, other = chain[first // 2], chain[second // 2]
-        long = size[one] >= least and size[other] >= least
-        if crossed[k] or long or one == other or first in taken or second in taken:
-            continue
-        taken |= {first, second}
-        size[one] += size[other] + gap[k]
-        chain[chain == other] = one
-        joints.append(Joint(first, second, np.zeros((0, 2)), marked=True))
-    return joints
+    order = np.lexsort((a, np.round(gap, 6)))
+    order = order[~crossed[order]]
+    pairs = np.column_stack([ends.number[a], ends.number[b]])[order]
+    size = np.array([line_length(line) for line in lines])
+    chosen = _chosen(pairs, gap[order], size, least, _FOLDED * width)
+    return [
+        Joint(int(first), int(second), np.zeros((0, 2)), marked=True)
+        for first, second in pairs[chosen]
+    ]
+
+
+def _chosen(
+    pairs: IntArray, gap: FloatArray, size: FloatArray, least: float, cost: float
+) -> list[int]:
+    """Links that make most of the length of lines long enough, less a cost for each of them.
+
+    A link is added, taken out, or takes the place of another, as long as there is a gain.
+
+    Parameters
+    ----------
+    pairs : (k, 2) int array
+        Ends that each link may join.
+    gap, size : (k,), (n,) arrays, mm
+        Lengths of links and of lines.
+    """
+    chosen: list[int] = []
+    while len(pairs):
+        gain = _gains(pairs, gap, size, least, chosen)
+        new, old = int(np.argmax(gain)), -1
+        most = gain[new] - cost
+        if not most > 0.0:
+            # What a link in the place of an old one gains, or none there: `new` is the old one.
+            for k in chosen:
+                rest = [other for other in chosen if other != k]
+                gain = _gains(pairs, gap, size, least, rest)
+                lost = gain[k]
+                gain -= lost
+                gain[k] = cost - lost
+                best = int(np.argmax(gain))
+                if gain[best] > most:
+                    new, old, most = best, k, gain[best]
+        if not most > _TIE * least:
+            break
+        chosen = [k for k in chosen if k != old] + ([new] if new != old else [])
+    return chosen
+
+
+def _gains(
+    pairs: IntArray, gap: FloatArray, size: FloatArray, least: float, chosen: list[int]
+) -> FloatArray:
+    """Worth (k,) that each link adds to those chosen; -inf where its ends are not free."""
+    line = pairs // 2
+    chain = connected(line[chosen], len(size))
+    total = np.bincount(chain, size, len(size))
+    total += np.bincount(chain[line[chosen, 0]], gap[chosen], len(size))
+    one, other = chain[line].T
+    # A link makes a strand longer, but it is worth the less, the longer it is.
+    gain = _worth(total[one] + total[other] + gap, least) - 2.0 * gap
+    gain -= _worth(total[one], least) + _worth(total[other], least)
+    free = ~np.isin(pairs, pairs[chosen]).any(axis=1) & (one != other)
+    return np.where(free, np.round(gain, 6), -np.inf)
 
 
 _BEND = 0.8
