@@ -63,7 +63,7 @@ _END = 0.4
 """Distance that strands keep from the border at last, in widths: half a width but for corners."""
 _CHARTED = 1.03
 """Shortest strand in the chart of a curved layer, over the machine's: charts change lengths."""
-_FOLDING = 0.4, 1.025
+_FOLDING = 0.36, 1.024
 """Factors, where strands may fold, on the lengths of smoothing, and on the pitch: with none of them
 left out, nothing gives way."""
 _HALVINGS = 40
@@ -92,7 +92,7 @@ class Stripes:
     folds : bool, default False
         Whether strands that are too short are joined to their neighbours by links in which they
         fold (`ccfem.paths.folds`). More of the layer is then covered, closer to the tension:
-        `smooth` and `border` count two fifths, and the pitch is 2.5 % larger.
+        `smooth` and `border` count 0.36 times, `pitch` 1.024 times.
     turns : {"tight", "printable", "cut"}, default "tight"
         As in `Zigzag`.
     """

@@ -67,9 +67,9 @@ def measured(
     -------
     coverage, coverage of tension
         Share of the layers within half a width of a strand, by area and by the tension there.
-    angle, within 10, within 10, by tension
-        Mean angle to the largest stress in the layer, degrees, and the share of the strands' length
-        within 10 degrees of it, by itself and by the tension there.
+    angle, angle by tension, within 10, within 10, by tension
+        Mean angle to the largest stress in the layer, degrees, by length and by the tension there,
+        and the share of the strands' length within 10 degrees of it, likewise.
     spacing, 5 %, spacing, median
         Distance to the neighbour, mm.
     on fibre
@@ -79,10 +79,15 @@ def measured(
     long
         Share of the length in strands of at least 42 mm.
     """
-    total = evaluate(paths, layers, stress, machine).total
+    evaluated = evaluate(paths, layers, stress, machine)
+    total, samples = evaluated.total, [of_layer.alignment for of_layer in evaluated.samples]
+    angle = np.degrees(np.concatenate([one.angle for one in samples]))
+    tension = np.concatenate([one.length * np.maximum(one.largest, 0.0) for one in samples])
+    known = ~np.isnan(angle)
     count, length = len(np.unique(paths.layer)), paths.lengths
     return {
         **{name: float(total[column]) for name, column in _INDEX_OF.items()},
+        "angle by tension": float(np.average(angle[known], weights=tension[known])),
         "metres": 1e-3 * float(length.sum()) / count,
         "strands": len(paths) / count,
         "long": float(length[length >= SHORTEST].sum() / length.sum()),
@@ -187,9 +192,11 @@ AUTHORS, LONG, SPARSE = "authors", "authors, 42 mm and more", "authors 2024, spa
 OURS: dict[str, tuple[str, dict[str, Any]]] = {
     "stripes": ("stripes", {}),
     "stripes, folds": ("stripes", {"folds": True}),
+    "stripes, folds, 2.16 m": ("stripes", {"folds": True, "density": 0.643}),
     "isocurve": ("isocurve", {}),
 }
-"""Plans of ours on their layers, as dense as they are by default: strategy and parameters."""
+"""Plans of ours on their layers: strategy and parameters. The third has as much fibre a layer as
+those strands of the authors that are long enough for the cutter."""
 ROWS = (AUTHORS, LONG, *OURS, SPARSE)
 
 SLICINGS = {"spatial": 0.0, "spatial, hole_weight 10": 10.0}
@@ -269,10 +276,11 @@ _COLUMNS = {
     "coverage": ".3f",
     "coverage of tension": ".3f",
     "angle": ".1f",
+    "angle by tension": ".2f",
     "within 10": ".0%",
     "spacing, 5 %": ".2f",
     "spacing, median": ".2f",
-    "on fibre": ".1%",
+    "on fibre": ".2%",
     "stiffness": ".3f",
 }
 

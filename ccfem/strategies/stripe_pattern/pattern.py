@@ -27,7 +27,7 @@ _ROUNDING = 1e-9
 """Relative difference of lengths below which rounding must not decide."""
 _POWERS = 8
 """Inverse iterations for the pattern."""
-_PULL = 0.15
+_PULL = 0.2
 """How much the border counts in each iteration, over the pattern before."""
 _SHIFT = 1e-6
 """Added to the diagonal of the pattern's energy, over its mean: that of a parallel field is 0."""

@@ -10,7 +10,6 @@ from scipy.linalg import solveh_banded
 from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
-from ccfem.geometry.facets import connected
 from ccfem.geometry.offsets import rings
 from ccfem.geometry.polylines import (
     farthest_point,
@@ -451,14 +450,18 @@ def _gains(
 ) -> FloatArray:
     """Worth (k,) that each link adds to those chosen; -inf where its ends are not free."""
     line = pairs // 2
-    chain = connected(line[chosen], len(size))
+    chain = np.arange(len(size))
+    for one, other in line[chosen]:
+        chain[chain == chain[other]] = chain[one]
     total = np.bincount(chain, size, len(size))
     total += np.bincount(chain[line[chosen, 0]], gap[chosen], len(size))
-    one, other = chain[line].T
+    first, second = total[chain[line]].T
     # A link makes a strand longer, but it is worth the less, the longer it is.
-    gain = _worth(total[one] + total[other] + gap, least) - 2.0 * gap
-    gain -= _worth(total[one], least) + _worth(total[other], least)
-    free = ~np.isin(pairs, pairs[chosen]).any(axis=1) & (one != other)
+    gain = _worth(first + second + gap, least) - 2.0 * gap
+    gain -= _worth(first, least) + _worth(second, least)
+    taken = np.zeros(2 * len(size), dtype=bool)
+    taken[pairs[chosen]] = True
+    free = ~taken[pairs].any(axis=1) & (chain[line[:, 0]] != chain[line[:, 1]])
     return np.where(free, np.round(gain, 6), -np.inf)
 
 
