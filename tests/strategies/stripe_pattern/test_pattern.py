@@ -88,6 +88,16 @@ def test_curves_of_a_constant_direction_are_straight_and_a_pitch_apart(angle):
     assert extent - 1.0 <= len(lines) <= extent + 1.0
 
 
+@pytest.mark.parametrize("pitch", [0.8, 1.6])
+def test_borders_draw_curves_to_half_a_pitch_from_them(pitch):
+    """Of a strip as wide as a whole number of pitches curves take all, side by side."""
+    points, triangles = grid(20, 16, 0.8)
+    cells = Cells(points, triangles)
+    lines = isocurves(stripe_pattern(cells, np.zeros(len(points)), pitch, rim=cells.border))
+    level = np.sort([float(line[:, 1].mean()) for line in lines])
+    np.testing.assert_allclose(level, np.arange(0.5 * pitch, 12.8, pitch), atol=0.01 * pitch)
+
+
 def test_curves_round_a_hole_are_circles():
     points, triangles = annulus(6.0, 12.0, 90, 10)
     cells = Cells(points, triangles)

@@ -64,6 +64,14 @@ def test_corners_join_what_is_too_short_side_by_side():
     assert not corners(lines, 1.0, 25.0)
 
 
+def test_corners_are_chosen_so_that_most_is_long_enough():
+    """Of three ends side by side the nearest pair would leave the third line too short."""
+    rows = ((0.0, 15.0), (1.0, 30.0), (1.9, 60.0))
+    lines = even_points([straight(0.0, stop, y) for y, stop in rows], 1.0)
+    (joint,) = corners(lines, 1.0, 42.0)
+    assert {joint.first, joint.second} == {0, 2}
+
+
 @pytest.mark.parametrize("radius", [3.85, 0.0])
 def test_what_is_left_is_filled_by_strands_that_fold_only_where_they_may(radius):
     """Rectangles of 60 x 14.5 mm: rings of known length, as long as their corners fit."""
