@@ -13,8 +13,8 @@ from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
 ALIKE = 0.01
-"""Root mean square of the difference of alike stress, over that of the stress. Our choice: a tenth
-of what solutions miss on the meshes that are usual."""
+"""Root mean square of the difference of alike stress, over that of the stress. Our choice, well
+below the error that a solution estimates on the meshes of shipped cases (17 % on the loop)."""
 
 EQUAL = 1e-6
 """Distance, mm, up to which two sections are equal: paths drawn on one are those of the other."""
@@ -72,8 +72,8 @@ def _along_patches(layer: Layer) -> dict[str, float]:
     """Length, mm, of the border that lies on each patch."""
     ends = {name: layer.points[edges] for name, edges in layer.patches.items() if len(edges)}
     return {
-        name: float(np.linalg.norm(each[:, 1] - each[:, 0], axis=1).sum())
-        for name, each in ends.items()
+        name: float(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1).sum())
+        for name, edges in ends.items()
     }
 
 
@@ -81,11 +81,11 @@ def _apart(one: Layer, other: Layer, nodal: FloatArray) -> float:
     """Difference of the stress on two layers of equal section, over the stress on the first."""
     middles = other.plane.points[other.triangles].mean(axis=1)
     triangle, weights = locate(one.plane.points, one.triangles, middles)
-    found = triangle >= 0
-    there = one.interpolate(nodal)[one.triangles[triangle[found]]]
-    first = np.einsum("tk,tkij->tij", weights[found], there)
-    second = other.interpolate(nodal)[other.triangles[found]].mean(axis=1)
-    area = other.areas[found]
+    inside = triangle >= 0
+    corners = one.interpolate(nodal)[one.triangles[triangle[inside]]]
+    first = np.einsum("tk,tkij->tij", weights[inside], corners)
+    second = other.interpolate(nodal)[other.triangles[inside]].mean(axis=1)
+    area = other.areas[inside]
     size = float(area @ (first**2).sum(axis=(1, 2)))
     difference = float(area @ ((second - first) ** 2).sum(axis=(1, 2)))
     return float(np.sqrt(difference / size)) if size > 0.0 else float("inf")
