@@ -98,7 +98,7 @@ class PinnedJoint:
         spared = set()
         if PULL_OUT in self.loads and NET_SECTION in self.loads:
             spared = {min((PULL_OUT, NET_SECTION), key=self.loads.__getitem__)}
-        return min(self.loads.keys() - spared, key=self.loads.__getitem__)
+        return min((mode for mode in self.loads if mode not in spared), key=self.loads.__getitem__)
 
     @property
     def load(self) -> float:

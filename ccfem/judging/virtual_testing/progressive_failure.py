@@ -389,7 +389,7 @@ class BreakingCurve:
         What failed first: "matrix", "fibre", "layers" or the "bond" of a strand.
     where : (3,) array, mm
         Place of that.
-    bond : float
+    utilisation : float
         How near layers are to parting at the highest load, 1 where they do; 0 if not judged.
     steps : int
         Solves of the damaged part.
@@ -405,7 +405,7 @@ class BreakingCurve:
     parted_at: IntArray
     first: str
     where: FloatArray
-    bond: float
+    utilisation: float
     steps: int
 
     __repr__ = in_brief
@@ -429,8 +429,8 @@ class BreakingCurve:
         )
         if self.parted[peak]:
             said += f" and layers had parted in {self.parted[peak]} cells"
-        elif self.bond:
-            said += f", with the bond between layers at {self.bond:.0%} of its strength"
+        elif self.utilisation:
+            said += f", with the bond between layers at {self.utilisation:.0%} of its strength"
         if not len(fibre):
             return f"{said}; no strand gave way"
         if self.broken[peak] > 0.0:
@@ -460,9 +460,9 @@ def _curve(model: _Model, stop: float) -> BreakingCurve:
         if holds * response.force < stop * max(row[0] for row in rows) or np.isinf(factor):
             rows.append((held * response.force, rows[-1][1], *model.lost(damage)))
             before, stress, at = highest
-            bond = at / float(model.parting(before, stress).min())
+            utilisation = min(at / float(model.parting(before, stress).min()), 1.0)
             events = cracked, broken, parted
-            return BreakingCurve(*_columns(rows), *events, what, where, min(bond, 1.0), step)
+            return BreakingCurve(*_columns(rows), *events, what, where, utilisation, step)
         if step == 0:
             what, where = model.first(response)
         most = _TOGETHER * factor

@@ -39,6 +39,12 @@ def alike_layers(layers: Sequence[Layer], stress: PartStress) -> IntArray:
     return source
 
 
+def equal_sections(one: Layer, other: Layer, distance: float = EQUAL) -> bool:
+    """Whether the borders of two flat layers are less than a distance, mm, apart."""
+    borders = [shapely.boundary(layer.plane.polygon) for layer in (one, other)]
+    return float(shapely.hausdorff_distance(*borders)) < distance
+
+
 def on_layer(paths: Toolpaths, layer: Layer) -> Toolpaths:
     """Paths of a layer with the same section, drawn on another; those of a curved layer itself."""
     if layer.flat is None:
@@ -59,8 +65,7 @@ def _equal(one: Layer, other: Layer) -> bool:
         return False
     if abs(one.thickness - other.thickness) > EQUAL:
         return False
-    borders = [shapely.boundary(layer.plane.polygon) for layer in (one, other)]
-    if not shapely.hausdorff_distance(*borders) < EQUAL:
+    if not equal_sections(one, other):
         return False
     a, b = _along_patches(one), _along_patches(other)
     return a.keys() == b.keys() and all(

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import shapely
 from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray
@@ -12,7 +11,7 @@ from ccfem.base.tensor import in_plane
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.locate import Buckets, barycentric_maps, bucket, locate
 from ccfem.machine.machine import Machine
-from ccfem.paths.planning.alike import EQUAL
+from ccfem.paths.planning.alike import EQUAL, equal_sections
 from ccfem.slicing.layers.layer import Layer, curved_layers
 from ccfem.strategies.fibre_aware.layer_axes import NearestLayers
 from ccfem.strategies.fibre_aware.smeared import SmearedPart
@@ -316,11 +315,10 @@ def layers_of_one_kind(
             kind_of = group * len(layers) + group_layers(layers, _MOST_GROUPS)
         return [np.flatnonzero(kind_of == k) for k in np.unique(kind_of)]
     kinds: list[list[int]] = []
-    borders = [shapely.boundary(layer.plane.polygon) for layer in layers]
-    for k, border in enumerate(borders):
+    for k, layer in enumerate(layers):
         for kind in kinds:
             same = group[kind[0]] == group[k]
-            if same and shapely.hausdorff_distance(borders[kind[0]], border) < distance:
+            if same and equal_sections(layers[kind[0]], layer, distance):
                 kind.append(k)
                 break
         else:

@@ -35,7 +35,7 @@ def test_a_bar_of_tilted_layers_parts_at_the_analytic_load(angle):
     assert curve.first == "layers"
     assert curve.load == pytest.approx(stress * AREA, rel=1e-4)
     assert curve.force[-1] < 0.65 * curve.load
-    assert curve.bond == pytest.approx(1.0, rel=1e-4)
+    assert curve.utilisation == pytest.approx(1.0, rel=1e-4)
     assert curve.parted[-1] == np.count_nonzero(curve.parted_at >= 0) > 0
     assert f"layers first at {curve.load:.4g} N" in curve.story
 
@@ -50,7 +50,7 @@ def test_layers_along_the_pull_hold():
     )
     np.testing.assert_array_equal(with_bond.force, without.force)
     assert not with_bond.parted.any()
-    assert with_bond.bond < 1e-3
+    assert with_bond.utilisation < 1e-3
 
 
 def test_parted_layers_carry_within_themselves_alone():
