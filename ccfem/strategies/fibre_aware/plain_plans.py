@@ -99,7 +99,9 @@ def _longer_side(section: Region, near: FloatArray) -> FloatArray:
     wide = np.roll(long, len(edges))
     least = (long * wide <= (long * wide).min() * (1.0 + _ALIKE)) & (long >= wide * (1.0 - _ALIKE))
     sides = sides[least]
-    angle = np.arctan(sides @ [-near[1], near[0]] / (sides @ near))
+    along = sides @ near
+    # A side has no sign: angles lie within a right angle of the direction.
+    angle = np.arctan2(np.where(along < 0.0, -1.0, 1.0) * (sides @ [-near[1], near[0]]), abs(along))
     alike = np.flatnonzero(np.abs(angle) <= np.abs(angle).min() + _ALIKE)
     longest: FloatArray = sides[alike[np.argmax(angle[alike])]]
     return longest

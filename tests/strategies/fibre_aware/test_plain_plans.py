@@ -78,3 +78,11 @@ def test_the_longer_side_of_a_section_turns_with_it(rectangle):
             # Of the chords at the end of the shorter axis that which rises with the tension.
             exact = points[12] - points[13]
             np.testing.assert_allclose(along / along[0], exact / exact[0], atol=1e-9)
+
+
+@pytest.mark.parametrize(("sides", "along"), [((30.0, 10.0), 0), ((10.0, 30.0), 1)])
+@pytest.mark.parametrize("pull", [0, 1])
+@pytest.mark.filterwarnings("error")
+def test_a_pull_across_the_longer_side_is_no_division_by_zero(sides, along, pull):
+    side = _longer_side(shapely.box(0.0, 0.0, *sides), np.eye(2)[pull])
+    np.testing.assert_allclose(np.abs(side), np.eye(2)[along], atol=1e-12)
