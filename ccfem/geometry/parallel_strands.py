@@ -86,12 +86,12 @@ def grow(
     lines, rest = extend_free_ends(lines, region, pitch, closest, _REACH * pitch)
     core = shapely.Polygon() if whole else _morphological_opening(rest, _ROUND * pitch)
     if shapely.is_empty(core):
-        return lines + _fill_rest(rest, pitch, closest)
+        return lines + _fill_rest(rest, lines, pitch, closest)
     # Where one curve takes over from another the ends form steps: extend them to a smooth border.
     outside = shapely.difference(region, core)
     lines, rest = extend_free_ends(lines, outside, pitch, closest, _REACH * pitch)
-    inner = _fill_rest(core, pitch, closest)
-    between = _kept_off(_fill_rest(rest, pitch, closest), inner, 0.5 * pitch)
+    inner = _fill_rest(core, lines, pitch, closest)
+    between = _kept_off(_fill_rest(rest, lines, pitch, closest), inner, 0.5 * pitch)
     return lines + inner + [line for line in between if line_length(line) >= pitch]
 
 
@@ -113,9 +113,10 @@ def _morphological_opening(rest: Region, radius: float) -> Region:
 def _without_crossings(lines: list[FloatArray], gap: float) -> list[FloatArray]:
     """Lines, the shorter of two crossing ones cut back by a gap: ends that meet head on overlap."""
     curves = strings(lines)
-    one, other = shapely.STRtree(curves).query(curves, predicate="crosses")
-    for k, j in zip(one.tolist(), other.tolist(), strict=True):
-        if (curves[k].length, k) < (curves[j].length, j):
+    crossing = shapely.STRtree(curves).query(curves, predicate="crosses").T.tolist()
+    # In the order of the curves, and equal lengths as equal: as the part turns, so do the strands.
+    for k, j in sorted(crossing):
+        if (round(curves[k].length, 6), k) < (round(curves[j].length, 6), j):
             curves[k] = shapely.difference(curves[k], shapely.buffer(curves[j], gap))
     opened = open_lines(curves)
     return [line for line in opened if line_length(line) >= gap]
@@ -223,15 +224,25 @@ def _without_hooks(line: FloatArray, least: float) -> FloatArray:
     return line[long[0] : long[-1] + 2] if len(long) else line
 
 
-def _fill_rest(rest: Region, pitch: float, closest: float) -> list[FloatArray]:
-    """Concentric strands where other strands leave room, except in narrow strips and specks."""
+def _fill_rest(
+    rest: Region, lines: Sequence[FloatArray], pitch: float, closest: float
+) -> list[FloatArray]:
+    """Concentric strands where lines leave room, except in narrow strips and specks.
+
+    The parts of the rest follow each other as the lines that they lie beside: their own order
+    changes as the section turns.
+    """
     rest = shapely.buffer(rest, -_SLIVER * pitch, join_style="mitre")
     rest = shapely.buffer(rest, _SLIVER * pitch, join_style="mitre")
     parts = shapely.get_parts(rest)
     parts = parts[shapely.area(parts) > _LEAST_REST * pitch**2]
     if not len(parts):
         return []
-    return concentric(shapely.multipolygons(parts), pitch, closest, walls=False)
+    line, part = shapely.STRtree(parts).query(strings(lines), "dwithin", distance=pitch)
+    beside = np.full(len(parts), len(lines))
+    np.minimum.at(beside, part, line)
+    order = np.argsort(beside, kind="stable").tolist()
+    return [line for k in order for line in concentric(parts[k], pitch, closest, walls=False)]
 
 
 def lengthened(line: FloatArray, region: Region, near: float, length: float) -> FloatArray:

@@ -1,7 +1,9 @@
 """Strands parallel to curves, and rings in what they leave."""
 
 import numpy as np
+import pytest
 import shapely
+from shapely import affinity
 
 from ccfem.geometry.parallel_strands import grow
 from ccfem.geometry.polylines import is_closed
@@ -32,3 +34,18 @@ def test_rings_beside_ends_in_steps_are_smooth():
     assert turn[slanted].max() < 60.0
     for line in strings(lines):
         assert line.is_simple
+
+
+@pytest.mark.parametrize("angle", [0.0, 90.0, 180.0, 270.0])
+def test_rings_of_equal_rests_keep_their_order_when_turned(angle):
+    """Strands down the middle of a plate leave equal rests: that beside line 0 comes first."""
+    plate = affinity.rotate(shapely.box(-10.0, -20.0, 10.0, 20.0), angle, origin=(0, 0))
+    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    turn = np.array([[c, s], [-s, c]])
+    strands = [np.array([[x, -21.0], [x, 21.0]]) @ turn for x in (0.5, -0.5)]
+    lines = grow(strands, plate, 1.0, 0.6, count=0)
+    middles = np.array([line.mean(axis=0) @ turn.T for line in lines[2:]])
+    half = len(middles) // 2
+    assert half > 3
+    assert (middles[:half, 0] > 1.0).all()
+    assert (middles[half:, 0] < -1.0).all()

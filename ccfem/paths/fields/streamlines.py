@@ -18,6 +18,10 @@ _SHARPEST = 0.5
 """Least cosine of the turn of the direction within one step: a line that turns by more than 60
 degrees has changed to the other family of principal directions."""
 
+_SKEW = 0.37
+"""Share of a triangle's second side beside its first in the sense of a line. In regular meshes
+stress is often across sides and sums of them in simple ratios, where rounding would choose."""
+
 _RARE = 0.05
 """Share of the area that may have a higher stress than the one used as a measure."""
 
@@ -217,7 +221,9 @@ def _follow_field(
     line = np.empty((most + 1, 2))
     x, y = start[0], start[1]
     line[0, 0], line[0, 1] = x, y
-    way = np.zeros(2)
+    # The first sense follows the corners of the triangle, so that it turns with the part.
+    a, b, c = field.corners[cell, 0], field.corners[cell, 1], field.corners[cell, 2]
+    way = b - a + _SKEW * (c - a)
     dx, dy, cell, fine = direction_at(field, cell, x, y, -1.0, way)
     if not fine:
         return line[:1].copy(), False

@@ -206,6 +206,8 @@ def _boundary_links(
                 continue
             arc = ring_arc(ring, float(position[k]), gap)
             arc[0], arc[-1] = meeting[k], meeting[after]
+            # Rings have points on straight edges that hang on how the section lies.
+            arc = shapely.get_coordinates(shapely.simplify(shapely.linestrings(arc), _ON_BORDER))
             leaving = np.stack([arc[1] - arc[0], arc[-2] - arc[-1]])
             turn = float(_angles(outward[end[[k, after]]], leaving).sum())
             cost = gap + turn_cost * turn / (0.5 * np.pi)

@@ -79,3 +79,18 @@ def test_starts_outside_give_nothing_and_steps_are_positive():
     assert streamlines(POINTS, TRIANGLES, field, np.zeros((0, 2)), 0.3) == []
     with pytest.raises(InputError, match="step"):
         streamlines(POINTS, TRIANGLES, field, [[5, 5]], 0.0)
+
+
+@given(turn=st.floats(0.0, 6.28))
+@settings(max_examples=10, deadline=None)
+def test_lines_turn_with_the_part_and_keep_their_sense(turn):
+    """Here the sign of an eigenvector changes between a turn of 0 and one of half a circle."""
+    uniform = np.full(len(POINTS), 1.0)
+    start = np.array([[20.0, 10.0]])
+    (line,) = streamlines(
+        POINTS, TRIANGLES, stress(uniform, 0.0 * uniform, 0.3 * uniform), start, 1.0
+    )
+    turned = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    field = stress(uniform, 0.0 * uniform, (0.3 + turn) * uniform)
+    (other,) = streamlines(POINTS @ turned, TRIANGLES, field, start @ turned, 1.0)
+    np.testing.assert_allclose(other, line @ turned, atol=1e-9)

@@ -14,6 +14,7 @@ from ccfem.paths.linking.finishing import (
     trim_to_clearance,
 )
 from ccfem.paths.linking.joining import Joint, join, link_ends
+from ccfem.paths.linking.possible_links import possible_links
 
 SQUARE = shapely.box(0.0, 0.0, 20.0, 20.0)
 
@@ -39,6 +40,17 @@ def test_join_closes_a_ring() -> None:
     (ring,) = join([a, b], [Joint(0, 2, np.zeros((0, 2))), Joint(1, 3, np.zeros((0, 2)))]).lines
     np.testing.assert_array_equal(ring[0], ring[-1])
     assert length(ring) == pytest.approx(42.0)
+
+
+@pytest.mark.parametrize("angle", [0.0, 33.0, 90.0, 217.0])
+def test_links_along_a_straight_border_do_not_hang_on_how_it_lies(angle: float) -> None:
+    """Rounding makes corners of points on the sides of a turned section; links have none there."""
+    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    turn = np.array([[c, s], [-s, c]])
+    border = shapely.get_coordinates(shapely.segmentize(SQUARE, 1.1))
+    lines = [np.array([[0.5, y], [7.0, y]]) @ turn for y in (1.5, 3.0, 4.5, 6.0)]
+    links = possible_links(lines, shapely.Polygon(border @ turn), 2.0, 1.0)
+    assert {len(link.path) for link in links} == {2}
 
 
 @pytest.mark.parametrize("along_boundary", [True, False])
