@@ -2,6 +2,7 @@
 
 import csv
 import os
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -45,6 +46,7 @@ from ccfem.papers.evidence.rows import (
     parts_of,
     predicted,
     rows,
+    strand_strength,
     summary,
 )
 from ccfem.paths.toolpaths import Toolpaths
@@ -116,6 +118,9 @@ def test_nothing_is_fitted_on_a_print_that_it_predicts():
         if row.kind in (SLOPE, LOAD) and not row.why:
             assert SOLIDS[row.scale] != SOLIDS[row.part]
             assert row.scale in row.rests_on
+        if row.kind == BREAKING and row.scale:
+            assert SOLIDS[row.scale] != SOLIDS[row.part]
+            assert f"strand of the {SOLIDS[row.scale]}" in row.rests_on
     # The tensile test of the cuboid sets its fibre, so it is no row that is predicted.
     (used,) = (row for row in rows() if row.part == "cuboid, pulled")
     assert "used for" in used.why
@@ -165,6 +170,28 @@ def test_absolute_values_take_the_matrix_of_the_other_part():
     # Twice the stress for a load: half the load of the Shell without fibre, times the gain.
     load = predicted(row_of("Loop", "zigzag", "", LOAD), tests).value
     assert load == pytest.approx(0.5 * 2.662 * 0.757 / 0.423 * np.sqrt(4.0 / 5.0))
+
+
+def test_a_load_grows_with_the_stiffness_until_a_strand_of_known_strength_breaks():
+    """By hand: strands of the other solid carried .02 N a N when its authors' paths broke."""
+    tests = exact_tests()
+    for part, forces in (("Loop", {"zigzag": 0.001, "authors": 0.02}), ("Shell, pulled", {})):
+        tests[part] = replace(tests[part], strand_force=forces)
+    # Half of the pushed Shell's fibre is a stand-in: only its zigzag says how strong strands are.
+    pushed = {"zigzag": 0.02, "authors": 9.0}
+    tests["Shell, pushed"] = replace(tests["Shell, pushed"], strand_force=pushed)
+    assert strand_strength("Shell, pulled", tests) == pytest.approx(0.02 * 6236.0)
+    assert strand_strength("Loop", tests) == pytest.approx(0.02 * 4519.0)
+    # Its strands would carry more than that when the load has grown as the stiffness: they break.
+    assert predicted(row_of("Loop", "authors", "", LOAD), tests).value == pytest.approx(4.519)
+    ratio = predicted(row_of("Loop", "authors", NONE, BREAKING), tests)
+    assert ratio.value == ratio.low == ratio.left_out == pytest.approx(4.519 / 2.662)
+    assert ratio.stiffness == pytest.approx(1.137 / 0.423 * np.sqrt(4.0 / 5.0))
+    # Those of the zigzag carry a twentieth of it, and the matrix decides.
+    zigzag = predicted(row_of("Loop", "zigzag", NONE, BREAKING), tests)
+    assert zigzag.value == zigzag.stiffness == pytest.approx(0.757 / 0.423 * np.sqrt(4.0 / 5.0))
+    whole = summary({row_of("Loop", "authors", NONE, BREAKING): ratio})
+    assert whole.stiffness == (error(row_of("Loop", "authors", NONE, BREAKING), ratio.stiffness),)
 
 
 def test_orders_and_medians():

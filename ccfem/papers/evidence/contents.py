@@ -264,6 +264,9 @@ def summary_lines(study: Study) -> str:
         if kind in whole.left_out:
             said += f"; rho fitted to the other solid {whole.median_left_out(kind):.1f} %"
             said += f" ({len(whole.left_out[kind])})"
+        if kind == rows.BREAKING:
+            said += f"; by the stiffness alone {rows.median_size(whole.stiffness):.1f} %"
+            said += f" ({min(whole.stiffness):+.0f} to {max(whole.stiffness):+.0f} %)"
         lines.append(f"median error of {_PLURAL[kind]}: {said}")
     counts = {name: len(pairs) for name, pairs in whole.orders.items()}
     total = sum(counts.values())

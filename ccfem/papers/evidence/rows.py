@@ -53,7 +53,8 @@ class Row:
     ours : bool
         Whether a plan of ccfem stands for paths that were not published.
     scale : str
-        Part whose print without fibre gives the matrix of an absolute value.
+        Part whose print without fibre gives the matrix of an absolute value, and whose solid gives
+        the strength of a strand.
     counted : bool
         Whether medians and orders count it.
     why : str
@@ -100,9 +101,13 @@ class Row:
             return "the tensile test of the same cuboid"
         if NONE == self.specimen == self.over:
             return "nothing: elasticity alone"
-        matrix = {SLOPE: "E", LOAD: "E and strength of the matrix"}.get(self.kind)
-        given = f"; {matrix} of {self.scale} without fibre" if matrix else ""
-        return f"rho {RHO:g} mm^2{given}"
+        if not self.scale:
+            return f"rho {RHO:g} mm^2"
+        matrix = "E" if self.kind == SLOPE else "strength of the matrix"
+        given = f"rho {RHO:g} mm^2; {matrix} of {self.scale} without fibre"
+        if self.kind == SLOPE or self.specimen == NONE:
+            return given
+        return f"{given}; strength of a strand of the {SOLIDS[self.scale]}"
 
     @property
     def two_designs(self) -> bool:
@@ -145,6 +150,7 @@ def _of_specimens(group: Mapping[str, Any]) -> Iterator[Row]:
                 kind=kind,
                 measured=measured[first] / measured[second],
                 ours=first in ours or second in ours,
+                scale=group.get("scale", "") if kind == BREAKING else "",
                 **common,
             )
     for kind, measured in ((SLOPE, group["slope"]), (LOAD, group["load"])):
@@ -196,44 +202,95 @@ class PartResult:
 
 @dataclass(frozen=True)
 class Prediction:
-    """Predicted value of a row, within an interval; `left_out` at rho fitted to other parts."""
+    """Predicted value of a row, within an interval.
+
+    `left_out` is the value at rho fitted to other parts, `stiffness` a ratio of breaking loads by
+    the stiffness alone.
+    """
 
     value: float
     low: float
     high: float
     left_out: float = np.nan
+    stiffness: float = np.nan
 
 
 def predicted(row: Row, tests: Mapping[str, PartResult]) -> Prediction:
     """Predict a row from the parts that it needs (`parts_of`)."""
-    values = np.array([_value(row, tests, k) for k in range(len(tests[row.part].readings))])
-    left_out = np.nan
-    if row.over_part == row.part and row.part in SOLIDS:
-        rho = fitted_rho([part for part in FITTED if SOLIDS[part] != SOLIDS[row.part]], tests)
-        ratios = [ratio_at(rho, name, tests[row.part]) for name in (row.specimen, row.over)]
-        left_out = ratios[0] / ratios[1]
-    return Prediction(float(values[0]), float(values.min()), float(values.max()), left_out)
-
-
-def _value(row: Row, tests: Mapping[str, PartResult], reading: int) -> float:
-    """Predict with one of the readings of the part."""
     tested = tests[row.part]
-    stiffness = tested.readings[reading][row.specimen]
+    values = np.array([_value(row, tests, reading) for reading in tested.readings])
+    left_out = stiffness = np.nan
+    if row.over_part == row.part and row.part in SOLIDS:
+        rho = fitted_rho(_other_solid(row.part), tests)
+        names = (NONE, row.specimen, row.over)
+        left_out = _value(row, tests, {name: ratio_at(rho, name, tested) for name in names})
+    if row.kind == BREAKING:
+        stiffness = _stiffness_ratio(row, tests, tested.readings[0])
+    return Prediction(
+        float(values[0]), float(values.min()), float(values.max()), left_out, stiffness
+    )
+
+
+def _stiffness_ratio(
+    row: Row, tests: Mapping[str, PartResult], stiffness: Mapping[str, float]
+) -> float:
+    """Stiffness of the print of a row over that of the other; `stiffness` of those of its part."""
+    same = row.over_part == row.part
+    other = stiffness if same else tests[row.over_part].readings[0]
+    return stiffness[row.specimen] / other[row.over]
+
+
+def _value(row: Row, tests: Mapping[str, PartResult], stiffness: Mapping[str, float]) -> float:
+    """Predict a row with one of the readings of the stiffness of its part."""
+    if row.kind == LOAD:
+        return _load(row, row.specimen, tests, stiffness)
+    if row.kind == BREAKING and row.scale:
+        over = _load(row, row.over, tests, stiffness)
+        return _load(row, row.specimen, tests, stiffness) / over
     if row.over:
-        return stiffness / tests[row.over_part].readings[reading][row.over]
-    scale = tests[row.scale]
-    if row.kind == SLOPE:
-        bare = scale.readings[0][NONE]
-        return stiffness * measured_of(row.scale, NONE, SLOPE) / bare
-    # The part without fibre breaks at the matrix stress at which the other one did; with fibre the
-    # load grows as the stiffness does.
+        return _stiffness_ratio(row, tests, stiffness)
+    bare = tests[row.scale].readings[0][NONE]
+    return stiffness[row.specimen] * measured_of(row.scale, NONE, SLOPE) / bare
+
+
+def _load(
+    row: Row, specimen: str, tests: Mapping[str, PartResult], stiffness: Mapping[str, float]
+) -> float:
+    """Predict the breaking load, kN, of a print of the part of a row.
+
+    Without fibre a part breaks at the matrix stress at which the other one did; with fibre the load
+    grows as the stiffness does, until a strand carries the force at which those of the other solid
+    broke. Both forces are those at the default rho.
+    """
+    tested, scale = tests[row.part], tests[row.scale]
     bare = measured_of(row.scale, NONE, LOAD) * scale.matrix_index / tested.matrix_index
-    return bare * stiffness / tested.readings[reading][NONE]
+    grown = bare * stiffness[specimen] / stiffness[NONE]
+    force = (tested.strand_force or {}).get(specimen, 0.0)
+    return min(grown, 1e-3 * strand_strength(row.part, tests) / force) if force else grown
+
+
+def strand_strength(part: str, tests: Mapping[str, PartResult]) -> float:
+    """Highest force, N, that a strand of the other solid carried in its prints when they broke.
+
+    Only prints whose paths are published count. Infinite where no force is known.
+    """
+    forces = [
+        1e3 * row.measured * (tests[row.part].strand_force or {}).get(row.specimen, 0.0)
+        for row in rows()
+        if row.part in _other_solid(part) and row.kind == LOAD and not row.ours
+    ]
+    return max(forces) or np.inf
+
+
+def _other_solid(part: str) -> list[str]:
+    """Parts of the solid that is not that of a part."""
+    return [other for other in FITTED if SOLIDS[other] != SOLIDS[part]]
 
 
 def parts_of(row: Row) -> tuple[str, ...]:
     """Parts that have to be tested for a row."""
-    others = FITTED if row.over_part == row.part and row.part in SOLIDS else ()
+    fitted = row.over_part == row.part or row.kind == LOAD
+    others = FITTED if fitted and row.part in SOLIDS else ()
     named = (row.part, row.over_part, row.scale, *others)
     return tuple(dict.fromkeys(name for name in named if name))
 
@@ -323,21 +380,27 @@ class Summary:
         Pairs of designs whose order is "right", "wrong" or a "tie".
     left_out : mapping of kind to tuple of floats
         Errors with rho fitted to the other solids.
+    stiffness : tuple of floats
+        Errors of ratios of breaking loads by the stiffness alone.
     """
 
     errors: Mapping[str, tuple[float, ...]]
     orders: Mapping[str, tuple[Row, ...]]
     left_out: Mapping[str, tuple[float, ...]]
+    stiffness: tuple[float, ...]
 
     def median(self, kind: str) -> float:
         """Median of the sizes of the errors of a kind, %; NaN without any."""
-        errors = self.errors.get(kind, ())
-        return float(np.median(np.abs(errors))) if errors else np.nan
+        return median_size(self.errors.get(kind, ()))
 
     def median_left_out(self, kind: str) -> float:
         """Median with rho fitted to the other solids, %."""
-        errors = self.left_out.get(kind, ())
-        return float(np.median(np.abs(errors))) if errors else np.nan
+        return median_size(self.left_out.get(kind, ()))
+
+
+def median_size(errors: Sequence[float]) -> float:
+    """Median of the sizes of errors; NaN without any."""
+    return float(np.median(np.abs(errors))) if errors else np.nan
 
 
 ALSO_OURS = ", ours too"
@@ -348,6 +411,7 @@ def summary(judged: Mapping[Row, Prediction]) -> Summary:
     """Sum up the rows that are predicted."""
     errors: dict[str, list[float]] = {}
     left_out: dict[str, list[float]] = {}
+    stiffness: list[float] = []
     orders: dict[str, list[Row]] = {"right": [], "wrong": [], "tie": []}
     for row, prediction in judged.items():
         if not row.counted:
@@ -361,6 +425,8 @@ def summary(judged: Mapping[Row, Prediction]) -> Summary:
         errors.setdefault(row.kind + ALSO_OURS, []).append(off)
         if not row.ours:
             errors.setdefault(row.kind, []).append(off)
+            if row.kind == BREAKING:
+                stiffness.append(error(row, prediction.stiffness))
             if not np.isnan(prediction.left_out):
                 without = error(row, prediction.left_out)
                 left_out.setdefault(row.kind, []).append(without)
@@ -368,4 +434,5 @@ def summary(judged: Mapping[Row, Prediction]) -> Summary:
         {kind: tuple(values) for kind, values in errors.items()},
         {verdict: tuple(pairs) for verdict, pairs in orders.items()},
         {kind: tuple(values) for kind, values in left_out.items()},
+        tuple(stiffness),
     )
