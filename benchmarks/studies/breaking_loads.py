@@ -23,6 +23,7 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from time import process_time
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -130,8 +131,8 @@ def main(arguments: list[str]) -> None:
     parser.add_argument("--picture", type=Path)
     asked = parser.parse_args(arguments)
     band, bond = asked.band, asked.bond
-    print("| part | cells | print | measured, N | experiment, N | error % | how |")
-    print("|---|---|---|---|---|---|---|")
+    print("| part | cells | print | measured, N | experiment, N | error % | how | processor s |")
+    print("|---|---|---|---|---|---|---|---|")
     ratios = ["| part | ratio | measured | experiment | error % |", "|---|---|---|---|---|"]
     for name in asked.parts:
         measured_as, make, paths = PARTS[name]
@@ -144,6 +145,7 @@ def main(arguments: list[str]) -> None:
             lines = None if fibre == NONE else paths(fibre)
             strands = lines if lines is None or bond is None else _without_folds(lines, field)
             given = {"band": band, "layers": layers, "bond": bond, "stop": asked.stop}
+            started = process_time()
             broken = ccfem.breaking_load(
                 strands, specimen, matrix_strength=MATRIX_STRENGTH, **given
             )
@@ -152,8 +154,8 @@ def main(arguments: list[str]) -> None:
             off = 100.0 * (broken.load / measured[fibre] - 1.0)
             about = f"{name} | {len(field.mesh.cells)} | {fibre} | {measured[fibre]:.0f}"
             within = " ({:.0f} to {:.0f})".format(*broken.band) if band else ""
-            row = f"| {about} | {broken.load:.0f}{within} | {off:+.0f} | {broken.curve.story} |"
-            print(row, flush=True)
+            row = f"| {about} | {broken.load:.0f}{within} | {off:+.0f} | {broken.curve.story}"
+            print(f"{row} | {process_time() - started:.0f} |", flush=True)
         for first, second in (("zigzag", NONE), ("authors", NONE), ("authors", "zigzag")):
             if not {first, second} <= set(loads):
                 continue

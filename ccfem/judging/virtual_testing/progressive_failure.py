@@ -321,7 +321,8 @@ class _Model:
 
     def _weakest(self, factors: FloatArray, most: float) -> list[int]:
         """Weakest window of each strand that breaks up to a factor: its others are relieved."""
-        order = np.argsort(factors, kind="stable")[: np.count_nonzero(factors <= most)]
+        weak = np.flatnonzero(factors <= most)
+        order = weak[np.argsort(factors[weak], kind="stable")]
         path = self.windows.strands.path[order % len(self.windows.strands)] if len(order) else order
         return [int(window) for window in order[np.sort(np.unique(path, return_index=True)[1])]]
 
@@ -559,8 +560,9 @@ EXPERIMENT = "experiment"
 
 WORTH = (
     "An experiment: a sequentially linear analysis in which the matrix softens, strands break and "
-    "layers part. It depends on the mesh, and strands do not come loose from the matrix unless a "
-    "force is given at which they do."
+    "layers part. It depends on the mesh. Nothing fails in compression, so that pressed parts come "
+    "out too strong, and strands come loose from the matrix only if a force is given at which they "
+    "do."
 )
 """What its numbers are worth; to be shown wherever they are."""
 
