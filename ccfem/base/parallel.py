@@ -18,6 +18,7 @@ from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import partial
 from multiprocessing.connection import Connection, wait
 from types import BuiltinFunctionType, FunctionType, MappingProxyType, ModuleType
 from typing import IO, Any, TypeVar, cast
@@ -47,11 +48,16 @@ def processors() -> int:
     """
     wanted = os.environ.get("CCFEM_THREADS", "")
     if not wanted:
-        granted = getattr(os, "sched_getaffinity", None)
-        return len(granted(0)) if granted is not None else os.cpu_count() or 1
+        return _granted()
     if not wanted.isdecimal() or int(wanted) < 1:
         raise InputError(f"CCFEM_THREADS is a whole number, 1 or more; got '{wanted}'")
     return int(wanted)
+
+
+def _granted() -> int:
+    """Processors that the system grants."""
+    granted = getattr(os, "sched_getaffinity", None)
+    return len(granted(0)) if granted is not None else os.cpu_count() or 1
 
 
 def in_threads(
@@ -180,8 +186,9 @@ def beside(
 ) -> Iterator[Callable[[], Result]]:
     """Work in another process while the block runs, with what waits for the result.
 
-    Until it is done, one processor less is left for other work of this process. Where there is no
-    room for it (`has_room_beside`), the work is done here when its result is asked for.
+    It takes what time other work of this process leaves: where that may use every processor of the
+    system, the process has a low priority, else one processor less is left until it is done. Where
+    there is no room for it (`has_room_beside`), it is done here when its result is asked for.
 
     Parameters
     ----------
@@ -193,7 +200,7 @@ def beside(
     if not has_room_beside():
         yield work
         return
-    forks = _Forks(work, [()], shared, 1)
+    forks = _Forks(partial(_with_low_priority, work), [()], shared, 1)
     _besides.append(forks)
     try:
         yield lambda: next(forks.results())
@@ -202,13 +209,26 @@ def beside(
         forks.end()
 
 
+_LOW = 10
+"""Of the priority of a process beside, which the system counts the other way: a tenth of the time
+beside one of this."""
+
+
+def _with_low_priority(work: Callable[[], Result]) -> Result:
+    if processors() >= _granted():
+        os.nice(_LOW)
+    return work()
+
+
 def has_room_beside() -> bool:
     """Whether a second processor is left here, and work is not shared out elsewhere."""
     return _left() > 1 and _may_fork() and _ELSEWHERE.get() is None
 
 
 def _left() -> int:
-    """Processors that nothing is done on beside this process."""
+    """Processors for work of this process: what is done beside it gives way, or takes one each."""
+    if processors() >= _granted():
+        return processors()
     return processors() - sum(not forks.done for forks in _besides)
 
 

@@ -339,11 +339,11 @@ class _Early:
         """What takes a planned run as far as its virtual test."""
         return partial(judged, prints=self.request.print_plans, tests=self.basis.tests)
 
-    def on(self, part: Part, wanted: Wanted) -> Ahead:
+    def on(self, part: Part, wanted: Wanted, tell: Tell) -> Ahead:
         """Judge runs on a part in another process, and bound what any of their length reach."""
 
         @contextmanager
-        def ahead(runs: Sequence[Run]) -> Iterator[Callable[[], Sequence[Run]]]:
+        def ahead(runs: Sequence[Run]) -> Iterator[Callable[[Sequence[Run]], Sequence[Run]]]:
             def work() -> tuple[list[Run], dict[float, UpperBound], dict[str, float]]:
                 done, spent = [self.judged(run, part) for run in runs], dict[str, float]()
                 basis = self.basis
@@ -351,11 +351,13 @@ class _Early:
                 known = {} if wanted is None else bounds_of(*about, lambda _: None, spent)
                 return done, known, spent
 
-            def outcome() -> Sequence[Run]:
+            def outcome(late: Sequence[Run]) -> Sequence[Run]:
+                parts = {run.slicing: part for run in late}
+                judged_late = side_by_side("judging {}", self.judged, late, parts, tell)
                 done, bounds, spent = result()
                 self.bounds.update(bounds)
                 self.seconds.update(spent)
-                return done
+                return [*done, *judged_late]
 
             with beside(work, shared=[runs, part, self.basis]) as result:
                 yield outcome
@@ -486,7 +488,7 @@ def _planned(
     wanted, runs = _per_layer(amount, parts), list[Run]()
     for name, part in parts.items():
         plan = partial(planned, part=part, wanted=wanted[name], tell=tell)
-        runs += all_planned(unplanned[name], plan, early.on(part, wanted[name]))
+        runs += all_planned(unplanned[name], plan, early.on(part, wanted[name], tell))
     if not request.named:
         return parts, runs, wanted[""]
     return parts, runs, amount if isinstance(amount, InAll) else None
@@ -516,7 +518,7 @@ def _to_the_shortest(
         if sets is not None:
             least = length = of_slicing[sets].length_per_layer
         part = parts[name]
-        runs += to_length(of_slicing, sets, length, part, tell, early.on(part, length))
+        runs += to_length(of_slicing, sets, length, part, tell, early.on(part, length, tell))
     return runs, InAll(in_all) if request.named else least
 
 

@@ -324,22 +324,24 @@ def _sampled(run: Run, part: Part, tell: Tell) -> Run:
     return sampled if sampled.failure or sampled.sampled else _by_itself(sampled, part, tell)
 
 
-Ahead = Callable[[Sequence[Run]], AbstractContextManager[Callable[[], Sequence[Run]]]]
-"""Judges planned runs in another process, and gives them back when asked."""
+Ahead = Callable[[Sequence[Run]], AbstractContextManager[Callable[[Sequence[Run]], Sequence[Run]]]]
+"""Judges planned runs in another process; given more, judges these here, and gives all back."""
 
 
 def all_planned(runs: Sequence[Run], plan: Callable[[Run], Run], ahead: Ahead) -> list[Run]:
     """Plan runs; those whose strategy takes the length itself, which takes longest, come last.
 
-    Beside these, some of the others are judged.
+    Beside these, some of the others are judged; then all are that this is done for.
     """
     late = {run.name for run in runs if isinstance(run.strategy, LengthStrategy)}
     done = {run.name: plan(run) for run in runs if run.name not in late}
     first = list(done.values())[:_AHEAD]
     if late and first and has_room_beside():
         with ahead(first) as judged_ahead:
-            done |= {run.name: plan(run) for run in runs if run.name in late}
-            done |= {run.name: run for run in judged_ahead()}
+            done |= {
+                run.name: run
+                for run in judged_ahead([plan(run) for run in runs if run.name in late])
+            }
     else:
         done |= {run.name: plan(run) for run in runs if run.name in late}
     return [done[run.name] for run in runs]

@@ -7,6 +7,7 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 
+from ccfem.base import parallel
 from ccfem.base.arrays import is_shared, read_only, shared_rows
 from ccfem.base.errors import InputError
 from ccfem.base.parallel import (
@@ -141,7 +142,8 @@ def test_processes_are_not_started_within_one(two):
     assert list(in_processes(outer, [0, 1])) == [True, True]
 
 
-def test_work_is_done_beside_other_work_on_the_processor_that_is_left(two, tmp_path):
+def test_work_is_done_beside_other_work_on_the_processor_that_is_left(two, tmp_path, monkeypatch):
+    monkeypatch.setattr(parallel, "_granted", lambda: 3)
     go = tmp_path / "go"
 
     def work():
@@ -158,6 +160,14 @@ def test_work_is_done_beside_other_work_on_the_processor_that_is_left(two, tmp_p
         go.touch()
         assert result() != os.getpid()
         assert os.getpid() not in in_processes(lambda _: os.getpid(), [0, 1])
+
+
+def test_work_beside_gives_way_where_other_work_may_use_all_processors(two, monkeypatch):
+    monkeypatch.setattr(parallel, "_granted", lambda: 2)
+    with beside(lambda: os.nice(0)) as result:
+        assert os.getpid() not in in_processes(lambda _: os.getpid(), [0, 1])
+        assert list(in_processes(lambda _: os.nice(0), [0, 1])) == 2 * [os.nice(0)]
+        assert result() > os.nice(0)
 
 
 def test_nothing_is_done_beside_work_that_is_shared_out(two):
