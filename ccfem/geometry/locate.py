@@ -1,13 +1,13 @@
 """Find the triangle or tetrahedron that holds a point, with a uniform grid of buckets."""
 
 from dataclasses import dataclass
-from functools import reduce
+from functools import cached_property, reduce
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
-from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.errors import InputError
 
 # A uniform grid of buckets for boxes, to find neighbours and containing boxes.
@@ -96,10 +96,70 @@ def _boxes_by_cell(first: IntArray, last: IntArray, shape: IntArray) -> tuple[In
     return starts, items
 
 
+@dataclass(frozen=True)
+class Simplices:
+    """Triangles of the plane, or tetrahedra in space, prepared once to be searched for points.
+
+    Attributes
+    ----------
+    corners : (m, d + 1, d) array, mm
+        In d = 2 or 3 dimensions, of either orientation; flat ones are never found.
+    rounding : float, mm
+        Distance outside within which a point counts as held.
+    """
+
+    corners: FloatArray
+    rounding: float
+
+    @classmethod
+    def of(cls, points: FloatArray, simplices: IntArray) -> "Simplices":
+        """Those with points (n, d), mm, as corners (m, d + 1)."""
+        return cls(points[simplices], _rounding(points))
+
+    @cached_property
+    def _boxes(self) -> tuple[FloatArray, FloatArray]:
+        by_corner = np.moveaxis(self.corners, 1, 0)
+        return reduce(np.minimum, by_corner), reduce(np.maximum, by_corner)
+
+    @cached_property
+    def _maps(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        return barycentric_maps(self.corners)
+
+    @cached_property
+    def _grid(self) -> Buckets:
+        low, high = self._boxes
+        return bucket(low - self.rounding, high + self.rounding)
+
+    def locate(self, queries: FloatArray, reach: float = 0.0) -> tuple[IntArray, FloatArray]:
+        """Simplex that holds each query point; as the function `locate`."""
+        queries = np.ascontiguousarray(queries, dtype=np.float64)
+        simplex = np.full(len(queries), -1, dtype=np.int64)
+        weights = np.zeros((len(queries), self.corners.shape[1]))
+        if not len(queries) or not len(self.corners):
+            return simplex, weights
+        # First without reach, which needs the fewest candidates; then only what was not found.
+        simplex, weights = _search(self._grid, *self._maps, queries, self.rounding)
+        left = np.flatnonzero(simplex < 0)
+        if reach > 0.0 and len(left):
+            low, high = self._boxes
+            slack = reach + self.rounding
+            grid = bucket(low - slack, high + slack)
+            simplex[left], weights[left] = _search(grid, *self._maps, queries[left], slack)
+        weights = np.maximum(weights, 0.0)
+        total = weights.sum(axis=1, keepdims=True)
+        return simplex, weights / np.where(total > 0.0, total, 1.0)
+
+
+def _rounding(points: FloatArray) -> float:
+    return 1e-9 * float(np.abs(points).max(initial=0.0))
+
+
 def locate(
     points: FloatArray, simplices: IntArray, queries: FloatArray, reach: float = 0.0
 ) -> tuple[IntArray, FloatArray]:
     """Triangle of the plane, or tetrahedron in space, that holds each query point.
+
+    What is searched more than once is prepared by `Simplices`.
 
     Parameters
     ----------
@@ -119,36 +179,22 @@ def locate(
         Weights of the corners, summing to 1; for a query outside, those of a point of the simplex
         close to it; 0 where `simplex` is -1.
     """
-    queries = np.ascontiguousarray(queries, dtype=np.float64)
-    triangle = np.full(len(queries), -1, dtype=np.int64)
-    weights = np.zeros((len(queries), simplices.shape[1]))
-    if not len(queries) or not len(simplices):
-        return triangle, weights
-    corners = points[simplices]
-    by_corner = np.moveaxis(corners, 1, 0)
-    low, high = reduce(np.minimum, by_corner), reduce(np.maximum, by_corner)
-    # Simplices away from all queries, as those off a layer of the part, need no more work.
-    rounding = 1e-9 * float(np.abs(corners).max())
-    most, least = np.fmax.reduce(queries), np.fmin.reduce(queries)
-    border = reach + rounding
-    near = np.flatnonzero(((low <= most + border) & (high >= least - border)).all(axis=1))
-    if not len(near):
-        return triangle, weights
-    corners, low, high = corners[near], low[near], high[near]
-    origins, gradients, heights = barycentric_maps(corners)
-    # First without reach, which needs the fewest candidates; then only what was not found.
-    for margin in (0.0, reach) if reach > 0.0 else (0.0,):
-        left = np.flatnonzero(triangle < 0)
-        if not len(left):
-            break
-        slack = margin + rounding
-        grid = bucket(low - slack, high + slack)
-        index, weight = _search(grid, origins, gradients, heights, queries[left], slack)
-        weight = np.maximum(weight, 0.0)
-        total = weight.sum(axis=1, keepdims=True)
-        triangle[left] = np.where(index >= 0, near[index], -1)
-        weights[left] = weight / np.where(total > 0.0, total, 1.0)
-    return triangle, weights
+    near = np.flatnonzero(_near(points, simplices, queries, reach + _rounding(points)))
+    kept = Simplices(points[simplices[near]], _rounding(points))
+    index, weights = kept.locate(queries, reach)
+    return np.append(near, -1)[index], weights
+
+
+def _near(points: FloatArray, simplices: IntArray, queries: FloatArray, border: float) -> BoolArray:
+    """Simplices that are not away from all queries, as those off a layer of the part are."""
+    if not len(queries):
+        return np.zeros(len(simplices), dtype=bool)
+    # Bits say on which sides of the box of the queries a point does not lie.
+    most, least = np.fmax.reduce(queries) + border, np.fmin.reduce(queries) - border
+    sides = np.concatenate([points <= most, points >= least], axis=1)
+    bits = np.packbits(sides, axis=1)[:, 0]
+    every = np.packbits(np.ones(sides.shape[1], dtype=bool))[0]
+    return np.asarray(reduce(np.bitwise_or, bits[simplices].T) == every)
 
 
 def barycentric_maps(corners: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -21,7 +21,6 @@ from ccfem.base.parallel import in_processes
 from ccfem.base.tensor import in_plane
 from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.facets import are_among, connected
-from ccfem.geometry.locate import locate
 from ccfem.geometry.polylines import line_length, pack, starts_segment
 from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
@@ -283,7 +282,7 @@ def _carrying(joined: Joined, layer: Layer, plane: FloatArray) -> list[_Strand]:
     points, offsets = pack(joined.lines)
     step = np.zeros_like(points)
     step[:-1] = np.where(starts_segment(offsets)[:-1, None], np.diff(points, axis=0), 0.0)
-    triangle, weights = locate(layer.plane.points, layer.triangles, points + 0.5 * step, np.inf)
+    triangle, weights = layer.plane_triangles.locate(points + 0.5 * step, np.inf)
     s11, s22, s12 = np.einsum("qk,qkc->cq", weights, plane[layer.triangles[triangle]])
     x, y = step.T
     length = np.hypot(x, y)

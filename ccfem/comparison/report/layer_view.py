@@ -14,7 +14,6 @@ from ccfem.comparison.report.packing import Rounded, as_bytes
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.shown import caption, drawn_layers, middle_layer
-from ccfem.geometry.locate import locate
 from ccfem.geometry.polylines import arc_lengths, resample, subdivide, turning_angles
 from ccfem.paths.fields.chart import chart_of, flat_view
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
@@ -167,7 +166,7 @@ def angle_on_layer(plane: FloatArray, stress: LayerStress) -> FloatArray:
         return angle
     layer = stress.layer
     middle, along = 0.5 * (plane[1:] + plane[:-1]), np.diff(plane, axis=0)
-    triangle, weights = locate(layer.plane.points, layer.triangles, middle, _REACH)
+    triangle, weights = layer.plane_triangles.locate(middle, _REACH)
     inside = np.flatnonzero(triangle >= 0)
     corners = in_plane(stress.nodal, layer.plane.frame)[layer.triangles[triangle[inside]]]
     _, _, direction = largest_in_plane(np.einsum("qk,qkc->qc", weights[inside], corners))
@@ -320,14 +319,14 @@ def _maps(
     layer = stress.layer
     cells = _CELLS if layers <= _MANY else _FEW_CELLS
     points, shape = _raster(box, cells)
-    triangle, weights = locate(layer.plane.points, layer.triangles, points, _size(box) / cells)
+    triangle, weights = layer.plane_triangles.locate(points, _size(box) / cells)
     plane = in_plane(stress.nodal, layer.plane.frame)[layer.triangles[triangle]]
     largest, _, _ = largest_in_plane(np.einsum("qk,qkc->qc", weights, plane))
     error = comparison.stress.error.densities(comparison.stress.mesh.volumes)[layer.cell]
     end = max(float(np.quantile(error, 0.98)), 1e-12) if len(error) else 1.0
     away = triangle < 0
     strokes, strokes_shape = _raster(box, _STROKES)
-    at, share = locate(layer.plane.points, layer.triangles, strokes)
+    at, share = layer.plane_triangles.locate(strokes)
     tensor = in_plane(stress.nodal, layer.plane.frame)[layer.triangles[at]]
     size, _, angle = largest_in_plane(np.einsum("qk,qkc->qc", share, tensor))
     shown = (at >= 0) & (size > 0.02 * limit)

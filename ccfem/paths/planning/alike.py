@@ -8,7 +8,6 @@ import shapely
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.fem.elasticity import PartStress
-from ccfem.geometry.locate import locate
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 
@@ -85,7 +84,7 @@ def _along_patches(layer: Layer) -> dict[str, float]:
 def _apart(one: Layer, other: Layer, nodal: FloatArray) -> float:
     """Difference of the stress on two layers of equal section, over the stress on the first."""
     middles = other.plane.points[other.triangles].mean(axis=1)
-    triangle, weights = locate(one.plane.points, one.triangles, middles)
+    triangle, weights = one.plane_triangles.locate(middles)
     inside = triangle >= 0
     corners = one.interpolate(nodal)[one.triangles[triangle[inside]]]
     first = np.einsum("tk,tkij->tij", weights[inside], corners)

@@ -15,6 +15,7 @@ from ccfem.base.tensor import in_axes
 from ccfem.body.mesh.round_walls import RoundWall, moved_onto
 from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.facets import connected, sides_at
+from ccfem.geometry.locate import Simplices
 from ccfem.geometry.shapes import Region
 
 # The plane of a flat layer: its frame and height, and coordinates in it.
@@ -186,6 +187,11 @@ class Layer(Shown):
         piece = connected(np.concatenate([t[:, :2], t[:, 1:]]), len(self.points))
         _, number = np.unique(piece[t[:, 0]], return_inverse=True)
         return read_only(number, int)
+
+    @cached_property
+    def plane_triangles(self) -> Simplices:
+        """Its triangles in its plane, to be searched for points."""
+        return Simplices.of(self.plane.points, self.triangles)
 
     @cached_property
     def plane(self) -> "FlatLayer":

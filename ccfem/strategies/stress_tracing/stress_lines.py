@@ -7,7 +7,6 @@ from numpy.typing import ArrayLike
 
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.tensor import in_plane, strongest_in_plane
-from ccfem.geometry.locate import locate
 from ccfem.slicing.layers.layer import LayerStress
 
 
@@ -36,7 +35,7 @@ def plane_stress_at(stress: LayerStress, points: FloatArray, reach: float) -> Fl
     Points outside the layer by up to `reach`, mm, take the stress at its border; others 0.
     """
     layer = stress.layer
-    cell, weights = locate(layer.plane.points, layer.triangles, points, reach)
+    cell, weights = layer.plane_triangles.locate(points, reach)
     corner = in_plane(stress.nodal, layer.plane.frame)[layer.triangles[cell]]
     return np.where(cell[:, None] >= 0, np.einsum("kc,kci->ki", weights, corner), 0.0)
 

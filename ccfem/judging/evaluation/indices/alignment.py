@@ -6,7 +6,6 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.tensor import in_plane, largest_in_plane
-from ccfem.geometry.locate import locate
 from ccfem.geometry.polylines import sample_midpoints
 from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, LayerSamples, PlanePaths
 from ccfem.judging.evaluation.sensitivity import acute
@@ -128,7 +127,7 @@ def sample_alignment(paths: PlanePaths, stress: LayerStress, step: float) -> Ali
     layer = paths.layer
     lines = paths.in_part
     points, tangents, length, _ = sample_midpoints(lines.points, lines.offsets, step)
-    triangle, weights = locate(layer.plane.points, layer.triangles, points, _ROUNDING)
+    triangle, weights = layer.plane_triangles.locate(points, _ROUNDING)
     inside = triangle >= 0
     corners = in_plane(stress.nodal, layer.plane.frame)[layer.triangles[triangle[inside]]]
     s = np.einsum("qk,qkc->qc", weights[inside], corners)

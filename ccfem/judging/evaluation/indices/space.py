@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import FloatArray, IntArray
-from ccfem.geometry.locate import locate, nearest_on_triangles
+from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.geometry.polylines import curvature_samples, merge_repeated, sample_midpoints
 from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, LayerSamples
 from ccfem.paths.toolpaths import Toolpaths
@@ -147,8 +147,7 @@ def _on_layer(layer: Layer, points: FloatArray) -> tuple[IntArray, FloatArray]:
     triangle = np.full(len(points), -1, dtype=np.int64)
     weights = np.zeros((len(points), 3))
     if layer.flat is not None:
-        plane = layer.plane
-        triangle, weights = locate(plane.points, layer.triangles, plane.project(points))
+        triangle, weights = layer.plane_triangles.locate(layer.plane.project(points))
     left = np.flatnonzero(triangle < 0)
     if len(left):
         nearest = nearest_on_triangles(layer.points, layer.triangles, points[left])
