@@ -1,9 +1,9 @@
-"""Numbers of nodes with which neighbours are close: the same ones on every machine."""
+"""Numbers of nodes with which factors stay sparse: the same ones on every machine."""
 
 import numpy as np
 from numba import njit
 
-from ccfem.base.arrays import IntArray
+from ccfem.base.arrays import FloatArray, IntArray, repeated
 
 
 def reverse_cuthill_mckee(start: IntArray, neighbour: IntArray) -> IntArray:
@@ -61,4 +61,49 @@ def _breadth_first(
                     k -= 1
                 order[k] = other
                 count += 1
+    return order
+
+
+_PIECE = 20
+"""Nodes of a piece that is not cut further."""
+
+
+def nested_dissection(points: FloatArray, start: IntArray, neighbour: IntArray) -> IntArray:
+    """Order of nodes in which halves come before what parts them.
+
+    The nodes are halved across the longest side of their box; those of the second half that have
+    neighbours in the first one come last, and both halves are ordered likewise (George, SIAM
+    Journal on Numerical Analysis 10 (1973) 345). Minimum degree fills a factor less, but takes
+    seconds on tens of thousands of nodes of a regular mesh, which all have the same degree.
+
+    Parameters
+    ----------
+    points : (n, d) array, mm
+    start, neighbour
+        As of `reverse_cuthill_mckee`.
+
+    Returns
+    -------
+    (n,) int array
+        Old numbers in new order.
+    """
+    order = np.empty(len(points), dtype=np.int64)
+    first_half = np.zeros(len(points), dtype=bool)
+    left = [(np.arange(len(points)), 0)]
+    while left:
+        nodes, begin = left.pop()
+        end = begin + len(nodes)
+        if len(nodes) <= _PIECE:
+            order[begin:end] = nodes
+            continue
+        axis = np.ptp(points[nodes], axis=0).argmax()
+        nodes = nodes[np.argsort(points[nodes, axis], kind="stable")]
+        low, high = np.split(nodes, [len(nodes) // 2])
+        first_half[low] = True
+        of, nth = repeated(start[high + 1] - start[high])
+        across = first_half[neighbour[start[high][of] + nth]]
+        parting = np.bincount(of, across, len(high)) > 0
+        first_half[low] = False
+        order[end - int(parting.sum()) : end] = high[parting]
+        left += [(low, begin), (high[~parting], begin + len(low))]
     return order

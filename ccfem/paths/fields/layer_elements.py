@@ -1,5 +1,6 @@
 """Linear finite elements on the triangles of a layer: gradients, Laplacian, adjacency."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -9,6 +10,7 @@ import scipy.sparse as sparse
 from scipy.sparse.linalg import splu
 
 from ccfem.base.arrays import FloatArray, IntArray, read_only
+from ccfem.body.mesh.numbering import nested_dissection
 from ccfem.geometry.facets import paired, signed_areas
 from ccfem.geometry.isocontours import triangle_edges
 from ccfem.slicing.layers.layer import Layer
@@ -18,6 +20,31 @@ def positive_definite(matrix: Any) -> Any:
     """Factorise a sparse symmetric positive definite matrix; the result has ``solve``."""
     options = {"SymmetricMode": True, "DiagPivotThresh": 0.0}
     return splu(sparse.csc_array(matrix), permc_spec="MMD_AT_PLUS_A", options=options)
+
+
+def dissected(matrix: Any, points: FloatArray) -> Callable[[FloatArray], FloatArray]:
+    """Factorise as `positive_definite`, quickly on regular triangles too; return the solve.
+
+    Parameters
+    ----------
+    matrix : sparse array (k n, k n)
+        With k rows for each point, one after the other.
+    points : (n, d) array, mm
+        By which it is ordered (`ccfem.body.mesh.numbering.nested_dissection`).
+    """
+    columns = sparse.csc_array(matrix)
+    each = columns.shape[0] // len(points)
+    order = nested_dissection(points, columns.indptr[::each], columns.indices // each)
+    rows = (each * order[:, None] + np.arange(each)).ravel()
+    options = {"SymmetricMode": True, "DiagPivotThresh": 0.0}
+    factor = splu(columns[rows][:, rows], permc_spec="NATURAL", options=options)
+
+    def solve(right: FloatArray) -> FloatArray:
+        solution = np.empty_like(right)
+        solution[rows] = factor.solve(right[rows])
+        return solution
+
+    return solve
 
 
 _STEEP = 0.9

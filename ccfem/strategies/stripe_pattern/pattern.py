@@ -17,7 +17,7 @@ from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, repeated
 from ccfem.base.tensor import largest_in_plane
 from ccfem.geometry.facets import signed_areas
 from ccfem.geometry.isocontours import chained, triangle_edges
-from ccfem.paths.fields.layer_elements import positive_definite
+from ccfem.paths.fields.layer_elements import dissected
 
 _COTANGENT = (0.05, 5.0)
 """Least and largest cotangent of an angle: triangles of level cuts may be slivers."""
@@ -198,7 +198,7 @@ def line_field(
         np.concatenate([b, a, np.arange(count)]),
     )
     matrix = sp.coo_array((np.concatenate([-w, -w, full]), (rows, columns)), (count, count))
-    z = positive_definite(matrix).solve(np.column_stack([wanted.real, wanted.imag]))
+    z = dissected(matrix, cells.points)(np.column_stack([wanted.real, wanted.imag]))
     return np.asarray(0.5 * np.arctan2(z[:, 1], z[:, 0]))
 
 
@@ -288,7 +288,7 @@ def _factor(cells: Cells, omega: FloatArray, same: FloatArray, diagonal: FloatAr
     size = 2 * len(diagonal)
     lower = sp.coo_array((values, (rows, columns)), (size, size)).tocsc()
     matrix = lower + lower.T + sp.diags_array(np.repeat(diagonal, 2))
-    solve = positive_definite(matrix).solve
+    solve = dissected(matrix, cells.points)
     return lambda rhs: solve(rhs.ravel()).reshape(-1, 2)
 
 

@@ -1,10 +1,12 @@
-"""Numbers of nodes with which neighbours are close."""
+"""Numbers of nodes with which factors stay sparse."""
 
 import networkx
 import numpy as np
 import pytest
+import scipy.sparse
+from scipy.sparse.linalg import splu
 
-from ccfem.body.mesh.numbering import reverse_cuthill_mckee
+from ccfem.body.mesh.numbering import nested_dissection, reverse_cuthill_mckee
 
 
 def sparse_rows(graph):
@@ -38,3 +40,23 @@ def test_every_node_once_and_a_narrow_band(seed):
     ends = np.stack(rows.nonzero())
     assert np.abs(np.diff(place[ends], axis=0)).max() <= 8
     assert np.abs(np.diff(ends, axis=0)).max() > 100
+
+
+def test_a_factor_of_a_dissected_grid_stays_within_the_bound_of_george():
+    # Of an n x n grid it has less than 31/4 n^2 log2 n entries (George 1973), row by row n^3.
+    n = 48
+    grid = networkx.strong_product(networkx.path_graph(n), networkx.path_graph(n))
+    rows = sparse_rows(grid)
+    order = nested_dissection(np.array(sorted(grid), dtype=float), rows.indptr, rows.indices)
+    np.testing.assert_array_equal(np.sort(order), np.arange(n * n))
+    matrix = scipy.sparse.diags_array(9.0 + np.zeros(n * n)) - rows
+    entries = [
+        splu(
+            scipy.sparse.csc_array(some),
+            permc_spec="NATURAL",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        ).L.nnz
+        for some in (matrix.tocsr()[order][:, order], matrix)
+    ]
+    assert entries[0] < 31 / 4 * n**2 * np.log2(n) < entries[1]
