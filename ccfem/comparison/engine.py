@@ -7,7 +7,7 @@ its own.
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from inspect import signature
@@ -112,8 +112,8 @@ class Solved:
         Stress of another program to plan and evaluate on.
     tests : Tests, optional
         None if nothing is tested.
-    every_layer, longest_test, course
-        As of `Request`.
+    every_layer, longest_test, course, limits_only
+        As of `Request`, the last one as of `Part`.
     """
 
     case: Case
@@ -123,6 +123,7 @@ class Solved:
     every_layer: bool = False
     longest_test: float = float("inf")
     course: Course = WITHOUT_HALT
+    limits_only: bool = False
 
     @property
     def field(self) -> StressField:
@@ -163,8 +164,8 @@ class Solved:
         strand = None if self.tests is None else self.tests.strand
         said = slicer_remarks(chosen, stress)
         stack = tuple(layers)
-        about = (strand, case.build, below, propped, said, self.every_layer, self.longest_test)
-        more = (case.bed, self.course, case.plastic, case.scatter)
+        about = (strand, case.build, below, propped, said, self.every_layer, self.limits_only)
+        more = (self.longest_test, case.bed, self.course, case.plastic, case.scatter)
         return Part(stress, stack, case.machine, self.cases, *about, *more)
 
 
@@ -482,7 +483,7 @@ def _planned(
         return {"": part}, [run], held
     unplanned = {name: _unplanned(request, name, part) for name, part in parts.items()}
     if isinstance(amount, Spread):
-        return parts, _spread(unplanned, parts, amount.points, tell), None
+        return parts, _spread(unplanned, parts, amount.points, tell, early), None
     if isinstance(amount, Shortest):
         return parts, *_to_the_shortest(request, unplanned, parts, tell, early)
     wanted, runs = _per_layer(amount, parts), list[Run]()
@@ -523,26 +524,36 @@ def _to_the_shortest(
 
 
 def _spread(
-    unplanned: Mapping[str, Sequence[Run]], parts: Mapping[str, Part], points: int, tell: Tell
+    unplanned: Mapping[str, Sequence[Run]],
+    parts: Mapping[str, Part],
+    points: int,
+    tell: Tell,
+    early: _Early,
 ) -> list[Run]:
     """Plan every strategy on every slicing to several lengths, the largest filling most layers.
 
     Fewer layers reach less at their most: a plan that lays its most is one run, however much more
-    was asked for.
+    was asked for. Runs on one slicing are judged while those on the next are planned.
     """
     most = max(len(part.layers) * full_length(part.layers, part.machine) for part in parts.values())
     lengths = np.geomspace(_LEAST * most, most, points)
-    runs: list[Run] = []
-    for name, part in parts.items():
-        for run in unplanned[name]:
-            tell(f"planning {run.name}")
-            longer: list[Run] = []
-            for planned_run in planned_to_lengths(run, part, (lengths / len(part.layers)).tolist()):
-                length = longer[-1].length_per_layer if longer else -1.0
-                if planned_run.length_per_layer > (1.0 + _ALIKE) * length:
-                    longer.append(planned_run)
-            runs += longer
-    return runs
+    done: list[Callable[[], Sequence[Run]]] = []
+    *_, last = parts
+    with ExitStack() as judging:
+        for name, part in parts.items():
+            per_layer, runs = (lengths / len(part.layers)).tolist(), list[Run]()
+            for run in unplanned[name]:
+                tell(f"planning {run.name}")
+                length = -1.0
+                for longer in planned_to_lengths(run, part, per_layer):
+                    if longer.length_per_layer > (1.0 + _ALIKE) * length:
+                        length = longer.length_per_layer
+                        runs.append(longer)
+            if name == last:
+                done.append(partial(list[Run], runs))
+            else:
+                done.append(partial(judging.enter_context(early.on(part, None, tell)(runs)), ()))
+        return [run for outcome in done for run in outcome()]
 
 
 def _unplanned(request: Request, slicing: str, part: Part) -> list[Run]:

@@ -128,7 +128,7 @@ def front_of(
         counts = counts_to_try(request.case, basis.planned_on)
     slicings = _slicings(counts)
     request = replace(request, strategies=kinds, slicings=slicings, amount=spread)
-    return _front(name, answer(request, progress, basis))
+    return _front(name, answer(request, progress, replace(basis, limits_only=True)))
 
 
 def _slicings(counts: Sequence[int]) -> dict[str, Slicing]:

@@ -92,6 +92,9 @@ class Part:
         Whether support is printed below what flat layers would lay in air.
     every_layer : bool
         Whether all indices are taken on every layer, and every layer is planned.
+    limits_only : bool
+        Whether indices that no limit of the machine bounds are taken on one layer: nobody asks for
+        them.
     longest_test : float, mm
         Length of fibre above which a run is not tested virtually.
     remarks : tuple of str
@@ -112,6 +115,7 @@ class Part:
     propped: bool = False
     remarks: tuple[str, ...] = ()
     every_layer: bool = False
+    limits_only: bool = False
     longest_test: float = float("inf")
     layout: BedLayout = AS_IT_STANDS
     course: Course = WITHOUT_HALT
@@ -428,7 +432,7 @@ def evaluated(run: Run, part: Part) -> Run:
         return replace(run, failure=why)
 
     def work() -> Run:
-        most = None if part.every_layer else _MOST_LAYERS
+        most = 1 if part.limits_only else None if part.every_layer else _MOST_LAYERS
         about = (part.layers, part.stress, part.machine, part.strand, part.build, most)
         evaluation = evaluate(run.toolpaths, *about, part.cases.heaviest.problem.filled)
         # Who planned given paths is not known, but where their file says so.
