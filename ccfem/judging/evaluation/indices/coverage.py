@@ -1,10 +1,12 @@
 """How much of the layer the fibre covers, and how much of its stress."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
+from typing import Any
 
 import numpy as np
 from numba import njit
-from scipy.ndimage import binary_opening
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.tensor import in_plane
@@ -154,8 +156,14 @@ def sample_coverage(
 
 def _gaps(free: BoolArray) -> float:
     """Count the grid points that lie in no free disc one fibre width wide."""
-    across = np.hypot(*np.meshgrid(np.arange(-_HALF, _HALF + 1), np.arange(-_HALF, _HALF + 1)))
-    opened = binary_opening(free, across <= _HALF + 0.5)
+    places = np.arange(-_HALF, _HALF + 1)
+    disc = np.argwhere(np.hypot(*np.meshgrid(places, places)) <= _HALF + 0.5).tolist()
+
+    def over_disc(values: BoolArray, combine: Callable[..., Any]) -> BoolArray:
+        padded, (n, m) = np.pad(values, _HALF), values.shape
+        return np.asarray(reduce(combine, (padded[i : i + n, j : j + m] for i, j in disc)))
+
+    opened = over_disc(over_disc(free, np.logical_and), np.logical_or)
     return float(np.count_nonzero(free & ~opened))
 
 
