@@ -209,9 +209,9 @@ def beside(
         forks.end()
 
 
-_LOW = 10
-"""Of the priority of a process beside, which the system counts the other way: a tenth of the time
-beside one of this."""
+_LOW = 5
+"""What is added to the niceness of a process beside. On one processor it then gets a third of the
+time of what it gives way to, and also of other people's work: less would hold it up behind that."""
 
 
 def _with_low_priority(work: Callable[[], Result]) -> Result:
