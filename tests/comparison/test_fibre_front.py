@@ -9,11 +9,15 @@ import pytest
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
+from ccfem.comparison.engine import Solved
 from ccfem.comparison.front_plans import fibre_front, front_of
 from ccfem.comparison.front_points import FibreFront, FrontPoint
 from ccfem.comparison.plan_to_stiffness import counts_to_try
 from ccfem.comparison.request import Request
+from ccfem.comparison.runs import Run
+from ccfem.comparison.stages import evaluated
 from ccfem.fem.elasticity import Force, Problem, Support, solve
+from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.fem.materials import isotropic
 from ccfem.judging.virtual_testing.strand import RHO
 from ccfem.machine import Machine
@@ -93,6 +97,21 @@ def test_plans_that_fail_before_the_part_without_fibre_are_not_marked():
     front = FibreFront("bar", "zigzag", points, {}, bare=100.0)
     assert front.strongest.tolist() == [False, True]
     assert front.stiffest.tolist() == [True, True]
+
+
+def test_a_strand_too_short_on_the_last_layer_alone_is_named(bar):
+    case, stress = bar
+    basis = Solved(case, WeightedCases.of({"pull": stress}), limits_only=True)
+    part = basis.cut()
+    lines = [(50.0, 0.0), (20.0, 3.0)]  # 20 mm: less than the 42 mm that the cutter needs
+    paths = Toolpaths.concatenate(
+        Toolpaths.from_plane([np.array([[5.0, y], [5.0 + length, y]])], layer)
+        for layer, (length, y) in zip(part.layers, lines, strict=True)
+    )
+    run = evaluated(Run("by hand", create("zigzag"), paths, None), part)
+    assert "shorter than 42 mm" in run.why_not
+    assert run.evaluation.taken_on_some == 1
+    assert np.isnan(run.evaluation.of_layer(1)["coverage"])
 
 
 def test_table_and_picture_show_every_plan(front, tmp_path):
