@@ -13,7 +13,7 @@ from ccfem.cases import create_case
 from ccfem.fem.elasticity.statics import solve
 from ccfem.machine import Kinematics
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.printing.curved_plan import curved_plan
+from ccfem.printing.print_plan import plan_print
 from ccfem.printing.support import slice_with_support
 from ccfem.slicing.slicers import as_slicer
 
@@ -30,7 +30,8 @@ def row(name: str) -> str:
     slicer = as_slicer(SLICINGS.get(name, case.slicing))
     layers, support = slice_with_support(slicer, stress, case.build, case.machine)
     machine = replace(case.machine, kinematics=Kinematics("head_head"))
-    plan = curved_plan(Toolpaths.empty(), layers, stress.mesh, machine, case.build, support)
+    about = (layers, stress.mesh, machine, support)
+    plan = plan_print(Toolpaths.empty(), *about, build=case.build)
     lengths = " | ".join(f"{value:.0f}" for value in plan.touched)
     return (
         f"| {name} | {len(layers)} + {len(support.layers)} | {len(plan.top)} | "

@@ -23,7 +23,8 @@ GONE = {
     "papers.layer_traction": (
         "use ccfem.judging.virtual_testing.failure_laws.interlayer.layer_traction, which returns "
         "the averaged stress too: opening, sliding, tensor"
-    )
+    ),
+    "printing.curved_plan": "use ccfem.printing.print_plan.plan_print, for layers of either kind",
 }
 """What replaces modules that are found under no other name."""
 

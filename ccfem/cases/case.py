@@ -20,9 +20,8 @@ from ccfem.machine.machine import Machine
 from ccfem.paths.placement.fibre_places import FibrePlaces
 from ccfem.paths.plastic.as_printed import as_printed
 from ccfem.paths.plastic.plastic import SOLID, Plastic
-from ccfem.printing.bed_layout import AS_IT_STANDS, BedLayout, bed_of
+from ccfem.printing.bed_layout import AS_IT_STANDS, BedLayout, bed_of, spun
 from ccfem.printing.line_counts import MOST_STRANDS, about_strands, check_strands
-from ccfem.printing.print_plan import spun
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.slicer import Slicer
 from ccfem.slicing.slicers.planar import Planar

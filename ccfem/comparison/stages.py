@@ -42,7 +42,6 @@ from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.bed_layout import AS_IT_STANDS, BedLayout
 from ccfem.printing.before_solving import in_air, refusal
 from ccfem.printing.course import WITHOUT_HALT, Course, on_course
-from ccfem.printing.curved_plan import curved_plan
 from ccfem.printing.part_moves import part_moves
 from ccfem.printing.print_plan import plan_print
 from ccfem.printing.print_totals import print_totals
@@ -458,14 +457,15 @@ def with_print(run: Run, part: Part) -> Run:
     if part.refusal:
         return replace(run, unprinted=part.refusal)  # said in `why_not` since the evaluation
     try:
-        what = (run.strands, part.layers, part.stress.mesh, part.machine)
-        build = part.build or (0.0, 0.0, 1.0)
-        curved = curved_layers(part.layers)
-        spin = part.layout.spin
-        plan = (
-            curved_plan(*what, build, part.support, spin)
-            if curved
-            else plan_print(*what, part.propped, spin, part.plastic)
+        plan = plan_print(
+            run.strands,
+            part.layers,
+            part.stress.mesh,
+            part.machine,
+            part.support or part.propped,
+            part.layout.spin,
+            part.plastic,
+            part.build or (0.0, 0.0, 1.0),
         )
         give_back()
         plan = on_course(arranged([plan], [part.layout], part.machine), part.course, part.machine)

@@ -2,16 +2,17 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ccfem.base.arrays import FloatArray
+from ccfem.base.arrays import FloatArray, freeze
 from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError, shown
 from ccfem.base.plain import plain_dataclass
 from ccfem.base.toml import from_table
+from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import plane_frame
 from ccfem.slicing.layers.slicer import Vector
 
@@ -68,6 +69,44 @@ class BedLayout:
             As `ccfem.slicing.layers.layer.plane_frame` returns it.
         """
         return upright if not self.spin else _about("z", self.spin) @ upright
+
+
+def spun(machine: Machine, spin: float) -> Machine:
+    """Machine whose lines of matrix keep their direction on the bed below a part that is turned."""
+    if not spin:
+        return machine
+    angle = (machine.gcode.matrix_angle - spin) % 360.0
+    return replace(machine, gcode=replace(machine.gcode, matrix_angle=angle))
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a part stands on the bed.
+
+    Attributes
+    ----------
+    axes : (3, 3) array
+        Rows are the axes of the bed in the frame of the mesh.
+    origin : (3,) array, mm
+        Corner of the bed, along these axes.
+    spin : float, degrees
+        As of `BedLayout`.
+    """
+
+    axes: FloatArray
+    origin: FloatArray
+    spin: float = 0.0
+
+    def __post_init__(self) -> None:
+        freeze(self, axes=float, origin=float)
+
+    def on_bed(self, points: FloatArray) -> FloatArray:
+        """Points (n, 3) of the mesh's frame on the bed."""
+        return np.asarray(points @ self.axes.T - self.origin)
+
+    def from_above(self, points: FloatArray) -> FloatArray:
+        """X and Y on the bed, (n, 2), of points of the mesh's frame."""
+        return np.asarray(points @ self.axes[:2].T - self.origin[:2])
 
 
 AS_IT_STANDS = BedLayout()

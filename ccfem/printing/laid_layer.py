@@ -1,6 +1,6 @@
 """Paths of one layer of a print, matrix or fibre, in the order of printing."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -8,13 +8,14 @@ import shapely
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.errors import InputError
-from ccfem.geometry.polylines import is_closed, merge_repeated, pack, starts_segment, subdivide
+from ccfem.geometry.polylines import merge_repeated, pack, starts_segment, subdivide
 from ccfem.geometry.shapes import Region, Shapes, bends, strings
 from ccfem.machine.machine import Machine
 from ccfem.paths.linking.print_order import nearest_end_order
 from ccfem.paths.splitting.printed_strands import border_crossings
 from ccfem.paths.splitting.slabs import StrandDensity
 from ccfem.paths.toolpaths import FIBRE, MATRIX, SUPPORT, Toolpaths
+from ccfem.printing.head_lean import Obstacles
 from ccfem.printing.matrix_lines import MatrixFill
 
 # Flow of matrix over fibre: lines are laid so that the layer comes out exactly full.
@@ -305,49 +306,54 @@ class Below:
 
 @dataclass(frozen=True)
 class LaidLayer:
-    """Paths of a layer in the order of printing.
+    """Paths of a layer in the order of printing, on the bed.
 
     Attributes
     ----------
+    height, thickness : float, mm
+        Top of the layer over the bed, and its own height.
     laid : (P,) array, mm
         Height of matrix, a line wide, on the step from each point.
-    room : (K,) array
-        Width that each line of matrix fills, over that of the machine's lines.
-    short : (K,) bool array
-        Lines of matrix in place of strands that are too short for the cutter.
-    sparse : (K,) bool array
-        Lines of sparse infill.
+    room : (K,) array, optional
+        Width that each line of matrix fills, over that of the machine's lines; by default 1.
+    short : (K,) bool array, optional
+        Lines of matrix in place of strands that are too short for the cutter; by default none.
+    sparse : (K,) bool array, optional
+        Lines of sparse infill; by default none.
     outside : float, mm
         Length of fibre outside the part.
-    trims : (t, 3) array, mm
-        As of `ccfem.printing.print_plan.PrintPlan`.
+    trims : (t, 2) array, mm
+        Where strands cross the part's border.
     """
 
     paths: Toolpaths
+    height: float
+    thickness: float
     laid: FloatArray
-    room: FloatArray
-    short: BoolArray
-    sparse: BoolArray
+    room: FloatArray = None  # type: ignore[assignment]
+    short: BoolArray = None  # type: ignore[assignment]
+    sparse: BoolArray = None  # type: ignore[assignment]
     warning: str = ""
     outside: float = 0.0
-    trims: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    trims: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
 
-    def at(self, number: int, height: float) -> "LaidLayer":
-        """Lay the same at another height, mm, as the layer of this number."""
-        paths = self.paths
-        points = paths.points.copy()
+    def __post_init__(self) -> None:
+        count = len(self.paths)
+        for name, default in (("room", 1.0), ("short", False), ("sparse", False)):
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, np.full(count, default))
+
+    def at(self, height: float) -> "LaidLayer":
+        """Lay the same, flat, at another height, mm."""
+        points = self.paths.points.copy()
         points[:, 2] = round(height, COORDINATE_DIGITS)
-        trims = self.trims.copy()
-        trims[:, 0] = number
-        layer = np.full(len(paths), number)
-        return replace(self, paths=replace(paths, points=points, layer=layer), trims=trims)
+        return replace(self, paths=replace(self.paths, points=points), height=height)
 
 
 def matrix_layer(
     fill: MatrixFill,
     pads: Sequence[FloatArray],
     below: Below,
-    number: int,
     height: float,
     thickness: float,
     machine: Machine,
@@ -363,27 +369,27 @@ def matrix_layer(
     """
     solid = fill.lines[: len(fill.lines) - fill.sparse]
     ways = [np.zeros(len(line), dtype=bool) for line in solid] + fill.ways
-    matrix, which = _printed(fill.lines, height, number, MATRIX, ways)
+    matrix, which = _printed(fill.lines, height, MATRIX, ways)
     sparse = which >= len(fill.lines) - fill.sparse
     heights, warning = np.zeros(0), ""
     room = np.array(fill.widths)[which] / machine.matrix_width
     strands = (below.strands, below.height, machine, below.sections)
     if len(matrix):
         matrix, heights, warning = with_flow(matrix, fill.solid, thickness, *strands, room, sparse)
-    pad, _ = _printed(pads, height, number, SUPPORT)
+    pad, _ = _printed(pads, height, SUPPORT)
     if len(pad):
         pad, high = pad_flow(pad, thickness, *strands)
         matrix, heights = Toolpaths.concatenate([matrix, pad]), np.append(heights, high)
         room = np.append(room, np.ones(len(pad)))
         sparse = np.append(sparse, np.zeros(len(pad), dtype=bool))
-    return LaidLayer(matrix, heights, room, np.zeros(len(matrix), dtype=bool), sparse, warning)
+    size = (height, thickness, heights, room)
+    return LaidLayer(matrix, *size, sparse=sparse, warning=warning)
 
 
 def fibre_layer(
     lines: Sequence[FloatArray],
     by_matrix: Sequence[FloatArray],
     border: Region,
-    number: int,
     height: float,
     thickness: float,
     machine: Machine,
@@ -393,55 +399,91 @@ def fibre_layer(
     Parameters are those of `matrix_layer`, and the border of the part on the layer.
     """
     outside = float(shapely.length(shapely.difference(strings(lines), border)).sum())
-    few, _ = _printed(by_matrix, height, number, MATRIX)
-    fibre = Toolpaths.concatenate([few, _printed(lines, height, number, FIBRE)[0]])
-    heights = np.full(len(fibre.points), thickness)
-    short = fibre.kind == MATRIX
-    places = border_crossings([*lines, *by_matrix], border)
-    trims = np.column_stack([np.full(len(places), number), places])
-    none = np.zeros(len(fibre), dtype=bool)
-    return LaidLayer(fibre, heights, np.ones(len(fibre)), short, none, "", outside, trims)
+    few, _ = _printed(by_matrix, height, MATRIX)
+    fibre = Toolpaths.concatenate([few, _printed(lines, height, FIBRE)[0]])
+    return LaidLayer(
+        fibre,
+        height,
+        thickness,
+        np.full(len(fibre.points), thickness),
+        short=fibre.kind == MATRIX,
+        outside=outside,
+        trims=border_crossings([*lines, *by_matrix], border),
+    )
 
 
 def _printed(
     lines: Sequence[FloatArray],
     height: float,
-    number: int,
     kind: int,
     ways: Sequence[BoolArray] | None = None,
 ) -> tuple[Toolpaths, IntArray]:
-    """Paths of one layer in printer coordinates, in the order of printing; and their lines."""
+    """Paths of one flat layer on the bed, in the order of printing; and their lines."""
     points, offsets = pack(lines)
     points = points.round(COORDINATE_DIGITS) + 0.0
     points, offsets, kept = merge_repeated(points, offsets)
-    pieces = np.split(points, offsets[1:-1]) if len(offsets) > 1 else []
-    which = np.array([k for k, line in enumerate(pieces) if len(line) > 1], dtype=np.int64)
-    lines = [pieces[k] for k in which.tolist()]
-    if not lines:
+    which = np.flatnonzero(np.diff(offsets) > 1)
+    if not len(which):
         return Toolpaths.empty(), which
-    order, backward, _ = nearest_end_order(
-        np.array([line[0] for line in lines]), np.array([line[-1] for line in lines])
-    )
-    turned = list(zip(order.tolist(), backward.tolist(), strict=True))
-    lines = [lines[k][::-1] if back else lines[k] for k, back in turned]
-    link = None
-    if ways is not None and any(way.any() for way in ways):
+    link = np.zeros(len(points), dtype=bool)
+    if ways is not None:
         # The step from a point is that to the next one that is kept.
-        step = np.concatenate(ways)[np.append(kept[1:], sum(map(len, ways))) - 1]
-        steps = [np.split(step, offsets[1:-1])[k][:-1] for k in which.tolist()]
-        link = np.concatenate(
-            [np.append(steps[k][::-1] if back else steps[k], False) for k, back in turned]
-        )
-    points, offsets = pack(lines)
-    height = round(height, COORDINATE_DIGITS)
-    points = np.column_stack([points, np.full(len(points), height)])
+        link = np.concatenate(ways)[np.append(kept[1:], sum(map(len, ways))) - 1]
+        link[offsets[1:] - 1] = False
     paths = Toolpaths(
-        points=points,
-        normals=np.broadcast_to([0.0, 0.0, 1.0], points.shape),
+        points=np.column_stack([points, np.full(len(points), round(height, COORDINATE_DIGITS))]),
+        normals=np.broadcast_to([0.0, 0.0, 1.0], (len(points), 3)),
         offsets=offsets,
-        layer=np.full(len(lines), number),
-        kind=np.full(len(lines), kind),
-        closed=np.array([is_closed(line) for line in lines]),
-        link=link,  # type: ignore[arg-type]
+        layer=np.zeros(len(offsets) - 1, dtype=np.int64),
+        kind=np.full(len(offsets) - 1, kind),
+        closed=np.zeros(len(offsets) - 1, dtype=bool),
+        link=link,
     )
+    paths, order, _ = in_order(paths.select(np.diff(offsets) > 1))
     return paths, which[order]
+
+
+def in_order(paths: Toolpaths) -> tuple[Toolpaths, IntArray, IntArray]:
+    """Paths in the order of printing, nearest end next; where they, and their points, were."""
+    if not len(paths):
+        return paths, paths.layer, np.zeros(0, dtype=np.int64)
+    starts, ends = (paths.points[at] for at in (paths.offsets[:-1], paths.offsets[1:] - 1))
+    order, backward, _ = nearest_end_order(starts, ends)
+    turned = backward.tolist()
+    rows = [
+        np.arange(paths.offsets[k], paths.offsets[k + 1])[:: -1 if back else 1]
+        for k, back in zip(order.tolist(), turned, strict=True)
+    ]
+    # The step on from a point of a path that is turned round is the one that led to it.
+    steps = [np.roll(row, -1) if back else row for row, back in zip(rows, turned, strict=True)]
+    at = np.concatenate(rows)
+    sorted_paths = Toolpaths(
+        points=paths.points[at],
+        normals=paths.normals[at],
+        offsets=np.append(0, np.cumsum(np.diff(paths.offsets)[order])),
+        layer=paths.layer[order],
+        kind=paths.kind[order],
+        closed=(starts == ends).all(axis=1)[order],
+        link=paths.link[np.concatenate(steps)],
+    )
+    return sorted_paths, order, at
+
+
+@dataclass(frozen=True)
+class Stack:
+    """The layers of a print and what is to be said of them.
+
+    Attributes
+    ----------
+    layers : iterable of LaidLayer
+        From the first printed to the last; each may be made when it is asked for.
+    remarks : tuple of str
+        What is doubtful, one line each.
+    obstacles : Obstacles, optional
+        What a head may touch beside its tip. None over flat layers, the one difference in what is
+        asked of a plan: all that is printed lies below the tip, whatever the order.
+    """
+
+    layers: Iterable[LaidLayer]
+    remarks: tuple[str, ...]
+    obstacles: Obstacles | None = None

@@ -20,6 +20,7 @@ from ccfem.paths.linking.joining import Joined, Joint, join
 from ccfem.paths.plastic.plastic import SOLID, Plastic
 from ccfem.paths.plastic.sparse_regions import NOTHING, MatrixSection, matrix_sections
 from ccfem.paths.splitting.slabs import Slab
+from ccfem.printing.bed_layout import Place
 from ccfem.slicing.layers.layer import Layer
 
 # Lines of sparse infill, clipped to a region; those of all layers of a part fit each other.
@@ -174,8 +175,7 @@ def matrix_fills(
     slabs: Sequence[Slab],
     fibre: Sequence[Layer],
     mesh: TetMesh,
-    frame: FloatArray,
-    origin: FloatArray,
+    place: Place,
     machine: Machine,
     plastic: Plastic = SOLID,
 ) -> list[MatrixFill | None]:
@@ -191,10 +191,6 @@ def matrix_fills(
         Flat layers that may get fibre.
     mesh : TetMesh
         The part.
-    frame : (3, 3) array
-        Rows are the axes of the bed in the frame of the mesh.
-    origin : (2,) array, mm
-        Subtracted from X and Y along these axes.
     plastic : Plastic
         Default: solid.
     """
@@ -203,12 +199,12 @@ def matrix_fills(
     fills: list[MatrixFill | None] = [None] * len(slabs)
     for k in of_matrix:
         fills[k] = MatrixFill()
-    plane, sections = matrix_sections(slabs, fibre, mesh, frame[2], plastic, machine)
+    plane, sections = matrix_sections(slabs, fibre, mesh, place.axes[2], plastic, machine)
     if plane is None:
         return fills
 
     def on_bed(points: FloatArray) -> FloatArray:
-        return plane.to_space(points) @ frame[:2].T - origin  # at any height
+        return place.from_above(plane.to_space(points))  # at any height
 
     def filled(section: Region, sparse: Region, angle: float, phase: float) -> MatrixFill:
         solid = section if sparse.is_empty else shapely.difference(section, sparse)

@@ -12,10 +12,10 @@ from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.machine import Kinematics, Machine
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.printing.bed_layout import BedLayout
-from ccfem.printing.curved_plan import curved_plan
 from ccfem.printing.export.gcode import gcode
 from ccfem.printing.part_moves import part_moves
 from ccfem.printing.poses import limited_tilt
+from ccfem.printing.print_plan import plan_print
 from ccfem.printing.together import arranged
 from ccfem.slicing.layers.level_surfaces import level_surfaces
 
@@ -76,7 +76,7 @@ def tips(kind, rows):
 def test_five_axes_lay_the_strands_where_they_were_planned(part, kind):
     mesh, layers, paths = part
     machine = replace(MACHINE, kinematics=Kinematics(kind, CENTRE, 90.0))
-    plan = curved_plan(paths, layers, mesh, machine)
+    plan = plan_print(paths, layers, mesh, machine)
     rows = words(gcode(plan, machine))
     place, axis = tips(kind, rows)
     planned = plan.paths.of_kind(FIBRE)
@@ -107,7 +107,7 @@ def test_five_axes_lay_the_strands_where_they_were_planned(part, kind):
 def test_nothing_travels_through_what_is_printed(part):
     mesh, layers, paths = part
     machine = replace(MACHINE, kinematics=Kinematics("head_head", CENTRE, 90.0))
-    rows = words(gcode(curved_plan(paths, layers, mesh, machine), machine))
+    rows = words(gcode(plan_print(paths, layers, mesh, machine), machine))
     place, _ = tips("head_head", rows)
     highest, seen = 0.0, 0
     for k in range(2, len(rows)):
@@ -123,25 +123,25 @@ def test_nothing_travels_through_what_is_printed(part):
 def test_layers_come_out_full(part):
     mesh, layers, paths = part
     machine = replace(MACHINE, kinematics=Kinematics("head_head"))
-    plan = curved_plan(paths, layers, mesh, machine)
+    plan = plan_print(paths, layers, mesh, machine)
     room = sum(float(k.areas @ k.local_thickness[k.triangles].mean(axis=1)) for k in layers)
     assert plan.volume(machine) == pytest.approx(room, rel=0.05)
 
 
 def test_an_upright_head_lays_what_it_does_not_touch(part):
     mesh, layers, paths = part
-    plan = curved_plan(paths, layers, mesh, MACHINE)
+    plan = plan_print(paths, layers, mesh, MACHINE)
     rows = words(gcode(plan, MACHINE))
     assert not rows[:, 3:6].any()
     assert np.ptp(rows[rows[:, 8] == 1][:, 2]) > 2.0
     with pytest.raises(InputError, match=r"tilt by up to 19 degrees, .* touches those above 12"):
-        curved_plan(paths, layers, mesh, replace(MACHINE, head_angle=78.0))
+        plan_print(paths, layers, mesh, replace(MACHINE, head_angle=78.0))
     short = replace(MACHINE.process, short="error")
     long = replace(MACHINE, minimum_length=60.0, process=short)
     with pytest.raises(
         InputError, match=r"no shorter than the 60 mm of machine.minimum_length; 4 of 4"
     ):
-        curved_plan(paths, layers, mesh, long)
+        plan_print(paths, layers, mesh, long)
 
 
 def test_the_tilt_has_a_limit():
@@ -174,7 +174,7 @@ def slanted():
 def test_copies_stand_as_far_apart_as_the_head_needs_and_hardly_more(kind):
     """No point of one copy lies in the cone of the head anywhere near the other."""
     machine = replace(MACHINE, kinematics=Kinematics(kind, CENTRE, 90.0))
-    plan = curved_plan(*slanted(), machine)
+    plan = plan_print(*slanted(), machine)
     whole = arranged([plan], [BedLayout(copies=(2, 1))], machine)
     moves = part_moves(whole, machine)
     left, right = whole.standing

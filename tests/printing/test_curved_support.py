@@ -16,8 +16,8 @@ from ccfem.fem.elasticity import Problem
 from ccfem.fem.materials import isotropic
 from ccfem.machine import Kinematics, Machine, Process
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.printing.curved_plan import curved_plan
 from ccfem.printing.export.gcode import gcode
+from ccfem.printing.print_plan import plan_print
 from ccfem.printing.support import support_layers, support_paths
 from ccfem.slicing.layers.level_surfaces import level_surfaces
 from ccfem.slicing.layers.slicer import standing
@@ -88,7 +88,7 @@ def between(place, chosen):
 def test_support_is_printed_below_the_part_and_before_it(part, kind):
     mesh, layers, support = part
     machine = Machine(kinematics=Kinematics(kind, CENTRE), process=Process(skirt_loops=1))
-    text = gcode(curved_plan(Toolpaths.empty(), layers, mesh, machine, support=support), machine)
+    text = gcode(plan_print(Toolpaths.empty(), layers, mesh, machine, support=support), machine)
     rows, kinds = moves(text)
     place, fed = rows[:, :3], rows[:, 6]
     props = kinds == "Support material"
@@ -132,7 +132,7 @@ def test_support_of_curved_layers_has_interface_gap_and_clearance(part):
     gap, clearance = 0.8, 2.0
     process = Process(support_interface=3, support_gap=gap, support_clearance=clearance)
     machine = Machine(kinematics=Kinematics("three_axes"), process=process)
-    text = gcode(curved_plan(Toolpaths.empty(), layers, mesh, machine, support=support), machine)
+    text = gcode(plan_print(Toolpaths.empty(), layers, mesh, machine, support=support), machine)
     rows, kinds = moves(text)
     lift = -support.columns.mesh.points[:, 2].min()
     props = kinds == "Support material"
@@ -184,6 +184,6 @@ def test_layers_that_look_down_are_stood_up(part):
     np.testing.assert_allclose(up, [0.0, 0.0, 1.0], atol=0.02)
     flat = Planar(count=3).cut(mesh)
     assert standing(flat, (1.0, 0.0, 0.0)) == (1.0, 0.0, 0.0)
-    plan = curved_plan(Toolpaths.empty(), layers, mesh, Machine(), (1.0, 0.0, 0.0))
+    plan = plan_print(Toolpaths.empty(), layers, mesh, Machine(), build=(1.0, 0.0, 0.0))
     assert any("upwards" in line for line in plan.warnings)
     assert any("--support" in line for line in plan.warnings)

@@ -5,7 +5,7 @@ import pytest
 
 from ccfem.machine import Kinematics, Machine
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
-from ccfem.printing.curved_plan import Matter, cleared, touched_length
+from ccfem.printing.head_lean import Matter, cleared, touched_length
 from ccfem.printing.islands import Islands, clashes, island_order, rests_on, steps_of
 from ccfem.printing.poses import under_bed
 

@@ -15,6 +15,7 @@ from ccfem.machine import Machine, machine_table, updated
 from ccfem.paths.plastic import Plastic
 from ccfem.paths.splitting.slabs import slabs_of
 from ccfem.paths.toolpaths import Toolpaths
+from ccfem.printing.bed_layout import Place
 from ccfem.printing.export.gcode import gcode
 from ccfem.printing.matrix_lines import gap_lines, matrix_fills
 from ccfem.printing.print_plan import plan_print
@@ -153,8 +154,8 @@ def test_a_solid_part_has_the_lines_that_it_always_had(walls):
     """A contour and a zigzag half a line in, less a quarter; further walls move it in."""
     mesh, width = box_mesh((20.0, 12.0, 2.0), (2, 1, 1)), MACHINE.matrix_width
     layers = Planar(heights=(1.0,)).cut(mesh)
-    slabs = slabs_of(layers, 0.0, 2.0, MACHINE)
-    fills = matrix_fills(slabs, layers, mesh, np.eye(3), np.zeros(2), MACHINE, Plastic(walls=walls))
+    slabs, place = slabs_of(layers, 0.0, 2.0, MACHINE), Place(np.eye(3), np.zeros(3))
+    fills = matrix_fills(slabs, layers, mesh, place, MACHINE, Plastic(walls=walls))
     section = corners_only(Planar(heights=(0.1,)).cut(mesh)[0].plane.polygon)
     profile, number = MACHINE.gcode, 0
     assert [fill is None for fill in fills] == [slab.fibre is not None for slab in slabs]

@@ -8,7 +8,7 @@ from ccfem.body.mesh.box import box_mesh
 from ccfem.machine import Machine, machine_table, updated
 from ccfem.paths.splitting import printed_strands
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.printing import part_moves, print_plan
+from ccfem.printing import flat_stack, part_moves, print_plan
 from ccfem.printing.export.gcode import gcode
 from ccfem.slicing.slicers.planar import Planar
 
@@ -24,9 +24,9 @@ def test_the_file_of_repeated_layers_is_that_of_layers_one_by_one(machine, monke
     paths = Toolpaths.concatenate(
         Toolpaths.from_plane(some, layer) for some, layer in zip(lines, layers, strict=True)
     )
-    laid, fibre_layer = [], print_plan.fibre_layer
+    laid, fibre_layer = [], flat_stack.fibre_layer
     monkeypatch.setattr(
-        print_plan, "fibre_layer", lambda *about: laid.append(about) or fibre_layer(*about)
+        flat_stack, "fibre_layer", lambda *about: laid.append(about) or fibre_layer(*about)
     )
 
     def file():
@@ -34,7 +34,7 @@ def test_the_file_of_repeated_layers_is_that_of_layers_one_by_one(machine, monke
 
     once = file()
     assert len(laid) == 2  # as many as there are different ones
-    for module in (print_plan, part_moves):
+    for module in (flat_stack, part_moves):
         monkeypatch.setattr(module, "repeating", one_by_one)
     monkeypatch.setattr(printed_strands, "repeated_layers", lambda _, some, __=None: all_of(some))
     assert file() == once
