@@ -147,7 +147,7 @@ class Solved:
         """
         case, stress = self.case, self.planned_on
         chosen = case.slicing if slicer is None else slicer
-        below: SupportLayers | None = None
+        below: SupportLayers | bool = support
         if support and has_field(chosen):
             layers, below = slice_with_support(chosen, stress, case.build, case.machine)
             if case.fibre is not None:
@@ -155,16 +155,15 @@ class Solved:
         else:
             layers = case.fibre_layers(stress, chosen)
         check_strands(layers, case.machine)
-        propped = support and not curved_layers(layers)
-        if propped:
-            below = None
+        if support and not curved_layers(layers):
+            below = True
             check_support(stress.mesh, layers, case.machine)
-        elif support and below is None:
+        elif below is True:
             raise InputError(NO_FIELD)
         strand = None if self.tests is None else self.tests.strand
         said = slicer_remarks(chosen, stress)
         stack = tuple(layers)
-        about = (strand, case.build, below, propped, said, self.every_layer, self.limits_only)
+        about = (strand, case.build, below, said, self.every_layer, self.limits_only)
         more = (self.longest_test, case.bed, self.course, case.plastic, case.scatter)
         return Part(stress, stack, case.machine, self.cases, *about, *more)
 

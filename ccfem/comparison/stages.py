@@ -85,10 +85,9 @@ class Part:
         Turn, place and copies on the bed.
     course : Course
         Where a print begins and halts.
-    support : SupportLayers, optional
-        Printed below curved layers.
-    propped : bool
-        Whether support is printed below what flat layers would lay in air.
+    support : SupportLayers or bool
+        Printed below curved layers; of flat ones, whether it is printed below what they would lay
+        in air.
     every_layer : bool
         Whether all indices are taken on every layer, and every layer is planned.
     limits_only : bool
@@ -110,8 +109,7 @@ class Part:
     cases: WeightedCases
     strand: Strand | None = None
     build: tuple[float, float, float] | None = None
-    support: SupportLayers | None = None
-    propped: bool = False
+    support: SupportLayers | bool = False
     remarks: tuple[str, ...] = ()
     every_layer: bool = False
     limits_only: bool = False
@@ -135,7 +133,7 @@ class Part:
     @cached_property
     def why_not_printable(self) -> tuple[str, ...]:
         """What keeps it from being printed, whatever is planned."""
-        layers = () if self.propped else self.flat_layers
+        layers = () if self.support else self.flat_layers
         air = in_air(self.stress.mesh, self.machine, layers)
         return tuple(filter(None, (self.refusal, air)))
 
@@ -462,7 +460,7 @@ def with_print(run: Run, part: Part) -> Run:
             part.layers,
             part.stress.mesh,
             part.machine,
-            part.support or part.propped,
+            part.support,
             part.layout.spin,
             part.plastic,
             part.build or (0.0, 0.0, 1.0),

@@ -13,10 +13,10 @@ from ccfem.machine.machine import Machine
 from ccfem.paths.splitting.printed_strands import PrintedStrands
 from ccfem.paths.toolpaths import FIBRE, SUPPORT, Toolpaths
 from ccfem.printing.bed_layout import Place
-from ccfem.printing.head_lean import Matter, Obstacles
 from ccfem.printing.islands import Islands, clashes, island_order, islands_of, rests_on, steps_of
 from ccfem.printing.laid_layer import COORDINATE_DIGITS, LaidLayer, Stack, in_order
 from ccfem.printing.layer_matrix import layer_matrix
+from ccfem.printing.poses import Matter, Obstacles
 from ccfem.printing.support import SupportLayers, support_paths
 from ccfem.slicing.layers.layer import Layer, plane_frame
 from ccfem.slicing.layers.slicer import Vector

@@ -15,8 +15,8 @@ from ccfem.paths.linking.print_order import nearest_end_order
 from ccfem.paths.splitting.printed_strands import border_crossings
 from ccfem.paths.splitting.slabs import StrandDensity
 from ccfem.paths.toolpaths import FIBRE, MATRIX, SUPPORT, Toolpaths
-from ccfem.printing.head_lean import Obstacles
 from ccfem.printing.matrix_lines import MatrixFill
+from ccfem.printing.poses import Obstacles
 
 # Flow of matrix over fibre: lines are laid so that the layer comes out exactly full.
 #

@@ -25,15 +25,15 @@ from ccfem.paths.toolpaths import FIBRE, MATRIX, Toolpaths
 from ccfem.printing.bed_layout import BedLayout, Place
 from ccfem.printing.curved_stack import curved_stack
 from ccfem.printing.flat_stack import flat_stack
-from ccfem.printing.head_lean import (
+from ccfem.printing.laid_layer import COORDINATE_DIGITS, Stack
+from ccfem.printing.poses import (
     Obstacles,
     check_tilt,
     cleared,
     contact_words,
+    poses,
     touched_length,
 )
-from ccfem.printing.laid_layer import COORDINATE_DIGITS, Stack
-from ccfem.printing.poses import poses
 from ccfem.printing.support import SupportLayers
 from ccfem.slicing.layers import Layer
 from ccfem.slicing.layers.layer import curved_layers, plane_frame
@@ -198,7 +198,7 @@ def plan_print(
     pieces while above a piece of a layer, that piece is printed first if possible
     (`ccfem.printing.islands`). The head stands along the normal of the layer, as far as
     `Kinematics.tilt_limit` allows, and leans where it would still touch something
-    (`ccfem.printing.head_lean`); remaining contact is stated in the warnings. The nozzle is at the
+    (`ccfem.printing.poses`); remaining contact is stated in the warnings. The nozzle is at the
     top of a layer, half its thickness above its middle.
 
     Parameters

@@ -5,9 +5,8 @@ import pytest
 
 from ccfem.machine import Kinematics, Machine
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
-from ccfem.printing.head_lean import Matter, cleared, touched_length
 from ccfem.printing.islands import Islands, clashes, island_order, rests_on, steps_of
-from ccfem.printing.poses import under_bed
+from ccfem.printing.poses import Matter, cleared, touched_length, under_bed
 
 UP = np.array([0.0, 0.0, 1.0])
 FIVE = Machine(head_angle=35.0, head_length=30.0, kinematics=Kinematics("head_head"))
