@@ -248,8 +248,8 @@ _Write = Callable[[], None]
 def _write_matrix(comparison: Comparison, folder: Path) -> None:
     """Write the matrix of curved layers for robots."""
     from ccfem.paths.toolpaths import MATRIX
+    from ccfem.printing.curved_stack import layer_matrix
     from ccfem.printing.export.robot_waypoints import write_robot_waypoints
-    from ccfem.printing.layer_matrix import layer_matrix
 
     layers, machine = comparison.layers, comparison.case.machine
     matrix = layer_matrix(layers, machine)

@@ -399,8 +399,8 @@ def fibre_layer(
     Parameters are those of `matrix_layer`, and the border of the part on the layer.
     """
     outside = float(shapely.length(shapely.difference(strings(lines), border)).sum())
-    few, _ = _printed(by_matrix, height, MATRIX)
-    fibre = Toolpaths.concatenate([few, _printed(lines, height, FIBRE)[0]])
+    kinds = np.repeat([FIBRE, MATRIX], [len(lines), len(by_matrix)])
+    fibre, _ = _printed([*lines, *by_matrix], height, kinds)
     return LaidLayer(
         fibre,
         height,
@@ -415,7 +415,7 @@ def fibre_layer(
 def _printed(
     lines: Sequence[FloatArray],
     height: float,
-    kind: int,
+    kind: int | IntArray,
     ways: Sequence[BoolArray] | None = None,
 ) -> tuple[Toolpaths, IntArray]:
     """Paths of one flat layer on the bed, in the order of printing; and their lines."""
@@ -435,7 +435,7 @@ def _printed(
         normals=np.broadcast_to([0.0, 0.0, 1.0], (len(points), 3)),
         offsets=offsets,
         layer=np.zeros(len(offsets) - 1, dtype=np.int64),
-        kind=np.full(len(offsets) - 1, kind),
+        kind=np.broadcast_to(kind, len(offsets) - 1),
         closed=np.zeros(len(offsets) - 1, dtype=bool),
         link=link,
     )
@@ -444,12 +444,19 @@ def _printed(
 
 
 def in_order(paths: Toolpaths) -> tuple[Toolpaths, IntArray, IntArray]:
-    """Paths in the order of printing, nearest end next; where they, and their points, were."""
+    """Paths in the order of printing: matrix before fibre, and of each the nearest end next.
+
+    Also where they, and their points, were before.
+    """
     if not len(paths):
         return paths, paths.layer, np.zeros(0, dtype=np.int64)
     starts, ends = (paths.points[at] for at in (paths.offsets[:-1], paths.offsets[1:] - 1))
-    order, backward, _ = nearest_end_order(starts, ends)
-    turned = backward.tolist()
+    parts, ways = [], []
+    for part in (paths.kind != FIBRE).nonzero()[0], (paths.kind == FIBRE).nonzero()[0]:
+        nearest, backward, _ = nearest_end_order(starts[part], ends[part])
+        parts.append(part[nearest])
+        ways.append(backward)
+    order, turned = np.concatenate(parts), np.concatenate(ways).tolist()
     rows = [
         np.arange(paths.offsets[k], paths.offsets[k + 1])[:: -1 if back else 1]
         for k, back in zip(order.tolist(), turned, strict=True)

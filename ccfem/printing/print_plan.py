@@ -196,7 +196,7 @@ def plan_print(
     layer height, less the share of the volume that the fibre takes, then the fibre. A layer of
     support is printed just before the layer of the part at its level. If the head would touch other
     pieces while above a piece of a layer, that piece is printed first if possible
-    (`ccfem.printing.islands`). The head stands along the normal of the layer, as far as
+    (`ccfem.printing.curved_stack`). The head stands along the normal of the layer, as far as
     `Kinematics.tilt_limit` allows, and leans where it would still touch something
     (`ccfem.printing.poses`); remaining contact is stated in the warnings. The nozzle is at the
     top of a layer, half its thickness above its middle.

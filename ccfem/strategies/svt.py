@@ -35,7 +35,7 @@ from ccfem.paths.linking.single_path import link_tracks
 from ccfem.paths.planning.infill import SPACING, Turns, check_fill, long_enough, with_turns
 from ccfem.paths.planning.strategy import Amount, LayerPlanner
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer, LayerStress, stress_on
+from ccfem.slicing.layers.layer import Layer, LayerStress, flat_layers, stress_on
 from ccfem.strategies.stress_tracing.band import band
 from ccfem.strategies.stress_tracing.frame import ARC_CHORD, frame
 from ccfem.strategies.stress_tracing.main_paths import main_paths
@@ -498,9 +498,7 @@ def _mean_size(stress: LayerStress) -> float:
 def _same_sections(layers: Sequence[Layer]) -> list[list[Layer]]:
     """Flat layers in groups of the same section."""
     sections: list[list[Layer]] = []
-    for layer in layers:
-        if layer.flat is None:
-            continue
+    for layer in flat_layers(layers):
         section = layer.plane.polygon
         for group in sections:
             other = group[0].plane.polygon

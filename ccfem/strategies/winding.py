@@ -22,7 +22,6 @@ from ccfem.base.checks import check_choices, check_fields
 from ccfem.base.errors import InputError
 from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.isocontours import isocontours
-from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.geometry.polylines import resample
 from ccfem.machine.machine import Machine
 from ccfem.paths.fields.layer_elements import Surface, positive_definite
@@ -326,11 +325,8 @@ class _Planner:
         lines = with_turns(self.strategy, lines, machine).lines
         normals = []
         for k, line in enumerate(lines):
-            nearest = nearest_on_triangles(layer.points, layer.triangles, line)
-            corners = layer.point_normals[layer.triangles[nearest.triangle]]
-            normal = np.einsum("qk,qkd->qd", nearest.weights, corners)
-            size = np.linalg.norm(normal, axis=1, keepdims=True)
-            normals.append(normal / np.maximum(size, 1e-300))
+            nearest = layer.nearest(line)
+            normals.append(layer.normals_at(nearest))
             lines[k] = nearest.points
         paths = Toolpaths.in_space(lines, normals, layer)
         return long_enough(paths, self.strategy.minimum_length, machine)

@@ -14,7 +14,7 @@ from ccfem.fem.elasticity import GivenStress
 from ccfem.judging.evaluation import evaluate
 from ccfem.machine import Machine
 from ccfem.paths.planning import plan
-from ccfem.printing.layer_matrix import layer_matrix
+from ccfem.printing.curved_stack import layer_matrix
 from ccfem.slicing.layers.level_surfaces import level_surfaces
 from ccfem.slicing.slicers import Spatial
 from ccfem.strategies import create

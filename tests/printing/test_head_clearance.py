@@ -5,7 +5,7 @@ import pytest
 
 from ccfem.machine import Kinematics, Machine
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
-from ccfem.printing.islands import Islands, clashes, island_order, rests_on, steps_of
+from ccfem.printing.curved_stack import Islands, clashes, island_order, rests_on, steps_of
 from ccfem.printing.poses import Matter, cleared, touched_length, under_bed
 
 UP = np.array([0.0, 0.0, 1.0])

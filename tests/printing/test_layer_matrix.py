@@ -7,8 +7,8 @@ from ccfem.body.mesh.box import box_mesh
 from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.machine import Machine
 from ccfem.paths.toolpaths import MATRIX
+from ccfem.printing.curved_stack import layer_matrix
 from ccfem.printing.export.robot_waypoints import write_robot_waypoints
-from ccfem.printing.layer_matrix import layer_matrix
 from ccfem.slicing.layers.level_surfaces import level_surfaces
 
 MACHINE = Machine(matrix_width=0.8, matrix_speed=11.0)

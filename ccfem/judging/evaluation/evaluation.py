@@ -27,7 +27,7 @@ from ccfem.machine.machine import Machine
 from ccfem.paths.fields.chart import chart_of
 from ccfem.paths.repeated import repeated_layers
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
-from ccfem.slicing.layers.layer import Layer, stress_on
+from ccfem.slicing.layers.layer import Layer, flat_layers, stress_on
 from ccfem.slicing.slicers.planar import Planar
 
 if TYPE_CHECKING:
@@ -333,8 +333,8 @@ def _below(layer: Layer, layers: Sequence[Layer], mesh: TetMesh, machine: Machin
         return None
     height, up = layer.flat.height, layer.plane.frame[2]
     level = height - 0.5 * (machine.strand_height + machine.highest_matrix(0.0))
-    flat = [each for each in layers if each.flat is not None and each.plane.height < height]
-    lower = max(flat, key=lambda each: each.plane.height, default=None)
+    under = [other for other in flat_layers(layers) if other.plane.height < height]
+    lower = max(under, key=lambda other: other.plane.height, default=None)
     if lower is not None and lower.plane.height >= level:
         return lower.plane.polygon
     bed = float((mesh.points @ up)[mesh.corners].min())

@@ -23,7 +23,7 @@ from ccfem.machine.machine import Machine
 from ccfem.paths.folds import WINDOW, Folds, joined_folds
 from ccfem.paths.repeated import repeated_layers
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
-from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer import Layer, flat_layers
 
 OUTSIDE = 0.05
 """Share of a strand's area that may lie outside the part. Our choice: the corners of a strand that
@@ -153,7 +153,7 @@ def _looked_at(
             place[k] = parts.beads.middle[most]
         return _Strands(parts.folds, share, place, parts if with_parts else None)
 
-    flat = sorted(layer.plane.height for layer in layers if layer.flat is not None)
+    flat = sorted(layer.plane.height for layer in flat_layers(layers))
     near = np.diff(flat).min(initial=np.inf) < machine.strand_height * (1.0 - _ROUNDING)
     if len(flat) < max(len(layers), 2) or near or (np.diff(fibre.layer) < 0).any():
         return one(fibre, layers)

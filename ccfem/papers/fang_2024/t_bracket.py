@@ -30,7 +30,7 @@ from ccfem.papers.fang_2024.authors import (
 from ccfem.paths.fields.chart import chart_of
 from ccfem.paths.planning import PartStrategy, Strategy, plan
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.printing.layer_matrix import layer_matrix
+from ccfem.printing.curved_stack import layer_matrix
 from ccfem.slicing.guidance.joints import joint_lines, joints_of
 from ccfem.slicing.layers.layer import Layer, stress_on
 from ccfem.slicing.principal_lines import strongest_stress

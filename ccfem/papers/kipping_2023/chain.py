@@ -11,7 +11,6 @@ from ccfem.base.arrays import FloatArray
 from ccfem.cases import create_case
 from ccfem.cases.case import Case
 from ccfem.fem.elasticity import StressField, solve
-from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.papers.contents import table
 from ccfem.paths.planning import plan
 from ccfem.paths.toolpaths import Toolpaths
@@ -69,9 +68,8 @@ def distances_below(layers: Sequence[Layer], judged: Sequence[bool] | None = Non
             near = ((middle > low - _FARTHEST) & (middle < high + _FARTHEST)).all(axis=1)
             if not near.any():
                 continue
-            foot = nearest_on_triangles(below.points, below.triangles, middle[near])
-            corners = below.points[below.triangles[foot.triangle]]
-            off = middle[near] - np.einsum("kc,kcd->kd", foot.weights, corners)
+            foot = below.nearest(middle[near])
+            off = middle[near] - below.values_at(foot, below.points)
             plane = np.abs(np.einsum("kd,kd->k", off, below.normals[foot.triangle]))
             inside = foot.distance - plane < _AT_BORDER * foot.distance + 1e-3
             nearest[near] = np.minimum(nearest[near], np.where(inside, plane, np.inf))

@@ -61,9 +61,7 @@ class Chart:
         """Images (n, 3) in the chart of points (n, 3) on the layer, mm."""
         if not len(points):
             return np.zeros((0, 3))
-        nearest = nearest_on_triangles(self.layer.points, self.layer.triangles, points)
-        corners = self.flat.points[self.layer.triangles[nearest.triangle]]
-        return np.asarray(np.einsum("qk,qkd->qd", nearest.weights, corners))
+        return self.layer.values_at(self.layer.nearest(points), self.flat.points)
 
     def flattened(self, paths: Toolpaths) -> Toolpaths:
         """Images in the chart of paths on the layer."""

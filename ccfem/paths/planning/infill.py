@@ -25,7 +25,7 @@ from ccfem.paths.raster.bitmap import Bitmap, bitmap
 from ccfem.paths.raster.patterns import Regions
 from ccfem.paths.raster.raster_plan import RasterPlan, raster_plan
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer, LayerStress
+from ccfem.slicing.layers.layer import Layer, LayerStress, flat_layers
 
 SPACING = Amount("spacing", most=1.0, least=20.0)
 """Amount of a strategy whose parameter `spacing` is the distance of strands in fibre widths."""
@@ -467,9 +467,7 @@ def short_share(layers: Sequence[Layer], machine: Machine) -> float:
     is the longer side of their smallest bounding rectangle. Curved layers do not count.
     """
     half, whole, short = 0.5 * machine.fibre_width, 0.0, 0.0
-    for layer in layers:
-        if layer.flat is None:
-            continue
+    for layer in flat_layers(layers):
         section = layer.plane.polygon
         whole += section.area
         for piece in shapely.get_parts(shapely.buffer(section, -half)):

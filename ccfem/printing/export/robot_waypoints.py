@@ -5,10 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
 from ccfem.base.whole import existing_file, whole_file
-from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.machine.machine import Machine
 from ccfem.paths.linking.print_order import step_speeds
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
@@ -64,19 +62,13 @@ def write_robot_waypoints(
     for index, layer in known.items():
         here = owner == index
         if here.any():
-            height[here] = _height(layer, fibre.points[here])
+            places = layer.nearest(fibre.points[here])
+            height[here] = layer.values_at(places, layer.local_thickness)
     table = np.column_stack([fibre.points, fibre.normals, height, feed])
     with whole_file(path) as temporary, temporary.open("w", encoding="ascii") as file:
         file.write(_HEADER + "\n")
         for k, p, row in zip(owner.tolist(), number.tolist(), table.tolist(), strict=True):
             file.write(f"{k},{p}," + ",".join(f"{value:.6g}" for value in row) + "\n")
-
-
-def _height(layer: Layer, points: FloatArray) -> FloatArray:
-    """Thickness of a layer at points on it, mm."""
-    nearest = nearest_on_triangles(layer.points, layer.triangles, points)
-    corners = layer.local_thickness[layer.triangles[nearest.triangle]]
-    return np.asarray(np.einsum("qk,qk->q", nearest.weights, corners))
 
 
 def write_layer_waypoints(path: str | Path, toolpaths: Toolpaths, layer: int) -> None:
@@ -136,10 +128,8 @@ def read_layer_waypoints(path: str | Path, layer: Layer) -> Toolpaths:
         ) from None
     if not np.isfinite(points).all():
         raise InputError(f"{path} has a place that is no number: mend or leave out that row")
-    nearest = nearest_on_triangles(layer.points, layer.triangles, points)
-    corners = layer.point_normals[layer.triangles[nearest.triangle]]
-    normals = np.einsum("qk,qkd->qd", nearest.weights, corners)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    nearest = layer.nearest(points)
+    normals = layer.normals_at(nearest)
     cut = np.flatnonzero(np.linalg.norm(np.diff(points, axis=0), axis=1) > _JUMP) + 1
     lines, across = np.split(points, cut), np.split(normals, cut)
     for k, line in enumerate(lines):

@@ -12,7 +12,7 @@ from ccfem.base.parallel import in_threads
 from ccfem.geometry.offsets import offset_rings
 from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
-from ccfem.paths.fields.chart import Chart
+from ccfem.paths.fields.chart import Chart, IdentityChart
 from ccfem.paths.toolpaths import MATRIX, Toolpaths
 from ccfem.printing.support.matched_layers import SupportLayers
 from ccfem.slicing.layers.layer import Layer, Plane, plane_frame
@@ -68,7 +68,7 @@ def support_paths(
             rings += [ring for level in levels for ring in level]
         paths = Toolpaths.from_plane(rings, seen.flat)
         paths = replace(paths, kind=np.full(len(paths), MATRIX, dtype=paths.kind.dtype))
-        return paths if seen.flat is layer else seen.lifted(paths)
+        return seen.lifted(paths)
 
     return Toolpaths.concatenate(in_threads(filled, numbered))
 
@@ -77,7 +77,7 @@ def _from_above(layer: Layer, frame: FloatArray) -> Chart:
     """Look at a layer along the build direction: none of a support lies upside down to it."""
     lengths = np.ones((len(layer.triangles), 2))
     if layer.flat is not None:
-        return Chart(layer, layer, lengths)
+        return IdentityChart(layer, layer, lengths)
     seen = layer.points @ frame.T * [1.0, 1.0, 0.0]
     flat = replace(layer, points=seen, flat=Plane(np.eye(3), 0.0), walls=())
     return Chart(layer, flat, lengths)

@@ -15,7 +15,7 @@ from ccfem.base.tensor import in_axes
 from ccfem.body.mesh.round_walls import RoundWall, moved_onto
 from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.facets import connected, sides_at
-from ccfem.geometry.locate import Simplices
+from ccfem.geometry.locate import Nearest, Simplices, nearest_on_triangles
 from ccfem.geometry.shapes import Region
 
 # The plane of a flat layer: its frame and height, and coordinates in it.
@@ -154,6 +154,20 @@ class Layer(Shown):
         w = self.weights.reshape((-1,) + (1,) * (nodal.ndim - 1))
         return (1.0 - w) * nodal[self.nodes[:, 0]] + w * nodal[self.nodes[:, 1]]
 
+    def nearest(self, points: FloatArray) -> Nearest:
+        """Places of the layer that are nearest to points (q, 3), mm."""
+        return nearest_on_triangles(self.points, self.triangles, points)
+
+    def values_at(self, places: Nearest, values: FloatArray) -> FloatArray:
+        """Values at places of the layer, (q, ...), of a field given at its points."""
+        corners = values[self.triangles[places.triangle]]
+        return np.asarray(np.einsum("qk,qk...->q...", places.weights, corners))
+
+    def normals_at(self, places: Nearest) -> FloatArray:
+        """Normals of the layer at places of it, (q, 3), of length 1."""
+        normals = self.values_at(places, self.point_normals)
+        return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+
     @property
     def _across(self) -> FloatArray:
         """Cross product of two sides of each triangle, (t, 3): twice its area, along its normal."""
@@ -215,6 +229,11 @@ class Layer(Shown):
 def curved_layers(layers: Sequence[Layer]) -> tuple[Layer, ...]:
     """Those of some layers that lie in no plane."""
     return tuple(layer for layer in layers if layer.flat is None)
+
+
+def flat_layers(layers: Iterable[Layer]) -> tuple[Layer, ...]:
+    """Those of some layers that lie in a plane."""
+    return tuple(layer for layer in layers if layer.flat is not None)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
 from ccfem.fem.elasticity import PartStress
 from ccfem.machine.machine import Machine
-from ccfem.slicing.layers.layer import Layer, curved_layers
+from ccfem.slicing.layers.layer import Layer, curved_layers, flat_layers
 
 Vector = tuple[float, float, float]
 Content = TypeVar("Content")
@@ -115,9 +115,7 @@ def check_pitch(layers: Sequence[Layer], machine: Machine) -> None:
 
     Curved layers are not checked, since their distance varies.
     """
-    check_heights(
-        np.sort([layer.flat.height for layer in layers if layer.flat is not None]), machine
-    )
+    check_heights(np.sort([layer.plane.height for layer in flat_layers(layers)]), machine)
 
 
 def check_heights(heights: FloatArray, machine: Machine) -> None:

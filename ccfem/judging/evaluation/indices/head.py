@@ -6,7 +6,6 @@ import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.geometry.cones import earlier_in_cones
-from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.geometry.polylines import merge_repeated, sample_midpoints
 from ccfem.judging.evaluation.layer_paths import (
     COARSE,
@@ -88,10 +87,8 @@ def sample_head(
         return HeadSamples(length, np.zeros(len(length)), np.zeros(len(length), dtype=bool))
     points, offsets, _ = merge_repeated(fibre.points, fibre.offsets, 1e-6)
     middle, _, length, _ = sample_midpoints(points, offsets, COARSE)
-    nearest = nearest_on_triangles(layer.points, layer.triangles, middle)
-    corners = layer.point_normals[layer.triangles[nearest.triangle]]
-    axis = np.einsum("sk,skd->sd", nearest.weights, corners)
-    axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-300)
+    nearest = layer.nearest(middle)
+    axis = layer.normals_at(nearest)
     tilt = np.degrees(np.arccos(np.clip(axis @ stack.build, -1.0, 1.0)))
     when = np.full(len(axis), layer.index)
     size = (machine.head_angle, machine.head_length)

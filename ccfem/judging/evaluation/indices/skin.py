@@ -6,7 +6,7 @@ import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.body.mesh import TetMesh
-from ccfem.geometry.locate import locate, nearest_on_triangles
+from ccfem.geometry.locate import locate
 from ccfem.geometry.polylines import merge_repeated, sample_midpoints
 from ccfem.geometry.shapes import INSIDE, section_places
 from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, LayerSamples
@@ -80,10 +80,8 @@ def _over(layer: Layer, points: FloatArray) -> tuple[FloatArray, BoolArray]:
         plane = layer.plane
         beside = section_places(plane.project(points), plane.polygon) != INSIDE
         return np.broadcast_to(plane.frame[2], points.shape), beside
-    nearest = nearest_on_triangles(layer.points, layer.triangles, points)
-    corners = layer.point_normals[layer.triangles[nearest.triangle]]
-    normal = np.einsum("sk,skd->sd", nearest.weights, corners)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    nearest = layer.nearest(points)
+    normal = layer.normals_at(nearest)
     along = points - nearest.points
     along = along - np.einsum("sd,sd->s", along, normal)[:, None] * normal
     return normal, np.linalg.norm(along, axis=1) > 0.5 * nearest.distance + 1e-6

@@ -24,6 +24,7 @@ from ccfem.fem.materials import Material
 from ccfem.judging.virtual_testing.stiffness_test import VirtualTest
 from ccfem.judging.virtual_testing.strand import Failure, Limits
 from ccfem.slicing.layers import Layer
+from ccfem.slicing.layers.layer import flat_layers
 
 ZONES = (ZONE, 0.5 * ZONE, 0.0)
 """Distances, mm, from patches of loads and supports within which nothing is judged. The first gives
@@ -191,7 +192,7 @@ def layer_normals(layers: Sequence[Layer], places: FloatArray) -> FloatArray:
     of the six nearest triangles: the first eigenvector of the sum of ``n n^T``. Vectors are never
     averaged, since a normal has no sign.
     """
-    frames = [layer.flat.frame[2] for layer in layers if layer.flat is not None]
+    frames = [layer.plane.frame[2] for layer in flat_layers(layers)]
     if not layers:
         raise InputError("the bond between layers needs layers; got none: slice the part")
     if len(frames) == len(layers) and (np.ptp(frames, axis=0) == 0.0).all():
