@@ -48,227 +48,6 @@ _THIN, _TOO_THIN = 0.01, 0.1
 warning, and with one. Our choice."""
 
 
-def with_flow(
-    paths: Toolpaths,
-    section: Region,
-    height: float,
-    strands: Sequence[FloatArray],
-    below: float,
-    machine: Machine,
-    sections: Sequence[float] | None = None,
-    shares: FloatArray | None = None,
-    sparse: BoolArray | None = None,
-) -> tuple[Toolpaths, FloatArray, str]:
-    """Lines of a matrix layer with the height that each of their steps lays.
-
-    Parameters
-    ----------
-    paths : Toolpaths
-        Of one layer of matrix.
-    section : shapely (Multi)Polygon, mm
-        What the layer has to fill, in the plane of the paths; without sparse infill.
-    height : float, mm
-        Of the layer.
-    strands : sequence of (n, 2) arrays, mm
-        Fibre directly below it, none for a layer on matrix.
-    below : float, mm
-        Height of the fibre layers that they lie in.
-    sections : sequence of float, mm^2, optional
-        Section of each strand; by default `Machine.strand_area`.
-    shares : (K,) array, optional
-        Width of each path over that of the machine; by default 1.
-    sparse : (K,) bool array, optional
-        Paths of sparse infill, which end in the section, and are not scaled; by default none.
-
-    Returns
-    -------
-    paths : Toolpaths
-        With a point wherever the height changes by a twentieth.
-    share : (P,) array, mm
-        Height of matrix, a line wide, on the step from each point; 0 at the end of a line.
-    warning : str
-        Where strands stand higher on more than a hundredth; else empty.
-
-    Raises
-    ------
-    InputError
-        Where strands stand higher than the matrix above them on more than a tenth of the layer.
-    """
-    points, offsets, segment = subdivide(paths.points, paths.offsets, _PIECE)
-    start = np.flatnonzero(starts_segment(offsets))
-    length = np.linalg.norm(points[start + 1] - points[start], axis=1)
-    middle = 0.5 * (points[start] + points[start + 1])[:, :2]
-    way = paths.link[segment]
-    length[way[start]] = 0.0  # nothing is laid there
-    if sections is None:
-        sections = [machine.strand_area] * len(strands)
-    volume = height + below - _density(strands, sections, middle, machine)
-    least = min(machine.least_line, height)
-    warning = _check(volume, length, height, below, least, machine)
-    wanted = np.maximum(volume, least)
-    if machine.gcode.compact:
-        last = np.searchsorted(start, offsets[1:]) - 1
-        wanted = _evened(wanted / height, length, last) * height
-    level = np.full(len(points), -1)
-    level[start] = np.round(wanted / (_STEP * height)).astype(np.int64)
-    level[way] = -2
-    kept, share, long = _in_runs(_begins_level(level, segment), start, wanted, length)
-    if machine.gcode.compact:
-        share = share.round(6)  # equal heights are exactly equal
-    line = np.searchsorted(np.searchsorted(kept, offsets), np.arange(len(kept)), "right") - 1
-    if shares is not None:
-        share *= shares[line]
-    scaled = np.ones(len(kept), dtype=bool) if sparse is None else ~sparse[line]
-    ends = None if sparse is None or not sparse.any() else paths.select(sparse)
-    room = _room(section, height + below, strands, sections, ends, machine)
-    scale = room / (machine.matrix_width * (share * long)[scaled].sum())
-    share[scaled] *= np.clip(scale, 1.0 / _SCALE, _SCALE)
-    # No line thinner than the machine prints; those in gaps are narrower instead.
-    floor = np.full(len(share), least) if shares is None else least * shares[line]
-    share = np.where(long > 0.0, np.maximum(share, floor), 0.0)
-    fewer = replace(
-        paths,
-        points=points[kept],
-        normals=np.broadcast_to(paths.normals[0], (len(kept), 3)),
-        offsets=np.searchsorted(kept, offsets),
-        link=way[kept],
-    )
-    return fewer, share, warning
-
-
-def _in_runs(
-    keep: BoolArray, start: IntArray, wanted: FloatArray, length: FloatArray
-) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Points at which runs begin, and the mean of a height over each run, with its length."""
-    kept = np.flatnonzero(keep)
-    run = (np.cumsum(keep) - 1)[start]
-    long = np.asarray(np.bincount(run, length, len(kept)), dtype=np.float64)
-    mean = np.bincount(run, wanted * length, len(kept)) / np.maximum(long, 1e-300)
-    return kept, mean, long
-
-
-def _room(
-    section: Region,
-    height: float,
-    strands: Sequence[FloatArray],
-    sections: Sequence[float],
-    sparse: Toolpaths | None,
-    machine: Machine,
-) -> float:
-    """Volume, mm^3, that strands and the ends of sparse infill leave to the lines of a layer."""
-    inside = shapely.length(shapely.intersection(strings(strands), section))
-    room = section.area * height - float(inside @ np.asarray(sections))
-    if sparse is not None:
-        room -= machine.matrix_width * height * _ends_inside(sparse, section)
-    return room
-
-
-def _begins_level(level: IntArray, segment: IntArray) -> BoolArray:
-    """Mark points that are kept: of neighbouring pieces at one height level only the first."""
-    keep = np.append(True, np.diff(segment) > 0)
-    keep[1:] |= level[1:] != level[:-1]
-    return keep
-
-
-def _ends_inside(sparse: Toolpaths, section: Region) -> float:
-    """Length, mm, of lines of sparse infill that end in a section, within it."""
-    ends, solid = _laid_lines(sparse), shapely.force_2d(section)
-    shapely.prepare(solid)
-    ends = ends[shapely.intersects(ends, solid)]  # the ends of lines: few of their steps
-    return float(shapely.length(shapely.intersection(ends, section)).sum())
-
-
-def _laid_lines(paths: Toolpaths) -> Shapes:
-    """Lines of matrix, without the ways between them on which nothing is laid."""
-    start = np.flatnonzero(starts_segment(paths.offsets) & ~paths.link)
-    ends = np.stack([paths.points[start], paths.points[start + 1]], axis=1)
-    return shapely.linestrings(ends[:, :, :2])
-
-
-def _evened(share: FloatArray, length: FloatArray, last: IntArray) -> FloatArray:
-    """Heights of steps (s,) in as few runs of one height as `_MISPLACED` allows.
-
-    What is laid up to a place, over the way to there, is a line that is simplified.
-
-    Parameters
-    ----------
-    share, length : (s,) arrays
-        Height of each step over that of the layer, and its length, mm.
-    last : (K,) int array
-        Steps that paths end with: no run goes on from one path to the next.
-    """
-    along, laid = (np.append(0.0, np.cumsum(column)) for column in (length, share * length))
-    curve = np.column_stack([_STRETCH * along, laid])
-    at = bends(curve, last[:-1] + 1, _MISPLACED)
-    run = np.diff(laid[at]) / np.maximum(np.diff(along[at]), 1e-300)
-    return np.repeat(run, np.diff(at))
-
-
-def pad_flow(
-    paths: Toolpaths,
-    height: float,
-    strands: Sequence[FloatArray],
-    below: float,
-    machine: Machine,
-    sections: Sequence[float],
-) -> tuple[Toolpaths, FloatArray]:
-    """Lines of pads, with the height that strands on the pads below leave to each step.
-
-    Parameters and results are those of `with_flow`; nothing is scaled, and nothing refused.
-    """
-    points, offsets, _ = subdivide(paths.points, paths.offsets, _PIECE)
-    after = np.minimum(np.arange(len(points)) + 1, len(points) - 1)
-    middle = 0.5 * (points + points[after])[:, :2]
-    volume = height + below - _density(strands, sections, middle, machine)
-    finer = replace(
-        paths,
-        points=points,
-        normals=np.broadcast_to(paths.normals[0], (len(points), 3)),
-        offsets=offsets,
-        link=np.zeros(len(points), dtype=bool),
-    )
-    return finer, np.maximum(volume, min(machine.least_line, height))
-
-
-def _density(
-    strands: Sequence[FloatArray], sections: Sequence[float], places: FloatArray, machine: Machine
-) -> FloatArray:
-    """Volume of strands per area, mm, round places (k, 2)."""
-    if not len(strands):
-        return np.zeros(len(places))
-    return StrandDensity.of(strands, sections, machine.fibre_width, places).at(places)
-
-
-def _check(
-    volume: FloatArray,
-    length: FloatArray,
-    height: float,
-    below: float,
-    least: float,
-    machine: Machine,
-) -> str:
-    """Refuse strands that stand higher than the matrix above them on too much of the layer."""
-    thin = length[volume < least].sum() / length.sum()
-    if thin <= _THIN:
-        return ""
-    order = np.argsort(volume, kind="stable")
-    share = np.cumsum(length[order]) / length.sum()
-    missing = least - float(volume[order[np.searchsorted(share, 0.01)]])
-    cure = "" if machine.process.stacks == "end" else ", or set process.stacks = 'end'"
-    said = (
-        f"strands stand higher than the {height:.3g} mm of matrix above them on {thin:.0%} of the "
-        f"layer; {height + missing:.3g} mm would do: lay fibre layers at least "
-        f"{height + below + missing:.3g} mm apart{cure}"
-    )
-    if thin > _TOO_THIN:
-        raise InputError(said)
-    return said
-
-
-COORDINATE_DIGITS = 3
-"""Decimals of coordinates, mm."""
-
-
 @dataclass(frozen=True)
 class Below:
     """Fibre layers since the last layer of matrix.
@@ -302,6 +81,207 @@ class Below:
         return Below(
             [*self.strands, *by_matrix, *lines], self.sections + sections, self.height + thickness
         )
+
+    def density(self, places: FloatArray, machine: Machine) -> FloatArray:
+        """Volume of strands per area, mm, round places (k, 2)."""
+        if not self.strands:
+            return np.zeros(len(places))
+        density = StrandDensity.of(self.strands, self.sections, machine.fibre_width, places)
+        return density.at(places)
+
+
+def with_flow(
+    paths: Toolpaths,
+    section: Region,
+    height: float,
+    below: Below,
+    machine: Machine,
+    shares: FloatArray | None = None,
+    sparse: BoolArray | None = None,
+) -> tuple[Toolpaths, FloatArray, str]:
+    """Lines of a matrix layer with the height that each of their steps lays.
+
+    Parameters
+    ----------
+    paths : Toolpaths
+        Of one layer of matrix.
+    section : shapely (Multi)Polygon, mm
+        What the layer has to fill, in the plane of the paths; without sparse infill.
+    height : float, mm
+        Of the layer.
+    below : Below
+        Fibre directly below it.
+    shares : (K,) array, optional
+        Width of each path over that of the machine; by default 1.
+    sparse : (K,) bool array, optional
+        Paths of sparse infill, which end in the section, and are not scaled; by default none.
+
+    Returns
+    -------
+    paths : Toolpaths
+        With a point wherever the height changes by a twentieth.
+    share : (P,) array, mm
+        Height of matrix, a line wide, on the step from each point; 0 at the end of a line.
+    warning : str
+        Where strands stand higher on more than a hundredth; else empty.
+
+    Raises
+    ------
+    InputError
+        Where strands stand higher than the matrix above them on more than a tenth of the layer.
+    """
+    points, offsets, segment = subdivide(paths.points, paths.offsets, _PIECE)
+    start = np.flatnonzero(starts_segment(offsets))
+    length = np.linalg.norm(points[start + 1] - points[start], axis=1)
+    middle = 0.5 * (points[start] + points[start + 1])[:, :2]
+    way = paths.link[segment]
+    length[way[start]] = 0.0  # nothing is laid there
+    shares = np.ones(len(paths)) if shares is None else shares
+    sparse = np.zeros(len(paths), dtype=bool) if sparse is None else sparse
+    volume = height + below.height - below.density(middle, machine)
+    least = min(machine.least_line, height)
+    warning = _check(volume, length, height, below.height, least, machine)
+    wanted = np.maximum(volume, least)
+    if machine.gcode.compact:
+        last = np.searchsorted(start, offsets[1:]) - 1
+        wanted = _evened(wanted / height, length, last) * height
+    level = np.full(len(points), -1)
+    level[start] = np.round(wanted / (_STEP * height)).astype(np.int64)
+    level[way] = -2
+    kept, share, long = _in_runs(_begins_level(level, segment), start, wanted, length)
+    if machine.gcode.compact:
+        share = share.round(6)  # equal heights are exactly equal
+    line = np.searchsorted(np.searchsorted(kept, offsets), np.arange(len(kept)), "right") - 1
+    share *= shares[line]
+    scaled = ~sparse[line]
+    room = _room(section, height, below, paths.select(sparse), machine)
+    scale = room / (machine.matrix_width * (share * long)[scaled].sum())
+    share[scaled] *= np.clip(scale, 1.0 / _SCALE, _SCALE)
+    # No line thinner than the machine prints; those in gaps are narrower instead.
+    share = np.where(long > 0.0, np.maximum(share, least * shares[line]), 0.0)
+    fewer = replace(
+        paths,
+        points=points[kept],
+        normals=np.broadcast_to(paths.normals[0], (len(kept), 3)),
+        offsets=np.searchsorted(kept, offsets),
+        link=way[kept],
+    )
+    return fewer, share, warning
+
+
+def _in_runs(
+    keep: BoolArray, start: IntArray, wanted: FloatArray, length: FloatArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Points at which runs begin, and the mean of a height over each run, with its length."""
+    kept = np.flatnonzero(keep)
+    run = (np.cumsum(keep) - 1)[start]
+    long = np.asarray(np.bincount(run, length, len(kept)), dtype=np.float64)
+    mean = np.bincount(run, wanted * length, len(kept)) / np.maximum(long, 1e-300)
+    return kept, mean, long
+
+
+def _room(
+    section: Region, height: float, below: Below, sparse: Toolpaths, machine: Machine
+) -> float:
+    """Volume, mm^3, that strands and the ends of sparse infill leave to the lines of a layer."""
+    height = height + below.height
+    inside = shapely.length(shapely.intersection(strings(below.strands), section))
+    room = section.area * height - float(inside @ np.asarray(below.sections))
+    return room - machine.matrix_width * height * _ends_inside(sparse, section)
+
+
+def _begins_level(level: IntArray, segment: IntArray) -> BoolArray:
+    """Mark points that are kept: of neighbouring pieces at one height level only the first."""
+    keep = np.append(True, np.diff(segment) > 0)
+    keep[1:] |= level[1:] != level[:-1]
+    return keep
+
+
+def _ends_inside(sparse: Toolpaths, section: Region) -> float:
+    """Length, mm, of lines of sparse infill that end in a section, within it."""
+    if not len(sparse):
+        return 0.0
+    ends, solid = _laid_lines(sparse), shapely.force_2d(section)
+    shapely.prepare(solid)
+    ends = ends[shapely.intersects(ends, solid)]  # the ends of lines: few of their steps
+    return float(shapely.length(shapely.intersection(ends, section)).sum())
+
+
+def _laid_lines(paths: Toolpaths) -> Shapes:
+    """Lines of matrix, without the ways between them on which nothing is laid."""
+    start = np.flatnonzero(starts_segment(paths.offsets) & ~paths.link)
+    ends = np.stack([paths.points[start], paths.points[start + 1]], axis=1)
+    return shapely.linestrings(ends[:, :, :2])
+
+
+def _evened(share: FloatArray, length: FloatArray, last: IntArray) -> FloatArray:
+    """Heights of steps (s,) in as few runs of one height as `_MISPLACED` allows.
+
+    What is laid up to a place, over the way to there, is a line that is simplified.
+
+    Parameters
+    ----------
+    share, length : (s,) arrays
+        Height of each step over that of the layer, and its length, mm.
+    last : (K,) int array
+        Steps that paths end with: no run goes on from one path to the next.
+    """
+    along, laid = (np.append(0.0, np.cumsum(column)) for column in (length, share * length))
+    curve = np.column_stack([_STRETCH * along, laid])
+    at = bends(curve, last[:-1] + 1, _MISPLACED)
+    run = np.diff(laid[at]) / np.maximum(np.diff(along[at]), 1e-300)
+    return np.repeat(run, np.diff(at))
+
+
+def pad_flow(
+    paths: Toolpaths, height: float, below: Below, machine: Machine
+) -> tuple[Toolpaths, FloatArray]:
+    """Lines of pads, with the height that strands on the pads below leave to each step.
+
+    Parameters and results are those of `with_flow`; nothing is scaled, and nothing refused.
+    """
+    points, offsets, _ = subdivide(paths.points, paths.offsets, _PIECE)
+    after = np.minimum(np.arange(len(points)) + 1, len(points) - 1)
+    middle = 0.5 * (points + points[after])[:, :2]
+    volume = height + below.height - below.density(middle, machine)
+    finer = replace(
+        paths,
+        points=points,
+        normals=np.broadcast_to(paths.normals[0], (len(points), 3)),
+        offsets=offsets,
+        link=np.zeros(len(points), dtype=bool),
+    )
+    return finer, np.maximum(volume, min(machine.least_line, height))
+
+
+def _check(
+    volume: FloatArray,
+    length: FloatArray,
+    height: float,
+    below: float,
+    least: float,
+    machine: Machine,
+) -> str:
+    """Refuse strands that stand higher than the matrix above them on too much of the layer."""
+    thin = length[volume < least].sum() / length.sum()
+    if thin <= _THIN:
+        return ""
+    order = np.argsort(volume, kind="stable")
+    share = np.cumsum(length[order]) / length.sum()
+    missing = least - float(volume[order[np.searchsorted(share, 0.01)]])
+    cure = "" if machine.process.stacks == "end" else ", or set process.stacks = 'end'"
+    said = (
+        f"strands stand higher than the {height:.3g} mm of matrix above them on {thin:.0%} of the "
+        f"layer; {height + missing:.3g} mm would do: lay fibre layers at least "
+        f"{height + below + missing:.3g} mm apart{cure}"
+    )
+    if thin > _TOO_THIN:
+        raise InputError(said)
+    return said
+
+
+COORDINATE_DIGITS = 3
+"""Decimals of coordinates, mm."""
 
 
 @dataclass(frozen=True)
@@ -373,12 +353,13 @@ def matrix_layer(
     sparse = which >= len(fill.lines) - fill.sparse
     heights, warning = np.zeros(0), ""
     room = np.array(fill.widths)[which] / machine.matrix_width
-    strands = (below.strands, below.height, machine, below.sections)
     if len(matrix):
-        matrix, heights, warning = with_flow(matrix, fill.solid, thickness, *strands, room, sparse)
+        matrix, heights, warning = with_flow(
+            matrix, fill.solid, thickness, below, machine, room, sparse
+        )
     pad, _ = _printed(pads, height, SUPPORT)
     if len(pad):
-        pad, high = pad_flow(pad, thickness, *strands)
+        pad, high = pad_flow(pad, thickness, below, machine)
         matrix, heights = Toolpaths.concatenate([matrix, pad]), np.append(heights, high)
         room = np.append(room, np.ones(len(pad)))
         sparse = np.append(sparse, np.zeros(len(pad), dtype=bool))

@@ -15,7 +15,7 @@ from ccfem.machine import machine_from, machine_names
 from ccfem.paths.splitting.slabs import LOW, slabs_of
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.printing.export.gcode import gcode
-from ccfem.printing.laid_layer import with_flow
+from ccfem.printing.laid_layer import Below, with_flow
 from ccfem.printing.print_plan import plan_print
 from ccfem.slicing.slicers.planar import Planar
 
@@ -46,7 +46,7 @@ def test_no_line_is_thinner_than_the_machine_prints():
     stack = [np.array([[0.0, 5.0 + 0.01 * k], [40.0, 5.0 + 0.01 * k]]) for k in range(3)]
     section = shapely.box(0.0, 0.0, 40.0, 10.0)
     paths = Toolpaths.from_plane(lines, layer)
-    _, laid, _ = with_flow(paths, section, 0.15, stack, 0.1, machine)
+    _, laid, _ = with_flow(paths, section, 0.15, Below().under(stack, [], 0.1, machine), machine)
     ends = laid == 0.0
     assert ends.sum() == len(lines)
     assert laid[~ends].min() == machine.least_line

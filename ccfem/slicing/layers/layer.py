@@ -164,7 +164,7 @@ class Layer(Shown):
         return np.asarray(np.einsum("qk,qk...->q...", places.weights, corners))
 
     def normals_at(self, places: Nearest) -> FloatArray:
-        """Normals of the layer at places of it, (q, 3), of length 1."""
+        """Return the normals of the layer at places of it, (q, 3), of length 1."""
         normals = self.values_at(places, self.point_normals)
         return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
 

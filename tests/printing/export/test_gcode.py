@@ -17,7 +17,7 @@ from ccfem.machine import Machine, Process, SpeedTable
 from ccfem.machine.gcode_profile import GcodeProfile
 from ccfem.paths.toolpaths import MATRIX, Toolpaths
 from ccfem.printing.export.gcode import gcode, write_gcode
-from ccfem.printing.laid_layer import with_flow
+from ccfem.printing.laid_layer import Below, with_flow
 from ccfem.printing.print_plan import check_machine, plan_print
 from ccfem.slicing.slicers.planar import Planar
 
@@ -289,7 +289,7 @@ def test_flow_follows_the_section_within_a_tenth(wide, scale):
         closed=np.zeros(1, bool),
     )
     strip = shapely.box(0.0, -0.5 * wide, 50.0, 0.5 * wide)
-    found, laid, warning = with_flow(paths, strip, 0.5, [], 0.0, MACHINE)
+    found, laid, warning = with_flow(paths, strip, 0.5, Below(), MACHINE)
     assert found.lengths.sum() == pytest.approx(50.0)
     np.testing.assert_allclose(laid[:-1], 0.5 * scale)
     assert not warning
