@@ -85,11 +85,11 @@ def matrix_sections(
     width = machine.matrix_width
 
     @cache
-    def covered(around: frozenset[Region]) -> Region:
-        return shapely.intersection_all(list(around))
+    def covered(around: tuple[Region, ...]) -> Region:
+        return shapely.intersection_all(around)
 
     @cache
-    def sparse(section: Region, around: frozenset[Region], near: frozenset[Region]) -> Region:
+    def sparse(section: Region, around: tuple[Region, ...], near: tuple[Region, ...]) -> Region:
         reach = 0.5 * _SLIVER * width
         skin = shapely.buffer(shapely.difference(section, covered(around)), -reach, quad_segs=_ARC)
         solid = [shapely.buffer(skin, reach + _ANCHOR * width, quad_segs=_ARC)]
@@ -101,19 +101,21 @@ def matrix_sections(
         parts = [part for part in shapely.get_parts(opened) if part.area > least]
         return parts[0] if len(parts) == 1 else shapely.MultiPolygon(parts)
 
-    def near_fibre(slab: Slab) -> frozenset[Region]:
+    def near_fibre(slab: Slab) -> tuple[Region, ...]:
         reach = (plastic.fibre_skins - 0.5) * machine.highest_matrix(0.0)
         half = 0.5 * machine.strand_height
-        return frozenset(
+        near = (
             area
             for height, area in areas
             if height - half - slab.upper < reach and slab.lower - height - half < reach
         )
+        return tuple(dict.fromkeys(near))
 
     count = len(ordered)
     for place, k in enumerate(of_matrix):
         window = range(place - plastic.skins, place + plastic.skins + 1)
-        around = frozenset(ordered[j] if 0 <= j < count else NOTHING for j in window)
+        # In their order: that of a set differs from one run of Python to the next.
+        around = tuple(dict.fromkeys(ordered[j] if 0 <= j < count else NOTHING for j in window))
         if k in sections and NOTHING not in around:
             slab, section, _ = sections[k]
             sections[k] = MatrixSection(slab, section, sparse(section, around, near_fibre(slab)))

@@ -60,6 +60,20 @@ def test_a_ledge_is_a_top_too():
     assert thicker[4].sparse.contains(shapely.Point(15.0 - 2.3 * WIDTH, 15.0))
 
 
+def test_regions_are_combined_from_the_lowest_layer_up(monkeypatch):
+    """In the order of a set, places differed by rounding from one run of Python to the next."""
+    box = box_mesh((SIDE, SIDE, 8.0), (2, 2, 1))
+    cone = TetMesh(box.points * (1.0 - 0.02 * box.points[:, 2:]) ** [1, 1, 0], box.cells)
+    combined, intersection = [], shapely.intersection_all
+    monkeypatch.setattr(
+        shapely, "intersection_all", lambda some: combined.append(some) or intersection(some)
+    )
+    _sections(cone, 10, Plastic("grid", 0.2, 2, 3))
+    assert [len(some) for some in combined] == [7] * 4
+    for some in combined:
+        assert (np.diff([region.area for region in some]) < 0.0).all()
+
+
 def test_layers_beside_fibre_are_solid_where_fibre_may_lie():
     mesh = box_mesh((SIDE, SIDE, 16.0), (2, 2, 1))
     fibre = Planar(heights=(8.0,)).cut(mesh)
