@@ -8,10 +8,7 @@ import numpy as np
 from ccfem.base.arrays import IntArray
 from ccfem.geometry.shapes import corners_only
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer
-
-_DECIMALS = 9
-"""Of coordinates, mm, in which paths that are the same agree: only rounding differs."""
+from ccfem.slicing.layers.layer import SAME_DECIMALS, Layer
 
 
 def repeated_layers(
@@ -43,7 +40,7 @@ def _digest(toolpaths: Toolpaths, layer: Layer) -> bytes:
     paths, digest = toolpaths.on_layer(layer.index), hashlib.sha256(layer.flat.frame.tobytes())
     places = paths.points @ layer.flat.frame.T - [0.0, 0.0, layer.flat.height]
     for column in (
-        places.round(_DECIMALS) + 0.0,
+        places.round(SAME_DECIMALS) + 0.0,
         paths.offsets,
         paths.kind,
         paths.closed,

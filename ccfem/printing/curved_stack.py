@@ -208,36 +208,25 @@ class Islands:
 
 def islands_of(layers: Sequence[Layer]) -> Islands:
     """Find the islands of layers, from the first printed to the last."""
-    stack, piece, counts, reach = [], [], [], []
-    points, normals, tops, areas = [], [], [], []
+    columns = []
     for number, layer in enumerate(layers):
         middle = layer.points[layer.triangles].mean(axis=1)
         cube = np.floor(middle / _COARSE).astype(np.int64)
         # Piece by piece, and in each one patch after the other: see `groups_in_cones`.
         key = np.column_stack([layer.component, cube // _PATCH, cube])
         _, first, which = np.unique(key, axis=0, return_index=True, return_inverse=True)
-        stands = np.bincount(which.ravel(), layer.areas, minlength=len(first))
+        area = np.bincount(which.ravel(), layer.areas, len(first)).astype(np.float64)
         count = np.bincount(layer.component[first])
-        points.append(middle[first])
-        normals.append(layer.normals[first])
+        points, normals = middle[first], layer.normals[first]
         half = 0.5 * layer.local_thickness[layer.triangles[first]].mean(axis=1)
-        tops.append(points[-1] + half[:, None] * normals[-1])
-        areas.append(stands)
-        counts.append(count)
-        stack.append(np.full(len(count), number))
-        piece.append(np.arange(len(count)))
-        reach.append(np.full(len(count), 2.0 * layer.thickness + _COARSE))
-    offsets = np.append(0, np.cumsum(np.concatenate(counts)))
-    return Islands(
-        np.concatenate(stack),
-        np.concatenate(piece),
-        np.concatenate(points),
-        np.concatenate(normals),
-        np.concatenate(tops),
-        np.concatenate(areas),
-        offsets,
-        np.concatenate(reach),
+        tops, reach = points + half[:, None] * normals, 2.0 * layer.thickness + _COARSE
+        pieces = (np.full(len(count), number), np.arange(len(count)))
+        columns.append((*pieces, points, normals, tops, area, count, np.full(len(count), reach)))
+    owner, piece, points, normals, tops, area, count, near = (
+        np.concatenate(column) for column in zip(*columns, strict=True)
     )
+    offsets = np.append(0, np.cumsum(count))
+    return Islands(owner, piece, points, normals, tops, area, offsets, near)
 
 
 def rests_on(islands: Islands) -> BoolArray:

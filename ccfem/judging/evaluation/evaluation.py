@@ -27,7 +27,7 @@ from ccfem.machine.machine import Machine
 from ccfem.paths.fields.chart import chart_of
 from ccfem.paths.repeated import repeated_layers
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
-from ccfem.slicing.layers.layer import Layer, flat_layers, stress_on
+from ccfem.slicing.layers.layer import SAME_DECIMALS, Layer, flat_layers, stress_on
 from ccfem.slicing.slicers.planar import Planar
 
 if TYPE_CHECKING:
@@ -40,8 +40,6 @@ COLUMNS: tuple[layer_paths.Column, ...] = tuple(
 
 _ROUNDING = 1e-3
 """Rounding, mm, of coordinates in path files."""
-_DECIMALS = 9
-"""Of the thickness, mm, in which layers that repeat others agree."""
 _DOWN = 0.01
 """Least cosine to the way down of a face that looks down: upright walls are bent by rounding."""
 
@@ -201,7 +199,7 @@ def _rows(
     )
     behind = [int(np.count_nonzero(late == layer.index)) for layer in layers]
     more = [
-        (round(layer.thickness, _DECIMALS), count, under and corners_only(under))
+        (round(layer.thickness, SAME_DECIMALS), count, under and corners_only(under))
         for layer, count, under in zip(layers, behind, below, strict=True)
     ]
     source = repeated_layers(toolpaths, layers, more)

@@ -11,16 +11,12 @@ from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError
 from ccfem.geometry.polylines import pack, sample_midpoints
 from ccfem.machine.machine import Machine
-from ccfem.slicing.layers import Layer
+from ccfem.slicing.layers.layer import SAME_DECIMALS, Layer
 
 LOW = 0.1
 """Least height of a layer of matrix, mm. Our choice."""
 _SAME = 1e-6
 """Heights closer than this, mm, are the same."""
-
-
-_DECIMALS = 9
-"""Of heights, mm."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +30,7 @@ class Slab:
     @property
     def height(self) -> float:
         """Its height, mm: equal ones are exactly equal."""
-        return round(self.upper - self.lower, _DECIMALS)
+        return round(self.upper - self.lower, SAME_DECIMALS)
 
 
 def slabs_of(

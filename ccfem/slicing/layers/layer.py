@@ -18,6 +18,10 @@ from ccfem.geometry.facets import connected, sides_at
 from ccfem.geometry.locate import Nearest, Simplices, nearest_on_triangles
 from ccfem.geometry.shapes import Region
 
+SAME_DECIMALS = 9
+"""Decimals of heights and coordinates, mm, in which those that are the same agree: only rounding
+differs."""
+
 # The plane of a flat layer: its frame and height, and coordinates in it.
 
 
