@@ -1,9 +1,12 @@
 import gc
 import os
+import subprocess
 
 import numpy as np
 import pytest
+from forked_children import ForkedChildren
 
+from ccfem.body.isolated import process
 from ccfem.body.mesh import TetMesh
 
 CUBE = np.array(
@@ -91,6 +94,23 @@ def meshes_of_tests(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("CCFEM_CACHE", str(tmp_path_factory.mktemp("meshes")))
         yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def forked_children():
+    """Fork the children that read and mesh; those of `started_children` start as for users."""
+    children = ForkedChildren()
+    with pytest.MonkeyPatch.context() as patch:
+        if hasattr(os, "fork"):
+            patch.setattr(process, "subprocess", children)
+        yield
+    children.end()
+
+
+@pytest.fixture
+def started_children(monkeypatch):
+    """Start each child of `ccfem.body.isolated` from nothing, as outside of tests."""
+    monkeypatch.setattr(process, "subprocess", subprocess)
 
 
 @pytest.fixture(scope="module")

@@ -123,7 +123,7 @@ def test_a_file_that_is_no_cad_file_is_one_line(parts, tmp_path):
     assert "\n" not in str(caught.value)
 
 
-def test_a_surface_that_gmsh_cannot_fill_stops_in_its_own_process(parts):
+def test_a_surface_that_gmsh_cannot_fill_stops_in_its_own_process(parts, started_children):
     with pytest.raises((ChildError, ccfem.base.errors.InputError)):
         in_own_process(
             "gmsh_meshing:cad_volume", seconds=60.0, path="/none.step", size=1.0, scale=1.0

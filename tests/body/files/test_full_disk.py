@@ -79,7 +79,7 @@ def test_what_cannot_be_written_is_one_line(tmp_path, name):
         assert os.listdir(tmp_path) == [name]
 
 
-def test_a_reader_whose_temporary_folder_is_full(tmp_path):
+def test_a_reader_whose_temporary_folder_is_full(tmp_path, started_children):
     write_stl(tmp_path / "box.stl", MESH.points, MESH.boundary)
     assert read_surface(tmp_path / "box.stl").volume == pytest.approx(1000.0)
     with largest_file(4000), pytest.raises(InputError, match="environment variable TMPDIR"):

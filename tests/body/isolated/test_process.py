@@ -8,6 +8,8 @@ from ccfem.body.files import read_mesh, read_surface
 from ccfem.body.isolated import process
 from ccfem.body.isolated.process import ChildError, in_own_process
 
+pytestmark = pytest.mark.usefixtures("started_children")
+
 CHILD = """
 import os, signal, time
 import numpy as np
