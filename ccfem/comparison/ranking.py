@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ccfem.comparison.headline import HEADLINE, TEST_COLUMNS, cell_text, headline_values
+from ccfem.comparison.headline import HEADLINE, TEST_COLUMNS, headline_values, value_text
 from ccfem.comparison.request import InAll, Wanted
 from ccfem.comparison.runs import Run
 from ccfem.judging.virtual_testing.equilibrium import IN_COMPRESSION, PARTIAL, TENSION
@@ -73,6 +73,7 @@ def best_values(runs: Sequence[Run], wanted: Wanted) -> dict[str, float]:
     ]
     order = ranking(equal, wanted)
     stiffest = len(order) > 1 and all(order_of(order[0], other) == FIRST for other in order[1:])
+    shown = [headline_values(run) for run in runs if run.evaluation is not None]
     best, columns = {}, [headline_values(run) for run in equal]
     for head in HEADLINE:
         values = [of_run.get(head.column, np.nan) for of_run in columns]
@@ -86,17 +87,9 @@ def best_values(runs: Sequence[Run], wanted: Wanted) -> dict[str, float]:
             winner = headline_values(order[0])[head.column]
         if head.column == "first_failure_load" and not _strongest(equal, winner):
             continue
-        texts = [
-            cell_text(run, head)[0]
-            for run in runs
-            if run.evaluation is not None and headline_values(run).get(head.column) != winner
-        ]
-        measured = next(
-            cell_text(run, head)[0]
-            for run in equal
-            if headline_values(run).get(head.column) == winner
-        )
-        if measured not in texts:
+        others = [of_run for of_run in shown if of_run.get(head.column) != winner]
+        measured = value_text({head.column: winner}, head)
+        if measured not in [value_text(of_run, head) for of_run in others]:
             best[head.column] = winner
     return best
 
