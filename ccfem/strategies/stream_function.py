@@ -20,6 +20,7 @@ from ccfem.base.parallel import beside, in_processes
 from ccfem.fem.elasticity import PartStress, StressField
 from ccfem.fem.elasticity.stress_field import WeightedCases, solved
 from ccfem.judging.virtual_testing import RHO, Strand, specimens
+from ccfem.judging.virtual_testing.strand import Limits
 from ccfem.machine.machine import Machine
 from ccfem.paths.fields.chart import chart_of, flat_view
 from ccfem.paths.fields.tensile import layer_tension
@@ -190,7 +191,7 @@ class StreamFunction:
         Raises
         ------
         InputError
-            When no layer has a tensile direction.
+            When no layer has a tensile direction, or the strength that is wanted is not known.
         """
         cases = WeightedCases.of(solved(stress, "stream_function"))
         length = self.natural_length(layers, machine)
@@ -235,7 +236,7 @@ class StreamFunction:
         Raises
         ------
         InputError
-            When no layer has a tensile direction in any case.
+            As `for_part`, where no layer has a tensile direction in any case.
         """
         least = 1.0 if len(cases) == 1 else _CASES_OVERFILL
         common = _Common(self, cases, tuple(layers), machine)
@@ -422,6 +423,10 @@ class _Common:
     cases: WeightedCases
     layers: tuple[Layer, ...]
     machine: Machine
+
+    def __post_init__(self) -> None:
+        if self.strategy.strength > 0.0:  # before anything is designed
+            Limits.of(self.cases.fields[0].problem.material)
 
     @cached_property
     def plain(self) -> list[Toolpaths]:
