@@ -129,8 +129,12 @@ def copy(tmp_path_factory):
         shutil.copytree(ROOT / folder, root / folder, ignore=ignored)
     # What is compiled is shared with the project, whoever compiles it first.
     for folder in {path.parent for path in (ROOT / "ccfem").rglob("*.py")}:
-        compiled(folder).mkdir(parents=True, exist_ok=True)
-        (root / folder.relative_to(ROOT) / "__pycache__").symlink_to(compiled(folder))
+        kept = compiled(folder)
+        kept.mkdir(parents=True, exist_ok=True)
+        if kept.name != "__pycache__":  # so is what Python compiled
+            for file in (folder / "__pycache__").glob("*.pyc"):
+                shutil.copy2(file, kept)
+        (root / folder.relative_to(ROOT) / "__pycache__").symlink_to(kept)
     shutil.copy(ROOT / "pyproject.toml", root)
     others = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
 
