@@ -23,7 +23,6 @@ from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create, named
 
 MACHINE = Machine()
-WIDE = Machine(fibre_width=1.3)
 NAMES = sorted(named())
 VARIANTS = [
     f"{name}-{variant}" for name in NAMES for variant in getattr(named()[name], "variants", {})
@@ -32,8 +31,8 @@ ALL = NAMES + VARIANTS
 QUICK = {"stream_function": {"evaluations": 2, "phases": 1}}
 """Parameters that none of the laws depends on, of strategies that are slow with their defaults."""
 
-SLOW = ("pruned", "stream_function", "streamline", "stripes", "svt")
-"""Strategies that lay wider fibre, so that there are fewer strands to plan."""
+SLOW = {"pruned": 1.7, "stream_function": 1.7, "streamline": 1.7, "stripes": 1.7, "svt": 1.3}
+"""Width, mm, of the fibre of slow strategies: where it is wide there are fewer strands to plan."""
 
 ALLOWED = {"pruned": 0.01, "stream_function": 0.01}
 """Share of the fibre that strategies may lay round tight turns where turns are cut."""
@@ -56,8 +55,8 @@ def strategy_of(label):
 
 
 def machine_of(strategy):
-    slow = tuple(named()[name] for name in SLOW)
-    return WIDE if isinstance(strategy, slow) else MACHINE
+    widths = (width for name, width in SLOW.items() if isinstance(strategy, named()[name]))
+    return Machine(fibre_width=next(widths, MACHINE.fibre_width))
 
 
 def plate_with_hole():
