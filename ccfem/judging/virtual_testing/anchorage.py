@@ -91,5 +91,15 @@ class Anchorage:
         starts = np.flatnonzero(new)
         run = np.searchsorted(starts, pieces, side="right") - 1
         begin, end = starts[run], np.append(starts[1:], len(carrying))[run] - 1
-        half = 0.5 * strands.length
+        half = self._half_lengths()
         return strands.arc[begin] - half[begin], strands.arc[end] + half[end]
+
+    def _half_lengths(self) -> FloatArray:
+        """Half the length of strand in which each piece lies, mm: cells share what is in a face."""
+        strands = self.strands
+        new = np.ones(len(strands.arc), dtype=bool)
+        new[1:] = strands.path[1:] != strands.path[:-1]
+        new[1:] |= np.abs(np.diff(strands.arc)) > 1e-6 * strands.length[1:]
+        starts = np.flatnonzero(new)
+        half: FloatArray = 0.5 * np.add.reduceat(strands.length, starts)[np.cumsum(new) - 1]
+        return half

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
+from ccfem.body.mesh.box import box_mesh
 from ccfem.body.mesh.patches import Box, Cylinder, Plane, patches_from_rules
 from ccfem.body.meshing import extrude
 from ccfem.comparison.tested_cases import in_all_cases
@@ -21,6 +22,7 @@ from ccfem.judging.virtual_testing.strand import Limits, Strand
 from ccfem.judging.virtual_testing.strands import cut_strands
 from ccfem.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
+from ccfem.slicing.slicers.planar import Planar
 
 WIDTH, DIAMETER, THICKNESS, END = 20.0, 8.0, 4.0, 12.0
 TENSILE, CRUSHING = 50.0, 60.0
@@ -222,6 +224,34 @@ def test_strands_beside_a_hole_hold_until_they_break_or_pull_out(pulled, line, h
     (joint,) = pinned_joints(stress, forces, 100.0, limits, anchorage)
     assert joint.loads.get("strand pull-out", 0.0) == pytest.approx(held, rel=0.03)
     assert joint.mode == "bearing"  # the matrix beside the hole holds more than one strand
+
+
+@pytest.mark.parametrize("place", [0.0, 0.37])
+def test_several_strands_across_a_plane_hold_by_their_shorter_sides(place):
+    """Each by itself: shear stress that is even times the girth and the shorter side, along it.
+
+    Of three along x, 3, 7 and 2.5 mm are beyond the plane or before it; one at 3:4 to its normal,
+    5 mm long there, counts by its cosine, .6; and one ends before it.
+    """
+    mesh = box_mesh((60.0, 20.0, 2.0), (17, 5, 1))
+    x = 30.0 + place
+    ends = [
+        ([x - 3.0, 2.0], [x + 15.0, 2.0]),
+        ([x - 20.0, 4.0], [x + 7.0, 4.0]),
+        ([x - 2.5, 6.0], [x + 2.6, 6.0]),
+        ([x - 3.0, 8.0], [x + 6.0, 20.0]),
+        ([x - 20.0, 18.0], [x - 1.0, 18.0]),
+    ]
+    (layer,) = Planar(count=1).cut(mesh)
+    lines = Toolpaths.from_plane([np.array(line) for line in ends], layer)
+    anchorage = Anchorage.of(cut_strands(lines, mesh), Machine())
+    whole = np.array([[-60.0, 60.0, -20.0, 20.0]])
+    held = anchorage.held(np.array([x, 0.0, 1.0]), np.eye(3), whole, np.inf)
+    flow = PULL_OUT_STRENGTH * 2.0 * (Machine().fibre_width + Machine().strand_height)
+    assert held == pytest.approx(flow * (3.0 + 7.0 + 2.5 + 0.6 * 5.0), rel=1e-9)
+    # Where strands break at the force of 4 mm, so much is what the longest of them holds.
+    held = anchorage.held(np.array([x, 0.0, 1.0]), np.eye(3), whole, 4.0 * flow)
+    assert held == pytest.approx(flow * (3.0 + 4.0 + 2.5 + 0.6 * 4.0), rel=1e-9)
 
 
 def test_a_hole_parts_where_matrix_and_strands_beside_it_have_gone():
