@@ -326,6 +326,14 @@ def test_layers_that_repeat_others_have_the_samples_that_they_would_take(make_pa
         np.testing.assert_allclose(repeated.values[name], every.values[name], rtol=1e-12)
 
 
+def test_a_place_that_rounds_to_zero_from_below_is_zero(make_part):
+    """Layers are compared by their bytes, in which -0 is not 0."""
+    part = make_part(bent, count=2)
+    lines = ([[5.0, y], [55.0, y]] for y in (0.0, -1e-12))
+    paths = Toolpaths.concatenate(part.paths(line, layer=k) for k, line in enumerate(lines))
+    assert repeated_layers(paths, part.layers).tolist() == [0, 0]
+
+
 def test_of_many_layers_some_tell_angles_and_distances(make_part):
     """What limits bound and what adds up is of all layers; the rest is that of the sample."""
     part = make_part(bent, count=5)
