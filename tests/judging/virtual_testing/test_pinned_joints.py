@@ -252,6 +252,10 @@ def test_several_strands_across_a_plane_hold_by_their_shorter_sides(place):
     # Where strands break at the force of 4 mm, so much is what the longest of them holds.
     held = anchorage.held(np.array([x, 0.0, 1.0]), np.eye(3), whole, 4.0 * flow)
     assert held == pytest.approx(flow * (3.0 + 4.0 + 2.5 + 0.6 * 4.0), rel=1e-9)
+    # The slanting one crosses the plane at y = 8 + 3 * 4 / 3.
+    there = np.array([[11.99, 12.01, -20.0, 20.0]])
+    held = anchorage.held(np.array([x, 0.0, 1.0]), np.eye(3), there, np.inf)
+    assert held == pytest.approx(flow * 0.6 * 5.0, rel=1e-9)
 
 
 def test_a_hole_parts_where_matrix_and_strands_beside_it_have_gone():
