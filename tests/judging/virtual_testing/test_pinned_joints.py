@@ -258,6 +258,19 @@ def test_several_strands_across_a_plane_hold_by_their_shorter_sides(place):
     assert held == pytest.approx(flow * 0.6 * 5.0, rel=1e-9)
 
 
+def test_a_strand_holds_no_farther_than_it_carries_and_as_far_as_it_does():
+    """It carries nothing up to a face of the cells, 5 mm before the plane, and then half."""
+    mesh = box_mesh((60.0, 20.0, 2.0), (12, 5, 1))
+    (layer,) = Planar(count=1).cut(mesh)
+    line = Toolpaths.from_plane([np.array([[10.0, 3.0], [50.0, 3.0]])], layer)
+    strands = cut_strands(line, mesh)
+    strands = replace(strands, share=np.where(strands.middle[:, 0] < 25.0, 0.0, 0.5))
+    anchorage = Anchorage(strands, 40.0)
+    whole = np.array([[-60.0, 60.0, -20.0, 20.0]])
+    held = anchorage.held(np.array([30.0, 0.0, 1.0]), np.eye(3), whole, np.inf)
+    assert held == pytest.approx(0.5 * 40.0 * 5.0, rel=1e-9)
+
+
 def test_a_hole_parts_where_matrix_and_strands_beside_it_have_gone():
     loads = {"bearing": 5.0, "net section": 2.0, "strand pull-out": 3.0, "shear-out": 4.0}
     joint = PinnedJoint("hole", np.zeros(3), np.ones(3), 8.0, 4.0, 1.0, 1.0, loads)
