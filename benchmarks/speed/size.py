@@ -1,11 +1,12 @@
 """Time and memory of a print, from part file to G-code, over the number of its layers.
 
-    python -m benchmarks.speed.size [LAYERS ...] [--size 400x300] [--strategy isocurve]
+    python -m benchmarks.speed.size [LAYERS ...] [--size 400x300] [--cells 1.5e6] [--strategy NAME]
 
 Each row is a process of its own that runs ``ccfem plan --gcode`` on a plate with three holes whose
-layers are 0.25 mm apart: clock, processor time and peak memory of its largest process, fibre, and
-what it wrote. The last lines are the exponents over the layers, by least squares of the logarithms,
-and what each further layer costs.
+layers are 0.25 mm apart, in about so many linear cells: clock, processor time and peak memory of
+its largest process, and what it wrote. Without a number of cells their edges are a 27th of
+the shorter side. The last lines are the exponents over the layers, by least squares of the
+logarithms, and what each further layer costs.
 """
 
 import argparse
@@ -51,12 +52,21 @@ bed = [600, 600, 600]
 """
 
 
-def plate(x: float, y: float, layers: int) -> str:
-    """Part file of a plate with so many layers."""
+_CELLS = 12.0 / 3.0**0.5
+"""Cells times the cube of their edge length, over the volume: a regular prism is three of them."""
+
+
+def edge_length(x: float, y: float, layers: int, cells: float) -> float:
+    """Edge length, mm, of so many cells in a plate with so many layers."""
+    return float((_CELLS * x * y * layers * _PITCH / cells) ** (1.0 / 3.0))
+
+
+def plate(x: float, y: float, layers: int, edge: float | None = None) -> str:
+    """Part file of a plate with so many layers, in cells of an edge length, mm."""
     small = min(x, y)
-    near = 0.2 * small
+    near, edge = 0.2 * small, edge or 0.037 * small
     return _PLATE.format(
-        x=x, y=y, height=layers * _PITCH, edge=0.037 * small, a=near, b=x - near, c=y - near,
+        x=x, y=y, height=layers * _PITCH, edge=edge, a=near, b=x - near, c=y - near,
         r=0.05 * small, m=0.5 * x, n=0.5 * y, d=0.13 * small,
     )  # fmt: skip
 
@@ -90,6 +100,7 @@ def main() -> None:
     )
     parser.add_argument("layers", type=int, nargs="*", default=[16, 32, 64])
     parser.add_argument("--size", default="400x300", help="of the plate, mm")
+    parser.add_argument("--cells", type=float, help="of the mesh, about")
     parser.add_argument("--strategy", default="isocurve")
     asked = parser.parse_args()
     x, y = map(float, asked.size.split("x"))
@@ -97,7 +108,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         for layers in asked.layers:
             part = Path(folder) / f"plate_{layers}.toml"
-            part.write_text(plate(x, y, layers))
+            edge = edge_length(x, y, layers, asked.cells) if asked.cells else None
+            part.write_text("order = 1\n" + plate(x, y, layers, edge))
             rows.append(measured(part, layers, asked.strategy, Path(folder) / str(layers)))
             if len(rows) == 1:
                 print("  ".join(f"{name:>12}" for name in rows[0]))

@@ -2,12 +2,14 @@
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from ccfem.base.row_blocks import RowBlocks
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -21,6 +23,8 @@ def read_only(values: ArrayLike, dtype: DTypeLike = float) -> NDArray[Any]:
 
     They are copied unless they are such an array of the right type already.
     """
+    if isinstance(values, RowBlocks):
+        return cast("NDArray[Any]", values)
     array = np.asarray(values)
     if array.dtype == dtype and array.flags.c_contiguous and not array.flags.writeable:
         return array
@@ -53,6 +57,8 @@ def is_shared(rows: NDArray[Any]) -> bool:
 
 def shared_rows(values: ArrayLike, dtype: DTypeLike = float) -> NDArray[Any]:
     """Return `values` as a read-only array whose rows are one row in memory where all are equal."""
+    if isinstance(values, RowBlocks):
+        return cast("NDArray[Any]", values)
     array = np.asarray(values)
     if len(array) < 2 or array.dtype != dtype:
         array = read_only(array, dtype)
@@ -75,10 +81,6 @@ _SMALL, _ALONE = 1_000_000, 2**25 + 4096
 grow where they are and leave no holes."""
 
 
-_MOVED = 100_000
-"""Rows that are moved at a time."""
-
-
 class RowBuffer:
     """Rows that come block by block, in one array that grows where it is.
 
@@ -96,6 +98,7 @@ class RowBuffer:
 
     def append(self, block: NDArray[Any]) -> None:
         """Add rows at the end."""
+        block = np.asarray(block)
         if not len(block):
             return
         begin, self._count = self._count, self._count + len(block)
@@ -110,35 +113,6 @@ class RowBuffer:
             self._rows[:begin] = first
         self._reserve(self._count)
         self._rows[begin : self._count] = block
-
-    def insert(self, places: Sequence[int], rows: NDArray[Any]) -> None:
-        """Insert rows before those at some places, which do not fall."""
-        count = self._count
-        if not len(places):
-            return
-        if self._one is not None and _alike(np.stack([self._one, *rows.astype(self._one.dtype)])):
-            self._count += len(places)
-            return
-        if self._one is not None:
-            self._rows = np.empty((count, *self._rows.shape[1:]), self._rows.dtype)
-            self._rows[:] = self._one
-            self._one = None
-        self._count = count + len(places)
-        self._reserve(self._count)
-        for number in range(len(places))[::-1]:
-            at = places[number]
-            # In pieces: rows that are moved onto themselves are copied first.
-            for end in range(count, at, -_MOVED):
-                begin = max(at, end - _MOVED)
-                self._rows[begin + number + 1 : end + number + 1] = self._rows[begin:end]
-            self._rows[at + number] = rows[number]
-            count = at
-
-    def seen(self) -> NDArray[Any]:
-        """All rows so far, read-only: to be forgotten before the buffer changes."""
-        if self._one is not None:
-            return np.broadcast_to(self._one, (self._count, *self._one.shape))
-        return sealed(self._rows[: self._count])
 
     def _reserve(self, count: int) -> None:
         if count <= len(self._rows):

@@ -67,6 +67,17 @@ def step_lengths(points: FloatArray, out: FloatArray | None = None) -> FloatArra
     return steps
 
 
+def extent(points: FloatArray, axes: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
+    """Least and largest coordinates of at least one point (P, d), or along axes (d, k)."""
+    low: FloatArray = np.full(points.shape[1] if axes is None else axes.shape[1], np.inf)
+    high = -low
+    for first in range(0, len(points), _TOGETHER):
+        piece = points[first : first + _TOGETHER]
+        piece = piece if axes is None else piece @ axes
+        low, high = np.minimum(low, piece.min(axis=0)), np.maximum(high, piece.max(axis=0))
+    return low, high
+
+
 def arc_lengths(points: FloatArray, offsets: IntArray) -> FloatArray:
     """Arc length from the start of its polyline to each point, (P,)."""
     along = np.cumsum(_steps(points, offsets))

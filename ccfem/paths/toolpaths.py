@@ -2,13 +2,15 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, RowBuffer, freeze, shared_rows
 from ccfem.base.display import Shown
-from ccfem.geometry.polylines import step_lengths
+from ccfem.base.row_blocks import RowBlocks
+from ccfem.geometry.polylines import extent, step_lengths
 from ccfem.slicing.layers.layer import Layer
 
 KINDS = ("fibre", "matrix", "support", "travel")
@@ -23,6 +25,9 @@ _COLUMNS: dict[str, tuple[Any, ...]] = {
     "link": (bool,),
 }
 """Arrays of paths that are joined as they are: their kind and the shape of a row."""
+
+_TOGETHER = 200_000
+"""Points whose steps are measured at a time."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +90,7 @@ class Toolpaths(Shown):
             raise ValueError("offsets must have one entry more than there are paths and end at P")
         if self.link.shape != (len(self.points),) or self.link[self.offsets[1:] - 1].any():
             raise ValueError("link must have shape (P,), and be false at the end of every path")
-        if not np.isfinite(self.points).all():
+        if len(self.points) and not np.isfinite(extent(self.points)).all():
             raise ValueError("points must be finite; got NaN or infinity")
 
     @classmethod
@@ -165,7 +170,10 @@ class Toolpaths(Shown):
     @classmethod
     def concatenate(cls, parts: Iterable["Toolpaths"]) -> "Toolpaths":
         """All paths of `parts`, in their order; none is kept while the next one is made."""
-        columns = {name: RowBuffer(kind, *shape) for name, (kind, *shape) in _COLUMNS.items()}
+        columns: dict[str, RowBuffer | RowBlocks] = {
+            name: RowBuffer(kind, *shape) for name, (kind, *shape) in _COLUMNS.items()
+        }
+        columns["points"] = RowBlocks(float, 3)
         sizes = [np.zeros(1, dtype=np.int64)]
         for part in parts:
             sizes.append(np.diff(part.offsets))
@@ -233,7 +241,13 @@ class Toolpaths(Shown):
         """Length of each path, (K,), mm."""
         if not len(self):
             return np.zeros(0)
-        steps = np.zeros(len(self.points))
-        step_lengths(self.points, steps[1:])
-        steps[self.offsets[:-1]] = 0.0
-        return np.add.reduceat(steps, self.offsets[:-1])
+        # Some paths at a time: those of a large print fill memory.
+        edges = np.searchsorted(self.offsets, np.arange(0, len(self.points), _TOGETHER))
+        total = np.zeros(len(self))
+        for first, last in pairwise(np.unique([*edges.tolist(), len(self)]).tolist()):
+            ends = self.offsets[first : last + 1]
+            steps = np.zeros(ends[-1] - ends[0])
+            step_lengths(self.points[ends[0] : ends[-1]], steps[1:])
+            steps[ends[:-1] - ends[0]] = 0.0
+            total[first:last] = np.add.reduceat(steps, ends[:-1] - ends[0])
+        return total

@@ -7,6 +7,7 @@ import numpy as np
 import shapely
 
 from ccfem.base.arrays import FloatArray
+from ccfem.geometry.polylines import extent
 from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import FIBRE
@@ -56,7 +57,7 @@ def beside(plan: PrintPlan, machine: Machine) -> Beside:
         and the skirt round all of them.
     """
     process, width = machine.process, machine.matrix_width
-    low, high = plan.paths.points[:, :2].min(axis=0), plan.paths.points[:, :2].max(axis=0)
+    low, high = (end[:2] for end in extent(plan.paths.points))
     half = 0.5 * width
     aside = _head_aside(plan, machine)
     low, high = low - half - aside, high + half + aside

@@ -61,7 +61,7 @@ def durations(moves: Moves, machine: Machine, heating: bool = True) -> FloatArra
             rows, first = rows[1:], False
         at = begin + rows
         stops = np.cumsum(halts[begin:end], dtype=np.int64)[rows]
-        seconds[at] = _motion(way[rows], length[rows], moves.speed[at], stops, machine)
+        seconds[at] = _motion(way[rows], length[rows], moves.speed[begin:end][rows], stops, machine)
     return seconds + waits(seconds, moves, machine) if heating else seconds
 
 

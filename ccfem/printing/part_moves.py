@@ -25,7 +25,6 @@ from ccfem.printing.moves import (
     HEAT,
     HEAT_BED,
     LAY,
-    LAYER,
     PATH_END,
     PATH_START,
     PAUSE,
@@ -360,8 +359,7 @@ def begin_layer(
     top, below : float, mm
         Tops of this layer and of the one below it.
     """
-    recorder.layer = number
-    recorder.note(LAYER, number)
+    recorder.begin_layer(number)
     warm = machine.process.warm_height
     if below <= warm < top and below > 0.0:
         if machine.process.warm_bed:

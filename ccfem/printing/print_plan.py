@@ -16,8 +16,9 @@ from ccfem.base.arrays import (
     shared_rows,
 )
 from ccfem.base.errors import InputError
+from ccfem.base.row_blocks import RowBlocks
 from ccfem.body.mesh.tet_mesh import TetMesh
-from ccfem.geometry.polylines import starts_segment, step_lengths
+from ccfem.geometry.polylines import extent, starts_segment, step_lengths
 from ccfem.machine.machine import Machine
 from ccfem.paths.plastic.plastic import SOLID, Plastic
 from ccfem.paths.splitting.printed_strands import SHORT, PrintedStrands, printed_strands
@@ -149,7 +150,7 @@ class PrintPlan:
         begins = starts_segment(self.paths.offsets)[:-1]
         matrix = np.repeat(self.paths.kind == MATRIX, np.diff(self.paths.offsets))[:-1] & begins
         volume = float((step_lengths(self.paths.points)[matrix] * self.laid[:-1][matrix]).sum())
-        fibre = float(self.paths.of_kind(FIBRE).lengths.sum())
+        fibre = float(self.paths.lengths[self.paths.kind == FIBRE].sum())
         return machine.matrix_width * volume + machine.strand_area * (fibre - self.outside)
 
 
@@ -272,8 +273,8 @@ def _place(
 
 def _joined(stack: Stack, strands: PrintedStrands) -> PrintPlan:
     """Plan of layers that are made one after the other: none is kept beside the plan."""
-    columns = {
-        "laid": RowBuffer(float),
+    columns: dict[str, RowBlocks | RowBuffer] = {
+        "laid": RowBlocks(float),
         "room": RowBuffer(float),
         "short": RowBuffer(bool),
         "sparse": RowBuffer(bool),
@@ -332,9 +333,10 @@ def check_bed(plan: PrintPlan, machine: Machine) -> None:
     points, bed = plan.paths.points, np.array(machine.gcode.bed)
     if not len(points):
         raise InputError("there is nothing to print: the part is thinner than a line of matrix")
-    reach = np.append(points.max(axis=0)[:2], points[:, 2].max() + machine.gcode.lift)
-    if (points.min(axis=0) < 0.0).any() or (reach > bed).any():
-        size = np.append(np.ptp(points, axis=0)[:2], reach[2])
+    low, high = extent(points)
+    reach = np.append(high[:2], high[2] + machine.gcode.lift)
+    if (low < 0.0).any() or (reach > bed).any():
+        size = np.append((high - low)[:2], reach[2])
         raise InputError(
             f"the part needs {size[0]:.4g} x {size[1]:.4g} x {size[2]:.4g} mm, but the printer has "
             f"{bed[0]:g} x {bed[1]:g} x {bed[2]:g} mm: turn it, or set bed in [machine.gcode]"

@@ -5,12 +5,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray, IntArray, RowBuffer
+from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.row_blocks import RowBlocks
 from ccfem.geometry.polylines import subdivide
 from ccfem.geometry.shapes import bends
 from ccfem.machine.machine import Machine
 from ccfem.printing.laid_layer import COORDINATE_DIGITS
-from ccfem.printing.moves import FEED, KINDS, LAY, TRAVEL, Moves, role
+from ccfem.printing.moves import FEED, KINDS, LAY, LAYER, TRAVEL, Moves, role
 
 _SAME = 1e-9
 _STRAIGHT = 1.5 * 10.0**-COORDINATE_DIGITS
@@ -117,7 +118,7 @@ class Recorder:
         self.rows: list[tuple[float, ...]] = []
         self.blocks: list[FloatArray] = []
         shapes = {name: (3,) if isinstance(at, slice) else () for name, at in _COLUMNS.items()}
-        self.columns = {name: RowBuffer(KINDS[name], *shape) for name, shape in shapes.items()}
+        self.columns = {name: RowBlocks(KINDS[name], *shape) for name, shape in shapes.items()}
         self.place: FloatArray | None = None
         self.normal = np.array([0.0, 0.0, 1.0])
         self.tool = -1
@@ -249,8 +250,18 @@ class Recorder:
         if len(self.blocks) > _BLOCKS:
             self._split()
 
+    def begin_layer(self, number: int) -> None:
+        """Note that a layer begins; its rows are blocks of their own, which others may repeat."""
+        self.layer = number
+        self._split()
+        self.note(LAYER, number)
+        self._split()
+
     def _split(self) -> None:
         """Keep the columns of the blocks so far, each as small as `Moves` has it."""
+        if self.rows:
+            self.blocks.append(np.array(self.rows))
+            self.rows = []
         table = np.concatenate([np.zeros((0, 17)), *self.blocks])
         self.blocks = []
         # Only strands have numbers, not the matrix between them.
@@ -261,20 +272,21 @@ class Recorder:
 
     def seen(self) -> Moves:
         """All that was noted so far: to be forgotten before more is."""
-        self._flush()
         self._split()
-        columns: dict[str, Any] = {name: column.seen() for name, column in self.columns.items()}
+        columns: dict[str, Any] = dict(self.columns)
         return Moves(**columns)
 
     def insert(
         self, event: int, places: Sequence[int], values: Sequence[float], tools: Sequence[int]
     ) -> None:
         """Insert events before rows: they happen where the row before ends."""
+        if not len(places):
+            return
         order = np.argsort(places, kind="stable")
         at = np.array(places, dtype=np.int64)[order]
         given = {"event": [event] * len(at), "amount": values, "tool": tools}
         for name, column in self.columns.items():
-            rows = column.seen()[np.maximum(at - 1, 0)]
+            rows = column[np.maximum(at - 1, 0)]
             if name not in ("place", "normal", "layer", "strand"):
                 rows = np.zeros_like(rows)
             if name in given:
@@ -283,7 +295,6 @@ class Recorder:
 
     def moves(self) -> Moves:
         """All that was noted; afterwards the recorder is empty."""
-        self._flush()
         self._split()
         columns: dict[str, Any] = {name: column.rows() for name, column in self.columns.items()}
         return Moves(**columns)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError
+from ccfem.geometry.polylines import extent
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import FIBRE, MATRIX, Toolpaths
 from ccfem.printing.bed_layout import BedLayout
@@ -159,7 +160,7 @@ def _said(plans: Sequence[PrintPlan], names: Sequence[str], count: int) -> tuple
 
 def _ends(plan: PrintPlan) -> tuple[FloatArray, FloatArray]:
     """Least and largest coordinates (3,) of the lines of a plan."""
-    return plan.paths.points.min(axis=0), plan.paths.points.max(axis=0)
+    return extent(plan.paths.points)
 
 
 def _brim(machine: Machine) -> float:

@@ -82,18 +82,13 @@ def test_equal_rows_share_one_in_memory_unless_a_zero_has_another_sign():
 
 
 @pytest.mark.parametrize("last", [1.0, 2.0])
-def test_rows_that_come_block_by_block_are_as_joined_and_inserted_at_once(last, monkeypatch):
-    monkeypatch.setattr(arrays, "_MOVED", 2)
+def test_rows_that_come_block_by_block_are_as_joined(last):
     blocks = [np.ones((3, 2)), np.zeros((0, 2)), np.ones((4, 2)), np.full((2, 2), last)]
     buffer = RowBuffer(float, 2)
     for block in blocks:
         buffer.append(block)
     joined = np.concatenate(blocks)
-    np.testing.assert_array_equal(buffer.seen(), joined)
-    places, rows = [0, 4, 4, 9], np.array([[5.0, 6.0], [1.0, 1.0], [7.0, 8.0], [2.0, 2.0]])
-    buffer.insert(places, rows)
-    assert len(buffer) == 13
-    np.testing.assert_array_equal(buffer.rows(), np.insert(joined, places, rows, axis=0))
+    np.testing.assert_array_equal(buffer.rows(), joined)
     assert len(buffer) == 0
 
 
@@ -104,12 +99,3 @@ def test_a_buffer_of_megabytes_holds_what_came(monkeypatch):
     for _ in range(12):
         buffer.append(block)
     np.testing.assert_array_equal(buffer.rows(), np.tile(block, 12))
-
-
-def test_rows_inserted_like_all_others_stay_shared():
-    buffer = RowBuffer(np.int8)
-    buffer.append(np.full(5, 3))
-    buffer.insert([2], np.array([3]))
-    rows = buffer.rows()
-    assert is_shared(rows)
-    assert rows.tolist() == 6 * [3]

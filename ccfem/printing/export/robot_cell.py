@@ -1,5 +1,6 @@
 """What a cell of robots does, as CSV: the moves of the G-code, and how the head stands."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -33,23 +34,28 @@ def write_robot_cell(path: str | Path, moves: Moves) -> None:
     InputError
         When the file cannot be written.
     """
-    length = moves.length
-    laying = (moves.event == LAY) & (length > 0.0)
-    share = [
-        np.divide(fed, length, out=np.zeros(len(moves)), where=laying)
-        for fed in (moves.feed, moves.beside)
-    ]
-    numbers = (moves.strand, moves.tool, moves.layer, *moves.place.T, *moves.normal.T)
-    columns = (*numbers, moves.speed, *share, moves.width, moves.height)
-    value = np.where(moves.feed == 0.0, moves.beside, moves.feed)
     with whole_file(path) as temporary, temporary.open("w", encoding="ascii") as file:
         file.write(_HEADER + "\n")
         for first in range(0, len(moves), _TOGETHER):
-            some = slice(first, first + _TOGETHER)
-            about = (moves.event, value, moves.amount, moves.tool)
-            names = map(_named, *(column[some].tolist() for column in about))
-            rows = zip(*(column[some].tolist() for column in columns), names, strict=True)
-            file.writelines(map(_ROW.__mod__, rows))
+            file.writelines(_lines(moves, first, first + _TOGETHER))
+
+
+def _lines(moves: Moves, first: int, last: int) -> Iterator[str]:
+    """Lines of some rows."""
+    before, some = max(first - 1, 0), slice(first, last)
+    place = moves.place[before:last]
+    way = np.diff(place, axis=0, prepend=place[:1])[first - before :]
+    length, event = np.linalg.norm(way, axis=1), moves.event[some]
+    feed, beside = moves.feed[some], moves.beside[some]
+    laying = (event == LAY) & (length > 0.0)
+    share = [np.divide(fed, length, out=np.zeros(len(fed)), where=laying) for fed in (feed, beside)]
+    tool, axes = moves.tool[some], (*place[first - before :].T, *moves.normal[some].T)
+    sizes = (moves.speed[some], *share, moves.width[some], moves.height[some])
+    columns = (moves.strand[some], tool, moves.layer[some], *axes, *sizes)
+    about = (event, np.where(feed == 0.0, beside, feed), moves.amount[some], tool)
+    names = map(_named, *(column.tolist() for column in about))
+    rows = zip(*(column.tolist() for column in columns), names, strict=True)
+    return map(_ROW.__mod__, rows)
 
 
 def _named(event: int, feed: float, amount: float, tool: int) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccfem.base.arrays import FloatArray
-from ccfem.geometry.polylines import sample_midpoints
+from ccfem.geometry.polylines import extent, sample_midpoints
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import FIBRE, SUPPORT, Toolpaths
 from ccfem.printing.print_plan import PrintPlan
@@ -50,8 +50,7 @@ def thumbnail_lines(plan: PrintPlan, machine: Machine) -> Iterator[str]:
 
 def thumbnail(plan: PrintPlan, machine: Machine, width: int, height: int) -> bytes:
     """Draw what is printed, seen from the front and above, as a PNG of so many pixels."""
-    seen = plan.paths.points @ np.column_stack([_RIGHT, -_UP])
-    low, high = seen.min(axis=0), seen.max(axis=0)
+    low, high = extent(plan.paths.points, np.column_stack([_RIGHT, -_UP]))
     grid = np.array([width, height]) * _FINER
     cell = max(float(((high - low) / ((1.0 - 2.0 * _MARGIN) * grid)).max()), 1e-6)
     step = max(cell, 0.5 * machine.matrix_width)
