@@ -1,8 +1,8 @@
 """Rows of large arrays, kept block by block: blocks that are equal are in memory once.
 
 Layers of a print that repeat others differ by their height alone. So that this shows, a block keeps
-each component of its rows by itself, and lengths in thousandths by their steps from the first one,
-where that tells them to the last bit.
+each component of its rows by itself: lengths in thousandths by their steps from the last one, where
+these tell them to the last bit, and values that are few by their places in a table.
 """
 
 import hashlib
@@ -22,24 +22,29 @@ _FINE = 1000.0
 """Steps to a millimetre of coordinates that are rounded."""
 _FAR = 2**30
 """Steps that are not kept in four bytes."""
+_FEW = 0.25
+"""Share of values up to which those that differ are a table. Our choice."""
 _SPARSE = 8
 """Times as many rows from the first to the last as are taken, from which blocks are read alone."""
 
 
 class _Component(NamedTuple):
-    """One component of a block: values, or steps of 1 / 1000 from a number of them."""
+    """One component of a block: values, steps of 1 / 1000 from `base`, or places in a table."""
 
     kept: NDArray[Any]
-    first: float | None = None
+    base: float | None = None
+    table: NDArray[Any] | None = None
 
     def values(self, some: slice = slice(None)) -> NDArray[Any]:
         """Values of some rows."""
         kept = self.kept[some]
-        return kept if self.first is None else (kept + self.first) / _FINE
+        if self.table is not None:
+            return np.asarray(self.table[kept])
+        return kept if self.base is None else (kept + self.base) / _FINE
 
     def between(self, begin: int, end: int) -> "_Component":
         """Those of rows from one to another."""
-        return _Component(self.kept[begin:end], self.first)
+        return self._replace(kept=self.kept[begin:end])
 
 
 def _bits(values: NDArray[Any]) -> NDArray[Any]:
@@ -52,8 +57,18 @@ def _steps(values: NDArray[Any]) -> _Component | None:
     if values.dtype != np.float64 or not np.abs(values).max() * _FINE < _FAR:
         return None
     steps = np.rint(_FINE * values)
-    found = _Component((steps - steps[0]).astype(np.int32), float(steps[0]))
+    found = _Component((steps - steps[-1]).astype(np.int32), float(steps[-1]))
     return found if np.array_equal(_bits(found.values()), _bits(values)) else None
+
+
+def _places(values: NDArray[Any]) -> _Component | None:
+    """Take places in a table of the values; None where these are many or small."""
+    if values.itemsize < 4:
+        return None
+    table, places = np.unique(_bits(values), return_inverse=True)
+    if len(table) > min(_FEW * len(values), 2**16):
+        return None
+    return _Component(places.astype(np.uint16), None, table.view(values.dtype))
 
 
 class RowBlocks(NDArrayOperatorsMixin):
@@ -84,12 +99,12 @@ class RowBlocks(NDArrayOperatorsMixin):
         bits = _bits(values)
         if (bits == bits[0]).all():
             return _Component(np.broadcast_to(values[:1].copy(), values.shape))
-        steps = _steps(values) or _Component(values)
-        kept = np.ascontiguousarray(steps.kept)
+        found = _steps(values) or _places(values) or _Component(values)
+        kept = np.ascontiguousarray(found.kept)
         digest = hashlib.sha256(kept.view(np.uint8)).digest() + kept.dtype.char.encode()
         kept = self._known.setdefault(digest, np.array(kept) if kept.base is not None else kept)
         kept.flags.writeable = False
-        return steps._replace(kept=kept)
+        return found._replace(kept=kept)
 
     def insert(self, places: Sequence[int], rows: NDArray[Any]) -> None:
         """Insert rows before those at some places, which do not fall."""

@@ -127,6 +127,7 @@ class Recorder:
         self.strand = -1
         self.drawn_back = 0.0
         self.beside_back = 0.0
+        self._begun = True
 
     def note(self, event: int, value: float = 0.0, tool: int | None = None) -> None:
         """Note what happens where the nozzle stands."""
@@ -210,7 +211,11 @@ class Recorder:
             rows[:, _COLUMNS["tool"]] = self.tool
             rows[:, _COLUMNS["layer"]] = self.layer
             rows[:, _COLUMNS["strand"]] = self.strand
-            self._flush()
+            if self._begun:
+                self._flush()
+            else:
+                self._split()
+                self._begun = True
             self.blocks.append(rows)
             self.place, self.normal = (rows[-1, _COLUMNS[name]].copy() for name in _POSE)
         self.top = max(self.top, steps.top)
@@ -251,11 +256,16 @@ class Recorder:
             self._split()
 
     def begin_layer(self, number: int) -> None:
-        """Note that a layer begins; its rows are blocks of their own, which others may repeat."""
+        """Note that a layer begins.
+
+        What it lays is in blocks of its own, which others may repeat; so is the way to there, which
+        depends on the layer below.
+        """
         self.layer = number
         self._split()
         self.note(LAYER, number)
         self._split()
+        self._begun = False
 
     def _split(self) -> None:
         """Keep the columns of the blocks so far, each as small as `Moves` has it."""

@@ -62,6 +62,15 @@ def test_what_thousandths_do_not_tell_is_kept_to_the_last_bit(value):
     assert rows.rows().tobytes() == joined.tobytes()
 
 
+def test_few_values_are_kept_by_their_places(monkeypatch):
+    monkeypatch.setattr(row_blocks, "SMALL", 0)
+    values = np.tile([1.0 / 3.0, -0.0, np.pi, 0.0], 1000)
+    rows = RowBlocks(float)
+    rows.append(values)
+    assert len(pickle.dumps(rows.rows())) < 4000 * 2 + 1000
+    assert np.asarray(rows).tobytes() == values.tobytes()
+
+
 def test_rows_are_inserted_at_once(stacked):
     rows, joined = stacked
     places, given = [0, 4, 4, 500, 1800], np.arange(15.0).reshape(5, 3)
