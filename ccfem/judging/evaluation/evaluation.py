@@ -316,8 +316,10 @@ def _check_layers(toolpaths: Toolpaths, layers: Sequence[Layer]) -> None:
 
 def _upright(layers: Sequence[Layer], build: Sequence[float] | None) -> FloatArray:
     """Return the unit vector of the build direction, by default the mean normal of the layers."""
-    total = np.sum([layer.areas @ layer.normals for layer in layers], axis=0)
-    up = total if build is None else np.asarray(build, dtype=np.float64)
+    if build is None:
+        up = np.sum([layer.areas @ layer.normals for layer in layers], axis=0)
+    else:
+        up = np.asarray(build, dtype=np.float64)
     return np.asarray(up / max(float(np.linalg.norm(up)), 1e-300))
 
 

@@ -183,10 +183,13 @@ class Layer(Shown):
         """Area of each triangle, (t,), mm^2."""
         return read_only(0.5 * np.linalg.norm(self._across, axis=1))
 
-    @cached_property
+    @property
     def normals(self) -> FloatArray:
-        """Unit normal of each triangle, (t, 3), upwards; zero where a triangle has no area."""
-        return read_only(self._across / np.maximum(2.0 * self.areas, 1e-300)[:, None])
+        """Unit normal of each triangle, (t, 3), upwards; zero where a triangle has no area.
+
+        They are not kept: those of hundreds of layers fill memory.
+        """
+        return np.asarray(self._across / np.maximum(2.0 * self.areas, 1e-300)[:, None])
 
     @cached_property
     def point_normals(self) -> FloatArray:

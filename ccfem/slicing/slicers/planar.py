@@ -1,11 +1,12 @@
 """Flat layers across the build direction."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray
+from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.checks import check_choices, check_number
 from ccfem.base.errors import InputError
 from ccfem.base.plain import plain_dataclass
@@ -120,8 +121,9 @@ class Planar:
         stack = self._stack(mesh, frame)
         # A layer stands for what is nearer to it than to the others.
         edges = [lowest, *(0.5 * (stack[1:] + stack[:-1])).tolist(), highest]
+        cells = _CellsByHeight.of(mesh, level)
         layers = [
-            _cut_plane(mesh, Plane(frame, float(height)), level, k, edges[k + 1] - edges[k])
+            _cut_plane(cells, Plane(frame, float(height)), k, edges[k + 1] - edges[k])
             for k, height in enumerate(stack)
         ]
         if layers[-1] is None and highest - stack[-1] < _TOP * (highest - lowest):
@@ -191,14 +193,40 @@ def slice_heights(
     return lowest + (np.arange(slabs, dtype=np.float64) + 0.5) * thickness
 
 
-def _cut_plane(
-    mesh: TetMesh, plane: Plane, level: FloatArray, index: int, thickness: float
-) -> Layer | None:
-    """Layer where a mesh, whose nodes are at heights `level` (n,), meets a plane; None nowhere."""
-    signed = level - plane.height
+@dataclass(frozen=True)
+class _CellsByHeight:
+    """Cells of a mesh whose nodes are at heights `level` (n,), in the order of their lowest corner.
+
+    `low` (c,) are these corners, and `tall` the height of the tallest cell.
+    """
+
+    mesh: TetMesh
+    level: FloatArray
+    order: IntArray
+    low: FloatArray
+    tall: float
+
+    @classmethod
+    def of(cls, mesh: TetMesh, level: FloatArray) -> "_CellsByHeight":
+        """Sort the cells of a mesh."""
+        corners = level[mesh.corners]
+        low = corners.min(axis=1)
+        tall = float((corners.max(axis=1) - low).max())
+        order = np.argsort(low, kind="stable")
+        return cls(mesh, level, order, low[order], tall)
+
+    def near(self, height: float, snap: float) -> IntArray:
+        """Cells, ascending, among which are all that reach to less than a distance of a height."""
+        ends = height - self.tall - 2.0 * snap, height + 2.0 * snap
+        return np.sort(self.order[slice(*np.searchsorted(self.low, ends))])
+
+
+def _cut_plane(cells: _CellsByHeight, plane: Plane, index: int, thickness: float) -> Layer | None:
+    """Layer where a mesh meets a plane; None nowhere."""
+    mesh, signed = cells.mesh, cells.level - plane.height
     snap = _SNAP * float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
     signed[np.abs(signed) < snap] = 0.0
-    cut = cut_at_zero(mesh, signed)
+    cut = cut_at_zero(mesh, signed, cells.near(plane.height, snap))
     if cut is None:
         return None
     normal = plane.frame[2]

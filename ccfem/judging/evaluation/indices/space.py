@@ -128,7 +128,8 @@ def sample(paths: LayerPaths) -> SpaceSamples:
         angle = np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0)))
         size = np.abs(strongest.value)
         angle[size <= 0.0] = np.nan
-    normal = np.einsum("ti,tij,tj->t", layer.normals, cells, layer.normals)
+    across = layer.normals
+    normal = np.einsum("ti,tij,tj->t", across, cells, across)
     return SpaceSamples(
         length,
         angle,
