@@ -1,12 +1,13 @@
 """Flat layers across the build direction."""
 
+import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.arrays import FloatArray, IntArray, read_only
 from ccfem.base.checks import check_choices, check_number
 from ccfem.base.errors import InputError
 from ccfem.base.plain import plain_dataclass
@@ -197,7 +198,8 @@ def slice_heights(
 class _CellsByHeight:
     """Cells of a mesh whose nodes are at heights `level` (n,), in the order of their lowest corner.
 
-    `low` (c,) are these corners, and `tall` the height of the tallest cell.
+    `low` (c,) are these corners, and `tall` the height of the tallest cell. Layers that cut the
+    same edges of the mesh share the arrays that say so, in `known`.
     """
 
     mesh: TetMesh
@@ -205,6 +207,7 @@ class _CellsByHeight:
     order: IntArray
     low: FloatArray
     tall: float
+    known: dict[bytes, IntArray] = field(default_factory=dict)
 
     @classmethod
     def of(cls, mesh: TetMesh, level: FloatArray) -> "_CellsByHeight":
@@ -214,6 +217,11 @@ class _CellsByHeight:
         tall = float((corners.max(axis=1) - low).max())
         order = np.argsort(low, kind="stable")
         return cls(mesh, level, order, low[order], tall)
+
+    def once(self, values: IntArray) -> IntArray:
+        """Take values that another layer has, too, from there."""
+        digest = hashlib.sha256(np.ascontiguousarray(values)).digest() + bytes([values.ndim])
+        return self.known.setdefault(digest, read_only(values, int))
 
     def near(self, height: float, snap: float) -> IntArray:
         """Cells, ascending, among which are all that reach to less than a distance of a height."""
@@ -236,9 +244,9 @@ def _cut_plane(cells: _CellsByHeight, plane: Plane, index: int, thickness: float
     border = border_edges(triangles, len(points))
     return Layer(
         points=points,
-        triangles=triangles,
-        cell=cut.cell,
-        nodes=cut.nodes,
+        triangles=cells.once(triangles),
+        cell=cells.once(cut.cell),
+        nodes=cells.once(cut.nodes),
         weights=cut.weights,
         loops=chain(border),
         flat=plane,
