@@ -78,6 +78,7 @@ LARGE = (
     "plate 200 150 8",
     "plate 400 300 8",
     "plate 400 300 16",
+    "plate 400 300 240",
 )
 """What is planned without a virtual test."""
 
@@ -207,7 +208,7 @@ Samples = dict[str, list[tuple[str, Counts, float]]]
 
 def known_of(row: dict[str, str]) -> Counts:
     """Read the counts in a line."""
-    named = ("unknowns", "solved", "triangles", "room", "volume")
+    named = ("unknowns", "solved", "triangles", "room", "volume", "some_room")
     return Counts(*(float(row[name]) for name in named))
 
 

@@ -108,8 +108,10 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         for layers in asked.layers:
             part = Path(folder) / f"plate_{layers}.toml"
-            edge = edge_length(x, y, layers, asked.cells) if asked.cells else None
-            part.write_text("order = 1\n" + plate(x, y, layers, edge))
+            text = plate(x, y, layers)
+            if asked.cells:
+                text = "order = 1\n" + plate(x, y, layers, edge_length(x, y, layers, asked.cells))
+            part.write_text(text)
             rows.append(measured(part, layers, asked.strategy, Path(folder) / str(layers)))
             if len(rows) == 1:
                 print("  ".join(f"{name:>12}" for name in rows[0]))

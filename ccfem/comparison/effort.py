@@ -18,7 +18,7 @@ import scipy.sparse as sp
 
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases.case import Case
-from ccfem.comparison.request import LONGEST_TEST, STRATEGIES
+from ccfem.comparison.request import LONGEST_TEST, MOST_LAYERS, STRATEGIES
 from ccfem.fem.elasticity.solve_cost import solve_costs
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer
@@ -34,10 +34,10 @@ TERMS: dict[str, tuple[str, ...]] = {
     "solve": ("solved", "triangles"),
     "plan stream_function": ("unknowns", "room"),
     "plan zigzag": ("triangles", "room"),
-    "plan": ("triangles", "room"),
+    "plan": ("triangles", "some_room"),
     "judge": ("solved", "triangles", "room"),
     "print": ("triangles", "volume"),
-    "judge untested": ("triangles", "room"),
+    "judge untested": ("triangles", "room", "some_room"),
     "bound": ("unknowns", "triangles"),
     "write": ("run", "room"),
     "write a print": ("run", "volume"),
@@ -73,6 +73,8 @@ class Counts:
     room : float, mm
         Length of strands that would cover these layers once.
     volume : float, mm^3
+    some_room : float, mm
+        `room` of at most 60 layers: more are planned and judged in part.
     run : float
         One.
     """
@@ -82,6 +84,7 @@ class Counts:
     triangles: float
     room: float
     volume: float
+    some_room: float
     run: float = 1.0
 
     @classmethod
@@ -91,7 +94,8 @@ class Counts:
         triangles = float(sum(len(layer.triangles) for layer in layers))
         room = float(sum(layer.areas.sum() for layer in layers)) / machine.fibre_width
         solved = 3.0 * len(mesh.points)
-        return cls(unknowns, solved, triangles, room, float(mesh.volumes.sum()))
+        some = room * min(MOST_LAYERS / max(len(layers), 1), 1.0)
+        return cls(unknowns, solved, triangles, room, float(mesh.volumes.sum()), some)
 
 
 def counts(case: Case, layers: Sequence[Layer]) -> tuple[Counts, ...]:

@@ -161,6 +161,10 @@ LONGEST_TEST = 3e6
 """Length of fibre, mm, up to which `ccfem plan` tests a plan virtually without being asked to: such
 a test takes about as long as the rest."""
 
+MOST_LAYERS = 60
+"""Layers on which indices are taken that some of more layers tell; of more layers those that are
+alike are planned once."""
+
 Wanted = float | InAll | None
 """Length of fibre that runs are held to: mm per layer, in total, or None if each lays its own."""
 

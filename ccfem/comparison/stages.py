@@ -10,6 +10,7 @@ from typing import Any
 from ccfem.base.arrays import IntArray
 from ccfem.base.errors import InputError, SolveError
 from ccfem.base.parallel import give_back, has_room_beside, in_processes
+from ccfem.comparison.request import MOST_LAYERS
 from ccfem.comparison.runs import Run, Tested
 from ccfem.comparison.tested_cases import in_all_cases
 from ccfem.fem.elasticity.stress_field import PartStress, StressField, WeightedCases
@@ -60,10 +61,6 @@ own amount."""
 
 _AHEAD = 4
 """Runs that are judged while others are being planned: it takes about as long."""
-
-_MOST_LAYERS = 60
-"""Layers on which indices are taken that some of more layers tell; of more layers those that are
-alike are planned once."""
 
 _TOLERANCE = 1e-6
 """Relative residual of the virtual tests: the error of the stiffness is of its square."""
@@ -140,7 +137,7 @@ class Part:
     @cached_property
     def alike(self) -> IntArray | None:
         """Position of the layer whose paths each may take; None where every layer is planned."""
-        if self.every_layer or len(self.layers) <= _MOST_LAYERS or self.several_cases:
+        if self.every_layer or len(self.layers) <= MOST_LAYERS or self.several_cases:
             return None
         return alike_layers(self.layers, self.stress)
 
@@ -429,7 +426,7 @@ def evaluated(run: Run, part: Part) -> Run:
         return replace(run, failure=why)
 
     def work() -> Run:
-        most = 1 if part.limits_only else None if part.every_layer else _MOST_LAYERS
+        most = 1 if part.limits_only else None if part.every_layer else MOST_LAYERS
         about = (part.layers, part.stress, part.machine, part.strand, part.build, most)
         evaluation = evaluate(run.toolpaths, *about, part.cases.heaviest.problem.filled)
         # Who planned given paths is not known, but where their file says so.

@@ -548,7 +548,7 @@ def test_help_names_the_limits_that_hold():
 
     tested, layers = (kind.__metadata__[0].help for kind in (options.TestOrNot, options.EveryLayer))
     assert f"up to {request.LONGEST_TEST / 1e6:g} km" in tested
-    assert f"on {stages._MOST_LAYERS}, evenly" in layers
+    assert f"on {request.MOST_LAYERS}, evenly" in layers
 
 
 LEANING = """\
