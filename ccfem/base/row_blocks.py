@@ -101,7 +101,7 @@ class RowBlocks(NDArrayOperatorsMixin):
             return _Component(np.broadcast_to(values[:1].copy(), values.shape))
         found = _steps(values) or _places(values) or _Component(values)
         kept = np.ascontiguousarray(found.kept)
-        digest = hashlib.sha256(kept.view(np.uint8)).digest() + kept.dtype.char.encode()
+        digest = hashlib.sha256(kept.tobytes()).digest() + kept.dtype.char.encode()
         kept = self._known.setdefault(digest, np.array(kept) if kept.base is not None else kept)
         kept.flags.writeable = False
         return found._replace(kept=kept)
@@ -208,7 +208,7 @@ class RowBlocks(NDArrayOperatorsMixin):
             rows[some] = self._between(begin, end)[numbers[some] - begin]
         return rows
 
-    def __array__(self, dtype: DTypeLike = None, copy: bool | None = None) -> NDArray[Any]:
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         whole = self._between(0, len(self))
         return whole if dtype is None else whole.astype(dtype, copy=False)
 

@@ -544,7 +544,7 @@ def test_a_plan_that_cannot_be_printed_says_so_and_ends_with_three(ccfem, folder
 def test_help_names_the_limits_that_hold():
     """Options are read before the engine is imported, so its numbers stand in their texts."""
     from ccfem.cli import options
-    from ccfem.comparison import request, stages
+    from ccfem.comparison import request
 
     tested, layers = (kind.__metadata__[0].help for kind in (options.TestOrNot, options.EveryLayer))
     assert f"up to {request.LONGEST_TEST / 1e6:g} km" in tested
