@@ -119,6 +119,23 @@ class System:
             solves,
         )
 
+    def reactions(self, case: str, displacement: FloatArray, internal: FloatArray) -> FloatArray:
+        """Reactions (n, 3), N, to a displacement (n, 3), mm, that needs the given forces (n, 3).
+
+        Raises
+        ------
+        SolveError
+            Where they do not balance the loads.
+        """
+        forces, held = self.forces_in(case), self.held_in(case)
+        residual = internal - forces
+        result = held.supported(residual)
+        if soft := soft_supports(self.problem):
+            result = result + spring_forces(self.problem.mesh, soft, displacement)
+        outside, moved = result + held.lost_in_ties(residual), bool(held.value.any())
+        check_balance(self.problem, case, displacement, forces, outside, moved)
+        return result
+
     def field(
         self, case: str, displacement: FloatArray, matrix: Any, record: SolveRecord
     ) -> StressField:
@@ -131,16 +148,8 @@ class System:
         if problem.density is not None:
             scaled = problem.density[:, None, None] * scaled
         internal = (matrix @ displacement.reshape(-1)).reshape(-1, 3)
-        forces, free = self.forces_in(case), free_strain(problem, case)
-        mesh, soft = problem.mesh, soft_supports(problem)
-        held = self.held_in(case)
-        residual = internal - forces
-        reactions = held.supported(residual)
-        if soft:
-            reactions = reactions + spring_forces(mesh, soft, displacement)
-        moved = bool(held.value.any())
-        outside = reactions + held.lost_in_ties(residual)
-        check_balance(problem, case, displacement, forces, outside, moved)
+        free, mesh = free_strain(problem, case), problem.mesh
+        reactions = self.reactions(case, displacement, internal)
         energy = 0.5 * float(np.vdot(displacement, internal))
         if free is not None:
             stress = times(scaled, free)

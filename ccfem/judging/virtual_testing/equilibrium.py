@@ -242,6 +242,9 @@ _SETTLING = 1e-4
 _PROGRESS = 1e-2
 """Factor by which each update reduces the residual while the set of carrying fibres may change."""
 
+_PROGRESS_BY_ENERGY = 0.2
+"""The same where the energy of the error is judged, in all modes."""
+
 
 @dataclass(frozen=True)
 class Equilibrium:
@@ -289,6 +292,7 @@ def equilibrium(
     mode: str = TENSION,
     known: Sequence[FloatArray] = (),
     tolerance: float = 1e-8,
+    energy: float = 0.0,
 ) -> Equilibrium:
     """Find the displacement of a part with fibres.
 
@@ -309,6 +313,9 @@ def equilibrium(
         mixture of them with the least energy. Default: the part without fibres.
     tolerance : float
         Largest relative residual that is accepted.
+    energy : float, default 0
+        On quadratic cells, largest error in energy norm, over the displacement, that is accepted
+        too, by an estimate: the stiffness is then accurate to its square.
 
     Raises
     ------
@@ -322,7 +329,9 @@ def equilibrium(
     known = known or (specimen.unreinforced.displacement,)
     u, total = known[-1], 0
     held, forces = specimen.held.touching(u), specimen.forces
-    most = _UPDATES if held.presses is None else 2 * _UPDATES
+    by_energy = energy > 0.0 and specimen.solver.backend == "two-level" and held.presses is None
+    most = _UPDATES if held.presses is None and not by_energy else 2 * _UPDATES
+    lowest = 1.0
     pieces = bars(strands, specimen.system.problem.mesh)
     full = axial_stiffness * strands.share
     strain, carried = _state(pieces, u, mode)
@@ -343,13 +352,18 @@ def equilibrium(
                 x = held.restrict(u)
                 u, part = held.expand(x), _reduced(specimen, held)
                 reduced, rest, residual = _imbalance(part, matrix, held, x, forces)
-        if residual <= tolerance:
+        # As in `Solver.energy_error`, half of the lowest eigenvalue found is used.
+        near = (
+            by_energy and update > 0 and _near(specimen, matrix, u, rest, 0.5 * lowest * energy**2)
+        )
+        if residual <= tolerance or near:
             check_pressed(held, (matrix @ u.reshape(-1)).reshape(u.shape) - forces, forces)
             return Equilibrium(u, matrix, strain, carried, update, total, residual)
         goal = max(0.5 * tolerance / residual, 0.0 if mode == BONDED else _PROGRESS)
         goal, apply = 0.5 * min(goal, 0.5), specimen.solver.apply
-        step, count, _ = conjugate_gradient(reduced, rest, apply, tolerance=goal)
-        total += count
+        goal = max(goal, _PROGRESS_BY_ENERGY) if by_energy else goal
+        step, count, least = conjugate_gradient(reduced, rest, apply, tolerance=goal)
+        total, lowest = total + count, min(lowest, least)
         x = x + step
         u = held.expand(x)
         before = carried
@@ -360,6 +374,32 @@ def equilibrium(
         f"virtual test: relative residual {residual:.1e} after {most} updates of the fibres "
         f"that carry tension, above the tolerance {tolerance:.1e}"
     )
+
+
+def _near(
+    specimen: Specimen, matrix: Reinforced, u: FloatArray, rest: FloatArray, most: float
+) -> bool:
+    """Whether a displacement (n, 3) leaves little energy, and reactions that balance the loads.
+
+    The energy is at least as convex as that of the part without fibre, K, whose preconditioner M
+    has the lowest eigenvalue of ``M^-1 K``: it lies above its least value by at most half of ``r^T
+    K^-1 r <= r^T M^-1 r / lowest``.
+
+    Parameters
+    ----------
+    rest : (k,) array, N
+        Forces out of balance, r.
+    most : float
+        Largest ``r^T M^-1 r`` over the energy of the displacement.
+    """
+    internal = matrix @ u.reshape(-1)
+    if not rest @ specimen.solver.apply(rest) <= most * (u.reshape(-1) @ internal):
+        return False
+    try:
+        specimen.system.reactions(specimen.unreinforced.case, u, internal.reshape(-1, 3))
+    except SolveError:
+        return False
+    return True
 
 
 def _imbalance(

@@ -116,6 +116,7 @@ def virtual_test(
     machine: Machine | None = None,
     known: Sequence[FloatArray] = (),
     tolerance: float = 1e-8,
+    energy: float = 0.0,
 ) -> VirtualTest:
     """Test a part with its fibres under the load case that it was solved for.
 
@@ -143,6 +144,8 @@ def virtual_test(
         Displacements near the solution, to start from; the nearest last.
     tolerance : float, default 1e-8
         Largest relative residual; the error of the stiffness is of its square.
+    energy : float, default 0
+        As of `ccfem.judging.virtual_testing.equilibrium.equilibrium`.
 
     Raises
     ------
@@ -155,7 +158,7 @@ def virtual_test(
     before = specimen.unreinforced
     axial = (Strand() if strand is None else strand).stiffness(specimen.modulus)
     started = perf_counter()
-    balanced = equilibrium(specimen, strands, axial, mode, known, tolerance)
+    balanced = equilibrium(specimen, strands, axial, mode, known, tolerance, energy)
     record = SolveRecord(
         backend=specimen.solver.backend,
         iterations=balanced.iterations,
@@ -214,13 +217,14 @@ def virtual_bracket(
     span: Sequence[float] = RHO_SPAN,
     machine: Machine | None = None,
     tolerance: float = 1e-8,
+    energy: float = 0.0,
 ) -> Bracket:
     """Test in every mode of `virtual_test`, with one factorisation; parameters as there."""
     specimen, strands = _prepared(fibres, part, machine)
     tests: list[VirtualTest] = []
     known = [specimen.unreinforced.displacement]
     for mode in IN_COMPRESSION:  # each starts from those before
-        test = virtual_test(strands, specimen, strand, mode, span, None, known, tolerance)
+        test = virtual_test(strands, specimen, strand, mode, span, None, known, tolerance, energy)
         tests.append(test)
         known.append(test.solution.displacement)
     return Bracket(*tests)

@@ -274,6 +274,30 @@ def test_the_solver_does_not_count():
     assert iterative.solution.record.residual <= 1e-8
 
 
+def test_on_quadratic_cells_the_energy_of_the_error_bounds_that_of_the_stiffness():
+    """Held against a factorisation of the part, and solves to rounding."""
+    mesh = box_mesh(SIZE, (12, 4, 3)).quadratic()
+    part = solve(dataclasses.replace(clamped(), mesh=mesh), "two-level")["load"]
+    strands = cut_strands(toolpaths(*random_lines()), mesh)
+    exact = virtual_bracket(strands, Specimen.of(part, "superlu"), span=(), tolerance=1e-10)
+    near = virtual_bracket(strands, part, span=(), energy=1e-3)
+    full = virtual_bracket(strands, part, span=())
+    for mode in IN_COMPRESSION:
+        test, other = getattr(near, mode), getattr(full, mode)
+        assert test.ratio == pytest.approx(getattr(exact, mode).ratio, rel=1e-6)
+        assert 1 <= test.solution.record.iterations < 0.7 * other.solution.record.iterations
+
+
+def test_a_rough_solution_is_taken_only_if_its_reactions_balance_the_loads():
+    """The resultant of the reactions is that of the load, within what is allowed: 1e-4."""
+    mesh = box_mesh(SIZE, (12, 4, 3)).quadratic()
+    part = solve(dataclasses.replace(clamped(), mesh=mesh), "two-level")["load"]
+    strands = cut_strands(toolpaths(*random_lines()), mesh)
+    test = virtual_test(strands, part, span=(), energy=0.5)
+    assert test.solution.record.residual > 1e-8
+    np.testing.assert_allclose(test.solution.reactions.sum(axis=0), [0.0, 0.0, -20.0], atol=2e-3)
+
+
 def test_the_load_need_not_be_the_one_that_paths_were_planned_for():
     problem = dataclasses.replace(clamped(), loads={"bend": BEND, "pull": PULL})
     lines, both = toolpaths(*random_lines()), solve(problem)
