@@ -89,6 +89,16 @@ def bends(line: FloatArray, kept: IntArray, tolerance: float) -> IntArray:
 
 _STRAIGHT = 1e-6
 """Turn of the border, radians, below which a point lies on a straight side."""
+def areas(shape: shapely.Geometry) -> shapely.MultiPolygon:
+    """Parts of a shape that have an area.
+
+    Unions and differences leave lines where areas touch, or a collection of nothing; further
+    operations refuse both.
+    """
+    parts = shapely.get_parts(shapely.get_parts(shape))
+    return shapely.multipolygons(parts[shapely.get_dimensions(parts) == 2])
+
+
 _DECIMALS = 11
 """Decimals of coordinates, mm: above the errors of slicing, below what any pattern resolves."""
 

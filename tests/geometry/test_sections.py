@@ -1,11 +1,12 @@
 """Sections as their corners alone."""
 
 import numpy as np
+import pytest
 import shapely
 from shapely import affinity
 
 from ccfem.cases import create_case
-from ccfem.geometry.shapes import corners_only
+from ccfem.geometry.shapes import areas, corners_only
 from ccfem.slicing.slicers.planar import Planar
 
 L_SHAPE = shapely.Polygon([(0, 0), (30, 0), (30, 10), (10, 10), (10, 30), (0, 30)])
@@ -39,3 +40,12 @@ def test_layers_of_an_extruded_part_are_equal():
     layers = Planar(count=4).cut(case.problem.mesh, case.build)
     assert not layers[0].plane.polygon.equals_exact(layers[1].plane.polygon, 0.0)
     assert len({corners_only(layer.plane.polygon) for layer in layers}) == 1
+
+
+def test_lines_in_a_region_stop_no_further_operation():
+    """A union that leaves a line where areas touch, cut with a union of nothing."""
+    square, line = shapely.box(0.0, 0.0, 2.0, 3.0), shapely.LineString([(2.0, 0.0), (5.0, 0.0)])
+    mixed = shapely.geometrycollections([square, line])
+    both = shapely.intersection(areas(shapely.union_all([])), areas(mixed))
+    assert both.is_empty
+    assert areas(mixed).area == pytest.approx(6.0)

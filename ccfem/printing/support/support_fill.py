@@ -10,7 +10,7 @@ from ccfem.base.arrays import FloatArray
 from ccfem.base.checks import check_number
 from ccfem.base.parallel import in_threads
 from ccfem.geometry.offsets import offset_rings
-from ccfem.geometry.shapes import Region
+from ccfem.geometry.shapes import Region, areas
 from ccfem.machine.machine import Machine
 from ccfem.paths.fields.chart import Chart, IdentityChart
 from ccfem.paths.toolpaths import MATRIX, Toolpaths
@@ -61,7 +61,7 @@ def support_paths(
         if number < len(layers):
             wide = _clear_of(layers[number], wide, frame, machine.process.support_clearance)
         rings = []
-        solid = shapely.intersection(solid, wide)
+        solid = areas(shapely.intersection(solid, wide))
         for region, pitch in ((shapely.difference(wide, solid), spacing * width), (solid, width)):
             with np.errstate(divide="ignore", invalid="ignore"):  # mitres of edges nearly in line
                 levels = offset_rings(region, 0.5 * width, pitch, width)
@@ -93,7 +93,7 @@ def _regions(
     heads : (f, 3, 3) array, mm
         Corners of the facets that hang over, along the axes of the build direction.
     """
-    process, whole = machine.process, seen.flat.plane.polygon
+    process, whole = machine.process, areas(seen.flat.plane.polygon)
     room = _room_above(layer.points @ frame.T, heads)
     places = seen.flat.plane.points
     high = layer.local_thickness
@@ -148,7 +148,7 @@ def _not_below(
     last = np.maximum.accumulate(np.where(used, np.arange(6), -1), axis=1)
     last = np.where(last < 0, last[:, -1:], last)
     pieces = shapely.polygons(np.take_along_axis(places, last[:, :, None], axis=1))
-    return shapely.union_all(pieces[shapely.area(pieces) > 0.0])
+    return areas(shapely.union_all(pieces[shapely.area(pieces) > 0.0]))
 
 
 def _clear_of(layer: Layer, wide: Region, frame: FloatArray, clearance: float) -> Region:
@@ -158,4 +158,4 @@ def _clear_of(layer: Layer, wide: Region, frame: FloatArray, clearance: float) -
     beside = shapely.union_all(shapes[shapely.area(shapes) > 0.0])
     if shapely.intersection(wide, beside).area > _BESIDE * wide.area:
         return wide  # below it
-    return shapely.difference(wide, shapely.buffer(beside, clearance))
+    return areas(shapely.difference(wide, shapely.buffer(beside, clearance)))
