@@ -319,10 +319,10 @@ def _reachable(roots: Sequence[Any]) -> _Known:
     known: _Known = {}
     following = list(roots)
     while following:
-        thing = following.pop()
-        if id(thing) not in known and not isinstance(thing, _CODE + _PLAIN):
-            known[id(thing)] = thing
-            following += gc.get_referents(thing)
+        value = following.pop()
+        if id(value) not in known and not isinstance(value, _CODE + _PLAIN):
+            known[id(value)] = value
+            following += gc.get_referents(value)
     return known
 
 
@@ -341,16 +341,16 @@ def _read_only_array(content: bytes, dtype: Any, shape: tuple[int, ...]) -> NDAr
 class ReadOnlyPickler(pickle.Pickler):
     """Keeps what is read-only so; arrays would come back without that."""
 
-    def reducer_override(self, thing: Any) -> Any:
+    def reducer_override(self, value: Any) -> Any:
         """Reduce mappings and arrays that are read-only, and leave the rest as it is."""
-        if isinstance(thing, MappingProxyType):
-            return _read_only_mapping, (dict(thing),)
-        if type(thing) is np.ndarray and is_shared(thing):
-            return _shared_rows, (thing[0].copy(), thing.shape)
-        if type(thing) is np.ndarray and not (thing.flags.writeable or thing.dtype.hasobject):
-            return _read_only_array, (thing.tobytes(), thing.dtype, thing.shape)
+        if isinstance(value, MappingProxyType):
+            return _read_only_mapping, (dict(value),)
+        if type(value) is np.ndarray and is_shared(value):
+            return _shared_rows, (value[0].copy(), value.shape)
+        if type(value) is np.ndarray and not (value.flags.writeable or value.dtype.hasobject):
+            return _read_only_array, (value.tobytes(), value.dtype, value.shape)
         override = getattr(super(), "reducer_override", None)
-        return NotImplemented if override is None else override(thing)
+        return NotImplemented if override is None else override(value)
 
 
 class _Pickler(ReadOnlyPickler):
@@ -358,8 +358,8 @@ class _Pickler(ReadOnlyPickler):
         super().__init__(file, pickle.HIGHEST_PROTOCOL)
         self._known = known
 
-    def persistent_id(self, thing: Any) -> int | None:
-        return id(thing) if id(thing) in self._known else None
+    def persistent_id(self, value: Any) -> int | None:
+        return id(value) if id(value) in self._known else None
 
 
 class _Unpickler(pickle.Unpickler):

@@ -114,10 +114,10 @@ _LINE = re.compile(r"ccfem: \d+ s, (\d+) %(?:, (about [^:]* left))?: (.*)")
 
 def step_of(line: str) -> tuple[float, str] | None:
     """Share of the work and step that a line of `progress_bar` says; None of another line."""
-    said = _LINE.fullmatch(line.strip())
-    if said is None:
+    match = _LINE.fullmatch(line.strip())
+    if match is None:
         return None
-    return int(said[1]) / 100.0, f"{said[3]} ({said[2]})" if said[2] else said[3]
+    return int(match[1]) / 100.0, f"{match[3]} ({match[2]})" if match[2] else match[3]
 
 
 def _line(text: str) -> None:

@@ -130,13 +130,13 @@ def toml_of(text: str, what: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        said = str(error)
-    at = re.search(r"line (\d+)", said)
+        message = str(error)
+    at = re.search(r"line (\d+)", message)
     lines = text.splitlines()
     line = lines[min(int(at[1]), len(lines)) - 1].strip() if at and lines else ""
-    cures = (cure for pattern, cure in _MISTAKES if re.search(pattern, said))
+    cures = (cure for pattern, cure in _MISTAKES if re.search(pattern, message))
     raise InputError(
-        f"{what} is not a TOML file: {said}"
+        f"{what} is not a TOML file: {message}"
         + (f", '{line}'" if line.isprintable() and 0 < len(line) < 100 else "")
         + f": {next(cures, 'start from ccfem example bracket_plate')}"
     )

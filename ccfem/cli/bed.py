@@ -129,10 +129,10 @@ def _request(
     """Ask for one part with its natural amount of fibre; short tests unless they are named."""
     from ccfem.comparison.request import DEFAULT_STRAND, LONGEST_TEST, Request, named_strategies
 
-    own = {name: values for name, values in parameters.items() if name == part.strategy}
+    chosen = {name: values for name, values in parameters.items() if name == part.strategy}
     return Request.of(
         case,
-        named_strategies(case, (part.strategy,), own),
+        named_strategies(case, (part.strategy,), chosen),
         part.layers,
         natural=True,
         strand=DEFAULT_STRAND if test is not False else None,

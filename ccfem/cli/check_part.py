@@ -91,8 +91,8 @@ def _of_a_solve(case: Case) -> list[str]:
             f"neither build directions nor pins are judged, for the part is not solved: {error}"
         ]
     turned = isinstance(slicing, Planar) and slicing.axis == "build"
-    said = better_direction(stress, case.build, case.machine) if turned else ""
-    return [line for line in (_about_order(problem, stress), said, about_pins(stress)) if line]
+    proposal = better_direction(stress, case.build, case.machine) if turned else ""
+    return [line for line in (_about_order(problem, stress), proposal, about_pins(stress)) if line]
 
 
 def _about_order(problem: Problem, rough: StressField) -> str:

@@ -140,16 +140,18 @@ def calibrated_file(name: str, text: str) -> str:
     pairs = [assignment(part) for part in text.split(",") if part.strip()]
     if len(dict(pairs)) < len(pairs):
         raise InputError(f"--measured names a measure twice: {text}")
-    machine, found = updated(Machine(), machine_table(name)), Measured.of(dict(pairs))
-    off = corrections(machine, found)
-    said = (
+    machine, measured = updated(Machine(), machine_table(name)), Measured.of(dict(pairs))
+    off = corrections(machine, measured)
+    remark = (
         f"Calibrated: fibre lay {off['x']:+.2f} mm to the right and {off['y']:+.2f} mm to the "
         f"back, began {off['start']:+.2f} mm and ended {off['end']:+.2f} mm too late; matrix fed: "
         f"{off['flow']:.3f} of what was asked for."
     )
     if machine.gcode.offset_by == "firmware":
-        said += " The firmware knows the offset of the fibre's nozzle: change it there by as much."
-    return _file(corrected(machine, found), said)
+        remark += (
+            " The firmware knows the offset of the fibre's nozzle: change it there by as much."
+        )
+    return _file(corrected(machine, measured), remark)
 
 
 def _list() -> None:
@@ -203,9 +205,9 @@ def _lines(value: Any, where: str) -> list[str]:
         words = ", ".join(
             word for word in kind.split(", ") if word.startswith(("mm", "deg", "g/", "s", "K/"))
         )
-        said = f"{words}: {meaning}" if words else meaning
-        if said and said != (lines[-1] if lines else ""):
-            lines += textwrap.wrap(said, _WIDTH - 2, initial_indent="# ", subsequent_indent="# ")
+        text = f"{words}: {meaning}" if words else meaning
+        if text and text != (lines[-1] if lines else ""):
+            lines += textwrap.wrap(text, _WIDTH - 2, initial_indent="# ", subsequent_indent="# ")
         lines.append(
             f"# {field.name} is not set" if entry is None else f"{field.name} = {_text(entry)}"
         )

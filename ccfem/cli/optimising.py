@@ -156,13 +156,13 @@ def optimise(
 
 def _now_and_then(progress: "Progress") -> "Progress":
     """Progress that names a step only where a tenth of the work is done since the one before."""
-    said, at = "", -1.0
+    shown, at = "", -1.0
 
     def tell(what: str, share: float) -> None:
-        nonlocal said, at
+        nonlocal shown, at
         if share >= at + _TENTH or share >= 1.0:
-            said, at = what, share
-        progress(said, share)
+            shown, at = what, share
+        progress(shown, share)
 
     return tell
 

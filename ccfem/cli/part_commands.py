@@ -222,7 +222,7 @@ class _NamingFormats(TyperCommand):
             "cad_files": cad.SUFFIXES,
             "meshes": suffixes(writable=True),
         }
-        names = {kind: ", ".join(those) for kind, those in known.items()}
+        names = {kind: ", ".join(members) for kind, members in known.items()}
         for parameter in self.params:
             text = getattr(parameter, "help", None)
             if text:

@@ -114,8 +114,8 @@ def _refined(case: "Case") -> "Case":
     before, after = (len(solved.mesh.cells) for solved in (case.problem, problem))
     # Between walls and infill the stress jumps: there cells of any size have an estimated error.
     solid = "" if case.plastic.solid else " with solid plastic"
-    said = f"{before:,} cells were refined to {after:,} by their estimated error{solid}"
-    findings = (*case.findings, said) if after > before else case.findings
+    remark = f"{before:,} cells were refined to {after:,} by their estimated error{solid}"
+    findings = (*case.findings, remark) if after > before else case.findings
     return replace(case, problem=problem, findings=findings)
 
 

@@ -80,10 +80,10 @@ def print_member(kind: str, name: str) -> None:
     console.print(f"[bold]{name}[/bold]")
     for paragraph in about(member):
         console.print(paragraph, markup=False)
-    said = attributes(member)
+    values = attributes(member)
     rows = []
     for field in dataclasses.fields(member):
-        what = said[field.name].kind if field.name in said else ""
+        what = values[field.name].kind if field.name in values else ""
         note = _amount(member, field.name)
         meaning = _meaning(member, field.name, by_class)
         text = f"{meaning} {note and f'It {note}.'}".strip()
@@ -187,8 +187,8 @@ def print_comparison(
         console.print(about_cells(comparison.stress), style="dim", markup=False)
     for line in shown:
         console.print(line, style="dim", markup=False)
-    for said in comparison.verdicts if details else comparison.verdicts[:1]:
-        console.print(said, style="bold", markup=False)
+    for verdict in comparison.verdicts if details else comparison.verdicts[:1]:
+        console.print(verdict, style="bold", markup=False)
     if any(run.tested is not None for run in runs):
         console.print(HONEST_PROMISE if details else IN_SHORT, style="dim", markup=False)
     if not details:
@@ -230,11 +230,11 @@ def _print_file(console: Console, file: Path, run: Printed) -> None:
     kinds = {spot.name for spot in plan.standing}
     what = "parts" if len(kinds) > 1 else "copies"
     many = f"{plan.copies} {what} in " if plan.copies > 1 else ""
-    said = (
+    text = (
         f"{file}  {many}{clock(totals.seconds)} of printing, {totals.matrix_mass:.2f} g of matrix, "
         f"{totals.fibre_mass:.2f} g of fibre"
     )
-    console.print(said, markup=False, soft_wrap=True)
+    console.print(text, markup=False, soft_wrap=True)
 
 
 def _print_where(console: Console, where: Path, seconds: float) -> None:

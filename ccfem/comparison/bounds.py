@@ -49,17 +49,17 @@ def bounds_of(
     if not request.bound or tests is None or not equal or presses(cases):
         return {}
     several, strand = len(cases) > 1, tests.strand
-    laid = [float(run.toolpaths.lengths.sum()) for run in equal]
-    lengths = [max(laid)]
+    fibre = [float(run.toolpaths.lengths.sum()) for run in equal]
+    lengths = [max(fibre)]
     if several_lengths:
-        lengths = _lengths_to_bound(laid, _SAME_CASES_BOUND if several else _SAME_BOUND)
+        lengths = _lengths_to_bound(fibre, _SAME_CASES_BOUND if several else _SAME_BOUND)
     of = " in all load cases" if several else ""
     bounds = {length: known[length] for length in lengths if length in known}
     lengths = [length for length in lengths if length not in known]
     with timed(seconds, "bound"):
         about = (part.machine, strand)
         # Those between the runs are there for the curve alone.
-        gaps = [None if length in laid or several else LOOSE for length in lengths]
+        gaps = [None if length in fibre or several else LOOSE for length in lengths]
         results = in_processes(
             lambda length, gap: upper_bound(cases, part.layers, length, *about, gap=gap),
             lengths,

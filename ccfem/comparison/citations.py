@@ -92,8 +92,8 @@ def sentence(key: str) -> str:
     place = " ".join(fields[name] for name in ("volume", "pages") if name in fields)
     parts = [names, fields["title"], f"{where} {place}".strip(), fields.get("year", "")]
     parts += [f"doi:{fields['doi']}"] if "doi" in fields else []
-    said = ". ".join(part.rstrip(".") for part in parts if part)
-    return re.sub(r"[{}]", "", said).replace("--", "–") + "."
+    text = ". ".join(part.rstrip(".") for part in parts if part)
+    return re.sub(r"[{}]", "", text).replace("--", "–") + "."
 
 
 @cache

@@ -80,7 +80,7 @@ class Curve:
         verdicts = [verdict(self.at(length), length) for length in self.common]
         if not any(verdicts):
             return ("Along the curve no two strategies can be printed as planned.",)
-        return tuple(said for said in verdicts if said)
+        return tuple(sentence for sentence in verdicts if sentence)
 
     @property
     def frame(self) -> "pd.DataFrame":

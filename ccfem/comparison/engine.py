@@ -161,9 +161,9 @@ class Solved:
         elif below is True:
             raise InputError(NO_FIELD)
         strand = None if self.tests is None else self.tests.strand
-        said = slicer_remarks(chosen, stress)
+        remarks = slicer_remarks(chosen, stress)
         stack = tuple(layers)
-        about = (strand, case.build, below, said, self.every_layer, self.limits_only)
+        about = (strand, case.build, below, remarks, self.every_layer, self.limits_only)
         more = (self.longest_test, case.bed, self.course, case.plastic, case.scatter)
         return Part(stress, stack, case.machine, self.cases, *about, *more)
 
@@ -298,7 +298,7 @@ def answer(
     bounds = bounds_of(*about, tell, seconds, early.bounds)
     runs = [bounded(run, bounds, wanted) for run in runs]
     stacks = {name: part.layers for name, part in parts.items()}
-    said = tuple(
+    remarks = tuple(
         f"{name}: {line}" if name else line for name, part in parts.items() for line in part.remarks
     )
     return Comparison(
@@ -312,7 +312,7 @@ def answer(
         given=basis.given,
         bounds=bounds,
         curve=curve,
-        of_slicers=said,
+        of_slicers=remarks,
         bare=bare,
     )
 

@@ -485,8 +485,8 @@ def _load_cases(comparison: Comparison) -> dict[str, Any]:
     if bound is None:
         return {"weights": weights, "bound": None}
     kept = ("objective", "singles", "case_weights", "least", "factors")
-    said = {name: getattr(bound, name) for name in kept} | {"reached": bound.attained}
-    return {"weights": weights, "bound": said}
+    values = {name: getattr(bound, name) for name in kept} | {"reached": bound.attained}
+    return {"weights": weights, "bound": values}
 
 
 def _load(stress: StressField) -> list[float] | None:

@@ -144,8 +144,8 @@ def _check_counts(counts: Sequence[int]) -> None:
 
 def _kinds(name: str, strategy: Strategy, strengths: Sequence[float]) -> dict[str, Strategy]:
     """Strategies that differ in how much strength counts in what they plan for."""
-    own = getattr(strategy, "strength", None)
-    if own is None and strengths:
+    for_strength = getattr(strategy, "strength", None)
+    if for_strength is None and strengths:
         raise InputError(
             f"'{name}' does not plan for strength; stream_function and pruned do: choose one of "
             "them, or leave strengths out"

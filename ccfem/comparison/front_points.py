@@ -148,10 +148,10 @@ class FibreFront:
 
     def __repr__(self) -> str:
         best, cases = max(self.points, key=lambda point: point.least_ratio), self.cases
-        said = f" in every one of {len(cases)} load cases" if cases else ""
+        under = f" in every one of {len(cases)} load cases" if cases else ""
         return (
             f"FibreFront of '{self.case}' by {self.strategy}: {len(self.points)} plans, up to "
-            f"{best.least_ratio:.3g} times as stiff{said} with {best.length / 1000.0:.4g} m on "
+            f"{best.least_ratio:.3g} times as stiff{under} with {best.length / 1000.0:.4g} m on "
             f"{best.layers} layers"
         )
 
@@ -169,9 +169,9 @@ class FibreFront:
         each: no plan with as little fibre reaches a larger share of that in its worst case.
         """
         measures, marks = [point.measure for point in self.points], []
-        for k, own in enumerate(measures):
-            shares = [own.share_of(other.ratios) for other in measures]
-            marks.append(self._front(own.share_of(np.ones(len(own.ratios))), shares)[k])
+        for k, measure in enumerate(measures):
+            shares = [measure.share_of(other.ratios) for other in measures]
+            marks.append(self._front(measure.share_of(np.ones(len(measure.ratios))), shares)[k])
         return np.array(marks)
 
     @property
@@ -181,9 +181,9 @@ class FibreFront:
 
     def _front(self, bare: float, values: Sequence[float]) -> BoolArray:
         # Plans to one length differ by what the shortest strand leaves: these count as equal.
-        laid = np.array([point.length for point in self.points])
+        fibre = np.array([point.length for point in self.points])
         asked = np.array([point.asked_in_all for point in self.points])
-        lengths = np.where(np.abs(laid - asked) <= TOLERANCE * asked, asked, laid)
+        lengths = np.where(np.abs(fibre - asked) <= TOLERANCE * asked, asked, fibre)
         printable = np.array([not point.why_not for point in self.points])
         across = np.append(0.0, np.where(printable, lengths, np.nan))
         return on_front(across, np.append(bare, values))[1:]
@@ -218,9 +218,9 @@ class FibreFront:
         self, values: Sequence[float], best: Sequence[bool]
     ) -> dict[str, list[AmountPoint]]:
         curves: dict[str, list[AmountPoint]] = {}
-        for each, value, marked in zip(self.points, values, best, strict=True):
-            point = AmountPoint(1e-3 * each.length, value, marked, not each.why_not)
-            curves.setdefault(each.kind, []).append(point)
+        for plan, value, marked in zip(self.points, values, best, strict=True):
+            point = AmountPoint(1e-3 * plan.length, value, marked, not plan.why_not)
+            curves.setdefault(plan.kind, []).append(point)
         return curves
 
     def plot_trade(self) -> "Figure":

@@ -79,7 +79,7 @@ def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictur
     stresses = [stress_on(layer, comparison.planned_on) for layer in layers]
     limit = max(tension_limit(stress) for stress in stresses)
     colours = palette(run.name for run in comparison.runs)
-    middle = next(each for each in stresses if each.layer.index == centre.index)
+    middle = next(of_layer for of_layer in stresses if of_layer.layer.index == centre.index)
     heading = f"tension in layer {middle.layer.index}, load case {comparison.stress.case}"
     checked = check(comparison.case)
     return Pictures(

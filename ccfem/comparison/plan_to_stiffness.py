@@ -131,9 +131,9 @@ def least_fibre(
         printed = printed_strands(planned.toolpaths, layers, mesh, machine).fibre
         strands = carrying_strands(printed, planned.strategy, layers, mesh, machine)
         ratios = virtual_tests(strands, parts, strand).ratios
-        reached, laid = float(ratios.min()), planned.length_per_layer
-        plans.setdefault(laid, LeastFibre(planned, length, reached, ratios, ()))
-        return laid, reached
+        reached, planned_length = float(ratios.min()), planned.length_per_layer
+        plans.setdefault(planned_length, LeastFibre(planned, length, reached, ratios, ()))
+        return planned_length, reached
 
     def following(_: int) -> float | None:
         last = plans[[*tried][-1]]
@@ -145,7 +145,7 @@ def least_fibre(
 
     wanted = (ratio, ratio + _CLOSE * (ratio - 1.0))
     close_in(tried, measured, _FIRST * most, following, wanted, _PLANS)
-    enough = [laid for laid, plan in plans.items() if plan.ratio >= ratio]
+    enough = [fibre for fibre, plan in plans.items() if plan.ratio >= ratio]
     if not enough:
         best = max(plans.values(), key=lambda plan: plan.ratio)
         every, where = "", ""

@@ -184,14 +184,14 @@ def _about_scatter(tested: Sequence[Run]) -> list[str]:
     if not known:
         return []
     deviation = known[0].deviation
-    said = (
+    remark = (
         f"scatter of prints ([scatter], one standard deviation): {tested[0].name} ± {deviation:.1%}"
     )
     if len(known) == len(tested) > 1 and not tested[0].cases:
         both = scatter_between(tested[0], tested[1])
         cancels = ": what they share cancels" if both < 0.5 * deviation else ""
-        said += f"; over {tested[1].name}, from the same spools, ± {both:.1%}{cancels}"
-    return [said]
+        remark += f"; over {tested[1].name}, from the same spools, ± {both:.1%}{cancels}"
+    return [remark]
 
 
 def _about_joints(tested: Sequence[Run]) -> list[str]:
@@ -199,8 +199,8 @@ def _about_joints(tested: Sequence[Run]) -> list[str]:
     best = tested[0].tested if tested else None
     if best is None:
         return []
-    said = said_of_pins(() if best.cases else best.joints, best.pins_not_judged)
-    return [said] if said else []
+    remark = said_of_pins(() if best.cases else best.joints, best.pins_not_judged)
+    return [remark] if remark else []
 
 
 def _about_links(total: Mapping[str, float]) -> list[str]:
@@ -368,22 +368,22 @@ def cases_verdict(runs: Sequence[Run], wanted: Wanted, bound: UpperBound | None)
     reached = f"{merit(first):.0%} {of}" if bound is not None else f"{merit(first):.2f} times {of}"
     names = f"{first.name} and {', '.join(run.name for run in group[1:])}"
     if len(group) == 1:
-        said = (
+        verdict = (
             f"{first.name} serves all load cases best: the worst of them reaches {reached}, "
             f"{merit(first) / merit(order[1]):.2f} times {order[1].name} (predicted, fibres "
             "carrying tension only; no other is better with some compression)."
         )
     elif all_same(group):
-        said = (
+        verdict = (
             f"No difference between {names} over all load cases: less than {RESOLUTION:.0%}, the "
             "resolution of the test."
         )
     else:
-        said = (
+        verdict = (
             f"Undecided between {names} over all load cases: fibres without and with some "
             "compression do not agree on an order."
         )
-    return said + left_out(runs, wanted, first)
+    return verdict + left_out(runs, wanted, first)
 
 
 def cases_remarks(
@@ -401,9 +401,9 @@ def cases_remarks(
     others : bool
         Whether the part has alternative supports.
     """
-    said = ", ".join(f"{n} {w:.2g}" for n, w in zip(cases.names, cases.weights, strict=True))
+    text = ", ".join(f"{n} {w:.2g}" for n, w in zip(cases.names, cases.weights, strict=True))
     texts = [
-        f"planned for {len(cases)} load cases, by weight: {said}; stiffness, first failure and "
+        f"planned for {len(cases)} load cases, by weight: {text}; stiffness, first failure and "
         f"indices of stress in the first table are those of '{cases.heaviest.case}'"
     ]
     if others:

@@ -484,8 +484,8 @@ def named_strategies(
     made: dict[str, Strategy] = {}
     for strategy in strategies:
         if isinstance(strategy, str):
-            own = {**case.parameters.get(strategy, {}), **overrides.get(strategy, {})}
-            made[strategy] = create(strategy, own)
+            chosen = {**case.parameters.get(strategy, {}), **overrides.get(strategy, {})}
+            made[strategy] = create(strategy, chosen)
         else:
             check_instance("strategy", strategy)
             made[free_name(member_name(strategy), {*made, *names})] = strategy

@@ -190,13 +190,13 @@ class Comparison:
         return headline_table(self.ranking, self.wanted, self.over_slicings)
 
     def __str__(self) -> str:
-        said = " ".join(self.verdicts)
-        return "\n".join([*self.table.first.lines("strategy"), *filter(None, [said])])
+        verdicts = " ".join(self.verdicts)
+        return "\n".join([*self.table.first.lines("strategy"), *filter(None, [verdicts])])
 
     def _repr_html_(self) -> str:
-        said = " ".join(self.verdicts)
+        verdicts = " ".join(self.verdicts)
         page = self.table.first.html("strategy") + paragraphs(
-            [*filter(None, [said]), *self.remarks]
+            [*filter(None, [verdicts]), *self.remarks]
         )
         return page + image(self.plot()) if self.succeeded else page
 
@@ -333,7 +333,7 @@ class Comparison:
         picture : path, optional
             Write the view to a file (.png) instead.
         """
-        runs = {each.name: each for each in self.ranking if len(each.toolpaths)}
+        runs = {ranked.name: ranked for ranked in self.ranking if len(ranked.toolpaths)}
         name = next(iter(runs), "") if run is None else run
         check_known("run with paths" if self.over_slicings else "strategy with paths", name, runs)
         layers = self.stacks[runs[name].slicing]
@@ -360,7 +360,7 @@ class Comparison:
     def verdicts(self) -> tuple[str, ...]:
         """The verdict, and those along the curve."""
         along = () if self.curve is None else self.curve.verdicts
-        return tuple(dict.fromkeys(said for said in (self.verdict, *along) if said))
+        return tuple(dict.fromkeys(verdict for verdict in (self.verdict, *along) if verdict))
 
     @property
     def remarks(self) -> list[str]:

@@ -20,7 +20,7 @@ def middle_layer(comparison: Comparison) -> Layer:
     """Middle one of the layers on which most runs lay fibre, to represent all."""
     indices = [set(np.unique(run.toolpaths.layer).tolist()) for run in comparison.succeeded]
     drawn = drawn_layers(comparison)
-    runs = [sum(layer.index in those for those in indices) for layer in drawn]
+    runs = [sum(layer.index in planned for planned in indices) for layer in drawn]
     best = [layer for layer, count in zip(drawn, runs, strict=True) if count == max(runs)]
     return best[len(best) // 2]
 

@@ -350,7 +350,7 @@ def all_planned(runs: Sequence[Run], plan: Callable[[Run], Run], ahead: Ahead) -
 
 
 def to_length(
-    own: Mapping[str, Run],
+    natural: Mapping[str, Run],
     setter: str | None,
     length: float | None,
     part: Part,
@@ -377,7 +377,7 @@ def to_length(
         start = Planned(run.strategy, run.toolpaths, run.length_per_layer)
         return planned(run, part, length, tell, start if len(run.toolpaths) else None)
 
-    runs = list(own.values())
+    runs = list(natural.values())
     return runs if length is None else all_planned(runs, level, ahead)
 
 
@@ -587,8 +587,8 @@ def _stage(run: Run, stage: str, work: Callable[[], Run], reason: str = "failure
         with timed(seconds, stage):
             done = work()
     except (InputError, SolveError) as error:
-        said: Any = {reason: str(error)}
-        done = replace(run, **said)
+        outcome: Any = {reason: str(error)}
+        done = replace(run, **outcome)
     return replace(done, seconds=seconds)
 
 

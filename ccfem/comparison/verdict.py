@@ -68,7 +68,7 @@ def left_out(runs: Sequence[Run], wanted: Wanted, best: Run | None = None) -> st
         Best of the runs that count; without it no run is called stiffer or untested.
     """
     order = [run for run in ranking(runs, wanted) if run.evaluation is not None]
-    said = {
+    reasons = {
         "Not tested": [run.name for run in comparable(runs, wanted) if best and not is_tested(run)],
         "Not at that length": [
             f"{run.name} (lays {_fibre(run, wanted)}{', stiffer' if _stiffer(run, best) else ''})"
@@ -81,7 +81,7 @@ def left_out(runs: Sequence[Run], wanted: Wanted, best: Run | None = None) -> st
             if not run.printable
         ],
     }
-    return "".join(f" {what}: {', '.join(names)}." for what, names in said.items() if names)
+    return "".join(f" {what}: {', '.join(names)}." for what, names in reasons.items() if names)
 
 
 def _stiffer(run: Run, best: Run | None) -> bool:
@@ -133,8 +133,8 @@ def _by_efficiency(runs: Sequence[Run], wanted: Wanted) -> str:
     order = sorted((name for name in known if np.isfinite(known[name])), key=lambda n: -known[n])
     why = "fewer than two have a virtual test" if any(map(is_tested, runs)) else "no virtual test"
     if not order:
-        said = why if any(map(is_tested, runs)) else "there is no virtual test"
-        return f"No verdict: {said}, and no fibre lies in tension."
+        reason = why if any(map(is_tested, runs)) else "there is no virtual test"
+        return f"No verdict: {reason}, and no fibre lies in tension."
     then = f", then {order[1]} with {known[order[1]]:.3f}" if len(order) > 1 else ""
     best = f"{order[0]} with {known[order[0]]:.3f}"
     return f"By efficiency alone ({why}): {best}{then}, {_amount(wanted)}."
@@ -153,22 +153,22 @@ def _ratios(runs: Sequence[Run], mode: str = TENSION) -> str:
 def _under_other(runs: Sequence[Run]) -> str:
     """Say the same of the alternative supports, where the table shows it."""
     names = dict(zip(ALTERNATIVES, ("tension only", "some compression"), strict=True))
-    said = [
+    sentences = [
         f"{_ratios(runs, mode)} ({name})" for mode, name in names.items() if all_have(runs, mode)
     ]
-    return f"; under the alternative supports {', '.join(said)}" if said else ""
+    return f"; under the alternative supports {', '.join(sentences)}" if sentences else ""
 
 
 def _lost(runs: Sequence[Run]) -> str:
     """Say which of the best runs the first is ahead of, but for what prints scatter."""
     first, *others = runs
-    said = [
+    sentences = [
         f"{stiffness_ratio(first) / stiffness_ratio(run):.2f} ± {scatter_between(first, run):.1%} "
         f"times {run.name}"
         for run in others
         if lost_in_scatter(first, run)
     ]
-    return f"; prints scatter too much: {first.name} is {', '.join(said)}" if said else ""
+    return f"; prints scatter too much: {first.name} is {', '.join(sentences)}" if sentences else ""
 
 
 def _fibre(run: Run, wanted: Wanted) -> str:

@@ -202,7 +202,7 @@ def _samples(sheet: _Sheet, step: float) -> tuple[FloatArray, FloatArray, FloatA
     corners = sheet.points[sheet.triangles]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     parts = np.ceil(longest / step).astype(np.int64)
-    found = [(sheet.points, sheet.normals, sheet.gaps)]
+    samples = [(sheet.points, sheet.normals, sheet.gaps)]
     for count in np.unique(parts[parts > 1]).tolist():
         i, j = np.meshgrid(np.arange(count + 1), np.arange(count + 1), indexing="ij")
         inside = i + j <= count
@@ -211,8 +211,8 @@ def _samples(sheet: _Sheet, step: float) -> tuple[FloatArray, FloatArray, FloatA
         points, normals = (
             np.concatenate(weights @ values[of]) for values in (sheet.points, sheet.normals)
         )
-        found.append((points, normals, (sheet.gaps[of] @ weights.T).ravel()))
-    points, normals, gaps = (np.concatenate(values) for values in zip(*found, strict=True))
+        samples.append((points, normals, (sheet.gaps[of] @ weights.T).ravel()))
+    points, normals, gaps = (np.concatenate(values) for values in zip(*samples, strict=True))
     size = np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     return points, normals / size, gaps
 
@@ -248,8 +248,8 @@ def _on_border(sheet: _Sheet, near: Nearest) -> BoolArray:
     open_[triangle, (side + 2) % 3] = True  # by the corner opposite a side
     corner = np.isin(sheet.triangles, sheet.border)
     none, all_ = near.weights < 1e-6, near.weights > 1.0 - 1e-6
-    found = (none & open_[near.triangle]) | (all_ & corner[near.triangle])
-    return np.asarray(found.any(axis=1))
+    border = (none & open_[near.triangle]) | (all_ & corner[near.triangle])
+    return np.asarray(border.any(axis=1))
 
 
 def _to_segment(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:

@@ -89,6 +89,8 @@ def bends(line: FloatArray, kept: IntArray, tolerance: float) -> IntArray:
 
 _STRAIGHT = 1e-6
 """Turn of the border, radians, below which a point lies on a straight side."""
+
+
 def areas(shape: shapely.Geometry) -> shapely.MultiPolygon:
     """Parts of a shape that have an area.
 

@@ -203,10 +203,10 @@ def folds(
     offsets = np.concatenate([[0], np.cumsum(count)])
     parts: list[tuple[IntArray, FloatArray, FloatArray]] = []
     for first, last in pairwise([0, *ends.tolist()]):
-        some, own = slice(offsets[first], offsets[last]), turning[first:last]
-        lines = (points[some], offsets[first : last + 1] - offsets[first], closed[own])
-        k, start, stop = _fold_stretches(*lines, begin[own], size[own], window, strict)
-        parts.append((own[k], start, stop))
+        some, turns = slice(offsets[first], offsets[last]), turning[first:last]
+        lines = (points[some], offsets[first : last + 1] - offsets[first], closed[turns])
+        k, start, stop = _fold_stretches(*lines, begin[turns], size[turns], window, strict)
+        parts.append((turns[k], start, stop))
     line, start, stop = (np.concatenate(column) for column in zip(_NONE, *parts, strict=True))
     return Folds(line, start, stop, lengths=size, closed=closed)
 

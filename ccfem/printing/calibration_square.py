@@ -189,7 +189,7 @@ def corrections(machine: Machine, measured: Measured) -> dict[str, float]:
     x = 0.5 * (measured.left - measured.right)
     y = 0.5 * (measured.front - measured.back)
     along = x if square.rightwards else -x
-    found = {
+    values = {
         "x": x,
         "y": y,
         "start": measured.start - ALONG - along,
@@ -198,13 +198,13 @@ def corrections(machine: Machine, measured: Measured) -> dict[str, float]:
     }
     if measured.mass is not None:
         fibre = 4.0 * machine.fibre_mass_per_length * (machine.shortest_strand + _LONGER)
-        found["flow"] = (measured.mass - fibre) / (square.mass - fibre)
-        if not _FLOW[0] < found["flow"] < _FLOW[1]:
+        values["flow"] = (measured.mass - fibre) / (square.mass - fibre)
+        if not _FLOW[0] < values["flow"] < _FLOW[1]:
             raise InputError(
                 f"mass must be about {square.mass:.1f} g; got {measured.mass:g}: weigh the square "
                 "alone, in g"
             )
-    return found
+    return values
 
 
 def corrected(machine: Machine, measured: Measured) -> Machine:

@@ -78,18 +78,18 @@ def on_course(plan: PrintPlan, course: Course, machine: Machine) -> PrintPlan:
     if course.pauses and not machine.gcode.pause:
         raise InputError("machine.gcode.pause has no lines to halt this machine: give them")
     pauses = sorted({_layer_of(text, plan.top.tolist(), first) for text in course.pauses})
-    said = [
+    remarks = [
         f"pause before layer {number}, when {plan.top[number - 1]:.3f} mm are printed"
         for number in pauses
     ]
     if first:
-        said.insert(
+        remarks.insert(
             0,
             f"begins at layer {first}, on {plan.top[first - 1]:.3f} mm that are printed; time and "
             "mass are of the rest. Z is not homed: before the start, let the nozzle of T0 touch "
             "the top of what is printed",
         )
-    return replace(plan, pauses=tuple(pauses), first=first, warnings=(*said, *plan.warnings))
+    return replace(plan, pauses=tuple(pauses), first=first, warnings=(*remarks, *plan.warnings))
 
 
 def _layer_of(text: str, tops: Sequence[float], first: int) -> int:

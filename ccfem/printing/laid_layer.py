@@ -226,10 +226,10 @@ def _evened(share: FloatArray, length: FloatArray, last: IntArray) -> FloatArray
     last : (K,) int array
         Steps that paths end with: no run goes on from one path to the next.
     """
-    along, laid = (np.append(0.0, np.cumsum(column)) for column in (length, share * length))
-    curve = np.column_stack([_STRETCH * along, laid])
+    along, lengths = (np.append(0.0, np.cumsum(column)) for column in (length, share * length))
+    curve = np.column_stack([_STRETCH * along, lengths])
     at = bends(curve, last[:-1] + 1, _MISPLACED)
-    run = np.diff(laid[at]) / np.maximum(np.diff(along[at]), 1e-300)
+    run = np.diff(lengths[at]) / np.maximum(np.diff(along[at]), 1e-300)
     return np.repeat(run, np.diff(at))
 
 
@@ -270,14 +270,14 @@ def _check(
     share = np.cumsum(length[order]) / length.sum()
     missing = least - float(volume[order[np.searchsorted(share, 0.01)]])
     cure = "" if machine.process.stacks == "end" else ", or set process.stacks = 'end'"
-    said = (
+    message = (
         f"strands stand higher than the {height:.3g} mm of matrix above them on {thin:.0%} of the "
         f"layer; {height + missing:.3g} mm would do: lay fibre layers at least "
         f"{height + below + missing:.3g} mm apart{cure}"
     )
     if thin > _TOO_THIN:
-        raise InputError(said)
-    return said
+        raise InputError(message)
+    return message
 
 
 COORDINATE_DIGITS = 3

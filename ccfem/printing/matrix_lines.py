@@ -344,7 +344,7 @@ def _infill_lines(
     angle = float(np.radians(machine.gcode.matrix_angle))
     turns = (0.0, 1.0) if plastic.infill == "grid" else (phase,)
     angles = [angle + 0.5 * np.pi * turn for turn in turns]
-    return [line for each in angles for line in parallel_lines(region, spacing, each)]
+    return [line for direction in angles for line in parallel_lines(region, spacing, direction)]
 
 
 def _across(lines: Sequence[FloatArray], angle: float) -> float:

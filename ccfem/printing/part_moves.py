@@ -155,15 +155,20 @@ def _first(plan: PrintPlan, number: int) -> int:
 def _what(plan: PrintPlan, number: int, lowest: BoolArray) -> Hashable:
     """Digest of all on a layer that its moves follow from, but for its height if it is flat."""
     paths, mine = plan.paths, np.flatnonzero(plan.paths.layer == number)
-    own = slice(mine[0], mine[-1] + 1)
+    rows = slice(mine[0], mine[-1] + 1)
     ends = paths.offsets[mine[0] : mine[-1] + 2]
     points = slice(ends[0], ends[-1])
     places, normals = paths.points[points], paths.normals[points]
-    if len(mine) != own.stop - own.start or np.ptp(places[:, 2]) or (normals[:, 2] != 1.0).any():
+    if len(mine) != rows.stop - rows.start or np.ptp(places[:, 2]) or (normals[:, 2] != 1.0).any():
         return number
     digest = hashlib.sha256(plan.thickness[number].tobytes())
     about = (paths.kind, paths.closed, plan.short, plan.sparse, plan.room, lowest)
-    columns = (places[:, :2], ends - ends[0], plan.laid[points], *(column[own] for column in about))
+    columns = (
+        places[:, :2],
+        ends - ends[0],
+        plan.laid[points],
+        *(column[rows] for column in about),
+    )
     for column in columns:
         digest.update(np.ascontiguousarray(column).tobytes())
     return digest.digest()

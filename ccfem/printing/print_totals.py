@@ -187,9 +187,9 @@ def part_totals(
         low, high = np.array(spot.low) - _ROUNDING, np.array(spot.high) + _ROUNDING
         place = moves.place[:, :2]
         owner[((place >= low) & (place <= high)).all(axis=1)] = names.index(spot.name)
-    laid = np.flatnonzero(moves.event == LAY)
-    following = np.searchsorted(laid, np.arange(len(moves)))
-    owner = np.append(owner[laid], -1)[following]
+    printed = np.flatnonzero(moves.event == LAY)
+    following = np.searchsorted(printed, np.arange(len(moves)))
+    owner = np.append(owner[printed], -1)[following]
     area = 0.25e-3 * np.pi * machine.matrix_diameter**2 * machine.matrix_density
     parts = []
     for k, name in enumerate(names):

@@ -153,9 +153,9 @@ def _said(plans: Sequence[PrintPlan], names: Sequence[str], count: int) -> tuple
     if len(plans) > 1:
         named = zip(names, plans, strict=True)
         return tuple(f"{name}: {line}" for name, plan in named for line in plan.warnings)
-    said = f"{count} copies, of all of which are fibre, matrix, time and file; "
-    said += "indices, virtual test and remarks on strands are of one"
-    return (*([said] if count > 1 else []), *plans[0].warnings)
+    remark = f"{count} copies, of all of which are fibre, matrix, time and file; "
+    remark += "indices, virtual test and remarks on strands are of one"
+    return (*([remark] if count > 1 else []), *plans[0].warnings)
 
 
 def _ends(plan: PrintPlan) -> tuple[FloatArray, FloatArray]:
@@ -433,7 +433,7 @@ def _merged(plans: Sequence[PrintPlan], spots: _Spots, stacks: Sequence[int]) ->
     count = len(spots.of)
     tops, sizes = (np.concatenate([getattr(p, x) for p in plans]) for x in ("top", "thickness"))
     levels = np.concatenate([_levels(plan) for plan in plans])
-    _, own, number = np.unique(levels, axis=0, return_index=True, return_inverse=True)
+    _, first, number = np.unique(levels, axis=0, return_index=True, return_inverse=True)
     edges = np.cumsum([len(plan.top) for plan in plans])[:-1]
     numbers = np.split(number.ravel(), edges)
     renamed = [
@@ -483,8 +483,8 @@ def _merged(plans: Sequence[PrintPlan], spots: _Spots, stacks: Sequence[int]) ->
             closed=paths.closed[which],
             link=paths.link[rows],
         ),
-        tops[own],
-        sizes[own],
+        tops[first],
+        sizes[first],
         laid=column("laid")[rows],
         room=column("room")[which],
         short=column("short")[which],

@@ -366,7 +366,7 @@ def first_in_spiral_out(
     elif radius > 0.0:
         # On a ring round a small hole a long ramp would cut through the hole.
         gaps = [max(min(gap, len(tree.contours[k]) // _TURN), SAMPLES) for k in chain]
-        opened = [_opened_loop(loop, each) for loop, each in zip(loops, gaps, strict=True)]
+        opened = [_opened_loop(loop, opening) for loop, opening in zip(loops, gaps, strict=True)]
         strands = [_ramped(opened[::-1])]
     else:
         strands = [_laps([_opened_loop(loop, gap) for loop in reversed(loops)])]

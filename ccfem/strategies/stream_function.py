@@ -352,8 +352,8 @@ class StreamFunction:
         """Design as `designed` does, from a first step that is known."""
         problem, group, start = self._posed(common, bounds)
         first = self._known_first(common, problem)
-        found = designed_in_steps(problem, start, self.evaluations, self.coverage, first)
-        return problem, group, found
+        designs = designed_in_steps(problem, start, self.evaluations, self.coverage, first)
+        return problem, group, designs
 
     def _known_first(self, common: "_Common", problem: StreamProblem) -> StreamDesign | None:
         """First step of a design in two steps; None for a design in one."""

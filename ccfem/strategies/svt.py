@@ -453,15 +453,17 @@ def alike(layers: Sequence[Layer], stress: PartStress) -> dict[int, Layer]:
         while left:
             largest = max(sizes)
             guide = next(
-                each for each, size in zip(left, sizes, strict=True) if size >= _AS_LARGE * largest
+                of_layer
+                for of_layer, size in zip(left, sizes, strict=True)
+                if size >= _AS_LARGE * largest
             )
             rest = []
-            for each, size in zip(left, sizes, strict=True):
-                if size <= _WEAK * largest or apart(guide, each) <= _TURNED:
-                    representatives[each.layer.index] = guide.layer
+            for of_layer, size in zip(left, sizes, strict=True):
+                if size <= _WEAK * largest or apart(guide, of_layer) <= _TURNED:
+                    representatives[of_layer.layer.index] = guide.layer
                 else:
-                    rest.append((each, size))
-            left, sizes = [each for each, _ in rest], [size for _, size in rest]
+                    rest.append((of_layer, size))
+            left, sizes = [of_layer for of_layer, _ in rest], [size for _, size in rest]
     return representatives
 
 

@@ -110,11 +110,11 @@ class Bench:
 
     def offered(self) -> list[str]:
         """Files of the folder that can be opened, and earlier part files of the workbench."""
-        found = [path for path in sorted(self.folder.iterdir()) if _is_body(path)]
+        bodies = [path for path in sorted(self.folder.iterdir()) if _is_body(path)]
         tables = [*sorted(self.folder.glob("*.toml")), *sorted(self.results.glob("*.toml"))]
         there = [path for path in tables if path.exists()]
-        found += [path for path in there if _names_body(path, path.stat().st_mtime_ns)]
-        return [path.relative_to(self.folder).as_posix() for path in found[:_LISTED]]
+        bodies += [path for path in there if _names_body(path, path.stat().st_mtime_ns)]
+        return [path.relative_to(self.folder).as_posix() for path in bodies[:_LISTED]]
 
     def open(self, what: str | os.PathLike[str]) -> None:
         """Open a body, a part file, or a case by name.
@@ -321,7 +321,9 @@ class Bench:
         except Exception as error:  # a check that fails ends no other
             return None, (("mistake", f"{type(error).__name__}: {error}"),)
         lines = checked.faults | {"warning": checked.warnings, "known": checked.facts}
-        return checked, tuple((kind, line) for kind, those in lines.items() for line in those)
+        return checked, tuple(
+            (kind, line) for kind, sentences in lines.items() for line in sentences
+        )
 
 
 def _is_body(path: Path) -> bool:

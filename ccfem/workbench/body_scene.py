@@ -43,13 +43,13 @@ def boxes(content: Mapping[str, Any]) -> dict[int, FloatArray]:
     """Opposite corners (2, 3), mm, of the fibre regions of a part file that are boxes."""
     fibre = content.get("fibre")
     regions = fibre.get("regions") if isinstance(fibre, Mapping) else None
-    those = {}
+    boxes_of = {}
     for k, region in enumerate(regions if isinstance(regions, list) else ()):
         if isinstance(region, Mapping) and region.get("rule") == "box":
             corners = finite([region.get("lower"), region.get("upper")])
             if corners is not None and corners.shape == (2, 3):  # else the check says so
-                those[k] = corners
-    return those
+                boxes_of[k] = corners
+    return boxes_of
 
 
 def stretched(corners: FloatArray, end: int, place: FloatArray, body: FloatArray) -> FloatArray:

@@ -64,9 +64,9 @@ class RunState:
             return ""
         if self.stopped:
             return self.stopped
-        said = [line for line in self.lines if line.startswith("ccfem: error: ")]
-        if said:
-            return said[-1].removeprefix("ccfem: error: ")
+        complaints = [line for line in self.lines if line.startswith("ccfem: error: ")]
+        if complaints:
+            return complaints[-1].removeprefix("ccfem: error: ")
         last = f": {self.lines[-1]}" if self.lines else ""
         return f"the run ended with exit code {self.code}{last}"
 

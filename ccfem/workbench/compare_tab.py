@@ -106,8 +106,8 @@ class CompareTab:
             tick = gui.add_checkbox(name, name in STRATEGIES, hint=about)
             self.ticks[name] = Field(self.page, tick, lambda _: self.show())
             lines.append(f"<li><b>{name}</b> {escaped(about)}</li>")
-        said = f"<summary>What they do</summary><ul>{''.join(lines)}</ul>"
-        gui.add_html(f'<details class="ccfem">{said}</details>')
+        summary = f"<summary>What they do</summary><ul>{''.join(lines)}</ul>"
+        gui.add_html(f'<details class="ccfem">{summary}</details>')
 
     # Running.
 
@@ -220,8 +220,8 @@ class CompareTab:
             else:
                 self.results = read_solution(out, text) if out.suffix else read_results(out)
             if out.suffix:  # what it found stands in no report
-                said = escaped("\n".join(state.lines))
-                self._said.content = f'<pre class="ccfem" tabindex="0">{said}</pre>'
+                log = escaped("\n".join(state.lines))
+                self._said.content = f'<pre class="ccfem" tabindex="0">{log}</pre>'
             self._ran = (self.results and self.results.part_file) or text
             self._show_results()
             self._show_age()
@@ -233,8 +233,8 @@ class CompareTab:
         self.ending.visible = state.running
         self._show_starts()
         self.bar.visible, self.bar.value = state.running, 100.0 * state.share
-        said = f"{100.0 * state.share:.0f} %: {state.step}" if state.running else state.complaint
-        self._said.content = f'<p class="ccfem" role="status">{escaped(said)}</p>' if said else ""
+        text = f"{100.0 * state.share:.0f} %: {state.step}" if state.running else state.complaint
+        self._said.content = f'<p class="ccfem" role="status">{escaped(text)}</p>' if text else ""
 
     def stop(self) -> None:
         """Stop the run, if there is one."""
@@ -257,7 +257,7 @@ class CompareTab:
         if bench.opened is None:
             return
         loads, sums = (bench.content.get(key) for key in ("loads", "combinations"))
-        names = [name for these in (loads, sums) if isinstance(these, dict) for name in these]
+        names = [name for shares in (loads, sums) if isinstance(shares, dict) for name in shares]
         options = (_FIRST, *names, _ALL)
         case = self.case.handle
         if case.options != options:
@@ -270,15 +270,17 @@ class CompareTab:
     def _show_commands(self, _: object = None) -> None:
         """Show what can be run, and the commands that do the same."""
         self._show_starts()
-        said = []
+        commands = []
         for name, begin in self._begins.items():
             if self._offers(name):
                 try:
                     command = shlex.join(["ccfem", *self._command_of(begin())[0]])
                 except InputError as error:
                     command = str(error)
-                said.append(f"<p>{name}: <code>{escaped(command)}</code></p>")
-        self._command.content = f'<div class="ccfem"><h2>In a terminal</h2>{"".join(said)}</div>'
+                commands.append(f"<p>{name}: <code>{escaped(command)}</code></p>")
+        self._command.content = (
+            f'<div class="ccfem"><h2>In a terminal</h2>{"".join(commands)}</div>'
+        )
 
     def _offers(self, name: str) -> bool:
         only = len(self._ticked()) == 1
@@ -480,13 +482,13 @@ class CompareTab:
         assert self.results is not None
         results = self.results
         layer = results.layers[place]
-        said = "".join(
+        text = "".join(
             f"<li><b>{escaped(name)}</b> {escaped(results.caption(name, place))}</li>"
             for name in names
         )
         self._layer_said.content = (
             f'<div class="ccfem"><p>Layer {layer["index"]}, {escaped(layer["where"])}</p>'
-            f"<ul>{said}</ul><div class='bar' style='background: {gradient('size')}'></div>"
+            f"<ul>{text}</ul><div class='bar' style='background: {gradient('size')}'></div>"
             f"<p class='ends'><span>0 N</span><span>{results.most_force:.3g} N in the fibre"
             "</span></p></div>"
         )

@@ -16,9 +16,9 @@ def draw_mesh(scene: Any, name: str, points: Any, triangles: Any, colour: Any, *
     return scene.add_mesh_simple(name, *shape, color=colour, **MATT, **more)
 
 
-def draw_label(scene: Any, name: str, said: str, place: Any, anchor: str = "bottom-center") -> Any:
+def draw_label(scene: Any, name: str, text: str, place: Any, anchor: str = "bottom-center") -> Any:
     """Draw words of what has a name at a place (3,), mm."""
-    return scene.add_label(f"{name}_said", said, position=tuple(place), anchor=anchor)
+    return scene.add_label(f"{name}_said", text, position=tuple(place), anchor=anchor)
 
 
 def draw_arrows(

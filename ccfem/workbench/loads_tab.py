@@ -161,10 +161,10 @@ class LoadsTab:
             self._said.content = ""
             return
         self.show_chosen()
-        those = entries(self.page.bench.content)
-        for name in self._rows.keys() - those.keys():
+        listed = entries(self.page.bench.content)
+        for name in self._rows.keys() - listed.keys():
             self._drop(name)
-        for place, (name, entry) in enumerate(those.items()):
+        for place, (name, entry) in enumerate(listed.items()):
             if name not in self._rows:
                 if entry.case not in self._tabs:
                     self._tabs[entry.case] = self._cases.add_tab(entry.case)
@@ -175,9 +175,9 @@ class LoadsTab:
             if field is not None:
                 field.put(entry.amount)
             said.content = lines_of(self._lines_about(entry))
-        for case in self._tabs.keys() - {entry.case for entry in those.values()}:
+        for case in self._tabs.keys() - {entry.case for entry in listed.values()}:
             self._tabs.pop(case).remove()
-        self._list.visible = bool(those)
+        self._list.visible = bool(listed)
 
     def _lines_about(self, entry: Entry) -> Said:
         """Lines of the check that name what an entry acts on, or its load case."""
@@ -201,10 +201,10 @@ class LoadsTab:
                 label = ", ".join(filter(None, (entry.key.capitalize(), entry.unit)))
                 handle = add(label, entry.amount, step=step)
                 field = Field(page, handle, partial(self._change, name))
-            said = gui.add_html("")
+            line = gui.add_html("")
             remove = gui.add_button("Remove", color="gray", hint=entry.title)
             remove.on_click(page.on(self._remove, name, folder))
-        return folder, field, said
+        return folder, field, line
 
     def _remove(self, name: Name, folder: Any) -> None:
         if name in self._rows and self._rows[name][0] is folder:  # else it was clicked twice

@@ -338,7 +338,7 @@ class Page(Tabbed):
         ends: FloatArray,
         presses: bool,
         start: FloatArray,
-        said: str,
+        text: str,
         turned: Callable[[FloatArray], None] | None,
         colour: tuple[int, int, int] = _LOAD,
     ) -> list[Any]:
@@ -347,7 +347,7 @@ class Page(Tabbed):
         drawn = draw_arrows(scene, name, ends[None], colour, 0.22 * long, 0.41)
         free = ends[0 if presses else 1]
         words = free + 0.12 * (ends[1] - ends[0]) * (-1.0 if presses else 1.0)
-        label = draw_label(scene, name, said, words)
+        label = draw_label(scene, name, text, words)
         if turned is None:
             return [drawn, label]
 
@@ -380,8 +380,8 @@ class Page(Tabbed):
 
         self._drag(rim, moved, lambda start, end: lay(turned(start, end)))
         ends = np.array([outer[0], outer[0] + long * up])
-        name, said = "/body/build", "build direction"
-        return [rim, lines, *self._arrow(name, ends, False, outer[0], said, lay, _BED)]
+        name, text = "/body/build", "build direction"
+        return [rim, lines, *self._arrow(name, ends, False, outer[0], text, lay, _BED)]
 
     def _ball(
         self,

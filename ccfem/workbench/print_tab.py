@@ -153,9 +153,9 @@ class PrintTab:
             near = gui.add_button_group("Fibre", ["Near faces", "In a box", "Everywhere"])
             near.on_click(page.on(self._regions, value=True))
         self._fibre_said = gui.add_html("")
-        for title, those in rows.items():
+        for title, inputs in rows.items():
             with gui.add_folder(title, expand_by_default=False):
-                self._add(those)
+                self._add(inputs)
         self._said = gui.add_html("")
         self._lines = gui.add_html("")
 
@@ -224,8 +224,8 @@ class PrintTab:
         where = None if case is None else case.fibre
         fibre = "Fibre lies everywhere." if where is None else f"Fibre lies {where.about()}."
         kept = f"As the part file has it: {hidden}" if hidden else ""
-        for handle, said in ((self._about, about), (self._fibre_said, fibre), (self._said, kept)):
-            handle.content = f'<p class="ccfem">{escaped(said)}</p>' if said else ""
+        for handle, text in ((self._about, about), (self._fibre_said, fibre), (self._said, kept)):
+            handle.content = f'<p class="ccfem">{escaped(text)}</p>' if text else ""
         lines = tuple(line for line in self.page.said if line[0] in _PRINTED)
         self._lines.content = f'<div class="ccfem">{lines_of(lines)}</div>'
 

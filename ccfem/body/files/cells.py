@@ -164,10 +164,10 @@ def _split(
         before += len(nodes)
     cells, ends = np.concatenate(corners), np.zeros((0, 2), dtype=np.int64)
     split = len(cells) - before + sum(counts.values())
-    said = " and ".join(f"{count:,} {name}" for name, count in sorted(counts.items()))
-    said += f" are split into {split:,} tetrahedra"
+    remark = " and ".join(f"{count:,} {name}" for name, count in sorted(counts.items()))
+    remark += f" are split into {split:,} tetrahedra"
     if not quadratic:
-        said += (
+        remark += (
             ', which are stiffer while they are linear: order = "auto" makes them quadratic where '
             "that matters, order = 2 always"
         )
@@ -175,7 +175,7 @@ def _split(
         cells = np.concatenate([nodes for _, nodes in solids])
     elif quadratic:
         points, cells, ends = _with_middles(points, cells, known, bulges)
-    return SplitCells(points, cells, np.concatenate(parent), ends, said if counts else "")
+    return SplitCells(points, cells, np.concatenate(parent), ends, remark if counts else "")
 
 
 def triangles_of(faces: IntArray) -> IntArray:

@@ -80,10 +80,10 @@ def _object(
     name = user.get(_PATH, name).removeprefix("/")
     wanted = user.get("objectid")
     objects = _model(archive, name, models).iterfind(f"{_CORE}resources/{_CORE}object")
-    found = next((one for one in objects if one.get("id") == wanted), None)
-    if found is None or depth == 0:
+    element = next((one for one in objects if one.get("id") == wanted), None)
+    if element is None or depth == 0:
         raise ValueError(f"object {wanted} is not there, or a part of itself")
-    for mesh in found.iterfind(f"{_CORE}mesh"):
+    for mesh in element.iterfind(f"{_CORE}mesh"):
         vertices = mesh.iterfind(f"{_CORE}vertices/{_CORE}vertex")
         triangles = mesh.iterfind(f"{_CORE}triangles/{_CORE}triangle")
         points = np.array([[float(v.attrib[c]) for c in "xyz"] for v in vertices])
@@ -91,7 +91,7 @@ def _object(
         if sides.size and not 0 <= sides.min() <= sides.max() < len(points):
             raise ValueError("a triangle names a point that is not there")
         yield points.reshape(-1, 3), sides.astype(np.int64).reshape(-1, 3)
-    for part in found.iterfind(f"{_CORE}components/{_CORE}component"):
+    for part in element.iterfind(f"{_CORE}components/{_CORE}component"):
         for points, sides in _object(archive, models, part, name, depth - 1):
             yield _placed(points, part), sides
 

@@ -89,9 +89,9 @@ def read_xdmf(path: str, step: int = 1) -> dict[str, Any]:
     reader = vtkXdmfReader()
     plain, steps = _plain_xdmf(path, step)
     _output(reader, plain)
-    found = reader.GetOutputDataObject(0)
-    whole = not found.IsA("vtkMultiBlockDataSet")
-    blocks = [found] if whole else [found.GetBlock(k) for k in range(found.GetNumberOfBlocks())]
+    output = reader.GetOutputDataObject(0)
+    whole = not output.IsA("vtkMultiBlockDataSet")
+    blocks = [output] if whole else [output.GetBlock(k) for k in range(output.GetNumberOfBlocks())]
     blocks = [block for block in blocks if block is not None and block.IsA("vtkUnstructuredGrid")]
     grids = [_grid_arrays(block) for block in blocks]
     volumes = [k for k, grid in enumerate(grids) if set(_SOLIDS) & set(grid["types"].tolist())]

@@ -112,7 +112,7 @@ def mesh_cad(
             continue
         for label in filter(None, (face_name(k), name)):
             groups.setdefault(label, []).append(facets)
-    mesh = mesh.with_patches({name: np.concatenate(those) for name, those in groups.items()})
+    mesh = mesh.with_patches({name: np.concatenate(parts) for name, parts in groups.items()})
     mesh = check_mesh(mesh)[0]
     return mesh, (fidelity(fine.surface, mesh).about("Gmsh"), *_about_solids(fine.solids, joined))
 
@@ -124,13 +124,13 @@ def _about_solids(names: tuple[str, ...], joined: Joined) -> tuple[str, ...]:
     known = [name for name in dict.fromkeys(names) if name and not name.startswith(_NO_NAME)]
     listed = ", ".join(known[:_LISTED]) + (", ..." if len(known) > _LISTED else "")
     if joined == "glued":
-        said = (
+        remark = (
             "of one material and joined where they touch: set joined = 'separate' for pieces that "
             "pass no force there"
         )
     else:
-        said = "each a piece of its own that passes no force where they touch: hold each of them"
-    return (f"{len(names)} solids in the file{f' ({listed})' if listed else ''}, {said}",)
+        remark = "each a piece of its own that passes no force where they touch: hold each of them"
+    return (f"{len(names)} solids in the file{f' ({listed})' if listed else ''}, {remark}",)
 
 
 def _made(

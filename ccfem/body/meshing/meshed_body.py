@@ -79,7 +79,7 @@ def mesh_body(
     def make() -> tuple[TetMesh, tuple[str, ...]]:
         if is_cad(path):
             return mesh_cad(path, edge_length, scale, joined)
-        surface, *said = _solid(files, scale) if folder else (read_surface(path, scale),)
+        surface, *remarks = _solid(files, scale) if folder else (read_surface(path, scale),)
         if before is not None:
             before(surface)
         mesh, fit, who = fill(surface, edge_length, mesher)
@@ -90,7 +90,7 @@ def mesh_body(
                 "machine for reuse"
             )
         named = mesh if folder else with_faces_of(surface, mesh, angle)
-        return named, (*said, about, *fit.doubts)
+        return named, (*remarks, about, *fit.doubts)
 
     asked: dict[str, object] = {
         "edge_length": float(edge_length),

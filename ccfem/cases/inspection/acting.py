@@ -138,8 +138,8 @@ def entries(content: Mapping[str, Any]) -> dict[Name, Entry]:
     tables: dict[tuple[str, ...], Any] = {("supports",): supports}
     tables |= {("loads", k): v for k, v in (cases if isinstance(cases, Mapping) else {}).items()}
     named: dict[Name, Entry] = {}
-    for keys, those in tables.items():
-        for k, table in enumerate(those if isinstance(those, list) else ()):
+    for keys, items in tables.items():
+        for k, table in enumerate(items if isinstance(items, list) else ()):
             if isinstance(table, Mapping):
                 entry = Entry((*keys, k), table)
                 alike = (entry.title, type(entry.amount))

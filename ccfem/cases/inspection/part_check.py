@@ -229,8 +229,8 @@ class Check(Shown):
 
     def __str__(self) -> str:
         worst_last = reversed(self.faults.items())
-        said = (f"{kind}: {line}" for kind, lines in worst_last for line in lines)
-        return "\n".join([self.known, *said])
+        sentences = (f"{kind}: {line}" for kind, lines in worst_last for line in lines)
+        return "\n".join([self.known, *sentences])
 
     def __repr__(self) -> str:
         return (

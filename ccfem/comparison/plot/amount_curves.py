@@ -119,8 +119,8 @@ def amount_curves(
     ]
     marks.append(Line2D([], [], color=OUTLINE, lw=1.0, ls=_ALONE, label="no paths exceed"))
     if together:
-        said = "none exceed in all cases at once"
-        marks.append(Line2D([], [], color=OUTLINE, lw=1.0, ls=_TOGETHER, label=said))
+        caption = "none exceed in all cases at once"
+        marks.append(Line2D([], [], color=OUTLINE, lw=1.0, ls=_TOGETHER, label=caption))
     marks += _hollow(p for curves in panels.values() for points in curves.values() for p in points)
     figure.legend(
         handles=marks,

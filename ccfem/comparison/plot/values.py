@@ -81,10 +81,10 @@ def _(value: TetMesh) -> Any:
 @figure.register
 def _(value: StressField) -> Any:
     mesh, stress = value.mesh, von_mises(value.nodal)
-    each = stress[mesh.boundary].mean(axis=1)
-    end = float(np.quantile(each, 0.98)) or 1.0
+    of_triangle = stress[mesh.boundary].mean(axis=1)
+    end = float(np.quantile(of_triangle, 0.98)) or 1.0
     heading = f"von Mises stress, {value.case}: darkest from {end:.3g} MPa on"
-    return part_figure(mesh.points, mesh.boundary, _shades(each / end), [], title=heading)
+    return part_figure(mesh.points, mesh.boundary, _shades(of_triangle / end), [], title=heading)
 
 
 def _shades(share: FloatArray) -> Sequence[str]:

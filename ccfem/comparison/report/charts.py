@@ -152,9 +152,9 @@ def spreads(
         "y_range": [0, 101],
         "mark": {"x": 1.0 / radius, "text": f"radius {radius:.3g} mm"} if radius > 0.0 else None,
         "series": [
-            _line(run, colours, np.clip(np.quantile(each, _QUANTILES), _LEAST, _MOST), shares)
-            for run, each in bends
-            if len(each)
+            _line(run, colours, np.clip(np.quantile(values, _QUANTILES), _LEAST, _MOST), shares)
+            for run, values in bends
+            if len(values)
         ],
     }
     tested = [run for run in runs if run.tested is not None]

@@ -235,8 +235,8 @@ def _breaking(
     picture = ""
     with spared("picture of the breaking load", left_out):
         picture = image(breaking_picture(broken, colours))
-    said = [f"{name}: {load.said}" for name, load in broken.items()]
-    return {"picture": picture, "said": said, "worth": WORTH, "table": breaking_table(broken)}
+    lines = [f"{name}: {load.said}" for name, load in broken.items()]
+    return {"picture": picture, "said": lines, "worth": WORTH, "table": breaking_table(broken)}
 
 
 def _parameters(comparison: Comparison) -> list[tuple[str, list[tuple[str, str, bool]]]]:

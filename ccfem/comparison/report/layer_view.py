@@ -216,7 +216,9 @@ def layer_views(stacks: Mapping[str, Comparison], colours: Mapping[str, str]) ->
         name: [stress_on(flat_view(k), stack.planned_on) for k in shown[name]]
         for name, stack in stacks.items()
     }
-    tension = max((tension_limit(s) for those in stresses.values() for s in those), default=1e-12)
+    tension = max(
+        (tension_limit(s) for of_layer in stresses.values() for s in of_layer), default=1e-12
+    )
     machine = next(iter(stacks.values())).case.machine
     most = 1.0 if machine.minimum_radius <= 0.0 else 2.0 / machine.minimum_radius
     forces = [_most_force(drawn) for drawn in lines.values() if drawn]

@@ -115,10 +115,10 @@ def _lines(
     before = moves.place[np.maximum(rows[starts] - 1, 0)]
     points = np.insert(moves.place[rows], starts, before, axis=0)
     drawn = shapely.linestrings(points, indices=np.insert(line, starts, np.arange(len(starts))))
-    laid = kind[starts] != len(KINDS) - 1
+    printed = kind[starts] != len(KINDS) - 1
     heights = moves.place[rows[kind != len(KINDS) - 1], 2]
     if len(heights) and np.ptp(heights) < _STEP:  # seen from above nothing is lost
-        drawn[laid] = shapely.simplify(drawn[laid], tolerance, preserve_topology=False)
+        drawn[printed] = shapely.simplify(drawn[printed], tolerance, preserve_topology=False)
     thinned, owner = shapely.get_coordinates(drawn, include_z=True, return_index=True)
     offsets = np.searchsorted(owner, np.arange(len(starts) + 1))
     return thinned, offsets, kind[starts]

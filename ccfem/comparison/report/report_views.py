@@ -169,12 +169,12 @@ class RunResults:
         triangles = np.asarray(part["triangles"], dtype=np.int64).reshape(-1, 3)
         if view == "stress":
             most = float(part["most_stress"])
-            said = f"von Mises stress, up to {most:.3g} MPa"
-            return Surface(part["points"], triangles, np.asarray(part["stress"]) / 254.0, said)
+            caption = f"von Mises stress, up to {most:.3g} MPa"
+            return Surface(part["points"], triangles, np.asarray(part["stress"]) / 254.0, caption)
         times, most = float(part["scale"]), float(part["most"])
-        said = f"displacement, up to {most:.3g} mm, drawn {times:g} times as large"
+        caption = f"displacement, up to {most:.3g} mm, drawn {times:g} times as large"
         points = part["points"] + times * part["moved"]
-        return Surface(points, triangles, np.asarray(part["moved_size"]) / 254.0, said)
+        return Surface(points, triangles, np.asarray(part["moved_size"]) / 254.0, caption)
 
     @property
     def files(self) -> dict[str, Path]:
@@ -188,14 +188,16 @@ class RunResults:
 
     def pieces(self, name: str, layer: int) -> Pieces:
         """Pieces of fibre of a strategy on the layer at a place of `layers`."""
-        view, laid = self.layers[layer], self._laid(name, layer)
-        points = _in_space(laid["space"] if "space" in laid else laid["points"], view["space"])
+        view, strands = self.layers[layer], self._laid(name, layer)
+        points = _in_space(
+            strands["space"] if "space" in strands else strands["points"], view["space"]
+        )
         last = np.zeros(len(points), dtype=bool)
-        last[np.asarray(laid["offsets"], dtype=int)[1:] - 1] = True
+        last[np.asarray(strands["offsets"], dtype=int)[1:] - 1] = True
         start = np.flatnonzero(~last)
-        force = np.asarray(laid["force"], dtype=float)
+        force = np.asarray(strands["force"], dtype=float)
         share = np.where(force == _NOT_KNOWN, 0.0, force / 254.0)
-        link = np.zeros(len(points)) if laid["link"] is None else np.asarray(laid["link"])
+        link = np.zeros(len(points)) if strands["link"] is None else np.asarray(strands["link"])
         ends = np.stack([points[start], points[np.minimum(start + 1, len(points) - 1)]], axis=1)
         return Pieces(ends.reshape(-1, 2, 3), share[start], link[start] > 0)
 
@@ -231,8 +233,8 @@ def _print_layer(view: dict[str, Any], count: int) -> PrintLayer:
     points, offsets = np.asarray(view["points"]), np.asarray(view["offsets"], dtype=int)
     start = np.setdiff1d(np.arange(len(points)), offsets[1:] - 1)
     kind = np.repeat(np.asarray(view["kind"], dtype=int), np.diff(offsets))[start]
-    said = f"Layer {view['index'] + 1} of {count}, up to {view['top']:.4g} mm"
-    return PrintLayer(said, np.stack([points[start], points[start + 1]], axis=1), kind)
+    caption = f"Layer {view['index'] + 1} of {count}, up to {view['top']:.4g} mm"
+    return PrintLayer(caption, np.stack([points[start], points[start + 1]], axis=1), kind)
 
 
 def _in_space(points: FloatArray, space: Any) -> FloatArray:

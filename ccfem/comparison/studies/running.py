@@ -83,7 +83,7 @@ def study(
     folder = Path("results") / definition.name if out is None else Path(out)
     with opened(folder, force) as store:
         known = {job.key: store[job.key] for job in jobs.jobs}
-        outcomes = {k: each for k, each in known.items() if each and not each.get("crashed")}
+        outcomes = {k: row for k, row in known.items() if row and not row.get("crashed")}
         missing = [job for job in jobs.jobs if job.key not in outcomes]
         with store.writing("study.json") as files:
             (files / "study.json").write_text(_about(definition, jobs), encoding="utf-8")
@@ -177,8 +177,8 @@ class _Teller:
         seconds = (time.monotonic() - self._start) / (self._done - self._first)
         left = _duration(seconds * (self._total - self._done))
         failed = f", {self._failed} failed" if self._failed else ""
-        said = f"{self._done} of {self._total} runs{failed}, about {left} left: {job.name}"
-        self._progress(said, self._done / self._total)
+        line = f"{self._done} of {self._total} runs{failed}, about {left} left: {job.name}"
+        self._progress(line, self._done / self._total)
 
 
 def _duration(seconds: float) -> str:

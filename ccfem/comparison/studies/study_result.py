@@ -109,10 +109,10 @@ class StudyResult:
         rows = []
         for job in self.jobs:
             outcome = self.outcome(job)
-            said = {name: outcome.get(name) for name in _SAID}
-            said |= {"printable": bool(said["printable"])}
-            values = {k: float(v) for k, v in outcome.get("values", {}).items() if k not in said}
-            rows.append({"run": job.key[:12], **_row(job, labels), **said, **values})
+            row = {name: outcome.get(name) for name in _SAID}
+            row |= {"printable": bool(row["printable"])}
+            values = {k: float(v) for k, v in outcome.get("values", {}).items() if k not in row}
+            rows.append({"run": job.key[:12], **_row(job, labels), **row, **values})
         return with_fronts(pd.DataFrame(rows))
 
     @property
@@ -230,8 +230,8 @@ def shown_table(frame: "pd.DataFrame") -> str:
     for row in frame.to_dict("records"):
         cells = "".join(f"<td>{escape(_text(row[name]))}</td>" for name in labels)
         if row["failure"]:
-            said = escape(f"failed: {row['failure']}")
-            cells += f'<td class="failed" colspan="{max(len(columns), 1)}">{said}</td>'
+            text = escape(f"failed: {row['failure']}")
+            cells += f'<td class="failed" colspan="{max(len(columns), 1)}">{text}</td>'
         else:
             cells += "".join(f"<td>{escape(_text(row[name]))}</td>" for name in columns)
         rows.append(cells)

@@ -132,8 +132,8 @@ def run_job(stress: Any, name: str, task: bytes) -> Outcome:
                 _BENCHES[name] = _Bench(unpacked(*data))
             return _run(_BENCHES[name], *unpacked(task))
         except Exception as error:  # of a strategy or slicer of someone else: told, never dropped
-            said = " ".join(f"{type(error).__name__}: {error}".split())
-            return crashed(said, traceback.format_exc())
+            message = " ".join(f"{type(error).__name__}: {error}".split())
+            return crashed(message, traceback.format_exc())
 
 
 def crashed(why: str, details: str = "") -> Outcome:

@@ -291,12 +291,12 @@ def _substitute_blocks(
     # Forward: within the block of each supernode, then off what lies below it, all its columns at
     # once.
     for s in range(count):
-        own = x[first[s] : first[s + 1]]
-        wide, below = len(own), rows[row_starts[s] : row_starts[s + 1]]
+        segment = x[first[s] : first[s + 1]]
+        wide, below = len(segment), rows[row_starts[s] : row_starts[s + 1]]
         high = wide + len(below)
         block, total = values[starts[s] : starts[s + 1]], room[: len(below)]
         for c in range(wide - 1):
-            _subtract(own[c + 1 :], block[c * high + c + 1 : c * high + wide], own[c])
+            _subtract(segment[c + 1 :], block[c * high + c + 1 : c * high + wide], segment[c])
         for i in range(len(total)):
             total[i] = 0.0
         c = 0
@@ -309,11 +309,11 @@ def _substitute_blocks(
                     block[at + high : at + high + len(total)],
                     block[at + 2 * high : at + 2 * high + len(total)],
                     block[at + 3 * high : at + 3 * high + len(total)],
-                    own[c : c + 4],
+                    segment[c : c + 4],
                 )
                 c += 4
             else:
-                _subtract(total, block[at : at + len(total)], -own[c])
+                _subtract(total, block[at : at + len(total)], -segment[c])
                 c += 1
         for i in range(len(total)):
             x[below[i]] -= total[i]
@@ -322,8 +322,8 @@ def _substitute_blocks(
         x[i] /= pivots[i]
     # Backward: gather what is known below the block, subtract its products, solve within the block.
     for s in range(count - 1, -1, -1):
-        own = x[first[s] : first[s + 1]]
-        wide, below = len(own), rows[row_starts[s] : row_starts[s + 1]]
+        segment = x[first[s] : first[s + 1]]
+        wide, below = len(segment), rows[row_starts[s] : row_starts[s + 1]]
         high = wide + len(below)
         block, other = values[starts[s] : starts[s + 1]], room[: len(below)]
         for i in range(len(other)):
@@ -339,16 +339,16 @@ def _substitute_blocks(
                     block[at + 3 * high : at + 3 * high + len(other)],
                     other,
                 )
-                own[c] -= p
-                own[c + 1] -= q
-                own[c + 2] -= r
-                own[c + 3] -= t
+                segment[c] -= p
+                segment[c + 1] -= q
+                segment[c + 2] -= r
+                segment[c + 3] -= t
                 c += 4
             else:
-                own[c] -= _product(block[at : at + len(other)], other)
+                segment[c] -= _product(block[at : at + len(other)], other)
                 c += 1
         for c in range(wide - 2, -1, -1):
-            own[c] -= _product(block[c * high + c + 1 : c * high + wide], own[c + 1 :])
+            segment[c] -= _product(block[c * high + c + 1 : c * high + wide], segment[c + 1 :])
 
 
 # Cholesky factorisation within the skyline of a matrix: fast where its band is narrow.

@@ -114,16 +114,16 @@ class Ties:
             return None
         others = np.setdiff1d(np.arange(n), tied.nodes)
         axes = self.axes[tied.nodes]
-        own = np.einsum("kij,kj,klj->kil", axes, tied.held, axes)
-        shares = tied.weights[:, :, None, None] * (np.eye(3) - own)[:, None]
+        rotated = np.einsum("kij,kj,klj->kil", axes, tied.held, axes)
+        shares = tied.weights[:, :, None, None] * (np.eye(3) - rotated)[:, None]
         rows = [others, tied.nodes, np.repeat(tied.nodes, tied.leaders.shape[1])]
         columns = [others, tied.nodes, tied.leaders.reshape(-1)]
-        blocks = [np.tile(np.eye(3), (len(others), 1, 1)), own, shares.reshape(-1, 3, 3)]
+        blocks = [np.tile(np.eye(3), (len(others), 1, 1)), rotated, shares.reshape(-1, 3, 3)]
         result = _block_matrix(
             np.concatenate(rows), np.concatenate(columns), np.concatenate(blocks), (n, n)
         )
         # What tied nodes would do by themselves must not reach any node in the end.
-        rest = _block_matrix(tied.nodes, tied.nodes, np.eye(3) - own, (n, n))
+        rest = _block_matrix(tied.nodes, tied.nodes, np.eye(3) - rotated, (n, n))
         for _ in range(_CASCADE):
             if abs(result @ rest).max() <= _NOTHING:
                 return result
@@ -367,9 +367,9 @@ class Held:
             else float(np.abs(matrix.diagonal()).mean())
         )
         if self.presses is not None:
-            own = np.flatnonzero(row == column)
-            lifted = (self.presses & self.free)[self.nodes][row[own]]
-            data[own] += _BED * size * np.eye(d) * lifted[:, :, None]
+            pressed = np.flatnonzero(row == column)
+            lifted = (self.presses & self.free)[self.nodes][row[pressed]]
+            data[pressed] += _BED * size * np.eye(d) * lifted[:, :, None]
         if partly.any():
             cut = np.flatnonzero(partly[row] | partly[column])
             data[cut] *= free[row[cut], :, None] & free[column[cut], None, :]

@@ -148,13 +148,13 @@ def _about_support(support: AnySupport, problem: Problem) -> list[str]:
 
 def _about_tie(support: TiedPatch, mesh: TetMesh) -> str:
     """Say that the coarser of two tied patches follows the finer one."""
-    own, other = (float(mesh.facet_areas(mesh.patch(name))[0].mean()) for name in support.patches)
-    if own <= _COARSER**2 * other:
+    size, other = (float(mesh.facet_areas(mesh.patch(name))[0].mean()) for name in support.patches)
+    if size <= _COARSER**2 * other:
         return ""
     return (
-        f"'{support.patch}', whose facets are {np.sqrt(own / other):.2g} times as wide, is tied to "
-        f"the finer '{support.to}', and nodes of that between those tied are left out, which makes "
-        f"the joint too soft: tie '{support.to}' to '{support.patch}'"
+        f"'{support.patch}', whose facets are {np.sqrt(size / other):.2g} times as wide, is tied "
+        f"to the finer '{support.to}', and nodes of that between those tied are left out, which "
+        f"makes the joint too soft: tie '{support.to}' to '{support.patch}'"
     )
 
 

@@ -92,11 +92,11 @@ def check_motion(mesh: CellMesh, points: FloatArray, holds: Holds) -> None:
     named = np.unique(piece)
     for k in named:
         which = piece == k
-        own = members.of(which)
-        place = used if len(named) == 1 else np.isin(np.arange(len(points)), own.node)
+        group = members.of(which)
+        place = used if len(named) == 1 else np.isin(np.arange(len(points)), group.node)
         centre = points[place].mean(axis=0)
         radius = float(np.linalg.norm(points[place] - centre, axis=1).max())
-        motion = _free_motions((points - centre) / radius, own, holds, which, centre, radius)
+        motion = _free_motions((points - centre) / radius, group, holds, which, centre, radius)
         if motion:
             about = f" (one of {len(named)} separate pieces)" if len(named) > 1 else ""
             raise InputError(f"the part{about} is free to {motion}: add a support that holds it")

@@ -377,10 +377,10 @@ def support_sets(problem: Problem) -> tuple[Problem, ...]:
         return (problem,)
     sets: list[tuple[tuple[AnySupport, ...], list[str]]] = []
     for case in problem.loads:
-        own = problem.supports_of(case)
-        known = next((cases for supports, cases in sets if supports == own), None)
+        in_case = problem.supports_of(case)
+        known = next((cases for supports, cases in sets if supports == in_case), None)
         if known is None:
-            sets.append((own, [case]))
+            sets.append((in_case, [case]))
         else:
             known.append(case)
     return tuple(

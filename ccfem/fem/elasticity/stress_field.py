@@ -203,7 +203,9 @@ def support_forces(problem: Problem, reactions: FloatArray) -> dict[str, FloatAr
         As `StressField.reactions`.
     """
     mesh = problem.mesh
-    holding = (each for each in problem.supports if not isinstance(each, support_kinds.TiedPatch))
+    holding = (
+        holder for holder in problem.supports if not isinstance(holder, support_kinds.TiedPatch)
+    )
     claims = [_claim(mesh, support) for support in holding]
     held = np.zeros(mesh.points.shape)
     for _, nodes, components in claims:
@@ -546,8 +548,8 @@ class WeightedCases:
         return len(self.fields)
 
     def __repr__(self) -> str:
-        said = (f"{n} {w:.3g}" for n, w in zip(self.names, self.weights, strict=True))
-        return f"WeightedCases({', '.join(said)})"
+        parts = (f"{n} {w:.3g}" for n, w in zip(self.names, self.weights, strict=True))
+        return f"WeightedCases({', '.join(parts)})"
 
     @property
     def names(self) -> tuple[str, ...]:

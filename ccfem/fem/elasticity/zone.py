@@ -139,14 +139,14 @@ def ball_averages(
     values = values[boxes.order]
     # Balls beside each other, one after the other, hold the same points.
     turn = np.argsort(boxes.number[judged], kind="stable")
-    centres, own = points[judged[turn]], np.zeros_like(result)
+    centres, sums = points[judged[turn]], np.zeros_like(result)
     if parts == 1:
-        _average(boxes, values, centres, boxes.number[judged[turn]], own)
+        _average(boxes, values, centres, boxes.number[judged[turn]], sums)
     else:
         columns = np.column_stack([boxes.weights, boxes.weights[:, None] * values])
         until = np.concatenate([np.zeros((1, columns.shape[1])), np.cumsum(columns, axis=0)])
-        _average_of_sums(boxes, columns, until, centres, own)
-    result[turn] = own
+        _average_of_sums(boxes, columns, until, centres, sums)
+    result[turn] = sums
     return result
 
 

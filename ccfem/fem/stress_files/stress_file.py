@@ -419,8 +419,8 @@ def grid_stress(
     if cell is not None:
         cell = cell[np.concatenate([np.flatnonzero(grid.types == kind) for kind in kinds])]
     unit = _text(grid.field.get(UNIT, np.array([])))
-    said = name not in (array, "stress")
-    chosen = f"of {path.name} the array {shown(name)} is taken" if said else ""
+    named = name not in (array, "stress")
+    chosen = f"of {path.name} the array {shown(name)} is taken" if named else ""
     return StressData(grid.points, corners, nodal, cell, unit, chosen=chosen, usual=usual)
 
 

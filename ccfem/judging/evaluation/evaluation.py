@@ -215,13 +215,13 @@ def _rows(
             kinds: Mapping[str, ModuleType] = kinds,
             origin: Sequence[Mapping[str, int]] = origin,
         ) -> dict[str, tuple[Any, dict[str, float]]]:
-            own = [name for name, at in origin[k].items() if at == k]
-            if not own:
+            names = [name for name, at in origin[k].items() if at == k]
+            if not names:
                 return {}
             on_layer = toolpaths.on_layer(layers[k].index)
             about = (stress, machine, below[k], behind[k], stack, upright)
             view = _view(on_layer, layers[k], *about)
-            samples = {name: kinds[name].sample(view) for name in own}
+            samples = {name: kinds[name].sample(view) for name in names}
             return {
                 name: (taken, _indices({name: taken}, basis)) for name, taken in samples.items()
             }

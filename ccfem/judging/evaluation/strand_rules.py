@@ -157,17 +157,19 @@ def _looked_at(
     near = np.diff(flat).min(initial=np.inf) < machine.strand_height * (1.0 - _ROUNDING)
     if len(flat) < max(len(layers), 2) or near or (np.diff(fibre.layer) < 0).any():
         return one(fibre, layers)
-    own = [layer for layer in layers if layer.index in fibre.layer]
-    own.sort(key=lambda layer: layer.index)
-    if not own:
+    with_fibre = [layer for layer in layers if layer.index in fibre.layer]
+    with_fibre.sort(key=lambda layer: layer.index)
+    if not with_fibre:
         return one(fibre, layers)
     # Layers that repeat others are looked at once, where nothing is kept of the strands themselves.
-    source = np.arange(len(own)) if with_parts else repeated_layers(fibre, own)
+    source = np.arange(len(with_fibre)) if with_parts else repeated_layers(fibre, with_fibre)
     first = np.unique(source).tolist()
-    each = [fibre.on_layer(own[k].index) for k in first]
-    results = in_processes(one, each, [[own[k]] for k in first], shared=[fibre])
+    fibres = [fibre.on_layer(with_fibre[k].index) for k in first]
+    results = in_processes(one, fibres, [[with_fibre[k]] for k in first], shared=[fibre])
     known = dict(zip(first, results, strict=True))
-    looked = [_at_height(known[at], own[at], own[k]) for k, at in enumerate(source.tolist())]
+    looked = [
+        _at_height(known[at], with_fibre[at], with_fibre[k]) for k, at in enumerate(source.tolist())
+    ]
     kept = [strands.parts for strands in looked if strands.parts is not None]
     return _Strands(
         joined_folds([strands.folds for strands in looked]),
@@ -314,21 +316,21 @@ def why_not(total: Mapping[str, float], machine: Machine) -> tuple[str, ...]:
     for rule in _RULES:
         value, limit = reasons[rule.limit], getattr(machine.limits, rule.limit)
         if value > limit:
-            said = rule.words.format(found=rule.pattern.format(value), machine=machine)
+            reason = rule.words.format(found=rule.pattern.format(value), machine=machine)
             excess = value / limit if limit > 0.0 else float("inf")
-            broken.append((-excess, f"{said} (limit {rule.pattern.format(limit)})"))
+            broken.append((-excess, f"{reason} (limit {rule.pattern.format(limit)})"))
     if reasons["order"] > 0.0:
-        said = f"{reasons['order']:.0f} paths come after one of a higher layer"
-        broken.append((-float("inf"), said))
+        reason = f"{reasons['order']:.0f} paths come after one of a higher layer"
+        broken.append((-float("inf"), reason))
     # Flat layers may be thick: matrix fills them in several lines.
     thick = total["thickness_95"]
     if total["tilt_mean"] > 0.0 and thick > machine.matrix_width:
-        said = (
+        reason = (
             f"curved layers up to {thick:.2g} mm thick, more than a line of matrix is wide "
             f"({machine.matrix_width:g} mm): cut more layers"
         )
-        broken.append((-thick / machine.matrix_width, said))
-    return tuple(said for _, said in sorted(broken))
+        broken.append((-thick / machine.matrix_width, reason))
+    return tuple(reason for _, reason in sorted(broken))
 
 
 def _bounded_values(total: Mapping[str, float]) -> dict[str, float]:

@@ -238,11 +238,11 @@ def said_of_pins(joints: Sequence[PinnedJoint], besides: str = "") -> str:
     """Remark on the weakest of some joints, which comes first, and `pins_not_judged` besides."""
     if not joints:
         return besides
-    said = (
+    remark = (
         f"pins in holes, not part of first failure: {joints[0].about}, of {len(joints)} "
         f"hole{'s' * (len(joints) > 1)}, by {COUNTED}"
     )
-    return "; ".join(filter(None, [said, besides]))
+    return "; ".join(filter(None, [remark, besides]))
 
 
 def _pieces(facets: IntArray) -> list[IntArray]:

@@ -424,19 +424,19 @@ class BreakingCurve:
     def story(self) -> str:
         """What broke first and how it went on, in one sentence."""
         peak, fibre = int(self.force.argmax()), np.flatnonzero(self.broken > 0.0)
-        said = (
+        story = (
             f"{self.first} first at {self.force[1]:.4g} N; at the highest load, {self.load:.4g} N "
             f"at {self.displacement[peak]:.3g} mm, {self.cracks[peak]} cells had cracked"
         )
         if self.parted[peak]:
-            said += f" and layers had parted in {self.parted[peak]} cells"
+            story += f" and layers had parted in {self.parted[peak]} cells"
         elif self.utilisation:
-            said += f", with the bond between layers at {self.utilisation:.0%} of its strength"
+            story += f", with the bond between layers at {self.utilisation:.0%} of its strength"
         if not len(fibre):
-            return f"{said}; no strand gave way"
+            return f"{story}; no strand gave way"
         if self.broken[peak] > 0.0:
-            return f"{said}; strands carried nothing any more over {self.broken[peak]:.3g} mm"
-        return f"{said}; strands gave way after it"
+            return f"{story}; strands carried nothing any more over {self.broken[peak]:.3g} mm"
+        return f"{story}; strands gave way after it"
 
 
 def _curve(model: _Model, stop: float) -> BreakingCurve:

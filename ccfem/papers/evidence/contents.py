@@ -257,23 +257,25 @@ def summary_lines(study: Study) -> str:
         every = whole.errors.get(kind + rows.ALSO_OURS, ())
         if not errors:
             continue
-        said = f"{whole.median(kind):.1f} %{wanted.get(kind, '')} ({len(errors)} values"
-        said += f", {min(errors):+.0f} to {max(errors):+.0f} %)"
+        sentence = f"{whole.median(kind):.1f} %{wanted.get(kind, '')} ({len(errors)} values"
+        sentence += f", {min(errors):+.0f} to {max(errors):+.0f} %)"
         if len(every) > len(errors):
-            said += f"; with our paths {whole.median(kind + rows.ALSO_OURS):.1f} % ({len(every)})"
+            sentence += (
+                f"; with our paths {whole.median(kind + rows.ALSO_OURS):.1f} % ({len(every)})"
+            )
         if kind in whole.left_out:
-            said += f"; rho fitted to the other solid {whole.median_left_out(kind):.1f} %"
-            said += f" ({len(whole.left_out[kind])})"
+            sentence += f"; rho fitted to the other solid {whole.median_left_out(kind):.1f} %"
+            sentence += f" ({len(whole.left_out[kind])})"
         if kind == rows.BREAKING:
-            said += f"; by the stiffness alone {rows.median_size(whole.stiffness):.1f} %"
-            said += f" ({min(whole.stiffness):+.0f} to {max(whole.stiffness):+.0f} %)"
-        lines.append(f"median error of {_PLURAL[kind]}: {said}")
+            sentence += f"; by the stiffness alone {rows.median_size(whole.stiffness):.1f} %"
+            sentence += f" ({min(whole.stiffness):+.0f} to {max(whole.stiffness):+.0f} %)"
+        lines.append(f"median error of {_PLURAL[kind]}: {sentence}")
     counts = {name: len(pairs) for name, pairs in whole.orders.items()}
     total = sum(counts.values())
     if total:
         theirs = [name for name, pairs in whole.orders.items() for row in pairs if not row.ours]
-        said = f"orders of two designs: {counts['right']} of {total} right"
-        lines.append(f"{said}; of published paths {theirs.count('right')} of {len(theirs)}")
+        sentence = f"orders of two designs: {counts['right']} of {total} right"
+        lines.append(f"{sentence}; of published paths {theirs.count('right')} of {len(theirs)}")
     for name in ("wrong", "tie"):
         lines += [f"order {name}: {row.part}, {row.quantity}" for row in whole.orders[name]]
     return "".join(f"- {line}\n" for line in lines)
@@ -412,8 +414,8 @@ def write_all(folder: Path, progress: Progress = silent) -> None:
     study = Study(parts_tested(progress))
     write_evidence(study, folder / "evidence.csv")
     names = write_figures(drawn_of(_figures(study), None), folder)
-    pairs, said = pairs_table(study), summary_lines(study)
-    (folder / "pairs.md").write_text(f"{pairs}\n{said}", encoding="utf-8")
+    pairs, lines = pairs_table(study), summary_lines(study)
+    (folder / "pairs.md").write_text(f"{pairs}\n{lines}", encoding="utf-8")
     sections = {
         "Measured and predicted": pairs,
         "With EA/E fitted to the other solid": left_out_table(study),

@@ -308,27 +308,27 @@ class FibrePlaces:
 
     def about(self) -> str:
         """Say the rules in a few words."""
-        said = []
+        remarks = []
         if self.layers is not None:
             names = (
                 self.layers if isinstance(self.layers, str) else ", ".join(map(str, self.layers))
             )
-            said.append(f"layers {names}")
+            remarks.append(f"layers {names}")
         if self.from_height is not None:
-            said.append(f"from {self.from_height:g} mm")
+            remarks.append(f"from {self.from_height:g} mm")
         if self.to_height is not None:
-            said.append(f"to {self.to_height:g} mm")
+            remarks.append(f"to {self.to_height:g} mm")
         if self.every > 1:
-            said.append(f"every {self.every} layers")
+            remarks.append(f"every {self.every} layers")
         if self.between:
-            said.append(f"{self.between} matrix layers between")
+            remarks.append(f"{self.between} matrix layers between")
         for mode in ("only", "exclude"):
             count = sum(area.mode == mode for area in self.regions)
             if count:
-                said.append(f"{count} regions {mode}" if count > 1 else f"1 region {mode}")
+                remarks.append(f"{count} regions {mode}" if count > 1 else f"1 region {mode}")
         if self.covered:
-            said.append("covered by matrix")
-        return ", ".join(said) or "all layers"
+            remarks.append("covered by matrix")
+        return ", ".join(remarks) or "all layers"
 
     def _chosen_layers(self, layers: Sequence[Layer], mesh: TetMesh) -> list[Layer]:
         """Layers by their numbers and heights."""
@@ -525,9 +525,9 @@ def _retriangulated(
     tree = shapely.STRtree(shapely.points(places))
     piece, near = tree.query(pieces, predicate="dwithin", distance=_GRID)
     order = np.split(near[np.argsort(piece, kind="stable")], np.cumsum(np.bincount(piece))[:-1])
-    for k, those in enumerate(order):
-        if len(those) > shapely.get_num_coordinates(pieces[k]) - 1:
-            pieces[k] = shapely.snap(pieces[k], shapely.multipoints(places[those]), _GRID)
+    for k, corners in enumerate(order):
+        if len(corners) > shapely.get_num_coordinates(pieces[k]) - 1:
+            pieces[k] = shapely.snap(pieces[k], shapely.multipoints(places[corners]), _GRID)
     parts, of_piece = shapely.get_parts(
         shapely.constrained_delaunay_triangles(pieces), return_index=True
     )

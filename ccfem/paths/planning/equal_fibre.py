@@ -554,12 +554,12 @@ class _Search:
         length = length_per_layer(planned.toolpaths, self.layers)
         if not self.meets(length, wanted) and np.isfinite(close):
             return None
-        said = f"{self.dial.says(more.strategy)} on {planned.more} of {count} layers"
+        remark = f"{self.dial.says(more.strategy)} on {planned.more} of {count} layers"
         if planned.cut:
-            said += f", strands cut back on {planned.cut}"
+            remark += f", strands cut back on {planned.cut}"
         if not self.meets(length, wanted):
-            said += f"; {about_lengths(length, wanted)}: {_of_strands(self.machine)}"
-        return Planned(less.strategy, planned.toolpaths, length, said, self.meets(length, wanted))
+            remark += f"; {about_lengths(length, wanted)}: {_of_strands(self.machine)}"
+        return Planned(less.strategy, planned.toolpaths, length, remark, self.meets(length, wanted))
 
     def off(self, wanted: float) -> Planned:
         """Return the extreme plan nearest to a length that the strategy does not reach."""

@@ -287,7 +287,7 @@ def _unbent(
         return [(line, link)]
     pieces = _between_bends(line, along, link, a, b, width, least)
     parts = [part_of_line(line, along, link, *ends) for ends in pieces]
-    return [each for part in parts for each in _unbent(*part, radius, width, least, True)]
+    return [piece for part in parts for piece in _unbent(*part, radius, width, least, True)]
 
 
 def _between_bends(

@@ -257,8 +257,8 @@ def _parts_without_folds(marked: _Marked, radius: float, least: float) -> list[_
             if not bends.counts[k]:
                 parts.append((line, link))
                 continue
-            along, own = along_line(line[:, :3]), number == k
-            a, b = off_links(start[own], stop[own], along, link)
+            along, inside = along_line(line[:, :3]), number == k
+            a, b = off_links(start[inside], stop[inside], along, link)
             long = b - a >= least
             parts += [
                 part_of_line(line, along, link, *ends)

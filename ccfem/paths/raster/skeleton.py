@@ -87,12 +87,12 @@ def _mirrored(line: BoolArray, axis: int) -> BoolArray:
     upper = np.moveaxis(line, axis, 0)
     half = (len(upper) + 1) // 2
     wanted = _topology(line)
-    for own, other in ((upper, upper[::-1]), (upper[::-1], upper)):
+    for left, other in ((upper, upper[::-1]), (upper[::-1], upper)):
         for near in (0, 1):
-            kept = own[:half].copy()
+            kept = left[:half].copy()
             if near:
                 kept[-1] |= other[half - 1]
-            both = np.concatenate([kept, kept[: len(own) - half][::-1]])
+            both = np.concatenate([kept, kept[: len(left) - half][::-1]])
             both = np.moveaxis(both, 0, axis)
             if _topology(both) == wanted:
                 return np.ascontiguousarray(both)

@@ -116,7 +116,9 @@ def printed_strands(
     # What leaves the part is cut off; what ends in stacks is removed.
     cut_off = float(fibre.lengths.sum()) - removed - _total(pieces)
     limit = machine.shortest_strand * (1.0 - SHORT)
-    split = sorted((piece for those in pieces.values() for piece in those), key=lambda p: p.path)
+    split = sorted(
+        (piece for of_layer in pieces.values() for piece in of_layer), key=lambda p: p.path
+    )
     split = [piece for piece in split if line_length(piece.line) > _NOTHING]
     long = [piece for piece in split if line_length(piece.line) >= limit]
     short = [piece for piece in split if line_length(piece.line) < limit]
@@ -160,13 +162,13 @@ def _check_fibre(fibre: Toolpaths, layers: Sequence[Layer], machine: Machine) ->
 
 def _about_short(by_matrix: Toolpaths, dropped: float) -> list[str]:
     """Say what became of what the cutter does not allow, if there is anything."""
-    said = []
+    remarks = []
     if len(by_matrix):
         length = by_matrix.lengths.sum()
-        said.append(f"{length:.1f} mm in {len(by_matrix)} strands are laid as matrix")
+        remarks.append(f"{length:.1f} mm in {len(by_matrix)} strands are laid as matrix")
     if dropped > 1e-3:
-        said.append(f"{dropped:.1f} mm are left out and filled with matrix")
-    return [f"too short for the cutter: {'; '.join(said)}"] if said else []
+        remarks.append(f"{dropped:.1f} mm are left out and filled with matrix")
+    return [f"too short for the cutter: {'; '.join(remarks)}"] if remarks else []
 
 
 def sections_of(layers: Sequence[Layer], mesh: TetMesh) -> dict[int, Region]:
@@ -207,7 +209,7 @@ def _whole(fibre: Toolpaths, layer: int) -> list[_Piece]:
 
 def _total(pieces: Mapping[int, Sequence[_Piece]]) -> float:
     """Length of all pieces, mm."""
-    return sum(line_length(piece.line) for those in pieces.values() for piece in those)
+    return sum(line_length(piece.line) for of_layer in pieces.values() for piece in of_layer)
 
 
 def _toolpaths(pieces: Sequence[_Piece], fibre: Toolpaths, kind: int) -> Toolpaths:

@@ -121,15 +121,15 @@ def check_cover(slabs: Sequence[Slab], machine: Machine) -> list[str]:
         return []
     problems, least = [], machine.process.cover
     sides = {"below the first": slabs[: fibre[0]], "over the last": slabs[fibre[-1] + 1 :]}
-    for side, those in sides.items():
-        height = those[-1].upper - those[0].lower if those else 0.0
+    for side, gaps in sides.items():
+        height = gaps[-1].upper - gaps[0].lower if gaps else 0.0
         if height < least - _SAME:
             raise InputError(
                 f"{height:.3g} mm of matrix {side} fibre layer do not hold it; at least "
                 f"{least:g} mm do: leave it without fibre (--set-fibre covered=true), move it with "
                 "--heights, or set process.cover"
             )
-        if len(those) == 1:
+        if len(gaps) == 1:
             problems.append(
                 f"only one layer of matrix, {height:.3g} mm, {side} fibre layer: two hold it better"
             )

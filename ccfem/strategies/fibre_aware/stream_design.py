@@ -533,8 +533,8 @@ class StreamProblem:
     def curvature(self, field: FloatArray, solutions: tuple[SmearedSolution, ...]) -> Any:
         """Matrix with a block for each field: mean over the cases of `StreamModel.curvature`."""
         counts, blocks = self._counts(solutions), []
-        for share, own in zip(self.shares, field.reshape(len(self.shares), -1), strict=True):
-            of_cases = [self.model.curvature(own, one) for one in solutions]
+        for share, values in zip(self.shares, field.reshape(len(self.shares), -1), strict=True):
+            of_cases = [self.model.curvature(values, one) for one in solutions]
             mean = sum(count * one for count, one in zip(counts, of_cases, strict=True))
             blocks.append((share or 1.0) * mean)  # a field without layers changes nothing
         return sp.block_diag(blocks, format="csc")
@@ -542,8 +542,8 @@ class StreamProblem:
     def levels(self, field: FloatArray, solutions: tuple[SmearedSolution, ...]) -> BorderLevels:
         """Cost, over all cases, of levels that lie farther from the border than they need to."""
         counts, levels = self._counts(solutions), []
-        for share, own in zip(self.shares, field.reshape(len(self.shares), -1), strict=True):
-            of_cases = [self.model.levels(own, one) for one in solutions]
+        for share, values in zip(self.shares, field.reshape(len(self.shares), -1), strict=True):
+            of_cases = [self.model.levels(values, one) for one in solutions]
             weight = share * (counts @ np.stack([one.weight for one in of_cases]))
             levels.append(replace(of_cases[0], weight=weight))
         return BorderLevels.side_by_side(levels)

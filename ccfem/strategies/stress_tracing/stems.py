@@ -33,26 +33,26 @@ def with_shared_stems(paths: Sequence[MainPath], frame: Frame) -> list[MainPath]
     forked = _forked(paths, frame)
     for k in range(len(forked)):
         for backward in (False, True):
-            own = _turned(forked[k], backward)
-            joint = own.members[-1].ends[1]
-            if own.closed or joint == FREE:
+            path = _turned(forked[k], backward)
+            joint = path.members[-1].ends[1]
+            if path.closed or joint == FREE:
                 continue
-            arrival = -outward(own.members[-1].reversed, frame, joint)
+            arrival = -outward(path.members[-1].reversed, frame, joint)
             # The stem ahead that turns least from the way that the path arrives.
             best, of, turned = _ALONG, -1, False
             for n, other in enumerate(forked):
                 for way in (False, True):
                     stem = _stem(_turned(other, way), joint)
-                    if n != k and stem is not None and _alike(own, _turned(other, way)):
+                    if n != k and stem is not None and _alike(path, _turned(other, way)):
                         along = float(arrival @ outward(stem, frame, joint))
                         if along > best:
                             best, of, turned = along, n, way
             if of >= 0:
                 whole = _turned(forked[of], turned)
                 mine, others = _divided(
-                    own, whole, outward(whole.members[-1], frame, joint), arrival
+                    path, whole, outward(whole.members[-1], frame, joint), arrival
                 )
-                forked[k] = _turned(replace(own, members=(*own.members, mine)), backward)
+                forked[k] = _turned(replace(path, members=(*path.members, mine)), backward)
                 rest = replace(whole, members=(*whole.members[:-1], others))
                 forked[of] = _turned(rest, turned)
     return forked

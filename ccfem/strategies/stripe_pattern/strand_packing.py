@@ -155,7 +155,7 @@ def evened(
     points, offsets = pack(lines)
     count, sizes = len(points), np.diff(offsets)
     line = np.repeat(np.arange(len(lines)), sizes)
-    rings = np.array([is_closed(each) for each in lines])
+    rings = np.array([is_closed(strand) for strand in lines])
     pairs = np.zeros((0, 2), dtype=np.int64)
     border = shapely.get_rings(shapely.get_parts(section))
     wall = shapely.get_coordinates(shapely.segmentize(border, _WALL * width))

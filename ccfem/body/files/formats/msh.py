@@ -68,4 +68,4 @@ def _with_groups(arrays: dict[str, Any], path: Path) -> TetMesh:
             word, nodes = blocks[rest[0]]
             corners = nodes[arrays[name], : 4 if word.startswith("quad") else 3]
             groups.setdefault(rest[1], []).append(triangles_of(corners))
-    return with_groups(mesh, {name: np.concatenate(each) for name, each in groups.items()})
+    return with_groups(mesh, {name: np.concatenate(facets) for name, facets in groups.items()})
