@@ -43,12 +43,12 @@ class ForkedChildren:
         with self._lock:
             if module not in self._servers:
                 words = [sys.executable, "-P", __file__, module]
+                # Without buffers: `select` does not see a second line that was read with the first.
                 self._servers[module] = subprocess.Popen(
-                    words, env=env, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+                    words, env=env, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0
                 )
             ask, answer = self._servers[module].stdin, self._servers[module].stdout
             ask.write(json.dumps([cwd, env]).encode() + b"\n")
-            ask.flush()
             child = int(answer.readline())
             late = not select.select([answer], [], [], timeout)[0]
             if late:

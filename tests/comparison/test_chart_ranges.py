@@ -59,9 +59,6 @@ def test_what_looks_like_another_value_is_not_marked(monkeypatch):
     monkeypatch.setattr(ranking, "ranking", lambda runs, wanted: tuple(runs))
     monkeypatch.setattr(ranking, "off_length", lambda run, wanted: False)
     monkeypatch.setattr(ranking, "order_of", lambda first, second: None)
-    monkeypatch.setattr(
-        ranking, "cell_text", lambda run, one: (one.pattern.format(run.values[one.column]), "")
-    )
 
     def marked(*values):
         runs = [Planned(f"run {k}", **{head.column: value}) for k, value in enumerate(values)]
