@@ -5,8 +5,8 @@
 
 Parts are "Loop" and "Shell" on the authors' meshes, "Loop, edges of 3.5 mm", the Loop meshed anew
 from its surface, and "Shell, pushed", for which the authors' own paths are not published. "Loop"
-takes a minute and a half of processor time, "Shell" six minutes; twice that with ``--band``, for
-the band of each load too. With ``--bond`` strands come loose from their ends and folds at that
+takes a minute of processor time, "Shell" six minutes; twice that with ``--band``, for the band of
+each load too. With ``--bond`` strands come loose from their ends and folds at that
 force, N, and carry nothing in folds; with ``--stop 0.9`` curves end at 90 % of their highest load,
 which saves minutes. "Shell, pushed" is off by more than twice, since nothing fails in compression:
 it takes five minutes with ``--stop 0.9``. The picture has the curves of the first part beside what

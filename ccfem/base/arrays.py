@@ -208,7 +208,7 @@ def in_brief(value: Any) -> str:
     parts = []
     for name in (field.name for field in dataclasses.fields(value)):
         given = getattr(value, name)
-        if isinstance(given, np.ndarray):
+        if isinstance(given, np.ndarray | RowBlocks):
             parts.append(f"{name} {given.shape}")
         elif given is None or isinstance(given, bool | int | str):
             parts.append(f"{name}={given!r}")

@@ -215,21 +215,27 @@ time of what it gives way to, and also of other people's work: less would hold i
 
 
 def _with_low_priority(work: Callable[[], Result]) -> Result:
-    if processors() >= _granted():
+    # Not where work whose result cannot be sent is done again by the user's own process.
+    if processors() >= _granted() and multiprocessing.current_process().daemon:
         os.nice(_LOW)
     return work()
 
 
 def has_room_beside() -> bool:
     """Whether a second processor is left here, and work is not shared out elsewhere."""
-    return _left() > 1 and _may_fork() and _ELSEWHERE.get() is None
+    return processors() - _undone() > 1 and _may_fork() and _ELSEWHERE.get() is None
 
 
 def _left() -> int:
     """Processors for work of this process: what is done beside it gives way, or takes one each."""
     if processors() >= _granted():
         return processors()
-    return processors() - sum(not forks.done for forks in _besides)
+    return processors() - _undone()
+
+
+def _undone() -> int:
+    """Count the processes beside this one that are at work."""
+    return sum(not forks.done for forks in _besides)
 
 
 def _may_fork() -> bool:

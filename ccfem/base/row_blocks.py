@@ -22,6 +22,8 @@ _FINE = 1000.0
 """Steps to a millimetre of coordinates that are rounded."""
 _FAR = 2**30
 """Steps that are not kept in four bytes."""
+_TINY = 1024
+"""Bytes of a component up to which it is kept as it is: blocks of single paths are not compared."""
 _FEW = 0.25
 """Share of values up to which those that differ are a table. Our choice."""
 _SPARSE = 8
@@ -99,6 +101,8 @@ class RowBlocks(NDArrayOperatorsMixin):
         bits = _bits(values)
         if (bits == bits[0]).all():
             return _Component(np.broadcast_to(values[:1].copy(), values.shape))
+        if values.nbytes <= _TINY:
+            return _Component(np.array(values))
         found = _steps(values) or _places(values) or _Component(values)
         kept = np.ascontiguousarray(found.kept)
         digest = hashlib.sha256(kept.tobytes()).digest() + kept.dtype.char.encode()
@@ -147,7 +151,9 @@ class RowBlocks(NDArrayOperatorsMixin):
     def _between(self, begin: int, end: int) -> NDArray[Any]:
         """Rows from one to another."""
         rows = np.empty((max(end - begin, 0), *self._row), self.dtype)
-        columns = rows.reshape(len(rows), -1).T if len(rows) else rows
+        if end <= begin:
+            return rows
+        columns = rows.reshape(len(rows), -1).T
         number = max(int(np.searchsorted(self._ends, begin, side="right")) - 1, 0)
         while number < len(self._blocks) and self._ends[number] < end:
             first, last = self._ends[number : number + 2]
@@ -181,6 +187,9 @@ class RowBlocks(NDArrayOperatorsMixin):
 
     def __getitem__(self, key: Any) -> Any:
         if isinstance(key, tuple):
+            of_rows = isinstance(key[0], int | np.integer | slice | np.ndarray)
+            if not of_rows or not all(isinstance(k, int | np.integer | slice) for k in key[1:]):
+                return np.asarray(self)[key]
             rows, inner = self[key[0]], key[1:]
             return rows[inner if isinstance(key[0], int | np.integer) else (slice(None), *inner)]
         if isinstance(key, slice):
@@ -189,9 +198,14 @@ class RowBlocks(NDArrayOperatorsMixin):
         if isinstance(key, int | np.integer):
             at = range(len(self))[int(key)]
             return self._between(at, at + 1)[0]
-        numbers = np.asarray(key)
-        numbers = np.flatnonzero(numbers) if numbers.dtype == bool else numbers
-        if not numbers.size or numbers.min() < 0:
+        numbers = key
+        if isinstance(key, np.ndarray) and key.dtype == bool and key.shape == (len(self),):
+            numbers = np.flatnonzero(key)
+        if not isinstance(numbers, np.ndarray) or numbers.dtype.kind not in "iu":
+            return np.asarray(self)[key]
+        if not numbers.size:
+            return np.empty((*numbers.shape, *self._row), self.dtype)
+        if numbers.min() < 0 or numbers.max() >= len(self):
             return np.asarray(self)[numbers]
         first, last = int(numbers.min()), int(numbers.max())
         if numbers.ndim == 1 and last - first > _SPARSE * len(numbers):
@@ -213,6 +227,8 @@ class RowBlocks(NDArrayOperatorsMixin):
         return whole if dtype is None else whole.astype(dtype, copy=False)
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *given: Any, **options: Any) -> Any:
+        if any(isinstance(one, RowBlocks) for one in options.get("out", ())):
+            raise ValueError("output array is read-only")
         plain = (np.asarray(one) if isinstance(one, RowBlocks) else one for one in given)
         return getattr(ufunc, method)(*plain, **options)
 

@@ -38,7 +38,7 @@ from ccfem.printing.poses import (
 from ccfem.printing.support import SupportLayers
 from ccfem.slicing.layers import Layer
 from ccfem.slicing.layers.layer import curved_layers, plane_frame
-from ccfem.slicing.layers.slicer import Vector, standing
+from ccfem.slicing.layers.slicer import NO_FIELD, Vector, standing
 
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -229,10 +229,12 @@ def plan_print(
         As `printed_strands`, and where flat layers are nearer to each other or to the part's ends
         than their height allows, strands stand higher than the matrix above them, the head of a
         machine of three axes would touch the layer that it lays, or the part does not fit on the
-        bed.
+        bed; and for curved layers whose support is asked for, but not given.
     """
     if isinstance(strands, Toolpaths):
         strands = printed_strands(strands, layers, mesh, machine)
+    if support is True and curved_layers(layers):
+        raise InputError(NO_FIELD)
     below = None if isinstance(support, bool) else support
     place = _place(layers, mesh, machine, below, spin, build)
     about = (strands, layers, mesh, machine, place)

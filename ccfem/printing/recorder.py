@@ -304,7 +304,7 @@ class Recorder:
             column.insert(at.tolist(), rows)
 
     def moves(self) -> Moves:
-        """All that was noted; afterwards the recorder is empty."""
+        """All that was noted; nothing is noted after it."""
         self._split()
         columns: dict[str, Any] = {name: column.rows() for name, column in self.columns.items()}
         return Moves(**columns)

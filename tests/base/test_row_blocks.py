@@ -8,6 +8,7 @@ from ccfem.base import row_blocks
 from ccfem.base.arrays import is_shared, read_only, shared_rows
 from ccfem.base.parallel import ReadOnlyPickler
 from ccfem.base.row_blocks import RowBlocks
+from ccfem.comparison.studies.fingerprint import fingerprint
 
 
 def blocks_of(*blocks):
@@ -39,6 +40,16 @@ def test_blocks_are_read_as_the_array_that_they_stand_for(stacked):
         np.testing.assert_array_equal(rows[key], joined[key])
     for key in ((slice(400, 600), 2), (far, slice(0, 2)), (5, 1), joined[:, 0] > 1.0, far[:0]):
         np.testing.assert_array_equal(rows[key], joined[key])
+    for key in ((..., slice(2)), None, [], [3, 1], (far, np.array([0, 2, 1, 1])), joined > 1.0):
+        np.testing.assert_array_equal(rows[key], joined[key])
+    for key in (slice(5, 5), slice(5, 3), slice(0, 0), np.zeros(len(joined), dtype=bool)):
+        np.testing.assert_array_equal(rows[key], joined[key])
+    for wrong in (np.ones(len(rows) + 1, dtype=bool), np.array([len(rows)]), len(rows)):
+        with pytest.raises(IndexError):
+            rows[wrong]
+    with pytest.raises(ValueError, match="read-only"):
+        rows += 1.0
+    assert fingerprint(rows) == fingerprint(joined)
     np.testing.assert_array_equal(rows + 1.0 < 2.0, joined + 1.0 < 2.0)
     np.testing.assert_array_equal(np.diff(rows, axis=0), np.diff(joined, axis=0))
     assert rows.sum() == joined.sum()

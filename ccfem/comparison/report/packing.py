@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccfem.base.arrays import FloatArray
+from ccfem.base.row_blocks import RowBlocks
 
 _STEPS = 65535
 """Largest whole number of 16 bits."""
@@ -74,6 +75,8 @@ def _taken(value: Any, parts: list[bytes]) -> Any:
         return None
     if isinstance(value, Rounded):
         return _rounded(value, parts)
+    if isinstance(value, RowBlocks):
+        value = np.asarray(value)
     if not isinstance(value, np.ndarray):
         return value
     if value.dtype == np.uint8:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ccfem.base.errors import InputError
+from ccfem.base.row_blocks import RowBlocks
 
 
 def fingerprint(*values: Any) -> str:
@@ -48,6 +49,8 @@ def fingerprint(*values: Any) -> str:
 
 def _encoded(value: Any, inside: tuple[int, ...]) -> Iterable[bytes]:
     """Bytes that stand for a value."""
+    if isinstance(value, RowBlocks):
+        value = np.asarray(value)
     if isinstance(value, np.ndarray) and not value.dtype.hasobject:
         yield f"array {value.dtype.str} {value.shape}".encode()
         yield np.ascontiguousarray(value).tobytes()

@@ -18,8 +18,8 @@ _COARSEST = 50
 
 _STRENGTH, _STRENGTH_BELOW_QUADRATIC = 0.08, 0.04
 """Size of a block above which it is a strong connection. Below quadratic cells the lower one takes
-half to four fifths of the iterations on the Shell of Chen et al. 2021, and about as many on
-sheets, arches and beams one to three cells high (measured: 0.8 to 1.1 times)."""
+fewer iterations on the Shell of Chen et al. 2021 (`benchmarks/speed/shell.py` prints them), and
+about as many on sheets, arches and beams one to three cells high."""
 
 _ENERGY = ("energy", {"krylov": "cg", "maxiter": 4, "degree": 1})
 """Smoothing of the prolongation."""

@@ -331,7 +331,7 @@ def equilibrium(
     held, forces = specimen.held.touching(u), specimen.forces
     by_energy = energy > 0.0 and specimen.solver.backend == "two-level" and held.presses is None
     most = _UPDATES if held.presses is None and not by_energy else 2 * _UPDATES
-    lowest = 1.0
+    lowest, last = 1.0, np.inf
     pieces = bars(strands, specimen.system.problem.mesh)
     full = axial_stiffness * strands.share
     strain, carried = _state(pieces, u, mode)
@@ -361,7 +361,9 @@ def equilibrium(
             return Equilibrium(u, matrix, strain, carried, update, total, residual)
         goal = max(0.5 * tolerance / residual, 0.0 if mode == BONDED else _PROGRESS)
         goal, apply = 0.5 * min(goal, 0.5), specimen.solver.apply
-        goal = max(goal, _PROGRESS_BY_ENERGY) if by_energy else goal
+        # Rough steps alone may go round among sets of fibres: what gained nothing is made finer.
+        goal = max(goal, _PROGRESS_BY_ENERGY) if by_energy and residual < last else goal
+        last = residual
         step, count, least = conjugate_gradient(reduced, rest, apply, tolerance=goal)
         total, lowest = total + count, min(lowest, least)
         x = x + step

@@ -385,7 +385,8 @@ Every stiffness, breaking load and ratio that five papers and Zhang et al. 2025 
 parts, beside what the virtual test predicts, with one set of parameters for all: EA/E = 4 mm^2 and
 strands that carry tension only. The intervals reach to strands with a fifth of their stiffness in
 compression. Breaking loads are taken to grow as the stiffness does, until a strand carries the
-highest force that strands of the other solid carried when its prints broke (a table below).
+highest force that strands of the other solid carried when its prints broke (a table below); these
+forces are taken in tension only, and intervals leave out the spread of that strength.
 
 {summary_lines(study)}
 What these figures are worth:

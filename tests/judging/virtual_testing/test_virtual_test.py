@@ -288,6 +288,19 @@ def test_on_quadratic_cells_the_energy_of_the_error_bounds_that_of_the_stiffness
         assert 1 <= test.solution.record.iterations < 0.7 * other.solution.record.iterations
 
 
+def test_rough_steps_settle_on_the_fibres_that_carry():
+    """Stiff strands along a slender strip; steps that are all rough never settle there."""
+    mesh = box_mesh((60.0, 4.0, 1.0), (20, 2, 1)).quadratic()
+    problem = dataclasses.replace(clamped((Force("x_max", (0.0, 0.0, 1.0)),)), mesh=mesh)
+    part = solve(problem, "two-level")["load"]
+    places = np.random.default_rng(3).uniform(0.03, 0.97, (120, 2)) * (4.0, 1.0)
+    lines = toolpaths(*(np.array([[0.0, *place], [60.0, *place]]) for place in places))
+    strands, stiff = cut_strands(lines, mesh), Strand(rho=100.0)
+    exact = virtual_test(strands, Specimen.of(part, "superlu"), stiff, span=())
+    rough = virtual_test(strands, part, stiff, span=(), energy=1e-3)
+    assert rough.ratio == pytest.approx(exact.ratio, rel=1e-6)
+
+
 def test_a_rough_solution_is_taken_only_if_its_reactions_balance_the_loads():
     """The resultant of the reactions is that of the load, within what is allowed: 1e-4."""
     mesh = box_mesh(SIZE, (12, 4, 3)).quadratic()
