@@ -14,7 +14,7 @@ MOST_LINES = 1e6
 """Lines of matrix: some minutes, and about 3 GB."""
 MOST_STRANDS = 5e5
 """Strands side by side, on all layers. A plate of 400 x 300 mm has 200,000 on 600 layers, which are
-mostly alike and take some 20 minutes; where all layers differ, it takes some hours."""
+mostly alike and take a quarter of an hour; where all layers differ, it takes some hours."""
 
 
 def check_matrix_lines(mesh: TetMesh, build: Sequence[float], machine: Machine) -> None:
