@@ -76,6 +76,8 @@ def test_layers_that_cannot_be_planned_on_are_refused_before_the_solve(slicer, s
     """By every command that plans, and in the words of the check."""
     monkeypatch.setattr("ccfem.comparison.engine.solve", None)
     monkeypatch.setattr("ccfem.comparison.studies.work.solve", None)
+    monkeypatch.setattr("ccfem.printing.line_counts.MOST_STRANDS", 1e5)
+    monkeypatch.setattr("ccfem.cases.case.MOST_STRANDS", 1e5)
     thin = {"fibre_width": 0.05, "fibre_height": 0.01, "filament_area": 1e-4}
     machine = thin if "about" in said else {}
     case = replace(part(**machine), slicing=slicer)
