@@ -113,9 +113,9 @@ def filled_layers(
     for number, layer in enumerate(layers):
         if support is not None and props is not None:
             for k in np.flatnonzero(support.before == number).tolist():
-                own = props.on_layer(k)
-                own = replace(own, kind=np.full(len(own), SUPPORT))
-                filled.append(_on_top(support.layers[k], own))
+                rings = props.on_layer(k)
+                rings = replace(rings, kind=np.full(len(rings), SUPPORT))
+                filled.append(_on_top(support.layers[k], rings))
         strands = fibre.on_layer(layer.index)
         whole = _on_top(layer, Toolpaths.concatenate([layer_matrix([layer], machine), strands]))
         filled.append(_full(whole, machine))

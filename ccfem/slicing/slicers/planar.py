@@ -220,7 +220,7 @@ class _CellsByHeight:
 
     def once(self, values: IntArray) -> IntArray:
         """Take values that another layer has, too, from there."""
-        digest = hashlib.sha256(values.tobytes()).digest() + bytes([values.ndim])
+        digest = hashlib.sha256(values.tobytes()).digest() + str(values.shape).encode()
         return self.known.setdefault(digest, read_only(values, int))
 
     def near(self, height: float, snap: float) -> IntArray:
