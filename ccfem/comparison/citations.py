@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Iterable, Mapping
 from functools import cache
+from importlib import metadata
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -99,5 +100,6 @@ def sentence(key: str) -> str:
 @cache
 def _entries() -> dict[str, str]:
     text = files("ccfem.comparison").joinpath("references.bib").read_text(encoding="utf-8")
+    text = text.replace("{the version installed}", f"{{{metadata.version('ccfem')}}}")
     entries = [entry.strip() for entry in re.split(r"\n(?=@)", text)]
     return {entry[entry.index("{") + 1 : entry.index(",")]: entry for entry in entries}

@@ -122,6 +122,10 @@ def test_every_method_says_what_to_cite():
     known = set(re.findall(r"^@\w+\{(\w+),", bibtex(cited(METHODS)), flags=re.MULTILINE))
     assert known == {"ccfem", *(key for keys in METHODS.values() for key in keys)}
     assert cited(["zigzag", "mine"]) == ["ccfem"]
+    changelog = Path(__file__).parents[2].joinpath("CHANGELOG.md").read_text(encoding="utf-8")
+    released = re.search(r"^## \[(\d[\d.]*)\]", changelog, flags=re.MULTILINE)
+    assert released
+    assert f"version = {{{released[1]}}}" in bibtex(["ccfem"])
     assert sentence("chen_2021").endswith(
         "Additive Manufacturing 49 102470. 2021. doi:10.1016/j.addma.2021.102470."
     )

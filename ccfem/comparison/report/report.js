@@ -28,14 +28,14 @@ function unpack(bytes) {
     const raw = new Uint8Array(entry.n * size), from = start + entry.at;
     for (let b = 0; b < size; b++)
       for (let k = 0; k < entry.n; k++) raw[k * size + b] = bytes[from + b * entry.n + k];
-    const found = new kind(raw.buffer);
-    if (!entry.low) return found;
+    const values = new kind(raw.buffer);
+    if (!entry.low) return values;
     const rows = entry.n / entry.low.length; // steps, a column after the other
     return entry.low.map((low, c) => {
       const column = new Float32Array(rows);
       let sum = 0;
       for (let k = 0; k < rows; k++) {
-        sum = (sum + found[c * rows + k]) & 65535;
+        sum = (sum + values[c * rows + k]) & 65535;
         column[k] = low + entry.step * sum;
       }
       return column;
@@ -625,7 +625,7 @@ function spaceScene(part, layers) {
     draw();
   };
   choice.onchange = colour.onchange = top.oninput = draw;
-  for (const each of [choice, colour, top]) each.addEventListener("change", () => printed(view));
+  for (const control of [choice, colour, top]) control.addEventListener("change", () => printed(view));
   byId("space").hidden = false;
   whenSeen(view, draw);
 }
@@ -665,7 +665,7 @@ function printScene(given) {
   begin();
   choice.onchange = () => { begin(); draw(); };
   top.oninput = alone.onchange = travel.onchange = draw;
-  for (const each of [choice, top, alone, travel]) each.addEventListener("change", () => printed(view));
+  for (const control of [choice, top, alone, travel]) control.addEventListener("change", () => printed(view));
   byId("print").hidden = false;
   whenSeen(view, draw);
 }
@@ -711,7 +711,7 @@ function breakingScene(part, given) {
   begin();
   choice.onchange = () => { begin(); draw(); };
   step.oninput = draw;
-  for (const each of [choice, step]) each.addEventListener("change", () => printed(view));
+  for (const control of [choice, step]) control.addEventListener("change", () => printed(view));
   byId("breaking-steps").hidden = false;
   whenSeen(view, draw);
 }
@@ -743,12 +743,12 @@ function charts(all) {
     const given = all[place.dataset.charts];
     if (!given.length) continue;
     place.closest("section").hidden = false;
-    for (const each of given) {
+    for (const data of given) {
       const element = document.createElement("div"), frame = document.createElement("div");
       element.className = "chart";
       frame.append(element);
       place.append(frame);
-      whenSeen(element, () => chart(element, each));
+      whenSeen(element, () => chart(element, data));
     }
   }
 }
