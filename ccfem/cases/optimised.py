@@ -197,6 +197,17 @@ def optimise(
         When a solve misses its tolerance.
     """
     asked = Optimisation(volume_fraction=volume_fraction, method=method, **options)
+    return find_design(case, asked, progress)
+
+
+def find_design(case: Case, asked: Optimisation, progress: Progress = silent) -> Optimised:
+    """Carry out an optimisation: `optimise` with what is asked of it as a value.
+
+    Raises
+    ------
+    InputError, SolveError
+        As `optimise`.
+    """
     problem = case.problem
     flat = None if asked.in_space else flat_part(problem.mesh)
     _check_case(case, asked, flat)

@@ -42,15 +42,6 @@ def numbers_of(text: str) -> tuple[float, ...]:
         raise InputError(f"expected numbers separated by commas; got '{text}'") from None
 
 
-def bed_table_of(
-    turn: Sequence[str] | None, centre: str | None = None, copies: str | None = None
-) -> dict[str, Any]:
-    """Read what is given of a turn, a place and copies on the bed as a table ``[bed]``."""
-    place = None if centre is None else list(numbers_of(centre))
-    given = {"turn": turn, "centre": place, "copies": copies}
-    return {key: value for key, value in given.items() if value is not None}
-
-
 def parameters_by_strategy(
     texts: Sequence[str], only: str | None = None
 ) -> dict[str, dict[str, Any]]:

@@ -3,66 +3,93 @@
 import shlex
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import prod
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeVar
 
 import typer
 
 from ccfem.base.errors import InputError
 from ccfem.cli import options
-from ccfem.cli.arguments import bed_table_of, parameters_by_strategy
+from ccfem.cli.arguments import parameters_by_strategy
 from ccfem.cli.machines import MachineName, SetMachine
-from ccfem.cli.part_choices import SetPlastic
+from ccfem.cli.part_choices import PlacedPart, SetPlastic
 
 if TYPE_CHECKING:
     from ccfem.cases.case import Case
     from ccfem.comparison.request import Request
 
+_Value = TypeVar("_Value", str, int)
 _EACH = "once for all parts, or once for each in their order"
 
 
-_Parts = Annotated[
-    list[str],
-    typer.Argument(metavar="CASE_OR_PART.toml ...", help="Parts; one may be named twice."),
-]
-_Strategies = Annotated[
-    list[str] | None, typer.Option(metavar="S", help=f"Strategy, {_EACH}; default stream_function.")
-]
-_Layers = Annotated[list[int] | None, typer.Option(metavar="N", help=f"Layers of fibre, {_EACH}.")]
-_Copies = Annotated[
-    list[str] | None,
-    typer.Option(metavar="N|NXxNY", help=f"How many, as 4, or 2x3 by X and Y, {_EACH}."),
-]
-_Turns = Annotated[
-    list[str] | None, typer.Option(metavar="AXIS=DEGREES", help=f"Turn, as z=37, {_EACH}.")
-]
-_Centres = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="X,Y", help="Middle of each part on the bed, mm; else they are laid out in rows."
-    ),
-]
+class _Part(NamedTuple):
+    """What is said of a part; parts of which the same is said are copies of one."""
+
+    case: str
+    strategy: str
+    layers: int | None
+    turn: str | None
+    centre: str | None
 
 
+@dataclass(frozen=True)
+class PartsOptions:
+    """Parts, and what is said of each of them."""
+
+    parts: Annotated[
+        list[str],
+        typer.Argument(metavar="CASE_OR_PART.toml ...", help="Parts; one may be named twice."),
+    ]
+    strategy: Annotated[
+        list[str] | None,
+        typer.Option(metavar="S", help=f"Strategy, {_EACH}; default stream_function."),
+    ] = None
+    layers: Annotated[
+        list[int] | None, typer.Option(metavar="N", help=f"Layers of fibre, {_EACH}.")
+    ] = None
+    copies: Annotated[
+        list[str] | None,
+        typer.Option(metavar="N|NXxNY", help=f"How many, as 4, or 2x3 by X and Y, {_EACH}."),
+    ] = None
+    turn: Annotated[
+        list[str] | None, typer.Option(metavar="AXIS=DEGREES", help=f"Turn, as z=37, {_EACH}.")
+    ] = None
+    centre: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="X,Y",
+            help="Middle of each part on the bed, mm; else they are laid out in rows.",
+        ),
+    ] = None
+
+    def counted(self) -> dict[_Part, str | None]:
+        """Parts in their order, and how many of each."""
+        strategy = _for_each("--strategy", self.strategy or ["stream_function"], self.parts)
+        layers = _for_each("--layers", self.layers, self.parts)
+        turn, centre = (
+            _for_each(option, given, self.parts)
+            for option, given in (("--turn", self.turn), ("--centre", self.centre))
+        )
+        copies = _for_each("--copies", self.copies, self.parts)
+        numbers: dict[_Part, list[str | None]] = {}
+        for *about, number in zip(self.parts, strategy, layers, turn, centre, copies, strict=True):
+            numbers.setdefault(_Part(*about), []).append(number)
+        return {part: _together(several) for part, several in numbers.items()}
+
+
+@options.grouped
 def bed(
-    parts: _Parts,
-    strategy: _Strategies = None,
+    *,
+    parts: PartsOptions,
     set_: options.SetOfStrategies = None,
-    layers: _Layers = None,
-    copies: _Copies = None,
-    turn: _Turns = None,
-    centre: _Centres = None,
     machine: MachineName = None,
     set_machine: SetMachine = None,
     set_plastic: SetPlastic = None,
-    support: options.PrintedSupport = False,
     virtual_test: options.TestOrNot = None,
     backend: options.Backend = "auto",
-    pause: options.Pause = None,
-    from_layer: options.FromLayer = 0,
-    cell: options.RobotCell = False,
+    printing: options.PrintOptions,
     out: options.Out = None,
     force: options.Force = False,
 ) -> None:
@@ -76,22 +103,29 @@ def bed(
     from ccfem.base.progress import progress_bar
     from ccfem.base.result_folder import whole_folder
     from ccfem.cli.first_run import compiling_beside
-    from ccfem.cli.run import elapsed, load, plan_code
+    from ccfem.cli.run import elapsed, plan_code
     from ccfem.cli.screen import print_bed
     from ccfem.comparison.bed_files import BED_FILES, write_bed
     from ccfem.comparison.bed_print import needs_support, print_together
-    from ccfem.printing.course import Course
 
     where = out or Path("results") / "bed"
 
     def ask() -> "list[Request]":
-        given = (strategy or ["stream_function"], layers, turn, centre, copies)
         parameters, requests = parameters_by_strategy(set_ or ()), []
-        for part, number in _counted(parts, *given).items():
-            table = bed_table_of(part.turn and [part.turn], part.centre, number)
-            case = load(part.case, None, False, machine, set_machine, None, table, set_plastic)
-            request = _request(part, case, parameters, virtual_test, backend)
-            requests.append(replace(request, support=support and needs_support(request)))
+        for part, number in parts.counted().items():
+            turn = None if part.turn is None else [part.turn]
+            chosen = PlacedPart(
+                part.case,
+                machine=machine,
+                set_machine=set_machine,
+                set_plastic=set_plastic,
+                turn=turn,
+                centre=part.centre,
+                copies=number,
+            )
+            request = _request(part, chosen.read(), parameters, virtual_test, backend)
+            support = printing.support and needs_support(request)
+            requests.append(replace(request, support=support))
         return requests
 
     with (
@@ -99,24 +133,14 @@ def bed(
         compiling_beside(),
         progress_bar(lines=True) as progress,
     ):
-        course = Course(tuple(pause or ()), from_layer)
+        course = printing.course
         printed = print_together(ask(), course, progress)
         progress("writing results", 1.0)
-        write_bed(printed, folder, shlex.join(["ccfem", *sys.argv[1:]]), cell)
+        write_bed(printed, folder, shlex.join(["ccfem", *sys.argv[1:]]), printing.cell)
     print_bed(printed, where, elapsed())
     codes = [plan_code(comparison, force) for comparison in printed.comparisons.values()]
     if any(codes):
         raise typer.Exit(max(codes))
-
-
-class _Part(NamedTuple):
-    """What is said of a part; parts of which the same is said are copies of one."""
-
-    case: str
-    strategy: str
-    layers: int | None
-    turn: str | None
-    centre: str | None
 
 
 def _request(
@@ -142,17 +166,9 @@ def _request(
     )
 
 
-def _counted(parts: Sequence[str], *given: Sequence[Any] | None) -> dict[_Part, str | None]:
-    """Parts in their order, and how many of each; given are strategies and so on, and copies."""
-    flags = ("--strategy", "--layers", "--turn", "--centre", "--copies")
-    columns = [_for_each(*named, parts) for named in zip(flags, given, strict=True)]
-    numbers: dict[_Part, list[str | None]] = {}
-    for *about, number in zip(parts, *columns, strict=True):
-        numbers.setdefault(_Part(*about), []).append(number)
-    return {part: _together(several) for part, several in numbers.items()}
-
-
-def _for_each(option: str, given: Sequence[Any] | None, parts: Sequence[str]) -> Sequence[Any]:
+def _for_each(
+    option: str, given: Sequence[_Value] | None, parts: Sequence[str]
+) -> Sequence[_Value | None]:
     """Values of an option for each part: one for all, or as many as there are parts."""
     if not given:
         return [None] * len(parts)

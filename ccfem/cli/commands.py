@@ -4,42 +4,35 @@ Everything heavy is imported by the command that needs it, so that ``ccfem --hel
 """
 
 import logging
-from functools import partial
 from importlib import metadata
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ccfem.base.errors import InputError
 from ccfem.base.progress import progress_bar
 from ccfem.cli import options
-from ccfem.cli.arguments import bed_table_of, drawings_of, names_of, parameters_by_strategy, path_of
+from ccfem.cli.arguments import parameters_by_strategy, path_of
 from ccfem.cli.bed import bed
 from ccfem.cli.fibre_amounts import front
-from ccfem.cli.machines import MachineName, SetMachine, machines
+from ccfem.cli.machines import machines
 from ccfem.cli.optimising import optimise
-from ccfem.cli.part_choices import SetFibre, SetPlastic
+from ccfem.cli.part_choices import GivenPart, PlacedPart, PrintedPart, TurnedPart
 from ccfem.cli.part_commands import add_part_commands
-from ccfem.cli.run import (
-    Output,
-    calibrated,
-    foreign_stress,
-    layers_of,
-    load,
-    plan_code,
-    run,
-    slicings_of,
-    with_given_paths,
-)
+from ccfem.cli.run import plan_code, run
+
+if TYPE_CHECKING:
+    from ccfem.cases.case import Case
+    from ccfem.comparison.request import Request
 
 # What ``ccfem support`` does: the layers below a part, summed up, and their paths as a file.
 
 
+@options.grouped
 def support(
-    case: options.CasePath,
-    set_case: options.SetCase = None,
+    given: GivenPart,
     layers: options.Layers = None,
     slicing: options.Slicing = None,
     angle: Annotated[
@@ -76,7 +69,6 @@ def support(
     from ccfem.base.checks import check_known
     from ccfem.base.whole import check_writable, whole_file
     from ccfem.body.files.surface import write_stl
-    from ccfem.cli.run import layers_of, load
     from ccfem.fem.elasticity.statics import solve
     from ccfem.printing.export.vtk import write_paths
     from ccfem.printing.support import slice_with_support, support_paths
@@ -88,11 +80,11 @@ def support(
         if out.suffix.lower() not in (".vtp", ".stl"):
             raise InputError(f"support is written as .vtp or .stl; got {out}: change its suffix")
         check_writable(out)
-    part = load(case, set_case)
+    part = given.read()
     names = part.problem.cases
     if load_case is not None:
         check_known("load case", load_case, names)
-    chosen = layers_of(layers, None, slicing)
+    chosen = options.LayerOptions(layers, None, slicing).chosen()
     slicer = as_slicer(part.slicing if chosen is None else chosen)
     part.check_layers(slicer)
     check_field(slicer)
@@ -337,16 +329,9 @@ def faces(
 
 
 @app.command()
+@options.grouped
 def check(
-    case: options.CasePath,
-    set_case: options.SetCase = None,
-    machine: MachineName = None,
-    set_machine: SetMachine = None,
-    set_fibre: SetFibre = None,
-    set_plastic: SetPlastic = None,
-    turn: options.Turn = None,
-    centre: options.Centre = None,
-    copies: options.Copies = None,
+    part: PlacedPart,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -364,131 +349,68 @@ def check(
     """
     from ccfem.cli.check_part import check_part
 
-    bed = bed_table_of(turn, centre, copies)
-    read = partial(load, case, set_case, False, machine, set_machine, set_fibre, bed, set_plastic)
-    if code := check_part(read, out):
+    if code := check_part(part.read, out):
         raise typer.Exit(code)
 
 
 @app.command()
+@options.grouped
 def compare(
-    case: options.CasePath,
-    strategies: options.Strategies = None,
-    set_case: options.SetCase = None,
-    layers: options.Layers = None,
-    heights: options.Heights = None,
-    slicing: options.Slicing = None,
-    slicings: options.Slicings = None,
-    fibre_per_layer: options.Fibre = None,
-    fibre: options.FibreInAll = None,
-    natural: options.Natural = False,
-    set_: options.SetOfStrategies = None,
-    paths: options.Paths = None,
-    paths_frame: options.PathsFrame = None,
-    curve: options.Curve = None,
+    *,
+    strategies: options.StrategyOptions,
+    given: TurnedPart,
+    cut: options.LayerOptions,
+    amount: options.AmountOptions,
     virtual_test: options.VirtualTest = True,
-    breaking_load: options.BreakingLoad = False,
-    every_layer: options.EveryLayer = False,
-    load_case: options.LoadCase = None,
-    refine: options.Refine = False,
-    calibration: options.Calibration = None,
-    machine: MachineName = None,
-    set_machine: SetMachine = None,
-    set_fibre: SetFibre = None,
-    set_plastic: SetPlastic = None,
-    turn: options.Turn = None,
-    backend: options.Backend = "auto",
-    stress: options.StressFile = None,
-    stress_unit: options.StressUnit = None,
-    stress_array: options.StressArray = None,
-    stress_step: options.StressStep = None,
-    stress_components: options.StressComponents = None,
-    pictures: options.Pictures = False,
-    drawings: options.Drawings = None,
-    details: options.Details = False,
-    scheduler: options.Scheduler = None,
-    out: options.Out = None,
-    force: options.Force = False,
+    solving: options.SolveOptions,
+    stress: options.StressOptions,
+    results: options.ResultOptions,
 ) -> None:
     """Plan a part by several strategies and show which is best, in numbers and a report."""
 
-    def ask() -> Any:
-        from ccfem.comparison.request import STRATEGIES, Request, named_strategies
+    def ask() -> "Request":
+        from ccfem.comparison.request import Request
+        from ccfem.slicing.slicers import split
 
-        names = STRATEGIES if strategies is None else names_of(strategies)
-        files = () if paths is None else names_of(paths)
-        parameters = parameters_by_strategy(set_ or ())
-        cut = layers_of(layers, heights, slicing)
-        several = None if slicings is None else slicings_of(slicings)
-        how = (stress_unit, stress_array, stress_step, stress_components)
-        given = foreign_stress(stress, refine, *how)
-        if drawings is not None and slicings is not None:
+        chosen, foreign = strategies.chooser(), stress.foreign(solving.refine)
+        if results.drawings is not None and amount.slicings is not None:
             raise InputError("--drawings works with one slicing only; got --slicings: drop one")
-        bed = bed_table_of(turn)
-        part = load(case, set_case, refine, machine, set_machine, set_fibre, bed, set_plastic)
-        part, strand = calibrated(part, virtual_test, calibration)
-        chosen = named_strategies(part, names, parameters) if names or not files else {}
+        layers = cut.chosen()
+        part, strand = solving.calibrated(given.read(solving.refine), virtual_test)
         return Request.of(
             part,
-            with_given_paths(part, chosen, files, paths_frame),
-            cut,
-            several,
-            fibre_per_layer,
-            fibre,
-            natural,
-            load_case=load_case,
+            chosen(part),
+            layers,
+            None if amount.slicings is None else split(amount.slicings),
+            amount.fibre_per_layer,
+            amount.fibre,
+            amount.natural,
+            load_case=solving.load_case,
             strand=strand,
-            stress=given,
-            backend=backend,
-            curve=curve,
-            every_layer=every_layer,
-            breaking_load=breaking_load,
+            stress=foreign,
+            backend=solving.backend,
+            curve=amount.curve,
+            every_layer=solving.every_layer,
+            breaking_load=solving.breaking_load,
         )
 
-    run(case, ask, Output(out, force, pictures, drawings_of(drawings), "", details), scheduler)
+    run(given.case, ask, results.output(), results.scheduler)
 
 
 @app.command()
+@options.grouped
 def plan(
-    case: options.CasePath,
+    *,
     strategy: options.Strategy = "stream_function",
     set_: options.SetOfOne = None,
-    set_case: options.SetCase = None,
-    layers: options.Layers = None,
-    heights: options.Heights = None,
-    slicing: options.Slicing = None,
-    fibre_per_layer: options.Fibre = None,
-    stiffness: options.Stiffness = None,
+    given: PlacedPart,
+    cut: options.LayerOptions,
+    amount: options.PlanAmountOptions,
     virtual_test: options.TestOrNot = None,
-    breaking_load: options.BreakingLoad = False,
-    every_layer: options.EveryLayer = False,
-    load_case: options.LoadCase = None,
-    refine: options.Refine = False,
-    calibration: options.Calibration = None,
-    machine: MachineName = None,
-    set_machine: SetMachine = None,
-    set_fibre: SetFibre = None,
-    set_plastic: SetPlastic = None,
-    turn: options.Turn = None,
-    backend: options.Backend = "auto",
-    gcode: options.PrintFile = False,
-    support: options.PrintedSupport = False,
-    centre: options.Centre = None,
-    copies: options.Copies = None,
-    pause: options.Pause = None,
-    from_layer: options.FromLayer = 0,
-    cell: options.RobotCell = False,
-    stress: options.StressFile = None,
-    stress_unit: options.StressUnit = None,
-    stress_array: options.StressArray = None,
-    stress_step: options.StressStep = None,
-    stress_components: options.StressComponents = None,
-    pictures: options.Pictures = False,
-    drawings: options.Drawings = None,
-    details: options.Details = False,
-    scheduler: options.Scheduler = None,
-    out: options.Out = None,
-    force: options.Force = False,
+    solving: options.SolveOptions,
+    stress: options.StressOptions,
+    printing: options.PlanPrintOptions,
+    results: options.ResultOptions,
 ) -> None:
     """Plan a part by one strategy, by default with its natural amount of fibre.
 
@@ -496,50 +418,47 @@ def plan(
     with --force it ends with 0.
     """
 
-    def ask() -> Any:
+    def ask() -> "Request":
         from ccfem.comparison.request import LONGEST_TEST, Request, named_strategies
-        from ccfem.printing.course import Course
 
         parameters = parameters_by_strategy(set_ or (), strategy)
-        cut = layers_of(layers, heights, slicing)
-        how = (stress_unit, stress_array, stress_step, stress_components)
-        given = foreign_stress(stress, refine, *how)
-        if not gcode and not (centre is None and copies is None):
+        layers, foreign = cut.chosen(), stress.foreign(solving.refine)
+        if not printing.gcode and not (given.centre is None and given.copies is None):
             raise InputError("--centre and --copies place a print on the bed: add --gcode")
-        if cell and not gcode:
+        if printing.cell and not printing.gcode:
             raise InputError("--cell writes the moves of a print: add --gcode")
-        course = Course(tuple(pause or ()), from_layer)
-        bed = bed_table_of(turn, centre, copies)
-        part = load(case, set_case, refine, machine, set_machine, set_fibre, bed, set_plastic)
-        part, strand = calibrated(part, virtual_test is not False, calibration)
-        untold = virtual_test is None and stiffness is None and load_case != "all"
+        course = printing.course
+        part, strand = solving.calibrated(given.read(solving.refine), virtual_test is not False)
+        natural = amount.fibre_per_layer is None and amount.stiffness is None
+        untold = virtual_test is None and amount.stiffness is None and solving.load_case != "all"
         return Request.of(
             part,
             named_strategies(part, (strategy,), parameters),
-            cut,
-            fibre_per_layer=fibre_per_layer,
-            natural=fibre_per_layer is None and stiffness is None,
-            stiffness=stiffness,
-            load_case=load_case,
+            layers,
+            fibre_per_layer=amount.fibre_per_layer,
+            natural=natural,
+            stiffness=amount.stiffness,
+            load_case=solving.load_case,
             strand=strand,
-            stress=given,
-            backend=backend,
-            print_plans=gcode,
-            support=support,
+            stress=foreign,
+            backend=solving.backend,
+            print_plans=printing.gcode,
+            support=printing.support,
             course=course,
-            every_layer=every_layer,
+            every_layer=solving.every_layer,
             longest_test=LONGEST_TEST if untold else float("inf"),
-            breaking_load=breaking_load,
+            breaking_load=solving.breaking_load,
         )
 
-    output = Output(out, force, pictures, drawings_of(drawings), f"-{strategy}", details, cell)
-    if code := plan_code(run(case, ask, output, scheduler), force):
+    output = results.output(f"-{strategy}", printing.cell)
+    if code := plan_code(run(given.case, ask, output, results.scheduler), results.force):
         raise typer.Exit(code)
 
 
 @app.command()
+@options.grouped
 def calibrate(
-    case: options.CasePath,
+    given: PrintedPart,
     unreinforced: Annotated[
         Path, typer.Option(metavar="CURVE.csv", help="Test of the part printed without fibre.")
     ],
@@ -554,14 +473,9 @@ def calibrate(
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="Parameter of it; repeatable."),
     ] = None,
-    set_case: options.SetCase = None,
     layers: options.Layers = None,
     fibre_per_layer: options.Fibre = None,
     load_case: options.OneLoadCase = None,
-    machine: MachineName = None,
-    set_machine: SetMachine = None,
-    set_fibre: SetFibre = None,
-    set_plastic: SetPlastic = None,
     out: Annotated[
         Path,
         typer.Option(
@@ -575,19 +489,24 @@ def calibrate(
     parameters and the amount of fibre of that print.
     """
     from ccfem.cli.fitting import fit_material
+    from ccfem.comparison.request import Request, named_strategies
 
     parameters = parameters_by_strategy(set_ or (), strategy) if strategy is not None else {}
-    settings = {
-        "layers": layers,
-        "fibre_per_layer": fibre_per_layer,
-        "natural": fibre_per_layer is None,
-        "strand": None,
-        "load_case": load_case,
-    }
-    read = partial(
-        load, case, set_case, False, machine, set_machine, set_fibre, set_plastic=set_plastic
-    )
-    fit_material(read, unreinforced, reinforced, strategy, parameters, settings, out)
+
+    def ask(part: "Case") -> "Request":
+        chosen = named_strategies(part, (strategy,) if strategy is not None else (), parameters)
+        return Request.of(
+            part,
+            chosen,
+            layers,
+            fibre_per_layer=fibre_per_layer,
+            natural=fibre_per_layer is None,
+            strand=None,
+            load_case=load_case,
+        )
+
+    planned = None if strategy is None else ask
+    fit_material(given.read, unreinforced, reinforced, planned, load_case, out)
 
 
 app.command()(bed)

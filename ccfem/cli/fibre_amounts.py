@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ccfem.cli import options
 from ccfem.cli.arguments import numbers_of, parameters_by_strategy
-from ccfem.cli.machines import MachineName, SetMachine
-from ccfem.cli.options import Backend, CasePath, Force, LoadCase, Out, SetCase, SetOfOne, Strategy
-from ccfem.cli.part_choices import SetFibre, SetPlastic
+from ccfem.cli.part_choices import PrintedPart
 
 if TYPE_CHECKING:
     from ccfem.comparison.front_cases import PointCases
@@ -82,11 +81,11 @@ _FILES = ("front.csv", "front.png", "trade.png", "command.txt")
 """All files that the command writes."""
 
 
+@options.grouped
 def front(
-    case: CasePath,
-    strategy: Strategy = "stream_function",
-    set_: SetOfOne = None,
-    set_case: SetCase = None,
+    given: PrintedPart,
+    strategy: options.Strategy = "stream_function",
+    set_: options.SetOfOne = None,
     layers: Annotated[
         str | None,
         typer.Option(
@@ -106,21 +105,16 @@ def front(
             "stiffness, as 0,0.25,0.5; trade.png shows what one costs in the other.",
         ),
     ] = None,
-    load_case: LoadCase = None,
-    machine: MachineName = None,
-    set_machine: SetMachine = None,
-    set_fibre: SetFibre = None,
-    set_plastic: SetPlastic = None,
-    backend: Backend = "auto",
-    out: Out = None,
-    force: Force = False,
+    load_case: options.LoadCase = None,
+    backend: options.Backend = "auto",
+    out: options.Out = None,
+    force: options.Force = False,
 ) -> None:
     """Show how stiff and strong a part gets with how much fibre, beside what no paths exceed."""
     from ccfem.base.csv_table import write_csv
     from ccfem.base.errors import InputError, spared
     from ccfem.base.progress import progress_bar
     from ccfem.base.result_folder import whole_folder
-    from ccfem.cli.run import load
     from ccfem.comparison.front_plans import front_of
     from ccfem.comparison.request import Request, named_strategies
 
@@ -131,7 +125,7 @@ def front(
     strengths = () if strength is None else numbers_of(strength)
     if strength is not None and not strengths:
         raise InputError(f"--strength expects numbers from 0 to 1 as 0,0.25,0.5; got '{strength}'")
-    part = load(case, set_case, False, machine, set_machine, set_fibre, set_plastic=set_plastic)
+    part = given.read()
     chosen = named_strategies(part, (strategy,), parameters)
     request = Request(part, chosen, load_case=load_case, backend=backend)
     where = out if out is not None else Path("results") / f"{part.name}-front"

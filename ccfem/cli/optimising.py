@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from os.path import lexists
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,111 +13,125 @@ from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
 from ccfem.base.toml import assignment
 from ccfem.cli.arguments import names_of, numbers_of, path_of
-from ccfem.cli.options import CasePath, SetCase
+from ccfem.cli.options import grouped
+from ccfem.cli.part_choices import GivenPart
 
 if TYPE_CHECKING:
     from ccfem.base.progress import Progress
-    from ccfem.cases.optimised import Optimised
+    from ccfem.cases.case import Case
+    from ccfem.cases.optimised import Optimisation, Optimised
 
 _TENTH = 0.1
 """Share of the iterations after which the next one is named."""
 
 
-# The options of the command alone.
+@dataclass(frozen=True)
+class OptimisationOptions:
+    """How a part is optimised."""
 
-_VolumeFraction = Annotated[
-    float, typer.Option(metavar="F", help="Share of the volume that is left, above 0, below 1.")
-]
-_Method = Annotated[
-    str,
-    typer.Option(
-        metavar="somp|simp",
-        help="Densities and the axis of a laminate, for plates; or densities alone.",
-    ),
-]
-_ElementSize = Annotated[
-    float | None,
-    typer.Option(
-        metavar="MM", help="Element size of a plate; by default it has 4000 square cells."
-    ),
-]
-_Radius = Annotated[
-    float | None,
-    typer.Option(metavar="MM", help="Radius of the filter; default two element sizes."),
-]
-_Filter = Annotated[
-    str, typer.Option("--filter", metavar="sensitivity|density", help="What is filtered.")
-]
-_Orientation = Annotated[
-    str,
-    typer.Option(
-        metavar="gradient|principal|fixed", help="How somp turns the axis of the laminate."
-    ),
-]
-_Laminate = Annotated[
-    str | None,
-    typer.Option(
-        metavar="E1,E2,NU12,G12",
-        help="Of somp, MPa; default the part's own material where it has an axis, else the "
-        "woven laminate of Wang et al. 2021.",
-    ),
-]
-_Weight = Annotated[
-    list[str] | None,
-    typer.Option(metavar="CASE=W", help="Weight of a load case, default 1; repeatable."),
-]
-_Keep = Annotated[
-    str | None,
-    typer.Option(
-        metavar="A,B,..",
-        help="Patches around which the part stays solid; default loaded patches and supported "
-        "holes; '' for none.",
-    ),
-]
-_Solid = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="X,Y,R",
-        help="Disc to keep solid, or X,Y,X,Y a rectangle, X,Y,Z,X,Y,Z a box; repeatable.",
-    ),
-]
-_Void = Annotated[
-    list[str] | None, typer.Option(metavar="X,Y,R", help="The same, to keep empty; repeatable.")
-]
-_Iterations = Annotated[int, typer.Option(metavar="N", help="Iterations at most.")]
-_InSpace = Annotated[
-    bool, typer.Option("--in-space", help="Optimise a flat part in 3D too (simp).")
-]
-_PartFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--out",
-        metavar="PART.toml",
-        parser=path_of,
-        help="Part file; beside it mesh, picture and history. Default NAME-optimised.toml.",
-    ),
-]
-_Replaced = Annotated[bool, typer.Option("--force", help="Replace files that are there.")]
+    volume_fraction: Annotated[
+        float, typer.Option(metavar="F", help="Share of the volume that is left, above 0, below 1.")
+    ]
+    method: Annotated[
+        str,
+        typer.Option(
+            metavar="somp|simp",
+            help="Densities and the axis of a laminate, for plates; or densities alone.",
+        ),
+    ] = "somp"
+    element_size: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MM", help="Element size of a plate; by default it has 4000 square cells."
+        ),
+    ] = None
+    radius: Annotated[
+        float | None,
+        typer.Option(metavar="MM", help="Radius of the filter; default two element sizes."),
+    ] = None
+    filter_: Annotated[
+        str, typer.Option("--filter", metavar="sensitivity|density", help="What is filtered.")
+    ] = "sensitivity"
+    orientation: Annotated[
+        str,
+        typer.Option(
+            metavar="gradient|principal|fixed", help="How somp turns the axis of the laminate."
+        ),
+    ] = "gradient"
+    laminate: Annotated[
+        str | None,
+        typer.Option(
+            metavar="E1,E2,NU12,G12",
+            help="Of somp, MPa; default the part's own material where it has an axis, else the "
+            "woven laminate of Wang et al. 2021.",
+        ),
+    ] = None
+    weight: Annotated[
+        list[str] | None,
+        typer.Option(metavar="CASE=W", help="Weight of a load case, default 1; repeatable."),
+    ] = None
+    keep: Annotated[
+        str | None,
+        typer.Option(
+            metavar="A,B,..",
+            help="Patches around which the part stays solid; default loaded patches and supported "
+            "holes; '' for none.",
+        ),
+    ] = None
+    solid: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="X,Y,R",
+            help="Disc to keep solid, or X,Y,X,Y a rectangle, X,Y,Z,X,Y,Z a box; repeatable.",
+        ),
+    ] = None
+    void: Annotated[
+        list[str] | None, typer.Option(metavar="X,Y,R", help="The same, to keep empty; repeatable.")
+    ] = None
+    iterations: Annotated[int, typer.Option(metavar="N", help="Iterations at most.")] = 200
+    in_space: Annotated[
+        bool, typer.Option("--in-space", help="Optimise a flat part in 3D too (simp).")
+    ] = False
+
+    def asked(self, part: "Case") -> "Optimisation":
+        """Return what is asked of an optimisation of a part."""
+        from ccfem.cases.optimised import Optimisation
+
+        check_number("--iterations", self.iterations, at_least=1)
+        if self.radius is not None:
+            check_number("--radius", self.radius, above=0.0, unit="mm")
+        weights = dict(assignment(text) for text in self.weight or ())
+        return Optimisation(
+            volume_fraction=self.volume_fraction,
+            method=self.method,  # type: ignore[arg-type]
+            element_size=self.element_size,
+            radius=self.radius,
+            filter=self.filter_,  # type: ignore[arg-type]
+            orientation=self.orientation,  # type: ignore[arg-type]
+            laminate=None if self.laminate is None else numbers_of(self.laminate),
+            weights=dict.fromkeys(part.problem.loads, 1.0) | weights if weights else None,
+            keep=None if self.keep is None else names_of(self.keep),
+            solid=[numbers_of(place) for place in self.solid or ()],
+            void=[numbers_of(place) for place in self.void or ()],
+            max_iterations=self.iterations,
+            in_space=self.in_space,
+        )
 
 
+@grouped
 def optimise(
-    case: CasePath,
-    volume_fraction: _VolumeFraction,
-    method: _Method = "somp",
-    set_case: SetCase = None,
-    element_size: _ElementSize = None,
-    radius: _Radius = None,
-    filter_: _Filter = "sensitivity",
-    orientation: _Orientation = "gradient",
-    laminate: _Laminate = None,
-    weight: _Weight = None,
-    keep: _Keep = None,
-    solid: _Solid = None,
-    void: _Void = None,
-    iterations: _Iterations = 200,
-    in_space: _InSpace = False,
-    out: _PartFile = None,
-    force: _Replaced = False,
+    given: GivenPart,
+    how: OptimisationOptions,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="PART.toml",
+            parser=path_of,
+            help="Part file; beside it mesh, picture and history. Default NAME-optimised.toml.",
+        ),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
 ) -> None:
     """Optimise the topology of a part; the new part is a part file with its mesh.
 
@@ -124,33 +139,16 @@ def optimise(
     picture of densities and outline (.png) and the compliance of every iteration (.csv).
     """
     from ccfem.base.progress import progress_bar
-    from ccfem.cases.optimised import optimise as find
-    from ccfem.cli.run import load
+    from ccfem.cases.optimised import find_design
 
-    check_number("--iterations", iterations, at_least=1)
-    if radius is not None:
-        check_number("--radius", radius, above=0.0, unit="mm")
-    whole, weights = load(case, set_case), dict(assignment(text) for text in weight or ())
-    options: dict[str, Any] = {
-        "element_size": element_size,
-        "radius": radius,
-        "filter": filter_,
-        "orientation": orientation,
-        "laminate": None if laminate is None else numbers_of(laminate),
-        "weights": dict.fromkeys(whole.problem.loads, 1.0) | weights if weights else None,
-        "keep": None if keep is None else names_of(keep),
-        "solid": [numbers_of(place) for place in solid or ()],
-        "void": [numbers_of(place) for place in void or ()],
-        "max_iterations": iterations,
-        "in_space": in_space,
-    }
+    whole = given.read()
+    asked = how.asked(whole)
     files = _files(Path(f"{whole.name}-optimised.toml") if out is None else out, force)
     with progress_bar(lines=True) as progress:
-        report = _now_and_then(progress)
-        optimised = find(whole, volume_fraction, method, progress=report, **options)  # type: ignore[arg-type]
+        optimised = find_design(whole, asked, _now_and_then(progress))
     # Another run may have written them since.
     files = _files(files[0], force)
-    _write(optimised, files, case)
+    _write(optimised, files, given.case)
     _say(optimised, files)
 
 

@@ -9,7 +9,8 @@ from typer.core import TyperCommand
 
 from ccfem.base.errors import InputError
 from ccfem.cli.arguments import path_of
-from ccfem.cli.options import Backend, CasePath, Refine, SetCase
+from ccfem.cli.options import Backend, Refine, grouped
+from ccfem.cli.part_choices import GivenPart
 
 _Out = Annotated[
     Path | None,
@@ -150,15 +151,15 @@ def _mesh(
     print(f"{out}: {len(mesh.cells):,} cells, patches {mesh.patch_list}")
 
 
+@grouped
 def _solve(
-    case: CasePath,
+    given: GivenPart,
     out: Annotated[
         Path,
         typer.Option(
             "-o", "--out", metavar="RESULT.vtu", parser=path_of, help="File that is written."
         ),
     ],
-    set_case: SetCase = None,
     load_case: Annotated[
         str | None,
         typer.Option(
@@ -175,12 +176,11 @@ def _solve(
     from ccfem.base.checks import check_known
     from ccfem.base.progress import progress_bar
     from ccfem.base.whole import check_writable
-    from ccfem.cli.run import load
     from ccfem.cli.screen import print_solution
     from ccfem.fem.elasticity.statics import solve
     from ccfem.printing.export.vtu_result import result_path, write_result
 
-    part = load(case, set_case, refine)
+    part = given.read(refine)
     names = part.problem.cases
     if load_case is not None:
         check_known("load case", load_case, names)

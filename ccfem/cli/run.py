@@ -7,24 +7,18 @@ import contextlib
 import shlex
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ccfem.base.errors import InputError
 from ccfem.base.progress import Progress, progress_bar
-from ccfem.base.toml import assignment
-from ccfem.cli.arguments import numbers_of
-from ccfem.cli.machines import machine_choice
-from ccfem.cli.part_choices import fibre_choice, plastic_choice
 
 if TYPE_CHECKING:
     from ccfem.cases.case import Case
     from ccfem.comparison.request import Request
     from ccfem.comparison.result import Comparison
-    from ccfem.judging.virtual_testing.strand import Strand
     from ccfem.paths.planning.strategy import Strategy
 
 _STARTED = time.perf_counter()
@@ -40,123 +34,6 @@ def complain(*messages: str) -> int:
     for message in messages:
         print("ccfem: error:", " ".join(message.split()), file=sys.stderr)
     return 2
-
-
-def load(
-    name: str,
-    set_case: Sequence[str] | None = None,
-    refine: bool = False,
-    machine: str | None = None,
-    set_machine: Sequence[str] | None = None,
-    set_fibre: Sequence[str] | None = None,
-    bed: Mapping[str, Any] = MappingProxyType({}),
-    set_plastic: Sequence[str] | None = None,
-) -> "Case":
-    """Read a part file, or make a case from its name and parameters.
-
-    Parameters
-    ----------
-    set_case : sequence of str, optional
-        Parameters of a case by name, each as ``NAME=VALUE``.
-    refine : bool, default False
-        Refine cells until they are fine enough by the estimated error.
-    machine, set_machine
-        As in `machine_choice`.
-    set_fibre, set_plastic
-        As in `fibre_choice` and `plastic_choice`.
-    bed : mapping
-        As in `ccfem.cli.arguments.bed_table_of`.
-    """
-    from ccfem.cases.reading import read
-
-    printer, places = machine_choice(machine, set_machine), fibre_choice(set_fibre)
-    plastic = plastic_choice(set_plastic)
-    _refuse_body(name)
-    parameters = dict(assignment(text) for text in set_case or ())
-    if parameters and name.endswith(".toml"):
-        raise InputError(
-            f"--set-case is for cases by name; '{name}' is a part file: change the file"
-        )
-    case = read(name, **parameters)
-    if printer is not None:
-        case = replace(case, machine=printer(case.machine))
-    if places is not None:
-        case = replace(case, fibre=places(case.fibre))
-    if plastic is not None:
-        case = replace(case, plastic=plastic(case.plastic))
-    if bed:
-        case = case.on_bed(bed)
-    return _refined(case) if refine else case
-
-
-def _refuse_body(name: str) -> None:
-    """Say what a part file is to who gives the body instead."""
-    from ccfem.body.files.formats import suffixes
-    from ccfem.body.files.surface import is_surface
-    from ccfem.body.meshing.cad import is_cad
-    from ccfem.cases.reading import is_analysis
-
-    body = Path(name)
-    if is_analysis(body):
-        return
-    if is_surface(body) or is_cad(body) or body.suffix.lower() in suffixes():
-        raise InputError(
-            f"{name} is a body without material, loads and supports; a part file (TOML) adds "
-            f"these: 'ccfem new {shlex.quote(name)}' writes one to fill in"
-        )
-
-
-def _refined(case: "Case") -> "Case":
-    """Case on cells that are fine enough by the estimated error; a finding says how many."""
-    from ccfem.fem.elasticity.statics import refine
-
-    problem = refine(case.problem)
-    before, after = (len(solved.mesh.cells) for solved in (case.problem, problem))
-    # Between walls and infill the stress jumps: there cells of any size have an estimated error.
-    solid = "" if case.plastic.solid else " with solid plastic"
-    remark = f"{before:,} cells were refined to {after:,} by their estimated error{solid}"
-    findings = (*case.findings, remark) if after > before else case.findings
-    return replace(case, problem=problem, findings=findings)
-
-
-def layers_of(layers: int | None, heights: str | None, slicing: str | None) -> Any:
-    """Read the layers from the one of three options that is given; None for the part's own."""
-    given = {"--layers": layers, "--heights": heights, "--slicing": slicing}
-    named = [name for name, value in given.items() if value is not None]
-    if len(named) > 1:
-        raise InputError(f"give --layers, --heights or --slicing; got {' and '.join(named)}")
-    if heights is not None:
-        return numbers_of(heights)
-    if slicing is None:
-        return layers
-    from ccfem.slicing.slicers import from_text
-
-    return from_text(slicing)
-
-
-def slicings_of(text: str) -> tuple[str, ...]:
-    """Read the slicings of a comparison over several."""
-    from ccfem.slicing.slicers import split
-
-    return split(text)
-
-
-def foreign_stress(path: Path | None, refine: bool, *values: Any) -> Any:
-    """Stress of another program to plan on; None for the part's own.
-
-    Values are those of its unit, array, step and components, each of which may be None.
-    """
-    from ccfem.comparison.request import ForeignStress
-
-    how = dict(zip(("unit", "array", "step", "components"), values, strict=True))
-    if path is None:
-        for name, value in how.items():
-            if value is not None:
-                raise InputError(f"--stress-{name} belongs to --stress; got no file: name it")
-        return None
-    if refine:
-        raise InputError("--refine changes the mesh that the file of --stress is on: drop one")
-    return ForeignStress(path, **how)
 
 
 @dataclass(frozen=True)
@@ -289,23 +166,6 @@ def with_given_paths(
             raise InputError(f"{file} holds no paths: check its name")
         named[name] = GivenPaths(toolpaths, file, pattern_of(file))
     return named
-
-
-def calibrated(
-    case: "Case", virtual_test: bool, calibration: Path | None
-) -> "tuple[Case, Strand | None]":
-    """Case and strand of the virtual test, with the matrix and the strand of a calibration."""
-    from ccfem.comparison.request import DEFAULT_STRAND
-
-    strand = DEFAULT_STRAND if virtual_test else None
-    if calibration is None:
-        return case, strand
-    from ccfem.judging.virtual_testing.calibration import read_calibration
-
-    fitted = read_calibration(calibration)
-    if strand is not None:
-        strand = fitted.strand(strand)
-    return replace(case, problem=replace(case.problem, material=fitted.material)), strand
 
 
 def _check(comparison: "Comparison") -> None:

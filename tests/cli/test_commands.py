@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+from typing import get_type_hints
 
 import numpy as np
 import pytest
@@ -546,7 +547,8 @@ def test_help_names_the_limits_that_hold():
     from ccfem.cli import options
     from ccfem.comparison import request
 
-    tested, layers = (kind.__metadata__[0].help for kind in (options.TestOrNot, options.EveryLayer))
+    every_layer = get_type_hints(options.SolveOptions, include_extras=True)["every_layer"]
+    tested, layers = (kind.__metadata__[0].help for kind in (options.TestOrNot, every_layer))
     assert f"up to {request.LONGEST_TEST / 1e6:g} km" in tested
     assert f"on {request.MOST_LAYERS}, evenly" in layers
 

@@ -87,7 +87,7 @@ def test_files_that_another_run_wrote_meanwhile_stay(plate, tmp_path, monkeypatc
     def meanwhile(*arguments, **options):
         (tmp_path / "plate-optimised.csv").write_text("theirs")
 
-    monkeypatch.setattr("ccfem.cases.optimised.optimise", meanwhile)
+    monkeypatch.setattr("ccfem.cases.optimised.find_design", meanwhile)
     code, out, err = plate("plate.toml", "--volume-fraction", "0.5")
     assert (code, out) == (2, "")
     assert "plate-optimised.csv is there already" in err
