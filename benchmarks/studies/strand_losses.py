@@ -30,7 +30,7 @@ from ccfem.paths.planning.strategy import full_length
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.planar import Planar
-from ccfem.strategies.fibre_aware.cut_and_move import prune_and_move
+from ccfem.strategies.fibre_aware.cut_and_move import Cutting, prune_and_move
 from ccfem.strategies.fibre_aware.heights import nearest_layer, room_for_fibre
 from ccfem.strategies.fibre_aware.prune import prune
 from ccfem.strategies.fibre_aware.smeared import SmearedPart
@@ -151,8 +151,8 @@ def losses(
     ]
     paths = Toolpaths.concatenate(whole)
     rows["linked and slid in: the paths"] = tested(paths, machine)
-    part, how = model.part.specimen, (3, 0.0, MOVES)
-    moved = prune_and_move((paths,), layers, part, length, machine, Strand(), *how)
+    part, how = model.part.specimen, Cutting(3, moves=MOVES)
+    moved = prune_and_move((paths,), layers, part, length, machine, Strand(), how)
     rows[f"moved in {MOVES} steps"] = tested(moved, machine)
     return rows
 

@@ -19,7 +19,7 @@ from ccfem.paths.planning.strategy import Amount, LayerPlanner, Strategy, WholeP
 from ccfem.paths.planning.unfolding import may_fold, without_folds
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies import create
-from ccfem.strategies.fibre_aware.cut_and_move import prune_and_move
+from ccfem.strategies.fibre_aware.cut_and_move import Cutting, prune_and_move
 from ccfem.strategies.fibre_aware.judges import Goal
 from ccfem.strategies.fibre_aware.plain_plans import plain_plans
 from ccfem.strategies.fibre_aware.plan_cases import plan_by_layers
@@ -177,14 +177,15 @@ class Pruned:
         bounds = measures(self.objective, cases, layers, in_all, machine, strand)
         goal = Goal(specimens(cases), cases.weights, bounds, self.objective)
         rounds = self.rounds if len(cases) == 1 else max(self.rounds, _CASES_ROUNDS)
-        cut_by = (rounds, self.strength, self.moves, TIGHT_SHARES[self.turns])
+        tight = TIGHT_SHARES[self.turns]
+        how = Cutting(rounds, self.strength, self.moves, tight, self.folds)
         tried = [paths]
         if self.of == "isocurve" and not self.base:
             tried += plain_plans(cases, layers, machine, curves=False)
         planners: list[tuple[Pruned, LayerPlanner]] = []
         for length in lengths:
             wanted = length * len(layers)
-            kept = prune_and_move(tried, layers, goal, wanted, machine, strand, *cut_by, self.folds)
+            kept = prune_and_move(tried, layers, goal, wanted, machine, strand, how)
             coverage = length / full
             overfill = max(planned / full / coverage, 1.0)
             planners.append((replace(self, coverage=coverage, overfill=overfill), WholePart(kept)))

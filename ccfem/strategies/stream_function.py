@@ -27,7 +27,7 @@ from ccfem.paths.fields.tensile import layer_tension
 from ccfem.paths.planning.strategy import Amount, LayerPlanner, WholePart, full_length
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer, stress_on
-from ccfem.strategies.fibre_aware.cut_and_move import prune_and_move
+from ccfem.strategies.fibre_aware.cut_and_move import Cutting, prune_and_move
 from ccfem.strategies.fibre_aware.heights import (
     fibre_capacity,
     group_layers,
@@ -289,10 +289,10 @@ class StreamFunction:
         tried = [list(chain(*some)) for some in zip(*map(candidates, designs), strict=True)]
         if self.strength:
             fields, solutions = designed.fields.ravel(), designed.objective.solution
-            how = (self.strength, self.evaluations)
-            strong = design_for_strength(problem, fields, solutions, *how)
+            weight, most = self.strength, self.evaluations
+            strong = design_for_strength(problem, fields, solutions, weight, most)
             tried = _with_first(candidates(strong), tried)
-        cut_by = (_ROUNDS, self.strength, self.moves, TIGHT_SHARES[self.turns])
+        how = Cutting(_ROUNDS, self.strength, self.moves, TIGHT_SHARES[self.turns])
         # Fields are designed on linear cells; moves gain less than those may be off.
         last = replace(goal, parts=specimens(cases)) if self.moves else None
         plans = []
@@ -300,9 +300,7 @@ class StreamFunction:
             offered = [*some, *common.plain]
             enough = [paths for paths in offered if float(paths.lengths.sum()) >= _WHOLE * length]
             offered = enough if whole and enough else offered
-            plans.append(
-                prune_and_move(offered, layers, goal, length, machine, strand, *cut_by, last=last)
-            )
+            plans.append(prune_and_move(offered, layers, goal, length, machine, strand, how, last))
         return plans
 
     def extraction(

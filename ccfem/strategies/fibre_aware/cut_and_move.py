@@ -6,6 +6,7 @@ the strength as asked for, and for half of that.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Protocol
 
@@ -64,6 +65,31 @@ class _Exchange(Protocol):
         """Make a plan better, given what it was cut from and its displacements."""
 
 
+@dataclass(frozen=True)
+class Cutting:
+    """How fibre is cut to a length and moved.
+
+    Attributes
+    ----------
+    rounds : int
+        Tests of each cut, as of `ccfem.strategies.fibre_aware.prune.prune`.
+    strength : float in [0, 1]
+        Weight of the load at first failure.
+    moves : int
+        Steps of `ccfem.strategies.fibre_aware.strand_moves.moved`.
+    tight : float in [0, 1]
+        Largest share of the fibre's length in bends tighter than the machine's radius.
+    fold : bool
+        Whether strands may fold.
+    """
+
+    rounds: int
+    strength: float = 0.0
+    moves: int = 0
+    tight: float = 1.0
+    fold: bool = False
+
+
 def prune_and_move(
     candidates: Sequence[Toolpaths],
     layers: Sequence[Layer],
@@ -71,11 +97,7 @@ def prune_and_move(
     length: float,
     machine: Machine,
     strand: Strand,
-    rounds: int,
-    strength: float,
-    moves: int,
-    tight: float = 1.0,
-    fold: bool = False,
+    how: Cutting,
     last: Goal | None = None,
 ) -> Toolpaths:
     """Cut fibre to a length, mm in all, move the rest, and cut it again to the length.
@@ -83,23 +105,21 @@ def prune_and_move(
     Each candidate is cut, and the best one is moved: the stiffest, or with strength the one of
     highest value. Before that the stiffest takes over stretches of the others (`exchanged`), if it
     was cut from much more fibre; for several load cases that gains next to nothing. With strength
-    it is moved once for the stiffness and once for both, and a test chooses. Parameters as in
-    `ccfem.strategies.fibre_aware.prune.prune` and
-    `ccfem.strategies.fibre_aware.strand_moves.moved`; `fold` is whether strands may fold, and
-    `last` the goal on the cells of the last test, by which moved paths are taken or not.
+    it is moved once for the stiffness and once for both, and a test chooses. `last` is the goal on
+    the cells of the last test, by which moved paths are taken or not.
     """
     goal = Goal.of(part)
 
     def cut(
         toolpaths: Toolpaths, share: float, tests: int, least: Judged | None = None
     ) -> Toolpaths:
-        return prune(toolpaths, goal, length, machine, strand, tests, share, tight, least)
+        return prune(toolpaths, goal, length, machine, strand, tests, share, how.tight, least)
 
     def judges_of(aim: Goal, tolerance: float) -> tuple[Judge, ...]:
-        if not strength:
+        if not how.strength:
             return (stiffness_judge(aim, machine, strand, layers, tolerance),)
-        how = (aim, layers, machine, strand, strength)
-        return tuple(strength_judge(*how, for_both, tolerance) for for_both in _FOR_BOTH)
+        both = (aim, layers, machine, strand, how.strength)
+        return tuple(strength_judge(*both, for_both, tolerance) for for_both in _FOR_BOTH)
 
     judges = judges_of(goal, _ROUGH)
 
@@ -109,12 +129,12 @@ def prune_and_move(
         cut_again = partial(cut, share=0.0)
         return exchanged(kept, candidates, goal.mesh, machine, judges[0], cut_again, near)
 
-    kept = best_cut(candidates, cut, judges[0], strength, rounds, exchange)
-    if not moves:
+    kept = best_cut(candidates, cut, judges[0], how.strength, how.rounds, exchange)
+    if not how.moves:
         return kept
-    radius, offered = kept_radius(machine, tight), [kept]
+    radius, offered = kept_radius(machine, how.tight), [kept]
     for judge in judges:
-        slid = moved(kept, layers, goal.mesh, machine, judge, moves, radius=radius)
+        slid = moved(kept, layers, goal.mesh, machine, judge, how.moves, radius=radius)
         if slid is not kept:
             offered.append(cut(slid, 0.0, 1))
     if len(offered) == 1:
@@ -122,7 +142,8 @@ def prune_and_move(
     # Tested as they are planned in the end, and only if they still lay the length.
     stress = goal.parts[0].unreinforced
     final = [
-        plan_layers(WholePart(paths), layers, layers, stress, machine, fold) for paths in offered
+        plan_layers(WholePart(paths), layers, layers, stress, machine, how.fold)
+        for paths in offered
     ]
     enough = (1.0 - TOLERANCE) * min(length, fibre_length(final[0]))
     lays = [paths for paths in final if fibre_length(paths) >= enough]

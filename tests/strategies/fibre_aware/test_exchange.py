@@ -74,7 +74,7 @@ def test_only_plans_that_were_much_too_long_are_exchanged(bent_beam, monkeypatch
     monkeypatch.setattr(cut_and_move, "exchanged", lambda *_: Toolpaths.empty())
     half, row = rows(layers, (0.5,)), float(rows(layers, (0.5,)).lengths.sum())
     planned = partial(cut_and_move.prune_and_move, layers=layers, part=Goal.of(stress))
-    about = {"machine": MACHINE, "strand": Strand(), "rounds": 1, "strength": 0.0, "moves": 0}
+    about = {"machine": MACHINE, "strand": Strand(), "how": cut_and_move.Cutting(1)}
     for heights_of, gone in (((0.5, 1.5), True), ((0.5,), False)):
         plans = [rows(layers, (9.0,)), rows(layers, heights_of)]
         kept = planned(plans, length=row, **about)

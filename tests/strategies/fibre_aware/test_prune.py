@@ -275,6 +275,6 @@ def test_what_cannot_be_stiffer_than_other_paths_is_given_up(bent_beam, monkeypa
     )
     monkeypatch.setattr(cut_and_move, "exchanged", lambda paths, *_: paths)
     for candidates in ([curves, rows], [rows, curves]):
-        about = (candidates, layers, goal, length, SHORT, Strand(), 2, 0.0, 0)
+        about = (candidates, layers, goal, length, SHORT, Strand(), cut_and_move.Cutting(2))
         kept = cut_and_move.prune_and_move(*about)
         np.testing.assert_array_equal(kept.points, stiff.points)

@@ -214,7 +214,13 @@ def test_moves_that_make_paths_worse_or_shorter_are_not_taken(bent_beam, monkeyp
     paths, goal = straight(layers, 0.5, 1.5), Goal.of(stress)
     monkeypatch.setattr(cut_and_move, "moved", lambda *_, **__: straight(layers, *heights))
     kept = cut_and_move.prune_and_move(
-        [paths], layers, goal, float(paths.lengths.sum()), MACHINE, Strand(), 1, 0.0, 6
+        [paths],
+        layers,
+        goal,
+        float(paths.lengths.sum()),
+        MACHINE,
+        Strand(),
+        cut_and_move.Cutting(1, moves=6),
     )
     assert kept is paths
 

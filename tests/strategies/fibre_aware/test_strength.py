@@ -20,7 +20,7 @@ from ccfem.machine import Machine
 from ccfem.paths.planning.layer_plans import plan_layers
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.strategies.fibre_aware import cut_and_move, judges, strength_value
-from ccfem.strategies.fibre_aware.cut_and_move import best_cut, prune_and_move
+from ccfem.strategies.fibre_aware.cut_and_move import Cutting, best_cut, prune_and_move
 from ccfem.strategies.fibre_aware.judges import Goal
 from ccfem.strategies.fibre_aware.prune import prune
 from ccfem.strategies.fibre_aware.stream_design import design
@@ -140,8 +140,8 @@ def test_tests_for_strength_have_the_tolerance_of_those_for_stiffness(
 
     monkeypatch.setattr(judges, "virtual_tests", recorded)
     monkeypatch.setattr(cut_and_move, "moved", lambda *_, **__: lines)
-    length, strength, moves = 0.93 * float(lines.lengths.sum()), 0.5, 1
-    prune_and_move([lines], layers, Goal.of(stress), length, SHORT, Strand(), 1, strength, moves)
+    length, how = 0.93 * float(lines.lengths.sum()), Cutting(1, strength=0.5, moves=1)
+    prune_and_move([lines], layers, Goal.of(stress), length, SHORT, Strand(), how)
     assert sorted(set(residuals)) == [1e-6, 1e-4]
 
 
