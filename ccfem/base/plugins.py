@@ -10,15 +10,17 @@ import importlib.util
 import inspect
 import pkgutil
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar
 
 from ccfem.base.checks import check_known
 from ccfem.base.errors import InputError, known_names
 from ccfem.base.toml import from_table
+
+Member = TypeVar("Member")
 
 
 def class_name(module: str) -> str:
@@ -54,11 +56,11 @@ def modules(package: str, group: str) -> dict[str, ModuleType]:
 
 def create(
     kind: str,
-    known: Mapping[str, Any],
+    known: Mapping[str, Callable[..., Member]],
     name: str,
     parameters: Mapping[str, Any] | None,
     cure: str = "",
-) -> Any:
+) -> Member:
     """Make a member from its name and parameters.
 
     Parameters
@@ -66,7 +68,7 @@ def create(
     kind : str
         What a member is called in messages, as "strategy".
     known : mapping of name to class or function
-    parameters : mapping of name to value, optional
+    parameters : mapping, optional
     cure : str, optional
         What else might have been meant by an unknown name.
 

@@ -21,6 +21,7 @@ from ccfem.base.toml import toml_of
 from ccfem.body.files.deck import check_included
 from ccfem.body.mesh.face_places import BodyFaces
 from ccfem.cases.inspection.face_choice import face_rule, patch_name
+from ccfem.cases.part_draft import PartDraft
 
 Keys = Sequence[str | int]
 """Where a value stands: names of tables, and places in lists."""
@@ -77,6 +78,17 @@ def content_of(text: str) -> dict[str, Any]:
         Where the text is not TOML.
     """
     return toml_of(text, "the part file")
+
+
+def draft_of(text: str) -> PartDraft:
+    """Return what a part file says, as far as it reads.
+
+    Raises
+    ------
+    InputError
+        Where the text is not TOML.
+    """
+    return PartDraft(content_of(text))
 
 
 def edited(text: str, change: Change) -> str:
@@ -202,19 +214,6 @@ def _like(content: Any, value: Any, inline: bool = False) -> Any:
 # The files that a part file names.
 
 
-def files_in(content: Mapping[str, Any]) -> dict[tuple[str | int, ...], str]:
-    """Files that a part file names, by where they stand in it."""
-    named: dict[tuple[str | int, ...], Any] = {
-        (key,): content.get(key) for key in ("mesh", "surface")
-    }
-    fibre = content.get("fibre")
-    regions = fibre.get("regions") if isinstance(fibre, Mapping) else None
-    for k, region in enumerate(regions if isinstance(regions, list) else ()):
-        if isinstance(region, Mapping):
-            named["fibre", "regions", k, "file"] = region.get("file")
-    return {keys: name for keys, name in named.items() if isinstance(name, str)}
-
-
 def check_files(text: str, home: Path, allowed: Sequence[Path]) -> None:
     """Refuse a part file that has a file read outside the folders that are allowed.
 
@@ -229,10 +228,10 @@ def check_files(text: str, home: Path, allowed: Sequence[Path]) -> None:
     ------
     InputError
     """
-    content = content_of(text)
-    for name in files_in(content).values():
+    draft = draft_of(text)
+    for name in draft.files.values():
         check_body(home / name, allowed)
-    slicing = content.get("slicing")
+    slicing = draft.content.get("slicing")
     layers = slicing.get("folder") if isinstance(slicing, Mapping) else None
     if isinstance(layers, str):
         check_inside(allowed[0] / layers, allowed)
@@ -272,7 +271,7 @@ def check_inside(path: Path, allowed: Sequence[Path]) -> Path:
 
 def rebased(text: str, home: Path, to: Path) -> str:
     """Text of a part file whose relative paths start from another folder."""
-    for keys, name in files_in(content_of(text)).items():
+    for keys, name in draft_of(text).files.items():
         if not Path(name).is_absolute() and home.resolve() != to.resolve():
             path = relpath((home / name).resolve(), to.resolve()).replace("\\", "/")
             text = edited(text, valued(keys, path))
@@ -294,15 +293,14 @@ def patch_of(text: str, listing: BodyFaces, numbers: Collection[int]) -> tuple[s
     """
     if not numbers:
         raise InputError("no face is chosen: click one, or choose it from the list")
-    rule, given = face_rule(listing, numbers), content_of(text).get("patches")
-    known = given if isinstance(given, Mapping) else {}
+    rule, known = face_rule(listing, numbers), draft_of(text).patches
     tables = [table for table in known.values() if isinstance(table, Mapping)]
     # All rules for faces of a part have one feature angle.
     rule |= next(({"angle": table["angle"]} for table in tables if "angle" in table), {})
     for name, table in known.items():
         if table == rule:
             return text, name
-    stem, name, count = patch_name(listing, numbers, rule), "", 1
+    stem, name, count = patch_name(listing, numbers, rule.get("normal")), "", 1
     while not name or name in known:
         name, count = f"{stem}_{count}" if count > 1 else stem, count + 1
     return edited(text, valued(("patches", name), rule)), name

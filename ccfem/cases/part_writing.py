@@ -1,7 +1,7 @@
 """A case as a part file: what `read_part` reads, written."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -102,7 +102,7 @@ def _supports(problem: Problem) -> list[dict[str, Any]]:
     return tables
 
 
-def _kind(value: Any, kinds: Mapping[str, Any]) -> dict[str, Any]:
+def _kind(value: Any, kinds: Mapping[str, Callable[..., Any]]) -> dict[str, Any]:
     """Table of a load or a support, its kind first."""
     kind = next(name for name, make in kinds.items() if make is type(value))
     given = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}

@@ -7,7 +7,6 @@ nozzle, how much fibre a start needs, and how much matrix is fed.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any
 
 import numpy as np
 
@@ -138,7 +137,7 @@ class Measured:
     mass: float | None = None
 
     @classmethod
-    def of(cls, values: Mapping[str, Any]) -> "Measured":
+    def of(cls, values: Mapping[str, float]) -> "Measured":
         """Take named values.
 
         Raises

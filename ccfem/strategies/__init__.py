@@ -1,6 +1,6 @@
 """Strategies: each turns the stress on a layer into fibre paths. One module a strategy."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from ccfem.base import plugins
@@ -23,7 +23,8 @@ def create(name: str, parameters: Mapping[str, Any] | None = None) -> Strategy:
         For an unknown strategy or parameter (the message lists the known ones), and for a value of
         the wrong type.
     """
-    return plugins.create("strategy", named(), name, parameters)
+    known: Mapping[str, Callable[..., Strategy]] = named()
+    return plugins.create("strategy", known, name, parameters)
 
 
 def __getattr__(name: str) -> Any:

@@ -20,10 +20,10 @@ from ccfem.body.files.formats import suffixes
 from ccfem.body.files.mesh_file import write_mesh
 from ccfem.body.files.surface import is_surface
 from ccfem.body.mesh.face_places import BodyFaces
-from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE
 from ccfem.body.meshing.cad import is_cad
 from ccfem.cases.inspection import Check, check
 from ccfem.cases.inspection.beginning import empty_part, faces_in_mm
+from ccfem.cases.part_draft import PartDraft
 from ccfem.cases.part_editing import (
     Change,
     History,
@@ -31,8 +31,8 @@ from ccfem.cases.part_editing import (
     check_files,
     check_inside,
     content_of,
+    draft_of,
     edited,
-    files_in,
     rebased,
     valued,
 )
@@ -98,7 +98,12 @@ class Bench:
     @property
     def content(self) -> Mapping[str, Any]:
         """What it says."""
-        return content_of(self.text)
+        return self.draft.content
+
+    @property
+    def draft(self) -> PartDraft:
+        """What it says, as far as it reads."""
+        return draft_of(self.text)
 
     @property
     def _there(self) -> Opened:
@@ -146,14 +151,14 @@ class Bench:
                 "(.toml) or a case"
             )
         self.opened, self.history = opened, History((text,))
-        self._saved, self._listing = None, (_body_of(content_of(text)), listing)
+        self._saved, self._listing = None, (draft_of(text).body, listing)
 
     def _write_case(self, name: str) -> Path:
         """Part file of a case in ``results``, with its mesh."""
         shipped = data_folder() / f"{name}.toml"
         if shipped.exists():
             text = shipped.read_text(encoding="utf-8")
-            for keys, file in files_in(content_of(text)).items():
+            for keys, file in draft_of(text).files.items():
                 self._write(self.results / Path(file).name, (shipped.parent / file).read_bytes())
                 text = edited(text, valued(keys, Path(file).name))
         else:
@@ -181,15 +186,15 @@ class Bench:
     @property
     def listing(self) -> BodyFaces:
         """Faces of the body of the part file that is shown."""
-        body = _body_of(self.content)
+        body = self.draft.body
         if self._listing is None or self._listing[0] != body:
             self._listing = (body, self._faces(self.text, self._there.home))
         return self._listing[1]
 
     def _faces(self, text: str, home: Path) -> BodyFaces:
         check_files(text, home, [self.folder])
-        content = content_of(text)
-        return faces_of_content(content, home, _body_of(content)[-1])
+        draft = draft_of(text)
+        return faces_of_content(draft.content, home, draft.feature_angle)
 
     # Editing.
 
@@ -338,16 +343,3 @@ def _names_body(path: Path, _: int) -> bool:
     except (InputError, OSError):
         return False
     return bool(content.keys() & {"mesh", "surface", "planform"})
-
-
-def _body_of(content: Mapping[str, Any]) -> tuple[Any, ...]:
-    """Return what the faces of a part file depend on, the feature angle last."""
-    keys = ("mesh", "surface", "planform", "scale", "merge_nodes")
-    tables = content.get("patches")
-    rules = tables.values() if isinstance(tables, Mapping) else ()
-    angles = [
-        float(rule["angle"])
-        for rule in rules
-        if isinstance(rule, Mapping) and isinstance(rule.get("angle"), int | float)
-    ]
-    return (*(content.get(key) for key in keys), (angles or [FEATURE_ANGLE])[0])

@@ -1,14 +1,12 @@
 """Symbols of what acts on a body, and of how it is printed, before it is meshed."""
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.patches import unit_vector
 from ccfem.cases.inspection.acting import finite
+from ccfem.cases.part_draft import PartDraft
 from ccfem.printing.bed_layout import bed_of
 
 _SNAP = np.cos(np.radians(6.0))
@@ -27,11 +25,11 @@ def snapped(direction: FloatArray) -> FloatArray:
     return np.asarray(unit)
 
 
-def upward(content: Mapping[str, Any]) -> FloatArray | None:
+def upward(draft: PartDraft) -> FloatArray | None:
     """Build direction (3,) of a part file, turned as it says; None where it says nothing right."""
     try:
-        build = unit_vector(content.get("build", "z"), "build").tolist()
-        return np.array(bed_of(build, content.get("bed", {}))[0])
+        build = unit_vector(draft.content.get("build", "z"), "build").tolist()
+        return np.array(bed_of(build, draft.content.get("bed", {}))[0])
     except InputError:  # the check says so
         return None
 
@@ -39,13 +37,11 @@ def upward(content: Mapping[str, Any]) -> FloatArray | None:
 # Boxes that hold fibre, or none.
 
 
-def boxes(content: Mapping[str, Any]) -> dict[int, FloatArray]:
+def boxes(draft: PartDraft) -> dict[int, FloatArray]:
     """Opposite corners (2, 3), mm, of the fibre regions of a part file that are boxes."""
-    fibre = content.get("fibre")
-    regions = fibre.get("regions") if isinstance(fibre, Mapping) else None
     boxes_of = {}
-    for k, region in enumerate(regions if isinstance(regions, list) else ()):
-        if isinstance(region, Mapping) and region.get("rule") == "box":
+    for k, region in draft.regions.items():
+        if region.get("rule") == "box":
             corners = finite([region.get("lower"), region.get("upper")])
             if corners is not None and corners.shape == (2, 3):  # else the check says so
                 boxes_of[k] = corners

@@ -3,7 +3,7 @@
 import inspect
 import mimetypes
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from ccfem.comparison.plot.colours import OUTLINE, gradient, rgb
 from ccfem.comparison.report.print_view import BESIDE, COLOURS, FILLS, KINDS, MOVES
 from ccfem.comparison.report.report_views import PrintLayer, RunResults, read_results, read_solution
 from ccfem.comparison.request import STRATEGIES
+from ccfem.paths.planning.strategy import Strategy
 from ccfem.printing.support import propped_space
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.workbench.bench import Opened
@@ -99,7 +100,7 @@ class CompareTab:
         self._body: tuple[Any, ...] = ("",)
         self.printed: list[PrintLayer] = []
 
-    def _add_ticks(self, known: dict[str, Any]) -> None:
+    def _add_ticks(self, known: Mapping[str, type[Strategy]]) -> None:
         gui, lines = self.page.server.gui, []
         for name, strategy in known.items():
             about = (inspect.getdoc(strategy) or "").split("\n")[0]

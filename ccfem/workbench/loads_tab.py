@@ -60,7 +60,7 @@ class LoadsTab:
         InputError
             Where it is there no more.
         """
-        entry = entries(self.page.bench.content).get(name)
+        entry = entries(self.page.bench.draft).get(name)
         if entry is None:
             raise InputError(f"{name[0]} is not in the part any more: add it again")
         return entry
@@ -161,7 +161,7 @@ class LoadsTab:
             self._said.content = ""
             return
         self.show_chosen()
-        listed = entries(self.page.bench.content)
+        listed = entries(self.page.bench.draft)
         for name in self._rows.keys() - listed.keys():
             self._drop(name)
         for place, (name, entry) in enumerate(listed.items()):

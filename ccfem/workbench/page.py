@@ -253,8 +253,8 @@ class Page(Tabbed):
         """Say what acts on the part, and where, as far as that is known."""
         now = (self.bench.text, self.bench.listing, self.checked)
         if any(new is not old for new, old in zip(now, self._acts_in, strict=True)):
-            content, listing = self.bench.content, self.bench.listing
-            places, those = patch_places(content, listing, self.checked), entries(content).items()
+            draft, listing = self.bench.draft, self.bench.listing
+            places, those = patch_places(draft, listing, self.checked), entries(draft).items()
             body = listing.points[listing.triangles]
             found = {k: (one, place) for k, one in those if (place := one.place(places, body))}
             self._acts_in, self._acting = now, found
@@ -290,9 +290,9 @@ class Page(Tabbed):
             self._drawn += self._symbol(f"/body/symbol_{k}", called, entry, place, corners)
         self._drawn += self._support()
         bounds = np.array(self._bounds())
-        for k, box in boxes(self.bench.content).items():
+        for k, box in boxes(self.bench.draft).items():
             self._drawn += self._box(k, box, bounds)
-        up = upward(self.bench.content)
+        up = upward(self.bench.draft)
         if up is not None:
             self._drawn += self._bed(corners.reshape(-1, 3), up, 0.22 * listing.size)
         self.paint()
@@ -430,7 +430,7 @@ class Page(Tabbed):
             return np.asarray(new[end])
 
         def dropped(end: int, to: FloatArray) -> None:
-            if place not in boxes(self.bench.content):
+            if place not in boxes(self.bench.draft):
                 raise InputError("this box is not in the part any more")
             new = stretched(corners, end, to, body)[end].round(3).tolist()
             key = "lower" if end == 0 else "upper"

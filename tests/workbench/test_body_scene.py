@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from ccfem.cases.inspection.face_choice import across
+from ccfem.cases.part_draft import PartDraft
 from ccfem.comparison.plot.symbols import (
     bed_under,
     box_edges,
@@ -68,13 +69,13 @@ def test_a_direction_near_an_axis_takes_it(angle):
 def test_the_bed_lies_under_the_part_as_it_is_built():
     corners = np.array([[x, y, z] for x in (0.0, 10.0) for y in (0.0, 20.0) for z in (5.0, 6.0)])
     for build, height in (("z", 5.0), ("-z", -6.0), ("x", 0.0), ("-y", -20.0)):
-        up = upward({"build": build})
+        up = upward(PartDraft({"build": build}))
         rim = bed_under(corners, up)
         assert rim @ up == pytest.approx(height)
         assert ((corners - rim.min(axis=0)) @ (1.0 - abs(up)) > 0.0).all()
     # A turn by 90 degrees about x lays y, which pointed back, upwards.
-    np.testing.assert_allclose(upward({"bed": {"turn": "x=90"}}), [0, 1, 0], atol=1e-12)
-    assert upward({"build": "w"}) is None
+    np.testing.assert_allclose(upward(PartDraft({"bed": {"turn": "x=90"}})), [0, 1, 0], atol=1e-12)
+    assert upward(PartDraft({"build": "w"})) is None
 
 
 def test_the_bed_swings_as_it_is_dragged():
@@ -111,5 +112,5 @@ def test_a_box_is_stretched_by_a_corner_and_takes_the_bounds_of_the_part():
     np.testing.assert_allclose(moved, [box[0], [15.0, 30.0, 500.0]])  # not past the other
     regions = [{"rule": "patch"}, {"rule": "box", "lower": [0, 0, 0], "upper": [1, 2, 3]}]
     regions += [{"rule": "box", "lower": [0, 0, 0], "upper": ["inf", 2, 3]}, {"rule": "box"}]
-    assert boxes({"fibre": {"regions": regions}}).keys() == {1}
-    assert boxes({"fibre": 3}) == {}
+    assert boxes(PartDraft({"fibre": {"regions": regions}})).keys() == {1}
+    assert boxes(PartDraft({"fibre": 3})) == {}

@@ -8,6 +8,7 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray
 from ccfem.cases.inspection.patch_places import PatchPlace
+from ccfem.cases.part_draft import Keys, PartDraft
 
 _SUPPORTS = {"held": "Hold", "sliding": "Roll"}
 _AMOUNTS = {
@@ -42,7 +43,7 @@ class Entry:
         What it says.
     """
 
-    keys: tuple[str | int, ...]
+    keys: Keys
     table: Mapping[str, Any]
 
     @property
@@ -132,18 +133,13 @@ class Entry:
         return PatchPlace(np.repeat(points.reshape(-1, 1, 3), 3, axis=1))
 
 
-def entries(content: Mapping[str, Any]) -> dict[Name, Entry]:
+def entries(draft: PartDraft) -> dict[Name, Entry]:
     """Supports and loads of a part file, as far as they read."""
-    supports, cases = content.get("supports"), content.get("loads")
-    tables: dict[tuple[str, ...], Any] = {("supports",): supports}
-    tables |= {("loads", k): v for k, v in (cases if isinstance(cases, Mapping) else {}).items()}
     named: dict[Name, Entry] = {}
-    for keys, items in tables.items():
-        for k, table in enumerate(items if isinstance(items, list) else ()):
-            if isinstance(table, Mapping):
-                entry = Entry((*keys, k), table)
-                alike = (entry.title, type(entry.amount))
-                named[*alike, sum(name[:2] == alike for name in named)] = entry
+    for keys, table in draft.acting.items():
+        entry = Entry(keys, table)
+        alike = (entry.title, type(entry.amount))
+        named[*alike, sum(name[:2] == alike for name in named)] = entry
     return named
 
 

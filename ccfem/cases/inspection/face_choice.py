@@ -1,7 +1,7 @@
 """Faces that are chosen: those alike, and the rule of a part file that chooses them again."""
 
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -101,14 +101,17 @@ def direction_value(direction: FloatArray) -> Any:
     return json.loads(text) if text.startswith("[") else text
 
 
-def patch_name(listing: BodyFaces, numbers: Collection[int], rule: Mapping[str, Any]) -> str:
-    """Name for a patch of faces, by their kind and size or direction, not by what acts on them."""
+def patch_name(listing: BodyFaces, numbers: Collection[int], normal: object) -> str:
+    """Name for a patch of faces, by their kind and size or direction, not by what acts on them.
+
+    The normal is that of its rule: the name of an axis, or anything else.
+    """
     faces = [listing.face(number) for number in numbers]
     kinds = {face.kind for face in faces}
     several = "s" if len(faces) > 1 else ""
     if kinds == {"cylinder"} and len({f"{face.radius:.3g}" for face in faces}) == 1:
         what = "hole" if all(face.hollow for face in faces) else "round"
         return f"{what}{several}_r{faces[0].radius:.3g}".replace(".", "_")
-    if kinds == {"plane"} and isinstance(rule.get("normal"), str):
-        return f"plane{several}_{rule['normal'].replace('-', 'minus_')}"
+    if kinds == {"plane"} and isinstance(normal, str):
+        return f"plane{several}_{normal.replace('-', 'minus_')}"
     return "face" + several if kinds != {"plane"} else "plane" + several

@@ -1,8 +1,6 @@
 """Where the patches of a part file lie, as far as that is known before it is meshed."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -11,6 +9,7 @@ from ccfem.base.errors import InputError, Mistakes
 from ccfem.body.mesh.face_places import BodyFaces
 from ccfem.body.mesh.face_rules import Faces, Holes
 from ccfem.cases.inspection.part_check import Check
+from ccfem.cases.part_draft import PartDraft
 from ccfem.cases.part_tables import rules_of
 
 
@@ -39,7 +38,7 @@ class PatchPlace:
 
 
 def patch_places(
-    content: Mapping[str, Any], listing: BodyFaces, checked: Check | None
+    draft: PartDraft, listing: BodyFaces, checked: Check | None
 ) -> dict[str, PatchPlace]:
     """Places of the patches of a part file, as far as they are known.
 
@@ -54,8 +53,7 @@ def patch_places(
             for name, facets in mesh.patches.items()
             if len(facets)
         }
-    tables = content.get("patches")
-    for name, rule in rules_of(tables if isinstance(tables, Mapping) else {}, Mistakes()).items():
+    for name, rule in rules_of(draft.patches, Mistakes()).items():
         try:
             numbers = rule.numbers_on(listing) if isinstance(rule, Faces | Holes) else ()
         except InputError:  # the check says so

@@ -13,10 +13,11 @@ from typing import Any
 
 import cloudpickle
 import numpy as np
+from numpy.typing import NDArray
 
 from ccfem.base.parallel import ReadOnlyPickler
 
-Parted = tuple[bytes, Mapping[str, Any]]
+Parted = tuple[bytes, Mapping[str, NDArray[Any]]]
 """A value as bytes without its arrays, and the arrays by name: for `unpacked`."""
 
 
@@ -35,7 +36,7 @@ def parted(value: Any) -> Parted:
     return target.getvalue(), dict(pickler.arrays)
 
 
-def unpacked(data: bytes, arrays: Mapping[str, Any] | None = None) -> Any:
+def unpacked(data: bytes, arrays: Mapping[str, NDArray[Any]] | None = None) -> Any:
     """Value of bytes that `packed` or `parted` made in a process that this one trusts."""
     return _Unpickler(io.BytesIO(data), arrays or {}).load()
 
@@ -57,7 +58,7 @@ class _PartingPickler(_Pickler):
 
     def __init__(self, target: io.BytesIO) -> None:
         super().__init__(target)
-        self.arrays: dict[str, Any] = {}
+        self.arrays: dict[str, NDArray[Any]] = {}
         self._kept: dict[int, tuple[str, Any]] = {}
 
     def persistent_id(self, value: Any) -> str | None:
@@ -71,7 +72,7 @@ class _PartingPickler(_Pickler):
 class _Unpickler(pickle.Unpickler):
     """Puts arrays back that were left out."""
 
-    def __init__(self, data: io.BytesIO, arrays: Mapping[str, Any]) -> None:
+    def __init__(self, data: io.BytesIO, arrays: Mapping[str, NDArray[Any]]) -> None:
         super().__init__(data)
         self._arrays = arrays
 

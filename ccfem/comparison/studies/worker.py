@@ -61,7 +61,7 @@ def main() -> None:
         what, name, file, task, rest = unpacked(queued.get())
         if what == "solve":
             rest, arrays = solve_part(task)
-            np.savez(file, **arrays)
+            np.savez(file, **arrays)  # type: ignore[arg-type]  # none is named allow_pickle
             done: Any = rest
         else:
             done = run_job(partial(_stress, rest, file), name, task)

@@ -222,9 +222,7 @@ def _rows(
             about = (stress, machine, below[k], behind[k], stack, upright)
             view = _view(on_layer, layers[k], *about)
             samples = {name: kinds[name].sample(view) for name in names}
-            return {
-                name: (taken, _indices({name: taken}, basis)) for name, taken in samples.items()
-            }
+            return {name: (taken, _indices(name, taken, basis)) for name, taken in samples.items()}
 
         pools = {name: layer_paths.Pool() for name in kinds}
         again = {(name, at) for k, of in enumerate(origin) for name, at in of.items() if at < k}
@@ -241,7 +239,7 @@ def _rows(
                 along_fibre.append(FibreSamples(samples["curvature"], samples["alignment"]))
         del kept
         for name, pooled in pools.items():  # one kind at a time: each fills memory
-            total |= _indices({name: pooled.samples()}, replace(basis, sampled=sampled))
+            total |= _indices(name, pooled.samples(), replace(basis, sampled=sampled))
     return [*rows, total], along_fibre
 
 
@@ -387,11 +385,10 @@ def _material(
     return strand_lamina(stress.material, strand.rho / section)
 
 
-def _indices(samples: Mapping[str, Any], basis: layer_paths.Basis) -> dict[str, float]:
-    """Value of each of `COLUMNS` that is made of these samples."""
+def _indices(source: str, samples: object, basis: layer_paths.Basis) -> dict[str, float]:
+    """Value of each of `COLUMNS` that is made of the samples of a module."""
     values: dict[str, float] = {}
     for name, kind in indices.named().items():
-        of = getattr(kind, "SAMPLES", name)
-        if of in samples:
-            values |= kind.indices(samples[of], basis)
+        if getattr(kind, "SAMPLES", name) == source:
+            values |= kind.indices(samples, basis)
     return values

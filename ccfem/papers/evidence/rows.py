@@ -5,7 +5,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -116,12 +115,55 @@ class Row:
         return bool(self.over) and NONE not in named and "stiffest" not in named
 
 
+@dataclass(frozen=True)
+class _Specimens:
+    """Prints of one part, as the file has them: slopes, kN/mm, and breaking loads, kN, by print."""
+
+    part: str
+    paper: str
+    source: str
+    published: str
+    tests: int
+    slope: Mapping[str, float]
+    load: Mapping[str, float]
+    ours: Sequence[str] = ()
+    scale: str = ""
+    why: str = ""
+
+    def rows(self) -> Iterator[Row]:
+        """Ratios of slopes and of loads, then slopes and loads themselves."""
+        for kind, measured in ((STIFFNESS, self.slope), (BREAKING, self.load)):
+            scale = self.scale if kind == BREAKING else ""
+            for first, second in _DESIGNS:
+                yield self._row(kind, first, measured[first] / measured[second], scale, second)
+        for kind, measured in ((SLOPE, self.slope), (LOAD, self.load)):
+            for name, value in measured.items():
+                yield self._row(kind, name, value, self.scale)
+
+    def _row(self, kind: str, name: str, measured: float, scale: str, over: str = "") -> Row:
+        return Row(
+            part=self.part,
+            specimen=name,
+            over=over,
+            over_part=self.part if over else "",
+            kind=kind,
+            measured=measured,
+            paper=self.paper,
+            source=self.source,
+            published=self.published,
+            tests=self.tests,
+            ours=bool({name, over} & set(self.ours)),
+            scale=scale,
+            why=self.why,
+        )
+
+
 @cache
 def rows() -> tuple[Row, ...]:
     """All rows of ``published.toml``, in its order."""
     text = Path(__file__).with_name("published.toml").read_text(encoding="utf-8")
     groups = tomllib.loads(text)
-    made = [row for group in groups["specimens"] for row in _of_specimens(group)]
+    made = [row for group in groups["specimens"] for row in _Specimens(**group).rows()]
     for entry in (*groups["ratio"], *groups["order"]):
         given = dict(entry)
         given["specimen"] = given.pop("print")
@@ -134,37 +176,6 @@ def rows() -> tuple[Row, ...]:
         empty["published"] = "nothing to compute from"
         made.append(Row(**{**empty, **given}))
     return tuple(made)
-
-
-def _of_specimens(group: Mapping[str, Any]) -> Iterator[Row]:
-    """Rows of one part: ratios of slopes and of loads, then slopes and loads themselves."""
-    common = {name: group[name] for name in ("part", "paper", "source", "published", "tests")}
-    common["why"] = group.get("why", "")
-    ours = group.get("ours", ())
-    for kind, measured in ((STIFFNESS, group["slope"]), (BREAKING, group["load"])):
-        for first, second in _DESIGNS:
-            yield Row(
-                specimen=first,
-                over=second,
-                over_part=group["part"],
-                kind=kind,
-                measured=measured[first] / measured[second],
-                ours=first in ours or second in ours,
-                scale=group.get("scale", "") if kind == BREAKING else "",
-                **common,
-            )
-    for kind, measured in ((SLOPE, group["slope"]), (LOAD, group["load"])):
-        for name, value in measured.items():
-            yield Row(
-                specimen=name,
-                over="",
-                over_part="",
-                kind=kind,
-                measured=value,
-                ours=name in ours,
-                scale=group.get("scale", ""),
-                **common,
-            )
 
 
 def measured_of(part: str, specimen: str, kind: str) -> float:

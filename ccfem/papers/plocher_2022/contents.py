@@ -42,9 +42,11 @@ from ccfem.papers.plocher_2022.study import (
     run_study,
 )
 from ccfem.paths.planning import plan
+from ccfem.paths.planning.strategy import Strategy
 from ccfem.paths.raster.patterns import concentric_regions, medial_regions
 from ccfem.paths.raster.raster_plan import raster_plan
 from ccfem.strategies import create
+from ccfem.strategies.grid import Grid
 
 EXPECTED = Path(__file__).with_name("expected.toml")
 """Claims of the paper, with the ranges that count as reproduced."""
@@ -153,12 +155,12 @@ def strongest_direction(field: PlaneField) -> Any:
     return angle, defined
 
 
-def try_variant(plate: Plate, strategy: str, parameters: dict[str, Any]) -> Tried:
+def try_variant(plate: Plate, strategy: Strategy) -> Tried:
     """Plan and solve one pattern on one plate."""
     stiffness = reduced_stiffness(named_material("c_fram"))
     layers, stress = plate.planned_on(2)
-    layers = layers[: 2 if strategy == "grid" else 1]
-    toolpaths = plan(create(strategy, parameters), layers, stress, machine_of(plate))
+    layers = layers[: 2 if isinstance(strategy, Grid) else 1]
+    toolpaths = plan(strategy, layers, stress, machine_of(plate))
     paths = [plane_paths(toolpaths, layer) for layer in layers]
     maps = [fibre_map(p, plate.mesh.centres, plate.bead) for p in paths]
     solved = laid_plate(plate.problem(stiffness), np.stack([m.angle for m in maps]), stiffness)
@@ -176,7 +178,7 @@ def try_variant(plate: Plate, strategy: str, parameters: dict[str, Any]) -> Trie
 def try_variants() -> dict[str, Tried]:
     """Try all variants."""
     return {
-        name: try_variant(make(**parameters), strategy, options)
+        name: try_variant(make(**parameters), create(strategy, options))
         for name, make, parameters, (strategy, options) in VARIANTS
     }
 

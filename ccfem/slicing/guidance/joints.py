@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import ArrayLike
 from scipy.sparse.csgraph import connected_components
 
 from ccfem.base.arrays import FloatArray, IntArray, read_only
@@ -70,9 +71,7 @@ class Joint:
             object.__setattr__(self, "direction", read_only(self.direction))
 
 
-def joint_of(
-    mesh: TetMesh, name: str, rings: int = 4, direction: FloatArray | None = None
-) -> Joint:
+def joint_of(mesh: TetMesh, name: str, rings: int = 4, direction: ArrayLike | None = None) -> Joint:
     """Find the joint that a patch belongs to.
 
     Parameters
@@ -115,7 +114,7 @@ def joints_of(
     stress: PartStress,
     names: Sequence[str] = (),
     rings: int = 4,
-    directions: Mapping[str, Any] | None = None,
+    directions: Mapping[str, ArrayLike] | None = None,
 ) -> tuple[Joint, ...]:
     """Find the joints of a part in the order of their names, each hole once.
 

@@ -5,6 +5,7 @@ import pytest
 
 from ccfem.cases.inspection.acting import entries
 from ccfem.cases.inspection.patch_places import PatchPlace
+from ccfem.cases.part_draft import PartDraft
 from ccfem.cases.part_loads import LOADS
 
 BODY = np.array([[[0, 0, 0], [8.0, 0, 0], [0, 4.0, 6.0]]])
@@ -16,7 +17,7 @@ PLACES = {
 
 def only(**table):
     """A load of a table alone: its entry, and where it acts."""
-    (entry,) = entries({"loads": {"a": [table]}}).values()
+    (entry,) = entries(PartDraft({"loads": {"a": [table]}})).values()
     return entry, entry.place(PLACES, BODY)
 
 
@@ -50,7 +51,8 @@ def test_loads_act_on_patches_at_points_and_about_axes():
 
 def test_supports_have_no_size_and_a_place():
     edge = {"kind": "edge", "patches": ["left", "right"], "value": [0, 0, 1]}
-    those = entries({"supports": [edge, {"patch": "left"}, {"kind": "point", "point": [1, 2, 3]}]})
+    supports = [edge, {"patch": "left"}, {"kind": "point", "point": [1, 2, 3]}]
+    those = entries(PartDraft({"supports": supports}))
     assert [name[0] for name in those] == ["edge on ['left', 'right']", "Hold on left", "point"]
     assert [entry.amount for entry in those.values()] == [None] * 3
     places = [entry.place(PLACES, BODY) for entry in those.values()]
@@ -77,4 +79,4 @@ def test_what_cannot_be_read_acts_nowhere(table):
     assert place is None
     assert entry.along is None
     assert entry.said
-    assert entries({"loads": [table], "supports": table}) == {}
+    assert entries(PartDraft({"loads": [table], "supports": table})) == {}

@@ -4,10 +4,12 @@ What Gmsh itself reads of other programs, it reads likewise.
 """
 
 import importlib.util
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ccfem.base.arrays import IntArray
 from ccfem.base.errors import InputError
@@ -57,7 +59,7 @@ def read_by_gmsh(path: Path) -> TetMesh:
     return _with_groups(arrays, path)
 
 
-def _with_groups(arrays: dict[str, Any], path: Path) -> TetMesh:
+def _with_groups(arrays: Mapping[str, NDArray[Any]], path: Path) -> TetMesh:
     """Mesh with patches of arrays as `ccfem.body.isolated.gmsh_files` returns them."""
     parts = {name: name.split(":", 2) for name in arrays}
     blocks = {p[1]: (p[2], arrays[name]) for name, p in parts.items() if p[0] == "cells"}
