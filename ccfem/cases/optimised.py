@@ -209,18 +209,18 @@ def find_design(case: Case, asked: Optimisation, progress: Progress = silent) ->
         As `optimise`.
     """
     problem = case.problem
-    flat = None if asked.in_space else flat_part(problem.mesh)
-    _check_case(case, asked, flat)
+    plate = None if asked.in_space else flat_part(problem.mesh)
+    _check_case(case, asked, plate)
     for name in asked.keep or ():
         check_known("patch", name, sorted(problem.mesh.patches))
     if asked.keep is None:
         asked = replace(asked, keep=_to_keep(problem))
-    if flat is None:
+    if plate is None:
         return _of_solid(case, asked, progress)
-    return _of_sheet(case, asked, flat, progress)
+    return _of_sheet(case, asked, plate, progress)
 
 
-def _check_case(case: Case, asked: Optimisation, flat: FlatPart | None) -> None:
+def _check_case(case: Case, asked: Optimisation, plate: FlatPart | None) -> None:
     """Raise on a case that cannot be optimised by a method."""
     if not any(case.problem.loads.values()):
         raise InputError(f"'{case.name}' has no load, and nothing to be stiff against: add one")
@@ -229,24 +229,24 @@ def _check_case(case: Case, asked: Optimisation, flat: FlatPart | None) -> None:
             f"'{case.name}' has regions of other materials, which would not know where they end: "
             "leave them out, and keep their places with --solid"
         )
-    if asked.method == "somp" and flat is None:
+    if asked.method == "somp" and plate is None:
         raise InputError(
             f"'{case.name}' is {'to be designed in space' if asked.in_space else 'no plate'}: SOMP "
             "turns the fibre in the plane of a prism along z: take --method simp"
         )
 
 
-def _of_sheet(case: Case, asked: Optimisation, flat: FlatPart, progress: Progress) -> Optimised:
+def _of_sheet(case: Case, asked: Optimisation, plate: FlatPart, progress: Progress) -> Optimised:
     """Optimise a flat part as a sheet."""
     problem, size = case.problem, asked.element_size
-    size = float(np.sqrt(flat.planform.area / _CELLS)) if size is None else size
+    size = float(np.sqrt(plate.planform.area / _CELLS)) if size is None else size
     check_number("element size", size, above=0.0, unit="mm")
     radius = _REACH * size if asked.radius is None else asked.radius
     stiffness = plane_stiffness(problem.material.stiffness)
     if asked.method == "somp":
         stiffness = _laminate(asked.laminate, stiffness)
-    sheet, prism = sheet_problem(problem, flat, size, stiffness)
-    full = _rims(problem, flat, asked.keep or (), size).union(area_of(asked.solid))
+    sheet, prism = sheet_problem(problem, plate, size, stiffness)
+    full = _rims(problem, plate, asked.keep or (), size).union(area_of(asked.solid))
     empty = area_of(asked.void).difference(full)
     x, y = _middles(sheet.mesh.points, sheet.mesh.cells, prism)
     method: dict[str, Any] = {
@@ -266,9 +266,9 @@ def _of_sheet(case: Case, asked: Optimisation, flat: FlatPart, progress: Progres
         design = somp(sheet, stiffness, **common)
     else:
         design = Simp(asked.volume_fraction, minimum_stiffness=1e-6, **method)(sheet, **common)
-    planform = sheet_outline(design, flat, size, full, empty)
-    part = sheet_part(problem, flat, planform, min(size, _median_edge(problem)))
-    return _result(case, part, design, size, planform, planform.area / flat.planform.area)
+    planform = sheet_outline(design, plate, size, full, empty)
+    part = sheet_part(problem, plate, planform, min(size, _median_edge(problem)))
+    return _result(case, part, design, size, planform, planform.area / plate.planform.area)
 
 
 def _of_solid(case: Case, asked: Optimisation, progress: Progress) -> Optimised:
@@ -350,14 +350,14 @@ def _to_keep(problem: Problem) -> tuple[str, ...]:
     return tuple(sorted(loaded))
 
 
-def _rims(problem: Problem, flat: FlatPart, keep: Sequence[str], size: float) -> Any:
+def _rims(problem: Problem, plate: FlatPart, keep: Sequence[str], size: float) -> Any:
     """Area beside patches that stays solid, mm."""
-    traces = [flat.traces[name] for name in keep]
+    traces = [plate.traces[name] for name in keep]
     walls = [trace.wall.buffer(_RIM * size) for trace in traces if not trace.wall.is_empty]
     areas = [face for trace in traces for face in trace.faces]
-    whole = [area for area in areas if area.area > 0.99 * flat.planform.area]
+    whole = [area for area in areas if area.area > 0.99 * plate.planform.area]
     rims = shapely.union_all([*walls, *(area for area in areas if area not in whole)])
-    return shapely.intersection(rims, flat.planform)
+    return shapely.intersection(rims, plate.planform)
 
 
 def _middles(points: FloatArray, cells: Any, prism: Any) -> tuple[FloatArray, FloatArray]:

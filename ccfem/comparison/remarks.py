@@ -27,7 +27,7 @@ from ccfem.judging.virtual_testing.equilibrium import BONDED
 from ccfem.judging.virtual_testing.pinned_joints import COUNTED, said_of_pins
 from ccfem.judging.virtual_testing.stiffness_test import RESOLUTION, SAME, UNDECIDED
 from ccfem.paths.planning.alike import ALIKE
-from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer import Layer, flat_layers
 from ccfem.strategies.fibre_aware.upper_bound import LEAST, LOOSE, UpperBound
 
 _IMPORTANT = (
@@ -254,14 +254,13 @@ def open_remarks(runs: Sequence[Run], layers: Sequence[Layer], width: float) -> 
     width : float, mm
         Of the fibre.
     """
-    texts = []
+    texts, flat = [], {layer.index: layer for layer in flat_layers(layers)}
     for run in runs:
         if run.evaluation is None or not _filling(run):
             continue
         cover = run.evaluation.values["coverage"][:-1]
-        worst = int(run.evaluation.layers[int(np.nanargmin(cover))])
-        layer = next(candidate for candidate in layers if candidate.index == worst)
-        if np.nanmin(cover) >= _FULL or layer.flat is None:
+        layer = flat.get(int(run.evaluation.layers[int(np.nanargmin(cover))]))
+        if np.nanmin(cover) >= _FULL or layer is None:
             continue
         left = open_places(plane_paths(run.toolpaths, layer), width)
         largest = ", ".join(

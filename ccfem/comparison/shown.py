@@ -6,13 +6,14 @@ import numpy as np
 
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
-from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer import Layer, flat_layers
 
 
 def drawn_layers(comparison: Comparison) -> list[Layer]:
     """Layers that are drawn: all flat ones, and of curved ones those that have fibre."""
     indices = {int(k) for run in comparison.succeeded for k in np.unique(run.toolpaths.layer)}
-    chosen = [k for k in comparison.layers if k.flat is not None or k.index in indices]
+    indices |= {layer.index for layer in flat_layers(comparison.layers)}
+    chosen = [layer for layer in comparison.layers if layer.index in indices]
     return chosen or list(comparison.layers)
 
 

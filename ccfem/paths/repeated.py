@@ -8,7 +8,7 @@ import numpy as np
 from ccfem.base.arrays import IntArray
 from ccfem.geometry.shapes import corners_only
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import SAME_DECIMALS, Layer
+from ccfem.slicing.layers.layer import SAME_DECIMALS, Layer, Plane
 
 
 def repeated_layers(
@@ -30,15 +30,16 @@ def repeated_layers(
     for k, layer in enumerate(layers):
         if layer.flat is not None:
             about = (corners_only(layer.plane.polygon), more[k] if more else None)
-            source[k] = known.setdefault((_digest(toolpaths, layer), *about), k)
+            source[k] = known.setdefault(
+                (_digest(toolpaths.on_layer(layer.index), layer.flat), *about), k
+            )
     return source
 
 
-def _digest(toolpaths: Toolpaths, layer: Layer) -> bytes:
-    """Digest of the paths on a flat layer, in its frame."""
-    assert layer.flat is not None
-    paths, digest = toolpaths.on_layer(layer.index), hashlib.sha256(layer.flat.frame.tobytes())
-    places = paths.points @ layer.flat.frame.T - [0.0, 0.0, layer.flat.height]
+def _digest(paths: Toolpaths, plane: Plane) -> bytes:
+    """Digest of the paths in a plane, in its frame."""
+    digest = hashlib.sha256(plane.frame.tobytes())
+    places = paths.points @ plane.frame.T - [0.0, 0.0, plane.height]
     for column in (
         places.round(SAME_DECIMALS) + 0.0,
         paths.offsets,

@@ -116,7 +116,7 @@ def moved_onto(
     first: IntArray,
     places: FloatArray,
     second: IntArray | None = None,
-    flat: FloatArray | None = None,
+    planes: FloatArray | None = None,
 ) -> FloatArray:
     """Move places the shortest way onto round walls, along another surface if need be.
 
@@ -127,7 +127,7 @@ def moved_onto(
     places : (k, 3) array, mm
     second : (k,) int array, optional
         Another wall that they come to lie on too; -1 for none.
-    flat : (k, 3) array, optional
+    planes : (k, 3) array, optional
         Without a second wall, unit normals of the planes that they stay in; zero for none.
 
     Returns
@@ -137,13 +137,13 @@ def moved_onto(
     """
     result = places.copy()
     second = np.full(len(places), -1) if second is None else second
-    flat = np.zeros(places.shape) if flat is None else flat
+    planes = np.zeros(places.shape) if planes is None else planes
     for _ in range(_STEPS):
         gap, normal = _distances(walls, first, result)
         other, across = _distances(walls, second, result)
         alone = second < 0
-        across[alone] = flat[alone]
-        other[alone] = np.einsum("ki,ki->k", result - places, flat)[alone]
+        across[alone] = planes[alone]
+        other[alone] = np.einsum("ki,ki->k", result - places, planes)[alone]
         # The least step x n + y m that closes both gaps: two equations in x and y.
         cosine = np.einsum("ki,ki->k", normal, across)
         both = (cosine**2 < _ACROSS) & (across != 0.0).any(axis=1)

@@ -17,7 +17,7 @@ from ccfem.comparison.shown import caption, drawn_layers, middle_layer
 from ccfem.geometry.polylines import arc_lengths, resample, subdivide, turning_angles
 from ccfem.paths.fields.chart import chart_of, flat_view
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
-from ccfem.slicing.layers.layer import Layer, LayerStress, stress_on
+from ccfem.slicing.layers.layer import Layer, LayerStress, flat_layers, stress_on
 
 # Fibre paths as the report draws them: fewer points, and values on the pieces between these.
 
@@ -402,11 +402,10 @@ def _failure(run: Run, layers: Sequence[Layer]) -> dict[str, Any] | None:
         return None
     where = np.asarray(failure.where, dtype=np.float64)
     place = {"what": failure.what, "load": failure.load, "where": where.tolist()}
-    away = [
-        np.inf if k.flat is None else abs(float(where @ k.flat.frame[2]) - k.flat.height)
-        for k in layers
-    ]
-    if not np.isfinite(min(away, default=np.inf)):
+    flat = flat_layers(layers)
+    if not flat:
         return place
-    nearest = int(np.argmin(away))
-    return {**place, "layer": nearest, "at": layers[nearest].plane.project(where).tolist()}
+    away = [abs(float(where @ layer.plane.frame[2]) - layer.plane.height) for layer in flat]
+    nearest = flat[int(np.argmin(away))]
+    number = next(k for k, layer in enumerate(layers) if layer is nearest)
+    return {**place, "layer": number, "at": nearest.plane.project(where).tolist()}

@@ -16,7 +16,7 @@ from ccfem.machine.machine import Machine
 from ccfem.paths.planning.strategy import Amount
 from ccfem.paths.planning.unfolding import may_fold
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer, LayerStress
+from ccfem.slicing.layers.layer import Layer, LayerStress, curved_layers
 
 _FEW, _RIVALS = 9, 3
 """Points of a path that tell which layers may be nearest, and how many of these are looked at."""
@@ -107,7 +107,7 @@ class GivenPaths:
         InputError
             When a path lies on none of them: farther from it than half its height.
         """
-        if any(layer.flat is None for layer in layers):
+        if curved_layers(layers):
             return self._on_curved(layers)
         heights = np.array([layer.plane.height for layer in layers])
         level = self._levels(layers[0].plane.frame[2])

@@ -436,11 +436,11 @@ def charted_rings(
         # Points with chords of one wall on both sides lie on mesh edges, which are chords too.
         inner = (wall >= 0) & (wall == np.roll(wall, 1))
         corners = points[loop].copy()
-        corners[inner] = moved_onto(round_walls, wall[inner], corners[inner], flat=turn[inner, 2])
+        corners[inner] = moved_onto(round_walls, wall[inner], corners[inner], planes=turn[inner, 2])
         following = np.roll(corners, -1, axis=0)
         middle = 0.5 * (corners + following)
         sagitta = np.linalg.norm(
-            moved_onto(round_walls, wall, middle, flat=turn[:, 2]) - middle, axis=1
+            moved_onto(round_walls, wall, middle, planes=turn[:, 2]) - middle, axis=1
         )
         count = np.where(wall < 0, 1, np.clip(np.ceil(np.sqrt(sagitta / _SAGITTA)), 1, _MOST))
         first = np.repeat(np.arange(len(loop)), count.astype(int))
@@ -448,7 +448,7 @@ def charted_rings(
         places = (1.0 - share) * corners[first] + share * following[first]
         between = share[:, 0] > 0.0
         places[between] = moved_onto(
-            round_walls, wall[first[between]], places[between], flat=turn[first[between], 2]
+            round_walls, wall[first[between]], places[between], planes=turn[first[between], 2]
         )
         away = places - points[loop[first]]
         rings.append(image[loop[first]] + np.einsum("kij,kj->ki", turn[first, :2], away))
@@ -523,5 +523,5 @@ def _onto_wall(plane: Plane, places: FloatArray, wall: RoundWall) -> FloatArray:
     """Places (k, 2) moved onto a wall within the plane."""
     flat = np.tile(plane.frame[2], (len(places), 1))
     space = plane.to_space(places)
-    moved = moved_onto([wall], np.zeros(len(places), dtype=np.int64), space, flat=flat)
+    moved = moved_onto([wall], np.zeros(len(places), dtype=np.int64), space, planes=flat)
     return np.asarray(plane.project(moved))

@@ -191,8 +191,8 @@ class Spatial:
             up / np.linalg.norm(up),
         )
         # A field that is nearly linear gives flat layers, which can be printed with three axes.
-        flat = _flat(guidance, joints, up, self.flat_within)
-        values = guidance.values if flat is None else mesh.points @ flat
+        normal = _flat(guidance, joints, up, self.flat_within)
+        values = guidance.values if normal is None else mesh.points @ normal
         # The field has a mean gradient of 1: its range is a height.
         low, high = np.quantile(values[mesh.corners], [0.0, 1.0])
         count = self._count(high - low)
@@ -204,8 +204,8 @@ class Spatial:
                 f"layers fold back on themselves over {100 * quality.folded:.1f} % of the part: "
                 "raise smoothness, lower joint_weight, or choose other signs or joints"
             )
-        if flat is not None:
-            layers, bubbles, specks = Planar(count=count).cut(mesh, _vector(flat)), 0, 0
+        if normal is not None:
+            layers, bubbles, specks = Planar(count=count).cut(mesh, _vector(normal)), 0, 0
         else:
             edge = self.shortest_edge or _SHORTEST * mean_edge(mesh)
             levels = low + (np.arange(count) + 0.5) * step
