@@ -21,7 +21,6 @@ from ccfem.comparison.plot.breaking_curves import breaking_picture
 from ccfem.comparison.plot.colours import palette
 from ccfem.comparison.plot.part_picture import coloured, drawn_arrows, load_arrows, support_marks
 from ccfem.comparison.plot.values import image
-from ccfem.comparison.report.breaking_view import breaking_views
 from ccfem.comparison.report.charts import curve_charts, fronts, spreads
 from ccfem.comparison.report.deformed_view import deformed
 from ccfem.comparison.report.layer_view import layer_views
@@ -41,7 +40,7 @@ from ccfem.comparison.table import (
 )
 from ccfem.fem.elasticity.stress_field import StressField, about_cells
 from ccfem.judging.evaluation import COLUMNS
-from ccfem.judging.virtual_testing.progressive_failure import WORTH
+from ccfem.judging.virtual_testing.progressive_failure import WORTH, BreakingLoad
 from ccfem.judging.virtual_testing.stiffness_test import HONEST_PROMISE
 
 
@@ -287,6 +286,54 @@ def _rows(values: Mapping[str, Any]) -> list[tuple[str, str]]:
     shown = {k: v for k, v in values.items() if v not in (None, "")}
     return [(k.replace("_", " "), f"{v:.4g}" if isinstance(v, float) else f"{v:,}" if
              isinstance(v, int) else str(v)) for k, v in shown.items()]  # fmt: skip
+
+
+# How parts break, step by step: what has failed at each row of a curve.
+
+
+_MOST_FAILED = 6000
+"""Cracked cells, and pieces of broken strand, that are drawn of a part; of more, an even share."""
+
+
+def breaking_views(broken: Mapping[str, BreakingLoad], centres: FloatArray) -> list[dict[str, Any]]:
+    """Return what the page draws of breaking loads.
+
+    Parameters
+    ----------
+    broken : mapping of name to BreakingLoad
+    centres : (m, 3) array, mm
+        Of the cells of the part.
+
+    Returns
+    -------
+    list of dict
+        Of each part its ``name``, the columns of its curve, and the places of ``cells`` that crack,
+        of pieces of ``strands`` that break and of ``layers`` that part, with the rows at which they
+        do.
+    """
+    return [
+        {
+            "name": name,
+            "force": load.curve.force,
+            "displacement": load.curve.displacement,
+            "cracks": load.curve.cracks,
+            "broken": load.curve.broken,
+            "parted": load.curve.parted,
+            "cells": _failed(centres, load.curve.cracked_at),
+            "strands": _failed(load.strands.middle, load.curve.broken_at),
+            "layers": _failed(centres, load.curve.parted_at),
+        }
+        for name, load in broken.items()
+    ]
+
+
+def _failed(places: FloatArray, row: IntArray) -> dict[str, Any]:
+    """Places (k, 3) of what fails, in the order of its rows."""
+    failed = np.flatnonzero(row >= 0)
+    failed = failed[np.argsort(row[failed], kind="stable")]
+    failed = failed[:: max(1, -(-len(failed) // _MOST_FAILED))]
+    size = float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 1.0
+    return {"points": Rounded(places[failed], 1e-4 * size), "row": row[failed]}
 
 
 # The page itself: a template filled with texts, and the data and programs that it holds.
