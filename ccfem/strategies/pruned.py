@@ -12,10 +12,17 @@ from ccfem.base.arrays import freeze
 from ccfem.base.checks import check_choices, check_fields
 from ccfem.base.errors import InputError
 from ccfem.fem.elasticity import PartStress
-from ccfem.fem.elasticity.stress_field import WeightedCases, solved
+from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.judging.virtual_testing import RHO, Strand, specimens
 from ccfem.machine.machine import Machine
-from ccfem.paths.planning.strategy import Amount, LayerPlanner, Strategy, WholePart, full_length
+from ccfem.paths.planning.strategy import (
+    Amount,
+    ByCoverage,
+    LayerPlanner,
+    Strategy,
+    WholePart,
+    full_length,
+)
 from ccfem.paths.planning.unfolding import may_fold, without_folds
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies import create
@@ -35,7 +42,7 @@ _CASES_ROUNDS = 3
 
 
 @dataclass(frozen=True)
-class Pruned:
+class Pruned(ByCoverage):
     """The most useful fibre of another strategy.
 
     The load is that of the stress given to the strategy. Fibre is taken to carry tension only. With
@@ -114,10 +121,6 @@ class Pruned:
         """Underlying strategy with its parameters."""
         return create(self.of, {**_BASES.get(self.of, {}), **self.base})
 
-    def natural_length(self, layers: Sequence[Layer], machine: Machine) -> float:
-        """Length that the coverage asks for, mm per layer."""
-        return self.coverage * full_length(layers, machine)
-
     def for_part(
         self, stress: PartStress, layers: Sequence[Layer], machine: Machine
     ) -> LayerPlanner:
@@ -130,23 +133,6 @@ class Pruned:
         """
         wanted = self.natural_length(layers, machine)
         return self.to_lengths(stress, layers, machine, (wanted,))[0][1]
-
-    def to_lengths(
-        self,
-        stress: PartStress,
-        layers: Sequence[Layer],
-        machine: Machine,
-        lengths: Sequence[float],
-    ) -> list[tuple["Pruned", LayerPlanner]]:
-        """Plan for one load case by `for_cases`.
-
-        Raises
-        ------
-        InputError
-            As `for_part`.
-        """
-        cases = WeightedCases.of(solved(stress, "pruned"))
-        return self.for_cases(cases, layers, machine, lengths)
 
     def for_cases(
         self,

@@ -24,7 +24,7 @@ from ccfem.judging.virtual_testing.strand import Limits
 from ccfem.machine.machine import Machine
 from ccfem.paths.fields.chart import chart_of, flat_view
 from ccfem.paths.fields.tensile import layer_tension
-from ccfem.paths.planning.strategy import Amount, LayerPlanner, WholePart, full_length
+from ccfem.paths.planning.strategy import Amount, ByCoverage, LayerPlanner, WholePart, full_length
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer, stress_on
 from ccfem.strategies.fibre_aware.cut_and_move import Cutting, prune_and_move
@@ -79,7 +79,7 @@ _WIDE = {"tight": 0.0, "cut": 1.3}
 
 
 @dataclass(frozen=True)
-class StreamFunction:
+class StreamFunction(ByCoverage):
     """Fibre placed and directed so that the part becomes as stiff as possible.
 
     All layers share one field where the stress is about the same at all heights; otherwise the
@@ -177,10 +177,6 @@ class StreamFunction:
         check_fields(self, "moves", at_least=0)
         check_choices(self)
 
-    def natural_length(self, layers: Sequence[Layer], machine: Machine) -> float:
-        """Length that the coverage asks for, mm per layer."""
-        return self.coverage * full_length(layers, machine)
-
     def for_part(
         self, stress: PartStress, layers: Sequence[Layer], machine: Machine
     ) -> LayerPlanner:
@@ -197,23 +193,6 @@ class StreamFunction:
         length = self.natural_length(layers, machine)
         common = _Common(self, cases, tuple(layers), machine)
         return WholePart(self._cut_to_lengths(common, (length,))[0])
-
-    def to_lengths(
-        self,
-        stress: PartStress,
-        layers: Sequence[Layer],
-        machine: Machine,
-        lengths: Sequence[float],
-    ) -> list[tuple["StreamFunction", LayerPlanner]]:
-        """Plan for one load case by `for_cases`.
-
-        Raises
-        ------
-        InputError
-            As `for_part`.
-        """
-        cases = WeightedCases.of(solved(stress, "stream_function"))
-        return self.for_cases(cases, layers, machine, lengths)
 
     def for_cases(
         self,

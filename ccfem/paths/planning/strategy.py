@@ -7,8 +7,9 @@ from typing import ClassVar, Protocol, runtime_checkable
 import numpy as np
 
 from ccfem.base.arrays import in_brief
+from ccfem.base.checks import member_name
 from ccfem.fem.elasticity import PartStress
-from ccfem.fem.elasticity.stress_field import WeightedCases
+from ccfem.fem.elasticity.stress_field import WeightedCases, solved
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer, LayerStress
@@ -176,6 +177,39 @@ class Planned:
 def full_length(layers: Sequence[Layer], machine: Machine) -> float:
     """Length of fibre that covers a layer side by side, mm, mean over the layers."""
     return float(np.mean([layer.areas.sum() for layer in layers])) / machine.fibre_width
+
+
+class ByCoverage:
+    """A `CasesStrategy` with a coverage, which plans for one load case as for several.
+
+    Attributes
+    ----------
+    coverage : float
+        Length of fibre over that which fills all layers.
+    """
+
+    coverage: float
+
+    def natural_length(self, layers: Sequence[Layer], machine: Machine) -> float:
+        """Length that the coverage asks for, mm per layer."""
+        return self.coverage * full_length(layers, machine)
+
+    def to_lengths(
+        self: CasesStrategy,
+        stress: PartStress,
+        layers: Sequence[Layer],
+        machine: Machine,
+        lengths: Sequence[float],
+    ) -> "Sequence[tuple[Strategy, LayerPlanner]]":
+        """Plan for one load case by `for_cases`.
+
+        Raises
+        ------
+        InputError
+            As `for_part`.
+        """
+        cases = WeightedCases.of(solved(stress, member_name(self)))
+        return self.for_cases(cases, layers, machine, lengths)
 
 
 @dataclass(frozen=True)
