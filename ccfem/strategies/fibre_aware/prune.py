@@ -108,14 +108,18 @@ def prune(
         about = (goal, strands, length, displacements, strand)
         return least is not None and most_merit(*about) <= least.value
 
-    if least is not None and beaten(cut_strands(toolpaths, goal.mesh), least.displacements):
-        return Toolpaths.empty()
+    strands = None
+    if least is not None:
+        strands = cut_strands(toolpaths, goal.mesh)
+        if beaten(strands, least.displacements):
+            return Toolpaths.empty()
     if length_now <= length and (tight >= 1.0 or tight_share(toolpaths, machine) <= tight):
         return toolpaths
     known = None
     worth = Worth.of(goal.parts, strand, strength) if strength else None
     for k in range(rounds):
-        strands = cut_strands(toolpaths, goal.mesh)
+        if k or strands is None:
+            strands = cut_strands(toolpaths, goal.mesh)
         tested = equilibria(goal, strands, strand, known, _TOLERANCE)
         known, counts = tested.displacements, goal.counts(tested.ratios)
         if beaten(strands, known):
