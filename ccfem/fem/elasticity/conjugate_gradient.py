@@ -88,7 +88,8 @@ def _iterate(
         z = precondition(residual)
         new = product(residual, z)
         beta = (new - product(previous, z)) / old if iteration else 0.0
-        direction = z + beta * direction
+        direction *= beta
+        direction += z
         image = times(matrix, direction)
         curvature = product(direction, image)
         if not curvature > 0.0:  # not positive definite, or no direction left

@@ -171,7 +171,7 @@ class Supernodes(NamedTuple):
         _substitute_blocks(
             self.first, self.starts, self.row_starts, self.values, self.rows, self.pivots, x
         )
-        return x[self.order]
+        return x.take(self.order)
 
 
 def supernodes(factor: SuperLU) -> Supernodes | None:
@@ -187,9 +187,14 @@ def supernodes(factor: SuperLU) -> Supernodes | None:
     lower = factor.L
     lower.sort_indices()
     first = _first_columns(lower.indptr, lower.indices)
-    blocks = _supernode_blocks(lower.indptr, lower.indices, lower.data, first)
+    wide, high = np.diff(first), np.diff(lower.indptr)[first[:-1]]
+    starts, row_starts = (np.append(0, np.cumsum(size)) for size in (wide * high, high - wide))
+    # Made by NumPy, which asks the system for large pages: every solve reads all of it twice.
+    values = np.zeros(starts[-1], dtype=np.float32)
+    rows = np.empty(row_starts[-1], dtype=np.int32)
+    _fill_blocks(lower.indptr, lower.indices, lower.data, first, starts, row_starts, values, rows)
     order = np.asarray(factor.perm_r, dtype=np.int64)
-    return Supernodes(order, factor.U.diagonal(), first, *blocks)
+    return Supernodes(order, factor.U.diagonal(), first, starts, row_starts, values, rows)
 
 
 @njit(cache=True, nogil=True)
@@ -211,19 +216,18 @@ def _first_columns(indptr: Int32Array, indices: Int32Array) -> IntArray:  # prag
 
 
 @njit(cache=True, nogil=True)
-def _supernode_blocks(
-    indptr: Int32Array, indices: Int32Array, data: FloatArray, first: IntArray
-) -> tuple[IntArray, IntArray, Float32Array, Int32Array]:  # pragma: no cover
-    """Return where blocks and their rows begin, values and rows."""
-    count = len(first) - 1
-    starts, row_starts = np.zeros(count + 1, np.int64), np.zeros(count + 1, np.int64)
-    # A block is dense: its columns one after the other, the triangle first, then the rows below.
-    for s in range(count):
-        wide, high = first[s + 1] - first[s], indptr[first[s] + 1] - indptr[first[s]]
-        starts[s + 1] = starts[s] + wide * high
-        row_starts[s + 1] = row_starts[s] + high - wide
-    values, rows = np.zeros(starts[count], np.float32), np.empty(row_starts[count], np.int32)
-    for s in range(count):
+def _fill_blocks(
+    indptr: Int32Array,
+    indices: Int32Array,
+    data: FloatArray,
+    first: IntArray,
+    starts: IntArray,
+    row_starts: IntArray,
+    values: Float32Array,
+    rows: Int32Array,
+) -> None:  # pragma: no cover
+    """Fill blocks: dense, their columns one after the other, the triangle first, then the rest."""
+    for s in range(len(first) - 1):
         wide, begin = first[s + 1] - first[s], indptr[first[s]]
         high = indptr[first[s] + 1] - begin
         for i in range(high - wide):
@@ -232,7 +236,6 @@ def _supernode_blocks(
             column = indptr[first[s] + c]
             for i in range(c, high):
                 values[starts[s] + c * high + i] = data[column + i - c]
-    return starts, row_starts, values, rows
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})

@@ -390,7 +390,7 @@ class Held:
         """Sum forces (3k,), N, on the free components, of nodal forces (n, 3)."""
         if self.ties is not None:
             forces = self.ties.gather(forces)
-        carried = forces[self.nodes]
+        carried = forces.take(self.nodes, axis=0)
         return (carried if self._whole else carried * self.free[self.nodes]).reshape(-1)
 
     @cached_property
@@ -398,18 +398,31 @@ class Held:
         """Whether every node that can move can do so in all components."""
         return bool(self.free[self.nodes].all())
 
+    @cached_property
+    def _row(self) -> IntArray:
+        """Row (n,) of each node among those that can move; behind the last one of the others."""
+        row = np.full(len(self.free), len(self.nodes))
+        row[self.nodes] = np.arange(len(self.nodes))
+        return row
+
     def expand(self, solution: FloatArray) -> FloatArray:
         """Displacement (n, 3) of a solution (3k,) of the reduced system, mm."""
-        return self._displacement(self.value.copy(), solution)
+        result = self.value + self._moved(solution)
+        return result if self.ties is None else self.ties.expand(result)
 
     def motion(self, solution: FloatArray) -> FloatArray:
         """Displacement (n, 3) of a solution (3k,) with everything else held at zero, mm."""
-        return self._displacement(np.zeros_like(self.value), solution)
-
-    def _displacement(self, result: FloatArray, solution: FloatArray) -> FloatArray:
-        values = solution.reshape(-1, self.free.shape[1])
-        result[self.nodes] += values if self._whole else values * self.free[self.nodes]
+        result = self._moved(solution)
         return result if self.ties is None else self.ties.expand(result)
+
+    def _moved(self, solution: FloatArray) -> FloatArray:
+        """Solution (3k,) at its nodes, and zero at the others: (n, 3), mm."""
+        values = solution.reshape(-1, self.free.shape[1])
+        if not self._whole:
+            values = values * self.free[self.nodes]
+        # Rows that are taken by number: ten times as fast as rows that are put in their places.
+        padded = np.concatenate([values, np.zeros((1, values.shape[1]))])
+        return padded.take(self._row, axis=0)
 
     def restrict(self, displacement: FloatArray) -> FloatArray:
         """Solution (3k,) of the reduced system that stands for a displacement (n, 3)."""
