@@ -273,7 +273,8 @@ def _fold_stretches(
     for lag in range(1, int(most.max(initial=0)) + 1):
         pending = pending[most[pending] >= lag]
         other = first[line[pending]] + (number[pending] + lag) % samples[line[pending]]
-        turned = np.einsum("ij,ij->i", tangent[pending], tangent[other]) < limit
+        here, there = tangent.take(pending, axis=0), tangent.take(other, axis=0)
+        turned = np.einsum("ij,ij->i", here, there) < limit
         ahead[pending[turned]] = lag
         pending = pending[~turned]
     reach = ahead * step[line]
@@ -394,16 +395,15 @@ def _tangents(
     gap = np.diff(axis)
     integral = np.zeros_like(at_knot)
     integral[1:] = np.cumsum(0.5 * gap[:, None] * (at_knot[1:] + at_knot[:-1]), axis=0)
-    low, high = number * step[line] + base[line], (number + 1) * step[line] + base[line]
-
-    def integrated(place: FloatArray) -> FloatArray:
-        k = np.clip(np.searchsorted(axis, place, side="right") - 1, 0, len(axis) - 2)
-        way = (place - axis[k])[:, None]
-        slope = (at_knot[k + 1] - at_knot[k]) / np.maximum(gap[k], 1e-300)[:, None]
-        value: FloatArray = integral[k] + way * (at_knot[k] + 0.5 * way * slope)
-        return value
-
-    mean = integrated(high) - integrated(low)
+    # A step ends where the next one of its line begins.
+    of_end, end = repeated(np.where(parts > 0, parts + 1, 0))
+    place = end * step[of_end] + base[of_end]
+    k = np.clip(np.searchsorted(axis, place, side="right") - 1, 0, len(axis) - 2)
+    way, begun = (place - axis[k])[:, None], at_knot.take(k, axis=0)
+    slope = (at_knot.take(k + 1, axis=0) - begun) / np.maximum(gap[k], 1e-300)[:, None]
+    value = integral.take(k, axis=0) + way * (begun + 0.5 * way * slope)
+    last = np.append(of_end[1:] != of_end[:-1], True)
+    mean = np.diff(value, axis=0)[~last[:-1]]
     tangent: FloatArray = mean / np.maximum(np.linalg.norm(mean, axis=1), 1e-300)[:, None]
     position: FloatArray = (number + 0.5) * step[line]
     return line, position, tangent, step

@@ -152,14 +152,21 @@ def _bar_forces(
 
 
 def bars(strands: Strands, mesh: TetMesh) -> Bars:
-    """Make the pieces of fibre in a mesh ready to be applied to displacements."""
-    nodes = mesh.cells[strands.cell]
-    return Bars(nodes, _slopes(strands, mesh), strands.tangent, strands.length)
+    """Make the pieces of fibre in a mesh ready to be applied to displacements.
+
+    The strands store them for the last mesh.
+    """
+    known: tuple[TetMesh, Bars] | None = strands.__dict__.get("bars")
+    if known is None or known[0] is not mesh:
+        nodes = mesh.cells.take(strands.cell, axis=0)
+        known = mesh, Bars(nodes, _slopes(strands, mesh), strands.tangent, strands.length)
+        strands.__dict__["bars"] = known
+    return known[1]
 
 
 def _slopes(strands: Strands, mesh: TetMesh) -> FloatArray:
     """Slope (s, q) along each piece of the shape functions of its cell, 1/mm."""
-    gradients = cell_gradients(mesh)[strands.cell]
+    gradients = cell_gradients(mesh).take(strands.cell, axis=0)
     slope = np.einsum("sak,sk->sa", gradients, strands.tangent)
     if mesh.order == 1:
         return slope

@@ -122,8 +122,8 @@ def cut_strands(
     fibre = np.repeat(toolpaths.kind == FIBRE, np.diff(toolpaths.offsets))
     first_point = np.flatnonzero(fibre & starts_segment(toolpaths.offsets))
     path = np.searchsorted(toolpaths.offsets, first_point, side="right") - 1
-    start = toolpaths.points[first_point]
-    step = toolpaths.points[first_point + 1] - start
+    start = toolpaths.points.take(first_point, axis=0)
+    step = toolpaths.points.take(first_point + 1, axis=0) - start
     length = np.linalg.norm(step, axis=1)
     if not length.sum() > 0.0:
         raise InputError(
@@ -146,10 +146,10 @@ def cut_strands(
     return Strands(
         cell=cut.cell,
         length=(cut.end - cut.begin) * size * cut.share,
-        tangent=unit[cut.step],
+        tangent=unit.take(cut.step, axis=0),
         path=path[cut.step],
         arc=before[cut.step] + middle * size,
-        middle=start[cut.step] + middle[:, None] * step[cut.step],
+        middle=start.take(cut.step, axis=0) + middle[:, None] * step.take(cut.step, axis=0),
         outside=outside,
         share=lent,
     )

@@ -40,7 +40,10 @@ def alike_layers(layers: Sequence[Layer], stress: PartStress) -> IntArray:
 
 def equal_sections(one: Layer, other: Layer, distance: float = EQUAL) -> bool:
     """Whether the borders of two flat layers are less than a distance, mm, apart."""
-    borders = [shapely.boundary(layer.plane.polygon) for layer in (one, other)]
+    sections = [layer.plane.polygon for layer in (one, other)]
+    if shapely.equals_exact(*sections, tolerance=0.5 * distance):  # corner by corner
+        return True
+    borders = shapely.boundary(sections)
     return float(shapely.hausdorff_distance(*borders)) < distance
 
 

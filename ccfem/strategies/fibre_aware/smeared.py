@@ -34,8 +34,8 @@ _DIRECT_UNKNOWNS = 25_000
 """Largest system that is factorised: solves are then as fast as with multigrid, and rotate with the
 part to the last digits."""
 
-_PACKED = (np.array([0, 0, 0, 1, 1, 2]), np.array([0, 1, 2, 1, 2, 2]))
-"""Rows and columns of the upper triangle of a symmetric 3 x 3 matrix."""
+_PACKED = np.array([0, 1, 2, 4, 5, 8])
+"""Places of the upper triangle among the entries of a symmetric 3 x 3 matrix."""
 
 
 @dataclass(frozen=True)
@@ -227,7 +227,9 @@ class SmearedPart:
 
     def pack(self, stiffness: FloatArray) -> FloatArray:
         """Upper triangles (m, 6) of stiffnesses (m, 3, 3), times the volumes of the cells."""
-        return np.ascontiguousarray(stiffness[:, *_PACKED] * self.mesh.volumes[:, None])
+        packed = stiffness.reshape(-1, 9).take(_PACKED, axis=1)
+        packed *= self.mesh.volumes[:, None]
+        return packed
 
     def solve(
         self, fibre: Fibre, start: SmearedSolution | None = None, tolerance: float = 1e-5

@@ -541,17 +541,25 @@ class DensityAscent:
         Merit of the present density, which grows with the stiffness.
         """
         steps = self.steps + 1 if merit >= self.merit else 1
-        power = (stretch / (float(stretch.max()) or 1.0)) ** _EXPONENT
-        stepped = self._fitted(self.density * power)
+        # In place, as far as it goes: these arrays fill more than the cache of a processor.
+        power = stretch / (float(stretch.max()) or 1.0)
+        power **= _EXPONENT
+        power *= self.density
+        stepped = self._fitted(power)
         density, momentum = stepped, min((steps - 1.0) / (steps + 2.0), _MOST_MOMENTUM)
         if self.stepped is not None and momentum > 0.0:
-            density = self._fitted(
-                stepped * (stepped / np.maximum(self.stepped, 1e-300)) ** momentum
-            )
+            ahead = np.maximum(self.stepped, 1e-300)
+            np.divide(stepped, ahead, out=ahead)
+            ahead **= momentum
+            ahead *= stepped
+            density = self._fitted(ahead)
         return DensityAscent(self.volume, self.most, self.length, density, stepped, steps, merit)
 
     def _fitted(self, weight: FloatArray) -> FloatArray:
-        """Densities proportional to weights (m, k), with the given length and within the room."""
+        """Densities proportional to weights (m, k), with the given length and within the room.
+
+        They take the place of the weights.
+        """
         total = weight.sum(axis=1)
         # The length grows with the factor, at a slope that falls where a cell becomes full.
         full = self.most / np.maximum(total, 1e-300)
@@ -563,4 +571,7 @@ class DensityAscent:
         k = min(int(np.searchsorted(reached, self.length)), len(order) - 1)
         factor = min((self.length - filled[k]) / max(slope[k], 1e-300), full[order[k]])
         scale = np.minimum(full, factor)
-        return np.maximum(weight * scale[:, None], _TRACE * self.most[:, None])
+        weight *= scale[:, None]
+        np.maximum(weight, _TRACE * self.most[:, None], out=weight)
+        weight.flags.writeable = False
+        return weight
