@@ -272,7 +272,8 @@ def _fold_stretches(
     pending = np.flatnonzero(_may_fold(tangent, first[line], number, samples[line], most))
     for lag in range(1, int(most.max(initial=0)) + 1):
         pending = pending[most[pending] >= lag]
-        other = first[line[pending]] + (number[pending] + lag) % samples[line[pending]]
+        after = (number[pending] + lag) % samples[line[pending]]
+        other = np.asarray(first[line[pending]] + after, dtype=np.int64)
         here, there = tangent.take(pending, axis=0), tangent.take(other, axis=0)
         turned = np.einsum("ij,ij->i", here, there) < limit
         ahead[pending[turned]] = lag
