@@ -266,7 +266,8 @@ class AmountOptions:
         typer.Option(
             "--curve/--no-curve",
             help="Test every strategy at three to five lengths of fibre and draw stiffness over "
-            "length; by default only where one cannot lay the length of the others.",
+            "length; by default only where one cannot lay the length of the others, and no "
+            "curve that would take more than five minutes.",
         ),
     ] = None
 

@@ -1,6 +1,6 @@
 """Stiffness over the length of fibre, for comparisons in which no single length suits all."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,8 +9,10 @@ import numpy as np
 from ccfem.base.arrays import freeze
 from ccfem.comparison.headline import headline_values
 from ccfem.comparison.ranking import off_length
+from ccfem.comparison.request import Wanted
 from ccfem.comparison.runs import Run
 from ccfem.comparison.verdict import verdict
+from ccfem.paths.planning.given_paths import GivenPaths
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,6 +26,15 @@ _COLUMNS = (
     "first_failure_load",
     "efficiency",
 )
+
+
+def one_length_suits(runs: Sequence[Run], wanted: Wanted) -> bool:
+    """Whether no strategy lays a length other than the wanted one, since it cannot lay that."""
+    return not any(
+        off_length(run, wanted) and not isinstance(run.strategy, GivenPaths)
+        for run in runs
+        if run.evaluation is not None
+    )
 
 
 @dataclass(frozen=True)

@@ -23,12 +23,11 @@ from ccfem.base.progress import Progress, silent
 from ccfem.cases.case import Case
 from ccfem.cases.load_cases import weighted_cases
 from ccfem.comparison.bounds import bounded, bounds_of
-from ccfem.comparison.curve import Curve
+from ccfem.comparison.curve import Curve, one_length_suits
 from ccfem.comparison.curve_stages import along_curve
 from ccfem.comparison.effort import Counts, stage_effort
-from ccfem.comparison.expected import Schedule, curve_steps, expected_steps
+from ccfem.comparison.expected import LONGEST_CURVE, Schedule, curve_steps, expected_steps
 from ccfem.comparison.plan_to_stiffness import plan_to_stiffness
-from ccfem.comparison.ranking import off_length
 from ccfem.comparison.request import (
     DEFAULT_STRAND,
     STRATEGIES,
@@ -586,29 +585,25 @@ def _curve(
     tell: Schedule,
     seconds: dict[str, float],
 ) -> Curve | None:
-    """Compare at several lengths where that is asked for, or where one length suits not all."""
+    """Compare at several lengths where that is asked for, or where one length suits not all.
+
+    On large parts only where it is asked for.
+    """
     tests = basis.tests
     if request.named or tests is None or request.curve is False or len(basis.cases) > 1:
         return None
-    if request.curve is None and not _misses(runs, wanted):
+    steps = curve_steps(tell.steps, request.strategies)
+    long = sum(steps.values()) > LONGEST_CURVE
+    if request.curve is None and (long or one_length_suits(runs, wanted)):
         return None
     part, held = parts[""], None if isinstance(wanted, InAll) else wanted
-    tell.expect(curve_steps(tell.steps, request.strategies))
+    tell.expect(steps)
     with timed(seconds, "curve"):
         unchanged = [
             replace(run, strategy=before.strategy)
             for run, before in zip(runs, _unplanned(request, "", part), strict=True)
         ]
         return along_curve(unchanged, part, held, partial(with_test, tests=tests), tell)
-
-
-def _misses(runs: Sequence[Run], wanted: Wanted) -> bool:
-    """Whether a strategy lays a length other than the wanted one, since it cannot lay that."""
-    return any(
-        off_length(run, wanted) and not isinstance(run.strategy, GivenPaths)
-        for run in runs
-        if run.evaluation is not None
-    )
 
 
 def compare(

@@ -16,6 +16,10 @@ from ccfem.comparison.request import Request
 _POINTS = 5
 """Lengths on a curve, at most."""
 
+LONGEST_CURVE = 300.0
+"""Processor seconds, on the machine of `effort.toml`, above which a curve has to be asked for. Our
+choice."""
+
 _BREAKING = 10.0
 """Time of a breaking load over that of judging: a guess, so that the bar moves on."""
 

@@ -213,7 +213,8 @@ class Request:
         As in `ccfem.solve`.
     curve : bool, optional
         Test every strategy at three to five lengths of fibre. By default only if a strategy cannot
-        change its amount of fibre to the wanted length.
+        change its amount of fibre to the wanted length, and the part is not large
+        (`ccfem.comparison.expected.LONGEST_CURVE`).
     bound : bool, default True
         Whether to compute what no paths can exceed.
     print_plans : bool, default False

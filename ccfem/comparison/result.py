@@ -13,7 +13,7 @@ from ccfem.base.arrays import freeze
 from ccfem.base.checks import check_known
 from ccfem.base.errors import InputError
 from ccfem.cases.case import Case
-from ccfem.comparison.curve import Curve
+from ccfem.comparison.curve import Curve, one_length_suits
 from ccfem.comparison.front import cost_of, on_front
 from ccfem.comparison.headline import headline_values
 from ccfem.comparison.plot.scenes import View, show
@@ -385,6 +385,11 @@ class Comparison:
         lines += remarks(self.runs, self.wanted, alone)
         if not self.over_slicings:
             lines += open_remarks(self.succeeded, self.layers, self.case.machine.fibre_width)
+        if self._without_curve:
+            lines.append(
+                "one length of fibre does not suit all strategies, and a curve over the length "
+                "would take minutes on this part: --curve follows it (curve=True)"
+            )
         if self.several_cases:
             others = bool(self.case.alternative_supports)
             lines += cases_remarks(self.runs, self.wanted, self.cases, self.bound, others)
@@ -394,6 +399,14 @@ class Comparison:
                 f"paths are planned and evaluated on the stress of another program{assumed}"
             )
         return lines
+
+    @property
+    def _without_curve(self) -> bool:
+        """Whether a curve is missing that would be followed on a smaller part."""
+        request = self.request
+        possible = request.strand is not None and not request.named and not self.several_cases
+        unsaid = self.curve is None and request.curve is None
+        return possible and unsaid and not one_length_suits(self.runs, self.wanted)
 
     @property
     def notes(self) -> list[str]:

@@ -15,6 +15,7 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
 from ccfem.cli import commands
+from ccfem.comparison import engine
 from ccfem.comparison.engine import compare
 from ccfem.comparison.files import write_results
 from ccfem.comparison.headline import HEADLINE, cell_text, headline_values
@@ -279,6 +280,14 @@ def test_a_curve_can_be_asked_for_and_left_out(along):
         compare(strip(), two, strand=None, curve=True)
     with pytest.raises(InputError, match="several lengths are planned for already"):
         Request(strip(), rings, amount=Spread(), curve=True)
+
+
+def test_a_curve_that_takes_long_has_to_be_asked_for(monkeypatch, along):
+    monkeypatch.setattr(engine, "LONGEST_CURVE", 0.0)
+    rings = {"rings": along.runs[0].strategy}
+    result = compare(strip(), rings, layers=1, fibre_per_layer=50.0)
+    assert result.curve is None
+    assert any("--curve follows it" in line for line in result.remarks)
 
 
 def test_a_curve_runs_through_a_length_that_is_a_whole_number():
