@@ -150,6 +150,10 @@ def check_pressed(held: Held, reactions: FloatArray, forces: FloatArray) -> None
         )
 
 
+EQUATIONS = "equations"
+"""Where a field on many quadratic cells keeps the system, matrix and solver that it was solved by:
+its virtual tests take them over, since it takes long to set them up."""
+
 FieldT = TypeVar("FieldT", covariant=True)
 
 _ENERGY = 1e-4
@@ -259,6 +263,8 @@ def _with_error(field: StressField, why: str) -> StressField:
     record = replace(field.record, error=field.error.relative, order_because=why)
     result = replace(field, record=record)
     result.__dict__["error"] = field.error
+    if EQUATIONS in field.__dict__:
+        result.__dict__[EQUATIONS] = field.__dict__[EQUATIONS]
     return result
 
 
@@ -330,6 +336,8 @@ def solve_system(
             solve_seconds=now - started,
         )
         fields[case] = system.field(case, displacement[case], matrix, record)
+        if solver.backend == "two-level" and linear:
+            vars(fields[case])[EQUATIONS] = (system, matrix, solver)
         started = perf_counter()
     # Superposition: combinations of linear load cases need no solve.
     for name, factors in sums.items():

@@ -10,6 +10,7 @@ from ccfem.base.arrays import BoolArray, FloatArray, in_brief
 from ccfem.base.errors import InputError
 from ccfem.fem.elasticity import Solver, StressField, System, Temperature, prepare
 from ccfem.fem.elasticity.held import Held
+from ccfem.fem.elasticity.statics import EQUATIONS
 
 _SOLVES = 30
 """Right-hand sides to expect: a virtual test takes some twenty, a design hundreds."""
@@ -60,9 +61,16 @@ class Specimen:
 
     @classmethod
     def _made(cls, unreinforced: StressField, backend: str) -> "Specimen":
-        system = prepare(unreinforced.problem)
+        solved = unreinforced.__dict__.pop(EQUATIONS, None)
+        if solved is not None and solved[-1].backend == backend:
+            system, matrix, solver = solved
+            made = cls(unreinforced, system, matrix, backend)
+            made.__dict__["solver"] = solver
+        else:
+            system = prepare(unreinforced.problem)
+            made = cls(unreinforced, system, system.assemble(), backend)
         _check_case(system, unreinforced.case)
-        return cls(unreinforced, system, system.assemble(), backend)
+        return made
 
     def under(self, other: StressField) -> "Specimen":
         """Return the same part under another load case, with one factorisation.
