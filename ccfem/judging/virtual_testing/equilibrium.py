@@ -1,6 +1,6 @@
 """Equilibrium of the part with its fibres, which carry all, some or no compression."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -359,15 +359,17 @@ def equilibrium(
                 x = held.restrict(u)
                 u, part = held.expand(x), _reduced(specimen, held)
                 reduced, rest, residual = _imbalance(part, matrix, held, x, forces)
-        # As in `Solver.energy_error`, half of the lowest eigenvalue found is used.
-        near = (
-            by_energy and update > 0 and _near(specimen, matrix, u, rest, 0.5 * lowest * energy**2)
-        )
+        apply, near = specimen.solver.apply, False
+        if by_energy and update > 0:
+            corrected = apply(rest)
+            # As in `Solver.energy_error`, half of the lowest eigenvalue found is used.
+            near = _near(specimen, matrix, u, rest, corrected, 0.5 * lowest * energy**2)
+            apply = _knowing(apply, rest, corrected)
         if residual <= tolerance or near:
             check_pressed(held, (matrix @ u.reshape(-1)).reshape(u.shape) - forces, forces)
             return Equilibrium(u, matrix, strain, carried, update, total, residual)
         goal = max(0.5 * tolerance / residual, 0.0 if mode == BONDED else _PROGRESS)
-        goal, apply = 0.5 * min(goal, 0.5), specimen.solver.apply
+        goal = 0.5 * min(goal, 0.5)
         # Rough steps alone may go round among sets of fibres: what gained nothing is made finer.
         goal = max(goal, _PROGRESS_BY_ENERGY) if by_energy and residual < last else goal
         last = residual
@@ -385,8 +387,20 @@ def equilibrium(
     )
 
 
+def _knowing(
+    apply: Callable[[FloatArray], FloatArray], rhs: FloatArray, result: FloatArray
+) -> Callable[[FloatArray], FloatArray]:
+    """Return a function that is not applied to a right-hand side whose result is known."""
+    return lambda other: result if np.array_equal(other, rhs) else apply(other)
+
+
 def _near(
-    specimen: Specimen, matrix: Reinforced, u: FloatArray, rest: FloatArray, most: float
+    specimen: Specimen,
+    matrix: Reinforced,
+    u: FloatArray,
+    rest: FloatArray,
+    corrected: FloatArray,
+    most: float,
 ) -> bool:
     """Whether a displacement (n, 3) leaves little energy, and reactions that balance the loads.
 
@@ -396,13 +410,18 @@ def _near(
 
     Parameters
     ----------
-    rest : (k,) array, N
-        Forces out of balance, r.
+    rest, corrected : (k,) arrays, N and mm
+        Forces out of balance, r, and ``M^-1 r``.
     most : float
         Largest ``r^T M^-1 r`` over the energy of the displacement.
     """
+    # Where forces load the part, the energy is the work of those that balance them.
+    if specimen.forced:
+        work = float(np.vdot(specimen.forces, u)) - rest @ specimen.held.restrict(u)
+        if not rest @ corrected <= most * work:
+            return False
     internal = matrix @ u.reshape(-1)
-    if not rest @ specimen.solver.apply(rest) <= most * (u.reshape(-1) @ internal):
+    if not rest @ corrected <= most * (u.reshape(-1) @ internal):
         return False
     try:
         specimen.system.reactions(specimen.unreinforced.case, u, internal.reshape(-1, 3))
