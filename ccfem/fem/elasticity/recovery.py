@@ -6,7 +6,7 @@ import scipy.sparse as sp
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.tensor import from_voigt
 from ccfem.body.mesh import TetMesh
-from ccfem.body.mesh.curved_cells import NODES, gradients_at
+from ccfem.body.mesh.curved_cells import EDGES, NODES, gradients_at
 from ccfem.fem.elasticity.assembly import cell_gradients
 
 
@@ -60,10 +60,35 @@ def strain_at_nodes(mesh: TetMesh, displacement: FloatArray) -> FloatArray:
     """Voigt strain (m, q, 6) of each cell at its own nodes (q = 4, or 10 on quadratic cells)."""
     if mesh.order == 1:
         return np.repeat(cell_strain(mesh, displacement)[:, None], 4, axis=1)
-    gradients = cell_gradients(mesh)
-    u = displacement[mesh.cells].transpose(0, 2, 1)
-    at_nodes = [voigt_strain(u @ slopes_at(mesh, gradients, at)) for at in NODES]
-    return np.stack(at_nodes, axis=1)
+    gradients, i, j = cell_gradients(mesh), *mesh.edges.T
+    # In cells with straight sides it is linear: at the middle of a side it is the mean of its ends.
+    along = _FROM_CORNERS @ displacement[mesh.cells]
+    along = along.reshape(-1, 4, 4, 3).swapaxes(2, 3) @ gradients[:, None]
+    corners = voigt_strain(along)
+    result = np.concatenate([corners, 0.5 * (corners[:, i] + corners[:, j])], axis=1)
+    if len(mesh.curved):
+        cells = mesh.cells[mesh.curved]
+        u = displacement[cells].transpose(0, 2, 1)
+        curved = [voigt_strain(u @ gradients_at(mesh.points[cells], at)) for at in NODES]
+        result[mesh.curved] = np.stack(curved, axis=1)
+    return result
+
+
+def _slopes_from_corners() -> FloatArray:
+    """Slopes (16, 10) of the quadratic shape functions along each barycentric coordinate.
+
+    Four rows for each corner in turn: ``3 u_a`` along its own, ``4 u_ab - u_b`` along others.
+    """
+    result = np.zeros((4, 4, 10))
+    for k, (a, b) in enumerate(EDGES.tolist()):
+        result[a, b, 4 + k] = result[b, a, 4 + k] = 4.0
+    for a in range(4):
+        result[:, a, a] = -1.0
+        result[a, a, a] = 3.0
+    return result.reshape(16, 10)
+
+
+_FROM_CORNERS = _slopes_from_corners()
 
 
 def cell_stress(
