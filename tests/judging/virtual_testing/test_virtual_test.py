@@ -9,7 +9,7 @@ from hypothesis import given, settings, strategies as st
 
 from ccfem.base.errors import InputError, SolveError
 from ccfem.body.mesh.box import box_mesh
-from ccfem.fem.elasticity import Displacement
+from ccfem.fem.elasticity import Displacement, prepare
 from ccfem.fem.elasticity.problem import Force, PointForce, Problem, Support
 from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.materials import isotropic
@@ -426,3 +426,15 @@ def test_a_set_that_does_not_settle_is_an_error(monkeypatch):
     monkeypatch.setattr(equilibrium_module, "_UPDATES", 1)
     with pytest.raises(SolveError, match=r"relative residual .* after 1 updates"):
         virtual_test(toolpaths(*random_lines()), solve(clamped())["load"], mode=BONDED)
+
+
+def test_a_test_takes_over_the_equations_of_the_solve():
+    mesh = box_mesh((24.0, 12.0, 6.0), (12, 6, 3))
+    support, load = (Support("x_min"),), {"pull": (Force("x_max", (50.0, 0.0, 0.0)),)}
+    problem = Problem(mesh, isotropic(3500.0, 0.35), support, load, order=2)
+    field = solve(problem)["pull"]
+    solver = field.__dict__["equations"][-1]
+    taken, made = Specimen.of(field), prepare(field.problem)
+    assert field.record.backend == "two-level"
+    assert taken.solver is solver
+    np.testing.assert_array_equal(taken.matrix.data, made.assemble().data)
