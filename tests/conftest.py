@@ -66,15 +66,23 @@ def pytest_configure(config):
     config.addinivalue_line("markers", "slow: takes ten seconds or more; CCFEM_SLOW=1 runs it")
 
 
-def pytest_collection_modifyitems(items):
-    """Begin with the report in a browser, and have the workbench in one half way.
+COMPILE_NOTHING = {
+    "test_tet_part", "test_tets", "test_somp", "test_simp", "test_house", "test_submodules",
+    "test_medial_fill", "test_polylines", "test_hatch", "test_named_machines",
+}  # fmt: skip
+"""Files whose tests call nothing that numba compiles."""
 
-    Each keeps one process busy for long; side by side they would compile the same at one time.
+
+def pytest_collection_modifyitems(items):
+    """Begin with the report in a browser, beside what compiles nothing; workbench half way.
+
+    Two processes that begin with the same commands would compile the same at one time, both.
     Slow tests are left out, unless they are asked for.
     """
     half = {item.path: k < len(items) / 2 for k, item in reversed([*enumerate(items)])}
-    first = {"test_report_browser": 0, "test_workbench_browser": 2}
-    items.sort(key=lambda item: first.get(item.path.stem, 1 if half[item.path] else 3))
+    first = {"test_report_browser": 0, "test_workbench_browser": 3}
+    first |= dict.fromkeys(COMPILE_NOTHING, 1)
+    items.sort(key=lambda item: first.get(item.path.stem, 2 if half[item.path] else 4))
     if not os.environ.get("CCFEM_SLOW"):
         for item in items:
             if item.get_closest_marker("slow"):
