@@ -1,5 +1,6 @@
 import gc
 import os
+import signal
 import subprocess
 
 import numpy as np
@@ -97,6 +98,12 @@ def pytest_collection_finish():
     gc.freeze()
     gc.set_threshold(50_000, 20, 50)
     gc.enable()
+
+
+def pytest_runtest_setup():
+    """Let no closed connection end the process: Gmsh, where it is called here, has it do so."""
+    if hasattr(signal, "SIGPIPE"):
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
 
 
 @pytest.fixture(scope="session", autouse=True)
