@@ -5,11 +5,19 @@ import sys
 import pytest
 
 from ccfem.cli.main import main
+from ccfem.comparison import effort
+
+
+@pytest.fixture(scope="session")
+def pace():
+    """CPU seconds that the work takes here by which machines differ, measured once."""
+    return effort.pace()
 
 
 @pytest.fixture
-def ccfem(monkeypatch, capsys, tmp_path):
+def ccfem(monkeypatch, capsys, tmp_path, pace):
     """Call the command line in a folder of its own: exit code, stdout, stderr."""
+    monkeypatch.setattr(effort, "pace", lambda: pace)
 
     def call(*arguments):
         monkeypatch.chdir(tmp_path)

@@ -1,6 +1,7 @@
 """The square that calibrates a printer: printed on paper by one that is off, and measured."""
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,12 @@ def named(name):
     return updated(Machine(), machine_table(name))
 
 
+@cache
+def square_of(name):
+    """Square of a printer as its profile says."""
+    return calibration_square(named(name))
+
+
 def measured(name, offset=(0.0, 0.0), cutter=0.0, late=0.0):
     """Measure a square that a printer of other values than its profile has printed.
 
@@ -33,7 +40,7 @@ def measured(name, offset=(0.0, 0.0), cutter=0.0, late=0.0):
     strand begins late.
     """
     machine = named(name)
-    square = calibration_square(machine)
+    square = square_of(name)
     run = follow(gcode(square.plan, square.machine), name, (*offset, 0.0))
     assert not run.wrong
     low = 0.5 * (np.array(machine.gcode.bed[:2]) - square.side)
@@ -63,7 +70,7 @@ def test_a_printer_as_its_profile_says_needs_no_correction(name):
     found = measured(name)
     assert found == pytest.approx(EXACT, abs=0.01)
     machine = named(name)
-    same = corrected(machine, Measured.of(EXACT | {"mass": calibration_square(machine).mass}))
+    same = corrected(machine, Measured.of(EXACT | {"mass": square_of(name).mass}))
     assert same == replace(machine, cutter_distance=machine.tail)
 
 
