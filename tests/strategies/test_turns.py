@@ -26,6 +26,8 @@ WITH_TURNS = sorted(name for name, kind in named().items() if hasattr(kind, "tur
 NEEDS_JOINTS = {"winding"}
 TESTED = {"pruned": {}, "stream_function": {"evaluations": 3, "phases": 1}}
 """Strategies that choose by virtual tests which bends stay, up to 1 %, with quick parameters."""
+SLOW = {"mps", "pruned", "stream_function", "stripes", "svt"}
+"""Strategies that lay fibre 1.8 mm wide here: there are fewer strands to plan, which turn alike."""
 MOVES = {
     "plain": np.eye(3),
     "turned": np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]]),
@@ -66,12 +68,16 @@ def part(shape, move):
     return solve(problem)["pull"], Planar(count=1).cut(mesh)
 
 
+def machine_of(name):
+    return Machine(fibre_width=1.8) if name in SLOW else MACHINE
+
+
 @cache
 def planned(name, shape, move, turns="cut"):
     """Paths of a strategy, quick where it is slow, on the layer of a part."""
     strategy = create(name, {"turns": turns, **TESTED.get(name, {})})
     stress, layers = part(shape, move)
-    return plan(strategy, layers, stress, MACHINE)
+    return plan(strategy, layers, stress, machine_of(name))
 
 
 @pytest.mark.parametrize("name", [name for name in WITH_TURNS if name not in TESTED])
@@ -90,20 +96,20 @@ def test_where_turns_are_cut_nothing_bends_too_tightly(name, shape, move):
     (stress, layers), paths = part(shape, move), planned(name, shape, move)
     if len(paths):
         assert paths.lengths.min() >= MACHINE.minimum_length - 1e-6
-        assert evaluate(paths, layers, stress, MACHINE).total["curvature_ok"] >= 0.99
+        assert evaluate(paths, layers, stress, machine_of(name)).total["curvature_ok"] >= 0.99
 
 
 @pytest.mark.parametrize("name", sorted(TESTED))
 def test_bends_worth_most_stay_and_hardly_any_stiffness_goes(name):
-    stress, layers = part(gear, "plain")
+    (stress, layers), machine = part(gear, "plain"), machine_of(name)
     tight, cut = (planned(name, gear, "plain", turns) for turns in ("tight", "cut"))
     shares = [
-        1.0 - evaluate(paths, layers, stress, MACHINE).total["curvature_ok"]
+        1.0 - evaluate(paths, layers, stress, machine).total["curvature_ok"]
         for paths in (tight, cut)
     ]
     assert shares[0] > 0.0  # folds, which were most of the tight bends, are not planned
     assert 0.0 <= shares[1] <= 0.01
-    ratios = [virtual_test(paths, stress, span=(), machine=MACHINE).ratio for paths in (tight, cut)]
+    ratios = [virtual_test(paths, stress, span=(), machine=machine).ratio for paths in (tight, cut)]
     assert ratios[1] - 1.0 > 0.8 * (ratios[0] - 1.0)
 
 

@@ -24,7 +24,7 @@ from ccfem.strategies.grid import Grid
 from ccfem.strategies.mat import Mat
 from ccfem.strategies.mps import Mps
 
-MACHINE = Machine(fibre_width=1.0, minimum_length=10.0)
+MACHINE = Machine(fibre_width=1.6, minimum_length=10.0)
 
 
 @dataclass(frozen=True)
