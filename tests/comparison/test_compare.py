@@ -41,7 +41,7 @@ SIZE = (60.0, 24.0, 4.0)
 
 def strip(force=1000.0):
     """A strip along x that is free to contract: uniform stress."""
-    mesh = box_mesh(SIZE, (20, 8, 2))
+    mesh = box_mesh(SIZE, (16, 7, 2))
     supports = (Support("x_min", "x"), Support("y_min", "y"), Support("z_min", "z"))
     problem = Problem(
         mesh,

@@ -41,7 +41,7 @@ def part():
 
 @pytest.fixture(scope="module")
 def front(part):
-    return fibre_front(*part, "stream_function", STREAM, (2, 1), points=3)
+    return fibre_front(*part, "stream_function", STREAM, (2, 1), points=2)
 
 
 def test_every_plan_is_tested_in_every_case_by_itself(part, front):

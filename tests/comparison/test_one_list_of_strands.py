@@ -31,7 +31,7 @@ from ccfem.printing.export.gcode import gcode_of_moves
 from ccfem.slicing.slicers import Planar
 from ccfem.strategies import create
 
-SIZE = (130.0, 60.0, 2.0)
+SIZE = (130.0, 60.0, 1.4)
 HEIGHTS = (0.7, 1.05)
 
 

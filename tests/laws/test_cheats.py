@@ -155,11 +155,11 @@ class Cheat:
         return Toolpaths.from_plane(lines, layer, link=link)
 
 
-PARTS: dict[str, tuple[float, tuple[str, ...]]] = {
-    "bar": (7.0, tuple(CHEATS)),
-    "loop": (14.0, ("bundles", "micro_waves", "on_the_border", "fan", "outside")),
+PARTS: dict[str, tuple[float, int, tuple[str, ...]]] = {
+    "bar": (7.0, 2, tuple(CHEATS)),
+    "loop": (14.0, 1, ("bundles", "micro_waves", "on_the_border", "fan", "outside")),
 }
-"""Parts, with their element sizes; on the round one those cheats that lie otherwise there."""
+"""Parts, with element sizes and layers; on the round one those cheats that lie otherwise there."""
 
 UNTESTED = {"bar": {"short_pieces", "meanders", "outside"}, "loop": {"bundles", "outside"}}
 """Cheats that leave the part, or of which nothing is left to print, so that none is tested."""
@@ -167,17 +167,17 @@ UNTESTED = {"bar": {"short_pieces", "meanders", "outside"}, "loop": {"bundles", 
 
 @pytest.fixture(scope="module", params=PARTS)
 def judged(request):
-    size, cheats = PARTS[request.param]
+    size, layers, cheats = PARTS[request.param]
     case = ccfem.read(request.param, element_size=size)
     strategies = {name: create(name, case.parameters.get(name, {})) for name in HONEST}
     strategies |= {name: Cheat(name) for name in cheats}
-    return ccfem.compare(case, strategies, layers=2, natural=True)
+    return ccfem.compare(case, strategies, layers=layers, natural=True)
 
 
 def test_no_cheat_ranks_above_an_honest_strategy(judged):
     order = [run.name for run in judged.ranking]
     assert set(order[: len(HONEST)]) == set(HONEST)
-    assert set(order[len(HONEST) :]) == set(PARTS[judged.case.name][1])
+    assert set(order[len(HONEST) :]) == set(PARTS[judged.case.name][2])
     assert judged.ranking[0].printable
     assert not any(name in judged.verdict.split(" Not printable")[0] for name in CHEATS)
     table = judged.frame.set_index("strategy")
@@ -187,7 +187,7 @@ def test_no_cheat_ranks_above_an_honest_strategy(judged):
 
 def test_each_cheat_is_named_for_what_it_is(judged):
     cheats = judged.runs[len(HONEST) :]
-    assert tuple(run.name for run in cheats) == PARTS[judged.case.name][1]
+    assert tuple(run.name for run in cheats) == PARTS[judged.case.name][2]
     for run in cheats:
         _, said = CHEATS[run.name]
         assert said in (run.why_not or run.failure), run.name
@@ -217,7 +217,7 @@ def test_no_cheat_exceeds_the_bound(judged):
     """The bound has one strand a width in each layer; only strands that cross may have more."""
     ratios = {run.name: run.tested.bracket.tension.ratio for run in judged.runs if run.tested}
     name = judged.case.name
-    assert ratios.keys() == {*HONEST, *PARTS[name][1]} - UNTESTED[name]
+    assert ratios.keys() == {*HONEST, *PARTS[name][2]} - UNTESTED[name]
     del ratios["fan"]
     assert max(ratios.values()) <= judged.bound.ratio
 

@@ -31,7 +31,9 @@ ALL = NAMES + VARIANTS
 QUICK = {"stream_function": {"evaluations": 2, "phases": 1}}
 """Parameters that none of the laws depends on, of strategies that are slow with their defaults."""
 
-SLOW = {"pruned": 1.7, "stream_function": 1.7, "streamline": 1.7, "stripes": 1.7, "svt": 1.3}
+SLOW = {
+    "mps": 1.5, "pruned": 2.0, "stream_function": 2.0, "streamline": 1.7, "stripes": 1.7, "svt": 1.3
+}  # fmt: skip
 """Width, mm, of the fibre of slow strategies: where it is wide there are fewer strands to plan."""
 
 ALLOWED = {"pruned": 0.01, "stream_function": 0.01}

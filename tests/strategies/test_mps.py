@@ -341,7 +341,7 @@ def test_mps_under_mirrored_tension_is_mirrored():
 @pytest.fixture(scope="module")
 def loop():
     """The loop, the stress on it, and one layer."""
-    case = create_case("loop", element_size=6.0)
+    case = create_case("loop", element_size=8.0)
     stress = solve(case.problem)["pull"]
     return case, stress, Planar(count=1).cut(case.problem.mesh, case.build)
 

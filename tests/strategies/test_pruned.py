@@ -18,7 +18,7 @@ from ccfem.strategies.pruned import Pruned
 
 @pytest.mark.parametrize("name", ["concentric", "contour_zigzag", "isocurve"])
 def test_pruned_fibre_beats_the_same_length_planned_outright(name: str) -> None:
-    case = create_case("loop", element_size=4.0)
+    case = create_case("loop", element_size=5.0)
     field = solve(case.problem)["pull"]
     layers = Planar(count=1).cut(field.mesh, case.build)
     specimen = Specimen.of(field)

@@ -29,7 +29,7 @@ def coverage_of(paths, layers):
 
 @pytest.fixture(scope="module")
 def pulled_bar():
-    mesh = box_mesh((60.0, 20.0, 4.0), (24, 8, 2))
+    mesh = box_mesh((60.0, 20.0, 4.0), (18, 6, 2))
     supports = (Support("x_min", "x"), Support("y_min", "y"), Support("z_min", "z"))
     problem = Problem(mesh, PLA, supports, {"pull": (Traction("x_max", (5.0, 0.0, 0.0)),)}, order=1)
     return solve(problem, tolerance=1e-10)["pull"], Planar(count=2).cut(mesh)
@@ -38,7 +38,7 @@ def pulled_bar():
 @pytest.fixture(scope="module")
 def bent_beam():
     """A beam that is bent in the plane of its layers."""
-    mesh = box_mesh((80.0, 30.0, 4.0), (24, 9, 2))
+    mesh = box_mesh((80.0, 30.0, 4.0), (18, 7, 2))
     loads = {"tip": (Force("x_max", (0.0, -50.0, 0.0)),)}
     problem = Problem(mesh, PLA, (Support("x_min"),), loads, order=1)
     return solve(problem, tolerance=1e-10)["tip"], Planar(count=2).cut(mesh)
@@ -70,7 +70,7 @@ def test_uniform_tension_gets_straight_fibre_and_the_stiffness_of_parallel_bars(
 def test_little_fibre_beside_much_joins_the_ends_of_a_pulled_bar_too(pulled_bar):
     """Cut from a plan of three times as much, its strands would end where they carry."""
     stress, layers = pulled_bar
-    strategy = StreamFunction(evaluations=5, overfill=1.0, inset=0.0)
+    strategy = StreamFunction(evaluations=5, phases=1, overfill=1.0, inset=0.0)
     full = 20.0 * 60.0 / MACHINE.fibre_width
     planned = strategy.to_lengths(stress, layers, MACHINE, (0.2 * full, 0.6 * full))
     for (_, planner), share in zip(planned, (0.2, 0.6), strict=True):

@@ -25,7 +25,7 @@ MACHINE = Machine()
 
 @pytest.fixture(scope="module")
 def lever():
-    mesh = confirmed_gain.lever(size=3.5)
+    mesh = confirmed_gain.lever(size=4.5)
     load = {"planned": (Force("load", (0.0, -200.0, 0.0)),)}
     problem = Problem(mesh, printed_pla(), (Support("support"),), load, order=1)
     return solve(problem)["planned"], Planar(count=2).cut(mesh)
