@@ -48,15 +48,16 @@ def flat_stack(
             lambda points: (points @ turn.T if place.spin else points) - place.origin[:2],
         )
 
-    borders = {index: seen(section) for index, section in sections_of(used, mesh).items()}
-    placed = _Strands(strands, place, borders)
     same = strands.repeated(used)
     first = sorted(set(same.values()))
+    sections = sections_of([layer for layer in used if same[layer.index] == layer.index], mesh)
+    borders = {index: seen(section) for index, section in sections.items()}
+    placed = _Strands(strands, place, borders)
     above = in_processes(
         lambda index: height_over(placed.lines(index), borders[index], machine), first
     )
     height_of = dict(zip(first, above, strict=True))
-    over = {index: height_of[same[index]] for index in borders}
+    over = {index: height_of[at] for index, at in same.items()}
     slabs = slabs_of(used, bottom, top, machine, over)
     fills = matrix_fills(slabs, layers, mesh, place, spun(machine, place.spin), plastic)
     hanging = overhang(mesh, place.axes[2], machine) if support else None
@@ -67,7 +68,7 @@ def flat_stack(
 
 @dataclass(frozen=True)
 class _Strands:
-    """Strands as they are printed, where the part stands, and its borders by layer."""
+    """Strands as they are printed, where the part stands, and its borders by layers repeated."""
 
     printed: PrintedStrands
     place: Place
@@ -131,7 +132,7 @@ def _layers(
         size = (slab.upper - bottom, slab.height, machine)
         if slab.fibre is not None:
             k = slab.fibre
-            return fibre_layer(strands.fibre(k), strands.short(k), strands.borders[k], *size)
+            return fibre_layer(strands.fibre(k), strands.short(k), strands.borders[same[k]], *size)
         assert fill is not None
         below = strands.below(slabs, number, machine)
         return matrix_layer(fill, pad_lines(*pads[number], machine), below, *size)

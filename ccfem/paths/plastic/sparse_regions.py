@@ -74,10 +74,10 @@ def matrix_sections(
     middles = tuple(0.5 * (slabs[k].lower + slabs[k].upper) for k in of_matrix)
     if not middles:
         return None, {}
-    layers = Planar(heights=middles).cut(mesh, (float(up[0]), float(up[1]), float(up[2])))
-    cut = {of_matrix[layer.index]: corners_only(layer.plane.polygon) for layer in layers}
+    cut, plane = dict[int, Region](), None
+    for k, layer in Planar(heights=middles).sections(mesh, up.tolist()):
+        cut[of_matrix[k]], plane = corners_only(layer.polygon), plane or layer
     sections = {k: MatrixSection(slabs[k], section) for k, section in cut.items()}
-    plane = layers[0].plane if layers else None
     if plastic.solid:
         return plane, sections
     ordered = [cut.get(k, NOTHING) for k in of_matrix]

@@ -177,8 +177,8 @@ def sections_of(layers: Sequence[Layer], mesh: TetMesh) -> dict[int, Region]:
         return {}
     ordered = sorted(layers, key=lambda layer: layer.plane.height)
     heights = tuple(layer.plane.height for layer in ordered)
-    whole = Planar(heights=heights).cut(mesh, ordered[0].plane.frame[2])
-    return {layer.index: cut.plane.polygon for layer, cut in zip(ordered, whole, strict=True)}
+    whole = Planar(heights=heights).sections(mesh, ordered[0].plane.frame[2])
+    return {ordered[k].index: section.polygon for k, section in whole}
 
 
 # Pieces of planned paths, in space; those that nothing cuts keep their points to the last bit.

@@ -186,10 +186,10 @@ def _bridged(
     if not len(levels):
         return {}
     filled = {}
-    for layer in Planar(heights=tuple(levels.tolist())).cut(mesh, tuple(frame[2].tolist())):
-        section = shapely.simplify(layer.plane.polygon, _SMOOTH)
+    for k, layer in Planar(heights=tuple(levels.tolist())).sections(mesh, frame[2].tolist()):
+        section = shapely.simplify(layer.polygon, _SMOOTH)
         reach = 0.5 * span
         wide = shapely.buffer(section, reach, quad_segs=_ARC)
         closed = shapely.buffer(wide, -reach, quad_segs=_ARC)
-        filled[float(levels[layer.index])] = shapely.union(closed, section)
+        filled[float(levels[k])] = shapely.union(closed, section)
     return filled

@@ -56,12 +56,20 @@ def cut_at_zero(mesh: TetMesh, signed: FloatArray, among: IntArray | None = None
         return None
     # An edge of the mesh is one number: smaller node * n + larger node.
     keys, inverse = np.unique(lines, return_inverse=True)
-    a, b = np.divmod(keys, len(mesh.points))
+    nodes = np.stack(np.divmod(keys, len(mesh.points)), axis=1)
+    points, weights = on_edges(nodes, signed, mesh.points)
+    triangles, cell = _drop_repeated(inverse.reshape(-1, 3), crossing[cell])
+    return Cut(points, nodes, weights, triangles, cell)
+
+
+def on_edges(
+    nodes: IntArray, signed: FloatArray, points: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Points (k, 3) where edges between nodes (k, 2) are cut, and their weights (`Cut`)."""
+    a, b = nodes.T
     fall = signed[a] - signed[b]
     weights = np.divide(signed[a], fall, out=np.zeros(len(a)), where=fall != 0.0)
-    points = (1.0 - weights)[:, None] * mesh.points[a] + weights[:, None] * mesh.points[b]
-    triangles, cell = _drop_repeated(inverse.reshape(-1, 3), crossing[cell])
-    return Cut(points, np.stack([a, b], axis=1), weights, triangles, cell)
+    return (1.0 - weights)[:, None] * points[a] + weights[:, None] * points[b], weights
 
 
 _SIDES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])

@@ -1,7 +1,7 @@
 """Flat layers across the build direction."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
@@ -12,11 +12,18 @@ from ccfem.base.checks import check_choices, check_number
 from ccfem.base.errors import InputError
 from ccfem.base.plain import plain_dataclass
 from ccfem.body.mesh import TetMesh
+from ccfem.body.mesh.round_walls import RoundWall
 from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.facets import border_edges, counter_clockwise
 from ccfem.machine.machine import Machine
-from ccfem.slicing.layers.layer import Layer, Plane, plane_frame
-from ccfem.slicing.layers.level_cut import chain, cut_at_zero, patch_edges, wall_edges
+from ccfem.slicing.layers.layer import FlatLayer, Layer, Plane, plane_frame
+from ccfem.slicing.layers.level_cut import (
+    chain,
+    cut_at_zero,
+    on_edges,
+    patch_edges,
+    wall_edges,
+)
 from ccfem.slicing.layers.slicer import Vector, check_heights
 
 _TOP = 1e-3
@@ -117,22 +124,40 @@ class Planar:
             When a height lies outside the part or on its top, or a slab is higher than the part.
         """
         frame = plane_frame(_AXES.get(self.axis, build))
-        level = mesh.points @ frame[2]
-        lowest, highest = float(level[mesh.corners].min()), float(level[mesh.corners].max())
+        cells = _CellsByHeight.of(mesh, frame)
         stack = self._stack(mesh, frame)
         # A layer stands for what is nearer to it than to the others.
-        edges = [lowest, *(0.5 * (stack[1:] + stack[:-1])).tolist(), highest]
-        cells = _CellsByHeight.of(mesh, level)
+        edges = [cells.lowest, *(0.5 * (stack[1:] + stack[:-1])).tolist(), cells.highest]
         layers = [
             _cut_plane(cells, Plane(frame, float(height)), k, edges[k + 1] - edges[k])
             for k, height in enumerate(stack)
         ]
-        if layers[-1] is None and highest - stack[-1] < _TOP * (highest - lowest):
-            raise InputError(
-                f"layer height {stack[-1]:g} mm lies on the top of the part, where nothing is cut: "
-                "lay it at least half a strand height lower"
-            )
+        if layers[-1] is None:
+            cells.check_top(float(stack[-1]))
         return tuple(layer for layer in layers if layer is not None)
+
+    def sections(
+        self, mesh: TetMesh, build: Vector = (0.0, 0.0, 1.0)
+    ) -> Iterator[tuple[int, FlatLayer]]:
+        """Yield the sections of a mesh, with the place of their layers: `cut` without triangles.
+
+        Each is cut when it is asked for, and those between the same nodes only once as far as they
+        are equal: hundreds of layers need no more memory than one.
+
+        Raises
+        ------
+        InputError
+            As of `cut`.
+        """
+        frame = plane_frame(_AXES.get(self.axis, build))
+        cells = _CellsByHeight.of(mesh, frame)
+        stack = self._stack(mesh, frame).tolist()
+        for k, height in enumerate(stack):
+            section = _section(cells, Plane(frame, height))
+            if section is not None:
+                yield k, section
+            elif k == len(stack) - 1:
+                cells.check_top(height)
 
     def _stack(self, mesh: TetMesh, frame: FloatArray) -> FloatArray:
         """Heights of the layers along the build direction, rising, mm; all of them in the part."""
@@ -195,11 +220,21 @@ def slice_heights(
 
 
 @dataclass(frozen=True)
+class _Border:
+    """Border of all sections between the same nodes: as `Layer` has it, with the ends of edges."""
+
+    nodes: IntArray
+    loops: tuple[IntArray, ...]
+    patches: Mapping[str, IntArray]
+    walls: tuple[tuple[RoundWall, IntArray], ...]
+
+
+@dataclass(frozen=True)
 class _CellsByHeight:
     """Cells of a mesh whose nodes are at heights `level` (n,), in the order of their lowest corner.
 
     `low` (c,) are these corners, and `tall` the height of the tallest cell. Layers that cut the
-    same edges of the mesh share the arrays that say so, in `known`.
+    same edges of the mesh share the arrays that say so, in `known`, and their border.
     """
 
     mesh: TetMesh
@@ -207,51 +242,103 @@ class _CellsByHeight:
     order: IntArray
     low: FloatArray
     tall: float
+    lowest: float
+    highest: float
+    snap: float
     known: dict[bytes, IntArray] = field(default_factory=dict)
+    borders: dict[bytes, _Border] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, mesh: TetMesh, level: FloatArray) -> "_CellsByHeight":
-        """Sort the cells of a mesh."""
+    def of(cls, mesh: TetMesh, frame: FloatArray) -> "_CellsByHeight":
+        """Sort the cells of a mesh by their heights in a frame."""
+        level = mesh.points @ frame[2]
         corners = level[mesh.corners]
-        low = corners.min(axis=1)
-        tall = float((corners.max(axis=1) - low).max())
+        low, high = corners.min(axis=1), corners.max(axis=1)
         order = np.argsort(low, kind="stable")
-        return cls(mesh, level, order, low[order], tall)
+        ends = float((high - low).max()), float(low.min()), float(high.max())
+        snap = _SNAP * float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
+        return cls(mesh, level, order, low[order], *ends, snap)
 
     def once(self, values: IntArray) -> IntArray:
         """Take values that another layer has, too, from there."""
         digest = hashlib.sha256(values.tobytes()).digest() + str(values.shape).encode()
         return self.known.setdefault(digest, read_only(values, int))
 
-    def near(self, height: float, snap: float) -> IntArray:
-        """Cells, ascending, among which are all that reach to less than a distance of a height."""
-        ends = height - self.tall - 2.0 * snap, height + 2.0 * snap
-        return np.sort(self.order[slice(*np.searchsorted(self.low, ends))])
+    def signed(self, height: float) -> FloatArray:
+        """Heights of the nodes over a plane, (n,); 0 for those that are taken to lie on it."""
+        signed = self.level - height
+        signed[np.abs(signed) < self.snap] = 0.0
+        return signed
+
+    def met(self, signed: FloatArray, height: float) -> tuple[IntArray, bytes]:
+        """Cells, ascending, that reach to a plane, and a digest of the sides of their corners."""
+        ends = height - self.tall - 2.0 * self.snap, height + 2.0 * self.snap
+        near = np.sort(self.order[slice(*np.searchsorted(self.low, ends))])
+        side = np.sign(signed[self.mesh.corners[near]]).astype(np.int8)
+        meets = (side.min(axis=1) <= 0) & (side.max(axis=1) >= 0)
+        near, side = near[meets], side[meets]
+        return near, hashlib.sha256(near.tobytes() + side.tobytes()).digest()
+
+    def border(self, sides: bytes, triangles: IntArray, nodes: IntArray) -> _Border:
+        """Border of triangles whose points lie on edges of the mesh."""
+        if sides not in self.borders:
+            edges = border_edges(triangles, len(nodes))
+            about = (self.mesh, edges, nodes)
+            self.borders[sides] = _Border(
+                self.once(nodes), chain(edges), patch_edges(*about), wall_edges(*about)
+            )
+        return self.borders[sides]
+
+    def check_top(self, height: float) -> None:
+        """Refuse a height at the top of the part, where nothing is cut."""
+        if self.highest - height < _TOP * (self.highest - self.lowest):
+            raise InputError(
+                f"layer height {height:g} mm lies on the top of the part, where nothing is cut: "
+                "lay it at least half a strand height lower"
+            )
+
+
+def _onto(points: FloatArray, plane: Plane) -> FloatArray:
+    """Points of nodes that were taken to lie on a plane, moved onto it."""
+    normal = plane.frame[2]
+    return points + (plane.height - points @ normal)[:, None] * normal
 
 
 def _cut_plane(cells: _CellsByHeight, plane: Plane, index: int, thickness: float) -> Layer | None:
     """Layer where a mesh meets a plane; None nowhere."""
-    mesh, signed = cells.mesh, cells.level - plane.height
-    snap = _SNAP * float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
-    signed[np.abs(signed) < snap] = 0.0
-    cut = cut_at_zero(mesh, signed, cells.near(plane.height, snap))
+    signed = cells.signed(plane.height)
+    near, sides = cells.met(signed, plane.height)
+    cut = cut_at_zero(cells.mesh, signed, near)
     if cut is None:
         return None
-    normal = plane.frame[2]
-    # Nodes that were taken to lie on the plane are moved onto it.
-    points = cut.points + (plane.height - cut.points @ normal)[:, None] * normal
+    points = _onto(cut.points, plane)
     triangles = counter_clockwise(plane.project(points), cut.triangles)
-    border = border_edges(triangles, len(points))
+    border = cells.border(sides, triangles, cut.nodes)
     return Layer(
         points=points,
         triangles=cells.once(triangles),
         cell=cells.once(cut.cell),
-        nodes=cells.once(cut.nodes),
+        nodes=border.nodes,
         weights=cut.weights,
-        loops=chain(border),
+        loops=border.loops,
         flat=plane,
         index=index,
         thickness=thickness,
-        patches=patch_edges(mesh, border, cut.nodes),
-        walls=wall_edges(mesh, border, cut.nodes),
+        patches=border.patches,
+        walls=border.walls,
     )
+
+
+def _section(cells: _CellsByHeight, plane: Plane) -> FlatLayer | None:
+    """Section where a mesh meets a plane, equal to that of its layer; None nowhere."""
+    signed = cells.signed(plane.height)
+    near, sides = cells.met(signed, plane.height)
+    border = cells.borders.get(sides)
+    if border is None:
+        cut = cut_at_zero(cells.mesh, signed, near)
+        if cut is None:
+            return None
+        triangles = counter_clockwise(plane.project(_onto(cut.points, plane)), cut.triangles)
+        border = cells.border(sides, triangles, cut.nodes)
+    points = plane.project(_onto(on_edges(border.nodes, signed, cells.mesh.points)[0], plane))
+    return FlatLayer(plane.frame, plane.height, points, border.loops, border.walls)
