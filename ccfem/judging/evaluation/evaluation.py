@@ -1,6 +1,7 @@
 """The evaluator: every index of a set of paths, for each layer and in total."""
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -220,7 +221,9 @@ def _rows(
                 return {}
             on_layer = toolpaths.on_layer(layers[k].index)
             about = (stress, machine, below[k], behind[k], stack, upright)
-            view = _view(on_layer, layers[k], *about)
+            # What it is searched by fills memory where there are many: it goes with a copy.
+            layer = copy(layers[k]) if len(layers) > _TOGETHER else layers[k]
+            view = _view(on_layer, layer, *about)
             samples = {name: kinds[name].sample(view) for name in names}
             return {name: (taken, _indices(name, taken, basis)) for name, taken in samples.items()}
 

@@ -162,12 +162,21 @@ class LayerSamples:
             object.__setattr__(self, name, read_only(values))
 
 
+_MANY = 2**19
+"""Values from which equal ones are one, with the length of all."""
+
+
 class Pool:
-    """Samples of one kind, layer after layer: none is kept beside those of all."""
+    """Samples of one kind, layer after layer: none is kept beside those of all.
+
+    Of many values whose names a class of samples gives in `with_length`, with those of their
+    lengths, equal ones are kept once: layers that repeat others add nothing.
+    """
 
     def __init__(self) -> None:
         self._kind: Any = None
         self._columns: dict[str, RowBuffer] = {}
+        self._most: dict[str, int] = {}
 
     def add(self, samples: Any) -> None:
         """Add those of a layer."""
@@ -178,6 +187,17 @@ class Pool:
                 empty = RowBuffer(values.dtype, *values.shape[1:], share=False)
                 self._columns[field.name] = empty
             self._columns[field.name].append(values)
+        for name, length in getattr(samples, "with_length", {}).items():
+            if len(self._columns[name]) > self._most.get(name, _MANY):
+                self._merge(name, length)
+
+    def _merge(self, name: str, length: str) -> None:
+        """Keep equal values of a column once, with the sum of their lengths."""
+        values, weight = self._columns[name].rows(), self._columns[length].rows()
+        values, number = np.unique(values, return_inverse=True)
+        self._columns[name].append(values)
+        self._columns[length].append(np.bincount(number, weight, len(values)))
+        self._most[name] = max(_MANY, 2 * len(values))
 
     def samples(self) -> Any:
         """Those of all layers; afterwards there are none."""

@@ -1,6 +1,7 @@
 """Layers of equal section under alike stress, which are planned once."""
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -29,12 +30,13 @@ def alike_layers(layers: Sequence[Layer], stress: PartStress) -> IntArray:
     alike, form a run; the middle one of a run stands for all. Curved layers stand for themselves.
     """
     source = np.arange(len(layers))
-    first = 0
+    first, leading = 0, copy(layers[0])
     for k in range(1, len(layers) + 1):
-        if k < len(layers) and _alike(layers[first], layers[k], stress.nodal):
+        if k < len(layers) and _alike(leading, layers[k], stress.nodal):
             continue
         source[first:k] = (first + k) // 2
-        first = k
+        # What it is searched by fills memory: it goes with the copy.
+        first, leading = k, copy(layers[min(k, len(layers) - 1)])
     return source
 
 

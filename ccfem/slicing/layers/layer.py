@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 import shapely
 
-from ccfem.base.arrays import FloatArray, IntArray, freeze, read_only
+from ccfem.base.arrays import FloatArray, IntArray, freeze, read_only, shared_rows
 from ccfem.base.checks import check_known
 from ccfem.base.display import Shown
 from ccfem.base.errors import InputError
@@ -137,11 +137,12 @@ class Layer(Shown):
     outline: tuple[FloatArray, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.local_thickness is None:
-            everywhere = np.full(len(self.points), float(self.thickness))
-            object.__setattr__(self, "local_thickness", everywhere)
+        local = self.local_thickness
+        if local is None:
+            local = np.broadcast_to(float(self.thickness), len(self.points))
+        object.__setattr__(self, "local_thickness", shared_rows(local))
         freeze(self, points=float, triangles=int, cell=int, nodes=int, weights=float, patches=int)
-        freeze(self, local_thickness=float, turns=float, point_turns=float)
+        freeze(self, turns=float, point_turns=float)
         object.__setattr__(self, "loops", tuple(read_only(x, np.int64) for x in self.loops))
 
     def __repr__(self) -> str:

@@ -1,6 +1,7 @@
 """Room: how much of the fibre lies on other fibre, over it, outside the part, or on nothing."""
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 import shapely
@@ -131,6 +132,8 @@ class RoomSamples:
     fibre: FloatArray
     volume: FloatArray
     late: FloatArray
+
+    with_length: ClassVar[dict[str, str]] = {"stack": "stack_length", "fraction": "fraction_length"}
 
 
 def sample_room(

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray
+from ccfem.base.arrays import FloatArray, is_shared
 from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, LayerSamples
 
 PLACE = 145
@@ -19,7 +19,7 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class ThicknessSamples(LayerSamples):
-    """Area, mm^2, and thickness, mm, of each triangle of a layer: (t,) arrays."""
+    """Areas, mm^2, and their thickness, mm: (t,) arrays, of triangles or of an even layer."""
 
     area: FloatArray
     thickness: FloatArray
@@ -28,6 +28,9 @@ class ThicknessSamples(LayerSamples):
 def sample(paths: LayerPaths) -> ThicknessSamples:
     """Take the samples of one layer."""
     layer = paths.layer
+    if is_shared(layer.local_thickness):  # those of hundreds of flat layers would fill memory
+        first = layer.local_thickness[layer.triangles[:1]].mean(axis=1)
+        return ThicknessSamples(layer.areas.sum(keepdims=True), first)
     return ThicknessSamples(layer.areas, layer.local_thickness[layer.triangles].mean(axis=1))
 
 
