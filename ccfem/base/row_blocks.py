@@ -198,9 +198,9 @@ class RowBlocks(NDArrayOperatorsMixin):
         if isinstance(key, int | np.integer):
             at = range(len(self))[int(key)]
             return self._between(at, at + 1)[0]
-        numbers = key
         if isinstance(key, np.ndarray) and key.dtype == bool and key.shape == (len(self),):
-            numbers = np.flatnonzero(key)
+            return self._masked(key)
+        numbers = key
         if not isinstance(numbers, np.ndarray) or numbers.dtype.kind not in "iu":
             return np.asarray(self)[key]
         if not numbers.size:
@@ -211,6 +211,17 @@ class RowBlocks(NDArrayOperatorsMixin):
         if numbers.ndim == 1 and last - first > _SPARSE * len(numbers):
             return self._scattered(numbers)
         return self._between(first, last + 1)[numbers - first]
+
+    def _masked(self, mask: NDArray[np.bool_]) -> NDArray[Any]:
+        """Rows where a mask is set, without all of them."""
+        rows, count = np.empty((int(np.count_nonzero(mask)), *self._row), self.dtype), 0
+        for begin, end in pairwise(self._ends):
+            taken = mask[begin:end]
+            more = count + int(np.count_nonzero(taken))
+            if more > count:
+                rows[count:more] = self._between(begin, end)[taken]
+            count = more
+        return rows
 
     def _scattered(self, numbers: NDArray[Any]) -> NDArray[Any]:
         """Rows by numbers that are far apart."""

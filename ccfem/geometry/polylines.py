@@ -67,12 +67,21 @@ def step_lengths(points: FloatArray, out: FloatArray | None = None) -> FloatArra
     return steps
 
 
-def extent(points: FloatArray, axes: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
-    """Least and largest coordinates of at least one point (P, d), or along axes (d, k)."""
+def extent(
+    points: FloatArray, axes: FloatArray | None = None, among: BoolArray | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Least and largest coordinates of points (P, d), or along axes (d, k).
+
+    `among` (P,) tells which count, by default all; infinite where none does.
+    """
     low: FloatArray = np.full(points.shape[1] if axes is None else axes.shape[1], np.inf)
     high = -low
     for first in range(0, len(points), _TOGETHER):
         piece = points[first : first + _TOGETHER]
+        if among is not None:
+            piece = piece[among[first : first + _TOGETHER]]
+            if not len(piece):
+                continue
         piece = piece if axes is None else piece @ axes
         low, high = np.minimum(low, piece.min(axis=0)), np.maximum(high, piece.max(axis=0))
     return low, high

@@ -75,9 +75,11 @@ def _edges(halts: BoolArray) -> list[int]:
 
 def waits(seconds: FloatArray, moves: Moves, machine: Machine) -> FloatArray:
     """Seconds that each row waits for its tool, where all rows take some seconds without."""
-    pauses = np.array(seconds)
-    _add_heating(pauses, moves, machine)
-    pauses -= seconds
+    rows, pauses = np.flatnonzero(moves.event == WORK), np.zeros(len(seconds))
+    before = seconds[rows]
+    _add_heating(seconds, moves, machine)
+    pauses[rows] = seconds[rows] - before
+    seconds[rows] = before
     return pauses
 
 

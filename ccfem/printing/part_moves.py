@@ -10,7 +10,7 @@ import numpy as np
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.errors import InputError
 from ccfem.base.parallel import repeating
-from ccfem.geometry.polylines import along_line, line_length, points_along, turning_angles
+from ccfem.geometry.polylines import along_line, extent, line_length, points_along, turning_angles
 from ccfem.machine.machine import Machine
 from ccfem.machine.speeds import step_curvatures, table_speeds
 from ccfem.paths.toolpaths import FIBRE, SUPPORT
@@ -278,9 +278,7 @@ def _check_bed(moves: Moves, machine: Machine) -> None:
             continue
         # Z of an offset is set by firmware or file; the carriage itself stays in X and Y.
         shift = np.append(profile.offset[:2], 0.0) * fibre
-        low, high = (
-            np.array([end(column[rows]) for column in moves.place.T]) for end in (np.min, np.max)
-        )
+        low, high = extent(moves.place, among=rows)
         least, most = np.minimum(least, low - shift), np.maximum(most, high - shift)
     bed = np.array(profile.bed)
     if (least < 0.0).any() or (most > bed).any():
@@ -303,7 +301,8 @@ def _preheats(moves: Moves, machine: Machine) -> tuple[list[int], list[float], l
     least the heating time, (work - standby) over the rate, ahead of the change; or right after the
     change away if that is later.
     """
-    begin = np.concatenate([[0.0], np.cumsum(durations(moves, machine, heating=False))])[:-1]
+    end = durations(moves, machine, heating=False)
+    np.cumsum(end, out=end)  # in place: those of large prints fill memory
     rate = (machine.matrix_heating, machine.fibre_heating)
     places, values, tools = [], [], []
     for tool in (0, 1):
@@ -316,7 +315,7 @@ def _preheats(moves: Moves, machine: Machine) -> tuple[list[int], list[float], l
             else:
                 standby, first = float(moves.amount[before[-1]]), int(before[-1])
             need = max(float(moves.amount[k]) - standby, 0.0) / rate[tool]
-            at = int(np.searchsorted(begin, begin[k] - need, side="right")) - 1
+            at = int(np.searchsorted(end[:-1], (end[k - 1] if k else 0.0) - need, side="right"))
             # Behind the change away: standby, selection and wait of the other tool, and its fan.
             behind = first + 4 if len(before) else 1
             at = max(at, behind)

@@ -41,6 +41,8 @@ from ccfem.slicing.layers.layer import curved_layers, plane_frame
 from ccfem.slicing.layers.slicer import NO_FIELD, Vector, standing
 
 _UP = np.array([0.0, 0.0, 1.0])
+_TOGETHER = 1_000_000
+"""Points whose steps are measured at a time: those of a large print fill memory."""
 
 
 @dataclass(frozen=True)
@@ -149,7 +151,11 @@ class PrintPlan:
         """Volume of matrix and of fibre inside the parts, mm^3."""
         begins = starts_segment(self.paths.offsets)[:-1]
         matrix = np.repeat(self.paths.kind == MATRIX, np.diff(self.paths.offsets))[:-1] & begins
-        volume = float((step_lengths(self.paths.points)[matrix] * self.laid[:-1][matrix]).sum())
+        volume = 0.0
+        for first in range(0, len(matrix), _TOGETHER):
+            some = slice(first, min(first + _TOGETHER, len(matrix)))
+            steps = step_lengths(self.paths.points[first : some.stop + 1])
+            volume += float((steps[matrix[some]] * self.laid[some][matrix[some]]).sum())
         fibre = float(self.paths.lengths[self.paths.kind == FIBRE].sum())
         return machine.matrix_width * volume + machine.strand_area * (fibre - self.outside)
 

@@ -12,6 +12,8 @@ from ccfem.printing.duration import durations, waits
 from ccfem.printing.moves import LAY, TRAVEL, Moves
 from ccfem.printing.print_plan import Standing
 
+_TOGETHER = 500_000
+"""Rows whose layers are looked at a time: those of a large print fill memory."""
 _ROUNDING = 1e-3
 """Of places in moves, mm."""
 
@@ -164,7 +166,7 @@ def print_totals(moves: Moves, machine: Machine, standing: Sequence[Standing] = 
         fibre_fed,
         mass,
         fibre_fed * machine.fibre_mass_per_length,
-        layer_seconds(np.add(moving, waiting, out=waiting), moves),
+        layer_seconds(np.add(moving, waiting, out=moving), moves),
         spool_uses(moves, machine),
         {what: price * much for what, (price, much) in cost.items() if price is not None},
         prices.currency,
@@ -206,9 +208,12 @@ def part_totals(
 
 def layer_seconds(seconds: FloatArray, moves: Moves) -> dict[int, float]:
     """Seconds of each layer, in the order of printing, of those of every row (n,)."""
-    changes = np.flatnonzero(moves.layer[1:] != moves.layer[:-1]) + 1
+    changes = list[int]()
+    for first in range(0, len(moves), _TOGETHER):
+        layer = moves.layer[max(first - 1, 0) : first + _TOGETHER]
+        changes += (np.flatnonzero(layer[1:] != layer[:-1]) + max(first, 1)).tolist()
     total: dict[int, float] = {}
-    for begin, end in pairwise([0, *changes.tolist(), len(moves)] if len(moves) else []):
+    for begin, end in pairwise([0, *changes, len(moves)] if len(moves) else []):
         number = int(moves.layer[begin])
         # One after the other, as over all rows at once, where a layer goes on after others.
         of_layer = np.append(total.get(number, 0.0), seconds[begin:end])

@@ -6,6 +6,7 @@ text is the bytes of its UTF-8 (`as_bytes`).
 
 import base64
 import re
+import tempfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ccfem.base.errors import InputError, shown
+from ccfem.base.row_blocks import RowBlocks
 
 _EFFORT = 4
 """Compression level of zlib, 1 to 9; higher ones make the files of the loop no smaller."""
@@ -60,7 +62,8 @@ def write_vtk_xml(
                 f"the name {shown(name)} has characters that a file of VTK cannot hold: rename it"
             )
     with path.open("w", encoding="utf-8") as file:
-        file.writelines(_file_lines(kind, counts, sections, field or {}, components or {}))
+        about = (field or {}, components or {}, path.parent)
+        file.writelines(_file_lines(kind, counts, sections, *about))
 
 
 def as_bytes(text: str) -> NDArray[np.uint8]:
@@ -74,6 +77,7 @@ def _file_lines(
     sections: Mapping[str, Mapping[str, ArrayLike]],
     field: Mapping[str, ArrayLike],
     components: Mapping[str, Sequence[str]],
+    folder: Path,
 ) -> Iterator[str]:
     """Lines of the file (VTK file formats, "XML File Formats")."""
     yield '<?xml version="1.0" encoding="UTF-8"?>\n'
@@ -84,7 +88,8 @@ def _file_lines(
     if field:
         yield "<FieldData>\n"
         for name, values in field.items():
-            yield from _array(name, values, f' NumberOfTuples="{len(np.asarray(values))}"')
+            more = f' NumberOfTuples="{len(np.asarray(values))}"'
+            yield from _array(name, values, folder, more)
         yield "</FieldData>\n"
     numbers = " ".join(f'NumberOf{name}="{count}"' for name, count in counts.items())
     yield f"<Piece {numbers}>\n"
@@ -92,34 +97,40 @@ def _file_lines(
         yield f"<{tag}>\n"
         for name, values in arrays.items():
             titles = enumerate(components.get(name, ()))
-            yield from _array(name, values, "".join(f' ComponentName{k}="{s}"' for k, s in titles))
+            more = "".join(f' ComponentName{k}="{s}"' for k, s in titles)
+            yield from _array(name, values, folder, more)
         yield f"</{tag.partition(' ')[0]}>\n"
     yield f"</Piece>\n</{kind}>\n</VTKFile>\n"
 
 
 _ROWS = 500_000
 """Rows that are packed, and triples of bytes that are written, at a time: some fill memory."""
+_PACKED = 50_000_000
+"""Bytes that are packed in memory; more stand beside the file until their number is known."""
 
 
-def _array(name: str, values: ArrayLike, more: str = "") -> Iterator[str]:
+def _array(name: str, given: ArrayLike, folder: Path, more: str = "") -> Iterator[str]:
     """Yield one DataArray: one block of zlib with its sizes in bytes before it."""
-    values = np.asarray(values)
-    size, name_of_type = _TYPES.get(values.dtype.kind, ("i8", "Int64"))
-    if values.dtype == np.uint8:
+    values = given if isinstance(given, RowBlocks | range) else np.asarray(given)
+    begin = np.asarray(values[:1])
+    size, name_of_type = _TYPES.get(begin.dtype.kind, ("i8", "Int64"))
+    if begin.dtype == np.uint8:
         size, name_of_type = _TYPES["b"]
-    packer, packed, count = zlib.compressobj(_EFFORT), bytearray(), 0
-    for first in range(0, len(values), _ROWS):
-        data = np.ascontiguousarray(values[first : first + _ROWS], dtype=f"<{size}").tobytes()
-        packed += packer.compress(data)
-        count += len(data)
-    packed += packer.flush() if count else b""
-    # Number of blocks, size of a block, of a last one that is shorter, and of each when packed.
-    sizes = [1, count, 0, len(packed)] if count else [0, 0, 0]
-    columns = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
+    columns = f' NumberOfComponents="{begin.shape[1]}"' if begin.ndim == 2 else ""
     yield (
         f'<DataArray type="{name_of_type}" Name={quoteattr(name)}{columns}{more} format="binary">'
     )
-    yield base64.b64encode(np.array(sizes, dtype="<u8").tobytes()).decode("ascii")
-    for first in range(0, len(packed), 3 * _ROWS):  # whole groups of three bytes
-        yield base64.b64encode(packed[first : first + 3 * _ROWS]).decode("ascii")
+    packer, count = zlib.compressobj(_EFFORT), 0
+    with tempfile.SpooledTemporaryFile(_PACKED, dir=folder) as packed:
+        for first in range(0, len(values), _ROWS):
+            data = np.ascontiguousarray(values[first : first + _ROWS], dtype=f"<{size}").tobytes()
+            packed.write(packer.compress(data))
+            count += len(data)
+        packed.write(packer.flush() if count else b"")
+        # Number of blocks, size of a block, of a last one that is shorter, and of each when packed.
+        sizes = [1, count, 0, packed.tell()] if count else [0, 0, 0]
+        yield base64.b64encode(np.array(sizes, dtype="<u8").tobytes()).decode("ascii")
+        packed.seek(0)
+        while part := packed.read(3 * _ROWS):  # whole groups of three bytes
+            yield base64.b64encode(part).decode("ascii")
     yield "</DataArray>\n"

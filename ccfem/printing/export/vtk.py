@@ -56,7 +56,7 @@ def write_paths(
                 'CellData Scalars="layer"': paths,
                 "Points": {"Points": toolpaths.points},
                 "Lines": {
-                    "connectivity": np.arange(len(toolpaths.points)),
+                    "connectivity": range(len(toolpaths.points)),
                     "offsets": toolpaths.offsets[1:],
                 },
             },
