@@ -28,6 +28,25 @@ def test_a_box_gives_rectangles_of_its_section() -> None:
         assert len(layer.loops) == 1
 
 
+def test_sections_of_a_shell_are_the_areas_between_its_walls() -> None:
+    """A hollow frustum: at each height the outer less the inner square, both known."""
+    mesh = box_mesh((6.0, 6.0, 4.0), (6, 6, 4))
+    middle = np.abs(mesh.points[mesh.corners].mean(axis=1)[:, :2] - 3.0).max(axis=1)
+    hollow = TetMesh(mesh.points, mesh.cells[middle > 1.0])
+    narrow = 1.0 - 0.1 * hollow.points[:, 2:]
+    hollow = replace(hollow, points=np.hstack([3.0 + (hollow.points[:, :2] - 3.0) * narrow,
+                                               hollow.points[:, 2:]]))  # fmt: skip
+    heights = (0.0, 0.3, 0.31, 1.0, 2.5, 3.9)
+    sections = dict(Planar(heights=heights).sections(hollow))
+    assert list(sections) == list(range(len(heights)))
+    for layer in Planar(heights=heights).cut(hollow):
+        section = sections[layer.index]
+        # The sides of the cells are straight: squares that shrink by a tenth a mm.
+        size = 1.0 - 0.1 * heights[layer.index]
+        assert section.polygon.area == pytest.approx(32.0 * size**2, rel=1e-9)
+        assert section.polygon.equals_exact(layer.plane.polygon)
+
+
 def test_layers_through_mesh_nodes_have_the_whole_section() -> None:
     mesh = box_mesh((6.0, 4.0, 2.0), (6, 4, 2))
     low, middle = Planar(heights=[0.0, 1.0]).cut(mesh, (0, 0, 1))

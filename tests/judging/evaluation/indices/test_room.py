@@ -6,6 +6,7 @@ import pytest
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.box import box_mesh
 from ccfem.judging.evaluation.indices.room import room_indices, sample_room
+from ccfem.judging.evaluation.layer_paths import pool
 from ccfem.judging.evaluation.strand_rules import why_not
 from ccfem.machine import Limits, Machine
 
@@ -14,6 +15,19 @@ MACHINE = Machine(fibre_width=1.0, fibre_height=0.1, filament_area=0.1)
 
 def indices(paths, below=None, machine=MACHINE):
     return room_indices(sample_room(paths, machine, below))
+
+
+def test_layers_that_repeat_others_add_no_values_to_the_pool(pulled, monkeypatch):
+    """The index of many equal layers is that of one, whether or not equal values are merged."""
+    line = [[5.0, 10.0], [55.0, 10.0]]
+    samples = sample_room(pulled.plane(line, [[5.0, 10.4], [30.0, 10.4]]), MACHINE)
+    monkeypatch.setattr("ccfem.judging.evaluation.layer_paths._MANY", len(samples.stack))
+    pooled = pool([samples] * 50)
+    assert len(pooled.stack) <= 3 * len(samples.stack)
+    assert pooled.stack_length.sum() == pytest.approx(50 * samples.stack_length.sum(), rel=1e-12)
+    one, many = room_indices(samples), room_indices(pooled)
+    assert many["stack_99"] == one["stack_99"] == 2.0
+    assert many["fibre_fraction_99"] == one["fibre_fraction_99"]
 
 
 def test_strands_a_width_apart_lie_on_nothing(pulled):
