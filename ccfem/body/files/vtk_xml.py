@@ -121,7 +121,7 @@ def _array(name: str, given: ArrayLike, folder: Path, more: str = "") -> Iterato
         f'<DataArray type="{name_of_type}" Name={quoteattr(name)}{columns}{more} format="binary">'
     )
     packer, count = zlib.compressobj(_EFFORT), 0
-    with tempfile.SpooledTemporaryFile(_PACKED, dir=folder) as packed:
+    with tempfile.SpooledTemporaryFile(_PACKED, dir=str(folder)) as packed:
         for first in range(0, len(values), _ROWS):
             data = np.ascontiguousarray(values[first : first + _ROWS], dtype=f"<{size}").tobytes()
             packed.write(packer.compress(data))
