@@ -78,7 +78,9 @@ LARGE = (
     "plate 200 150 8",
     "plate 400 300 8",
     "plate 400 300 16",
+    "plate 400 300 72",
     "plate 400 300 240",
+    "plate 100 75 600 4.36",
 )
 """What is planned without a virtual test."""
 
@@ -98,9 +100,9 @@ def part(said: str, folder: Path) -> tuple[list[str], Case]:
     """Make what a command gets for a part, and the part itself."""
     name, *values = said.split()
     if name == "plate":
-        x, y, layers = map(float, values)
+        x, y, layers, *edge = map(float, values)
         file = folder / "plate.toml"
-        file.write_text("order = 1\n" + plate(x, y, int(layers)))
+        file.write_text("order = 1\n" + plate(x, y, int(layers), *edge))
         case = replace(read(file), slicing=Planar(count=int(layers)))
         return [str(file), "--layers", str(int(layers))], case
     options = [word for value in values for word in ("--set-case", value)]

@@ -20,8 +20,9 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases.case import Case
 from ccfem.comparison.request import LONGEST_TEST, MOST_LAYERS, STRATEGIES
 from ccfem.fem.elasticity.solve_cost import solve_costs
+from ccfem.geometry.shapes import corners_only
 from ccfem.machine.machine import Machine
-from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer import Layer, curved_layers
 
 COEFFICIENTS = Path(__file__).with_suffix(".toml")
 """What each term of each stage takes: CPU seconds, or gigabytes of memory."""
@@ -74,7 +75,8 @@ class Counts:
         Length of strands that would cover these layers once.
     volume : float, mm^3
     some_room : float, mm
-        `room` of at most 60 layers: more are planned and judged in part.
+        `room` of the layers that are planned: of more than 60, about four of those that cut the
+        same cells in equal sections, since their stress is alike (`alike_layers`).
     run : float
         One.
     """
@@ -94,8 +96,22 @@ class Counts:
         triangles = float(sum(len(layer.triangles) for layer in layers))
         room = float(sum(layer.areas.sum() for layer in layers)) / machine.fibre_width
         solved = 3.0 * len(mesh.points)
-        some = room * min(MOST_LAYERS / max(len(layers), 1), 1.0)
+        some = room * _planned_layers(layers) / max(len(layers), 1)
         return cls(unknowns, solved, triangles, room, float(mesh.volumes.sum()), some)
+
+
+_OF_EQUAL = 4
+"""Layers that are planned of those that cut the same cells: 22 of 238 on five layers of cells."""
+
+
+def _planned_layers(layers: Sequence[Layer]) -> int:
+    """Count about how many layers are planned, where those that are alike are not."""
+    count = len(layers)
+    if count <= MOST_LAYERS or curved_layers(layers):
+        return count
+    # Those that cut the same cells share the array that says so.
+    unequal = {(corners_only(layer.plane.polygon), id(layer.cell)) for layer in layers}
+    return min(_OF_EQUAL * len(unequal), count)
 
 
 def counts(case: Case, layers: Sequence[Layer]) -> tuple[Counts, ...]:
