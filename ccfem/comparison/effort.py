@@ -45,7 +45,7 @@ TERMS: dict[str, tuple[str, ...]] = {
     "report": ("run", "triangles"),
     "memory of compare": ("run", "solved", "triangles", "room"),
     "memory of plan": ("run", "solved", "triangles", "room"),
-    "memory of untested": ("run", "solved", "triangles", "some_room"),
+    "memory of untested": ("run", "solved", "room", "some_room"),
 }
 """What each stage grows with: attributes of `Counts`."""
 
