@@ -80,7 +80,7 @@ def counts(root: Path) -> dict[str, int]:
         "modules that one other imports": sum(n == 1 for n in users.values()),
         "functions of more than ten parameters": sum(n > 10 for n in parameters),
         "compiled functions of more than eight": sum(
-            len(f.args.args) > 8 and any("njit" in ast.unparse(d) for d in f.decorator_list)
+            len(f.args.args) > 8 and any("compiled" in ast.unparse(d) for d in f.decorator_list)
             for f in functions
         ),
         "tests of `cases is None`": len(re.findall(r"\bcases is (?:not )?None", whole)),

@@ -85,7 +85,7 @@ def broken(source: str, number: int) -> tuple[str, str, str]:
 
 def stale_modules(module: Path) -> set[str]:
     """Compiled modules that stand on a module: their cached code still holds what it was."""
-    compiled = [file for file in (ROOT / "ccfem").rglob("*.py") if "njit" in text_of(file)]
+    compiled = [file for file in (ROOT / "ccfem").rglob("*.py") if "@compiled" in text_of(file)]
     files, size = {module}, 0
     while size < len(files):
         size = len(files)
@@ -93,7 +93,7 @@ def stale_modules(module: Path) -> set[str]:
         files |= {
             f for f in compiled if any(f"from {name} import" in text_of(f) for name in dotted)
         }
-    return {file.stem for file in files if "njit" in text_of(file)}
+    return {file.stem for file in files if "@compiled" in text_of(file)}
 
 
 def fate(module: Path, text: str, tests: list[str], seconds: float) -> str:

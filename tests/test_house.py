@@ -197,7 +197,7 @@ def compiled():
     for name, those in nodes().items():
         for node in those:
             if isinstance(node, ast.FunctionDef) and any(
-                "njit" in ast.unparse(decorator) for decorator in node.decorator_list
+                "compiled" in ast.unparse(decorator) for decorator in node.decorator_list
             ):
                 yield f"{name}.{node.name}", node
 

@@ -86,7 +86,7 @@ def _in_source() -> tuple[int, int]:
     count = lines = 0
     for file in Path(next(iter(ccfem.__path__))).rglob("*.py"):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.FunctionDef) and "njit" in map(_name, node.decorator_list):
+            if isinstance(node, ast.FunctionDef) and "compiled" in map(_name, node.decorator_list):
                 count, lines = count + 1, lines + (node.end_lineno or 0) - node.lineno + 1
     return count, lines
 

@@ -19,9 +19,9 @@ a width.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, seen_only
+from ccfem.base.compiled import compiled
 from ccfem.geometry.locate import Buckets, bucket
 from ccfem.geometry.polylines import lengths, resample, starts_segment
 
@@ -156,7 +156,7 @@ def _layer_normals(
     return normal
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _chords(
     chord: FloatArray, length: FloatArray, line: IntArray, first: IntArray, closed: BoolArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:  # pragma: no cover
@@ -224,7 +224,7 @@ class _Bands(NamedTuple):
     ring: IntArray
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _shared(
     grid: Buckets, bands: _Bands, width: float, height: float, reach: float
 ) -> FloatArray:  # pragma: no cover
@@ -243,7 +243,7 @@ def _shared(
     return shares
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _edges(
     k: int,
     grid: Buckets,
@@ -291,7 +291,7 @@ def _edges(
     return events
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _same_band(k: int, other: int, bands: _Bands) -> bool:  # pragma: no cover
     """Whether two parts lie so near each other along one line that they are the same band."""
     if bands.line[other] != bands.line[k]:
@@ -302,7 +302,7 @@ def _same_band(k: int, other: int, bands: _Bands) -> bool:  # pragma: no cover
     return between < bands.apart[k]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _covered(
     k: int, other: int, bands: _Bands, half: float, height: float
 ) -> tuple[float, float]:  # pragma: no cover
@@ -323,7 +323,7 @@ def _covered(
     return _clipped(begin, end, side, shift, half)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _integrate(
     often: float,
     fold: float,
@@ -359,7 +359,7 @@ def _integrate(
     shares[0], shares[1], shares[2], shares[3] = alone / width, every / width, fill / width, most
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _clipped(
     low: float, high: float, value: float, slope: float, limit: float
 ) -> tuple[float, float]:  # pragma: no cover
@@ -370,7 +370,7 @@ def _clipped(
     return max(low, min(a, b)), min(high, max(a, b))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _sort(order: IntArray, at: FloatArray) -> None:  # pragma: no cover
     """Sort indices by the values they refer to, by insertion: there are few, nearly sorted."""
     for e in range(1, len(order)):

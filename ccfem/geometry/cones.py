@@ -3,9 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, seen_only
+from ccfem.base.compiled import compiled
 
 _BLOCK = 32
 """Number of consecutive points with a common bounding sphere, which is checked first."""
@@ -116,7 +116,7 @@ class _Blocks(NamedTuple):
     radius: FloatArray
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _point_in_cones(cones: _Cones, blocks: _Blocks, columns: int) -> IntArray:  # pragma: no cover
     """Point in each cone (n, columns), of each group; or (n, 1), of all, without columns."""
     tips, axes, when, cosine, sine, length = cones
@@ -146,7 +146,7 @@ def _point_in_cones(cones: _Cones, blocks: _Blocks, columns: int) -> IntArray:  
     return inside
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _height_in(
     tips: FloatArray, axes: FloatArray, k: int, points: FloatArray, p: int
 ) -> tuple[float, float]:  # pragma: no cover

@@ -9,9 +9,9 @@ A pose is (x, y, heading), mm and radians.
 """
 
 import numpy as np
-from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.compiled import compiled
 
 WORDS: IntArray = np.array(
     [[1, 0, 1], [-1, 0, -1], [1, 0, -1], [-1, 0, 1], [1, -1, 1], [-1, 1, -1]], dtype=np.int64
@@ -69,7 +69,7 @@ def shortest_curve(start: FloatArray, end: FloatArray, radius: float, step: floa
     return curve_points(start, end, WORDS[best], np.maximum(sizes[best], 0.0), radius, step)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _sample(
     pose: FloatArray, turns: IntArray, sizes: FloatArray, parts: IntArray, radius: float
 ) -> FloatArray:
@@ -87,7 +87,7 @@ def _sample(
     return line
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def advance(
     x: float, y: float, heading: float, turn: int, size: float, radius: float
 ) -> tuple[float, float, float]:
@@ -101,7 +101,7 @@ def advance(
     )
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _round(angle: float) -> float:
     """Angle in [0, 2 pi), or one that is almost a full turn as a small negative one."""
     turn = 2.0 * np.pi
@@ -109,7 +109,7 @@ def _round(angle: float) -> float:
     return angle - turn if angle > turn - _NO_TURN else angle
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def word_sizes(start: FloatArray, end: FloatArray, radius: float, sizes: FloatArray) -> None:
     """Fill `sizes` (6, 3), mm, with the pieces of each of `WORDS`; inf where there is no curve.
 

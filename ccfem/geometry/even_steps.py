@@ -1,9 +1,9 @@
 """Polylines in steps of about one length: fewer points on curves, more on straight lines."""
 
 import numpy as np
-from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.compiled import compiled
 from ccfem.geometry.polylines import merge_repeated, subdivide
 
 OFF = 0.005
@@ -66,7 +66,7 @@ def even_steps(
     return stepped, parts, np.stack([source[segment], source[following]], axis=1), share
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _needed(points: FloatArray, offsets: IntArray, fixed: BoolArray, tolerance: float) -> BoolArray:
     """Mask (P,) of the points that Douglas and Peucker keep, the fixed ones among them."""
     keep = fixed.copy()

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray, repeated
+from ccfem.base.compiled import compiled
 from ccfem.geometry.facets import unique_edges
 from ccfem.geometry.locate import Buckets, bucket
 from ccfem.geometry.polylines import starts_segment
@@ -100,7 +100,7 @@ def triangle_edges(triangles: IntArray) -> tuple[IntArray, IntArray]:
     return edges, edge.reshape(-1, 3)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _links(of_triangle: IntArray, low: IntArray, high: IntArray, start: IntArray) -> IntArray:
     """Crossings before and after each crossing on its curve, as of `chained`."""
     link = np.full((start[-1], 2), -1)
@@ -122,7 +122,7 @@ def _links(of_triangle: IntArray, low: IntArray, high: IntArray, start: IntArray
     return link
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def chained(link: IntArray) -> tuple[IntArray, IntArray]:
     """Curves through things that are linked to at most two others.
 
@@ -187,7 +187,7 @@ def least_distance(curves: Isocontours, reach: float, enough: float) -> float:
     return float(_least_distance(grid, start, curves.points, level, reach, enough))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _least_distance(
     grid: Buckets, start: IntArray, points: FloatArray, level: IntArray, reach: float, enough: float
 ) -> float:

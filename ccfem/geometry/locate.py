@@ -5,9 +5,9 @@ from functools import cached_property, reduce
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.compiled import compiled
 from ccfem.base.errors import InputError
 
 # A uniform grid of buckets for boxes, to find neighbours and containing boxes.
@@ -68,7 +68,7 @@ def bucket(low: FloatArray, high: FloatArray, cell: float | None = None) -> Buck
     return Buckets(origin, cell, shape, starts, items)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _boxes_by_cell(first: IntArray, last: IntArray, shape: IntArray) -> tuple[IntArray, IntArray]:
     """Items of each grid cell: boxes of cells from `first` to `last`, counted, then written."""
     starts = np.zeros(shape[0] * shape[1] * shape[2] + 1, np.int64)
@@ -215,7 +215,7 @@ def barycentric_maps(corners: FloatArray) -> tuple[FloatArray, FloatArray, Float
     return np.ascontiguousarray(corners[:, 0]), gradients, heights
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _search(
     grid: Buckets,
     origins: FloatArray,

@@ -8,9 +8,9 @@ first point at its end.
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, repeated
+from ccfem.base.compiled import compiled
 
 
 def pack(lines: Sequence[FloatArray]) -> tuple[FloatArray, IntArray]:
@@ -387,7 +387,7 @@ def until_itself(line: FloatArray, start: FloatArray, width: float) -> FloatArra
     return line[first : last + 1]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _own_way(
     line: FloatArray, seed: int, closed: bool, width: float, free: float
 ) -> tuple[int, int]:
@@ -415,7 +415,7 @@ def _own_way(
     return first, last
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _squared(line: FloatArray, p: int, q: int) -> float:
     """Square of the distance of two points."""
     x, y = line[p, 0] - line[q, 0], line[p, 1] - line[q, 1]

@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numba import njit
 from scipy.ndimage import distance_transform_edt
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, repeated
+from ccfem.base.compiled import compiled
 from ccfem.geometry.shapes import INSIDE, OUTSIDE, VOID, Region
 
 _CELL = 0.5
@@ -90,7 +90,7 @@ def section_grid(section: Region, margin: float) -> SectionGrid:
     return bare
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _fill_places(grid: SectionGrid) -> None:
     nx, ny = grid.places.shape
     about, around = np.empty(nx + 1, np.int64), np.empty(nx + 1, np.int64)
@@ -113,7 +113,7 @@ def _fill_places(grid: SectionGrid) -> None:
             grid.places[i, j] = _place_by_winding(about[i + 1], around[i + 1])
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def place(grid: SectionGrid, x: float, y: float) -> int:
     """Place of a point: INSIDE the section, in a VOID within its outer rings, or OUTSIDE."""
     j = int(np.floor((y - grid.origin[1]) / grid.cell))
@@ -130,13 +130,13 @@ def place(grid: SectionGrid, x: float, y: float) -> int:
     return _place_by_winding(about, around)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def contains(grid: SectionGrid, x: float, y: float) -> bool:
     """Whether a point lies in the section."""
     return place(grid, x, y) == INSIDE
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _place_by_winding(about: int, around: int) -> int:
     """Place from the winding numbers of all rings, and of the outer rings."""
     if about != 0:
@@ -144,7 +144,7 @@ def _place_by_winding(about: int, around: int) -> int:
     return VOID if around != 0 else OUTSIDE
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def place_and_room(grid: SectionGrid, x: float, y: float) -> tuple[int, float]:
     """Place of a point, and the radius round it that is free of border; 0 close to the border.
 

@@ -12,10 +12,10 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 import shapely
-from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.checks import check_fields, check_number
+from ccfem.base.compiled import compiled
 from ccfem.base.errors import InputError
 from ccfem.base.tensor import in_plane, strongest_in_plane
 from ccfem.geometry.section_grid import SectionGrid, contains, section_grid
@@ -218,7 +218,7 @@ def _empty(grid: SectionGrid, cell: float, room: int) -> _Placed:
     )
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _lay(
     section: _Section, placed: _Placed, seeds: FloatArray, homes: IntArray
 ) -> tuple[FloatArray, IntArray, BoolArray]:
@@ -264,7 +264,7 @@ def _lay(
     return placed.spot[:count], spans[:lines], closed[:lines]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _trace(
     section: _Section,
     placed: _Placed,
@@ -312,12 +312,12 @@ def _trace(
     return turn, count, False
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _cell(placed: _Placed, x: float, y: float) -> tuple[int, int]:
     return int((x - placed.origin[0]) / placed.cell), int((y - placed.origin[1]) / placed.cell)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _add(
     placed: _Placed,
     p: int,
@@ -335,7 +335,7 @@ def _add(
     placed.head[i, j] = p
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _take_back(placed: _Placed, first: int, end: int) -> None:
     """Remove the points that were added last."""
     for p in range(end - 1, first - 1, -1):
@@ -343,7 +343,7 @@ def _take_back(placed: _Placed, first: int, end: int) -> None:
         placed.head[i, j] = placed.following[p]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _crowded(
     placed: _Placed, x: float, y: float, number: int, along: float, limit: float, homing: bool
 ) -> bool:

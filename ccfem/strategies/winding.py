@@ -14,11 +14,11 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 from scipy.ndimage import gaussian_filter1d
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.checks import check_choices, check_fields
+from ccfem.base.compiled import compiled
 from ccfem.base.errors import InputError
 from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.isocontours import isocontours
@@ -538,7 +538,7 @@ def limit_bends(curve: FloatArray, largest: float) -> FloatArray:
     return np.vstack([points, points[:1]])
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _straightened(
     points: FloatArray, largest: float, spread: FloatArray, rounds: int
 ) -> FloatArray:  # pragma: no cover

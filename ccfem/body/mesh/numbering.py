@@ -1,9 +1,9 @@
 """Numbers of nodes with which factors stay sparse: the same ones on every machine."""
 
 import numpy as np
-from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray, repeated
+from ccfem.base.compiled import compiled
 
 
 def reverse_cuthill_mckee(start: IntArray, neighbour: IntArray) -> IntArray:
@@ -32,7 +32,7 @@ def reverse_cuthill_mckee(start: IntArray, neighbour: IntArray) -> IntArray:
     return order[::-1]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _breadth_first(
     start: IntArray, neighbour: IntArray, degree: IntArray, first: IntArray
 ) -> IntArray:

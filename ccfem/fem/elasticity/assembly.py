@@ -11,9 +11,9 @@ from functools import reduce
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 
 from ccfem.base.arrays import FloatArray, Int32Array, IntArray, freeze, seen_only
+from ccfem.base.compiled import compiled
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.curved_cells import (
     CELL_POINTS,
@@ -92,7 +92,7 @@ def cell_gradients(mesh: TetMesh) -> FloatArray:
     return result
 
 
-@njit(cache=True)
+@compiled
 def _gradients(points: FloatArray, cells: IntArray, result: FloatArray, volume: FloatArray) -> None:
     e = np.empty((3, 3))
     for cell in range(len(cells)):
@@ -119,7 +119,7 @@ def _gradients(points: FloatArray, cells: IntArray, result: FloatArray, volume: 
             result[cell, 0, d] = -total
 
 
-@njit(cache=True)
+@compiled
 def _times_gradient(c: FloatArray, g: FloatArray, factor: float, t: FloatArray) -> None:
     """Store ``factor * C B`` in t (6, 3), B the strain of displacements with gradient g."""
     x, y, z = factor * g[0], factor * g[1], factor * g[2]
@@ -129,7 +129,7 @@ def _times_gradient(c: FloatArray, g: FloatArray, factor: float, t: FloatArray) 
         t[k, 2] = c[k, 2] * z + c[k, 3] * y + c[k, 4] * x
 
 
-@njit(cache=True)
+@compiled
 def _against(t: FloatArray, p: int, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Row p of ``t.T B``, B the strain of displacements with gradient (x, y, z)."""
     return (
@@ -139,14 +139,14 @@ def _against(t: FloatArray, p: int, x: float, y: float, z: float) -> tuple[float
     )
 
 
-@njit(cache=True)
+@compiled
 def _mark(indptr: Int32Array, indices: Int32Array, i: int, slot: Int32Array) -> None:
     """Store in `slot` the entry of the pattern of each column of row i."""
     for s in range(indptr[i], indptr[i + 1]):
         slot[indices[s]] = s
 
 
-@njit(cache=True)
+@compiled
 def _mirror(
     indptr: Int32Array, indices: Int32Array, i: int, diagonal: Int32Array, data: FloatArray
 ) -> None:
@@ -167,7 +167,7 @@ def _mirror(
                 data[s, p, r] = data[above, r, p]
 
 
-@njit(cache=True)
+@compiled
 def _gather_linear(
     where: tuple[Int32Array, Int32Array, Int32Array, Int32Array],
     cells: IntArray,
@@ -201,7 +201,7 @@ def _gather_linear(
         _mirror(indptr, indices, i, diagonal, data)
 
 
-@njit(cache=True)
+@compiled
 def _gather_quadratic(
     where: tuple[Int32Array, Int32Array, Int32Array, Int32Array],
     cells: IntArray,
@@ -334,7 +334,7 @@ def _cell_matrices(nodes: FloatArray, stiffness: FloatArray) -> FloatArray:
     return total
 
 
-@njit(cache=True)
+@compiled
 def _scatter(
     indptr: Int32Array, indices: Int32Array, nodes: IntArray, blocks: FloatArray, data: FloatArray
 ) -> None:

@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 
 from ccfem.base.arrays import FloatArray, Int32Array, seen_only
+from ccfem.base.compiled import compiled
 
 
 def times(matrix: Any, x: FloatArray) -> FloatArray:
@@ -26,7 +26,7 @@ def times(matrix: Any, x: FloatArray) -> FloatArray:
     return result
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _times(
     indptr: Int32Array, indices: Int32Array, data: FloatArray, x: FloatArray, result: FloatArray
 ) -> None:  # pragma: no cover

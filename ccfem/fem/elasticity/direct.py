@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 from scipy.sparse.linalg import SuperLU, splu
 
 from ccfem.base.arrays import Float32Array, FloatArray, Int32Array, IntArray
+from ccfem.base.compiled import compiled
 from ccfem.base.errors import SolveError
 from ccfem.body.mesh.numbering import reverse_cuthill_mckee
 
@@ -197,7 +197,7 @@ def supernodes(factor: SuperLU) -> Supernodes | None:
     return Supernodes(order, factor.U.diagonal(), first, starts, row_starts, values, rows)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _first_columns(indptr: Int32Array, indices: Int32Array) -> IntArray:  # pragma: no cover
     """First columns of supernodes, and the number of columns."""
     n = len(indptr) - 1
@@ -215,7 +215,7 @@ def _first_columns(indptr: Int32Array, indices: Int32Array) -> IntArray:  # prag
     return first[: count + 1].copy()
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _fill_blocks(
     indptr: Int32Array,
     indices: Int32Array,
@@ -238,14 +238,14 @@ def _fill_blocks(
                 values[starts[s] + c * high + i] = data[column + i - c]
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
+@compiled(fastmath={"contract", "reassoc"})
 def _subtract(total: FloatArray, column: Float32Array, factor: float) -> None:  # pragma: no cover
     for i in range(len(total)):
         total[i] -= column[i] * factor
 
 
 # Four columns at a time: the vector they are added to is read and written once.
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
+@compiled(fastmath={"contract", "reassoc"})
 def _add_four(
     total: FloatArray,
     a: Float32Array,
@@ -259,7 +259,7 @@ def _add_four(
         total[i] += a[i] * p + b[i] * q + c[i] * r + d[i] * s
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
+@compiled(fastmath={"contract", "reassoc"})
 def _product(column: Float32Array, other: FloatArray) -> float:  # pragma: no cover
     total = 0.0
     for i in range(len(other)):
@@ -267,7 +267,7 @@ def _product(column: Float32Array, other: FloatArray) -> float:  # pragma: no co
     return total
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
+@compiled(fastmath={"contract", "reassoc"})
 def _four_products(
     a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, other: FloatArray
 ) -> tuple[float, float, float, float]:  # pragma: no cover
@@ -280,7 +280,7 @@ def _four_products(
     return p, q, r, s
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _substitute_blocks(
     first: IntArray,
     starts: IntArray,
@@ -364,7 +364,7 @@ _TOGETHER = 4
 """Rows that are eliminated together, two columns at a time; they share their first column."""
 
 
-@njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def _tile(
     a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, x: FloatArray, y: FloatArray, n: int
 ) -> tuple[float, ...]:
@@ -383,7 +383,7 @@ def _tile(
     return p, q, r, s, t, u, v, w
 
 
-@njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def _factorise(first: IntArray, start: IntArray, values: FloatArray) -> int:
     """Factorise in place; return the first row without a positive pivot, or -1.
 
@@ -432,7 +432,7 @@ def _factorise(first: IntArray, start: IntArray, values: FloatArray) -> int:
     return -1
 
 
-@njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def _substitute(first: IntArray, start: IntArray, values: FloatArray, x: FloatArray) -> None:
     """Solve in place with the factor of `_factorise`."""
     for i in range(first.size):
@@ -452,7 +452,7 @@ def _substitute(first: IntArray, start: IntArray, values: FloatArray, x: FloatAr
             left[k] -= row[k] * y
 
 
-@njit(cache=True)
+@compiled
 def _fill_profile(
     indptr: IntArray,
     indices: IntArray,

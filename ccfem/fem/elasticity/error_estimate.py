@@ -9,9 +9,9 @@ square: 10 % here is 1 % of the work of the load.
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, seen_only
+from ccfem.base.compiled import compiled
 from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity.assembly import cell_gradients, grouped
 from ccfem.fem.elasticity.recovery import slopes_at, times, voigt_strain
@@ -132,7 +132,7 @@ def _sum_of_squares(values: FloatArray, compliance: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("mqi,mqi->m", image, values))
 
 
-@njit(cache=True)
+@compiled
 def _compare_quadratic(
     points: FloatArray,
     corners: IntArray,
@@ -278,7 +278,7 @@ def stress_patches(
     return Patches(of_corner, mesh.points[nodes], size, coefficients)
 
 
-@njit(cache=True)
+@compiled
 def _terms(x: float, y: float, z: float, p: FloatArray) -> None:
     """Store the terms of a polynomial at a place."""
     p[0], p[1], p[2], p[3] = 1.0, x, y, z
@@ -286,7 +286,7 @@ def _terms(x: float, y: float, z: float, p: FloatArray) -> None:
         p[4], p[5], p[6], p[7], p[8], p[9] = x * x, y * y, z * z, y * z, x * z, x * y
 
 
-@njit(cache=True)
+@compiled
 def _gather_patch(
     group: int,
     corners: IntArray,
@@ -319,7 +319,7 @@ def _gather_patch(
     return count
 
 
-@njit(cache=True)
+@compiled
 def _cholesky(matrix: FloatArray, right: FloatArray) -> None:
     """Solve with a small positive definite matrix, in place."""
     n, m = right.shape
@@ -342,7 +342,7 @@ def _cholesky(matrix: FloatArray, right: FloatArray) -> None:
             right[i, c] = total / matrix[i, i]
 
 
-@njit(cache=True)
+@compiled
 def _fit(
     points: FloatArray,
     corners: IntArray,
@@ -404,7 +404,7 @@ def _fit(
                 coefficients[group, i, j] = right[i, j]
 
 
-@njit(cache=True)
+@compiled
 def fitted(
     coefficients: FloatArray, x: float, y: float, z: float, p: FloatArray, out: FloatArray
 ) -> None:

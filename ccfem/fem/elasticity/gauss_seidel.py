@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 
 from ccfem.base.arrays import Float32Array, FloatArray, Int32Array
+from ccfem.base.compiled import compiled
 
 _CONTRACT = {"contract"}
 """Products and sums may be fused."""
@@ -26,7 +26,7 @@ def rows_of(matrix: sp.bsr_array) -> Int32Array:
     return np.repeat(np.arange(len(matrix.indptr) - 1, dtype=np.int32), np.diff(matrix.indptr))
 
 
-@njit(cache=True, fastmath=_CONTRACT)
+@compiled(fastmath=_CONTRACT)
 def _three(
     start: Int32Array,
     column: Int32Array,
@@ -67,7 +67,7 @@ def _three(
             y[2] -= m[0, 2] * u + m[1, 2] * v + m[2, 2] * w
 
 
-@njit(cache=True, fastmath=_CONTRACT)
+@compiled(fastmath=_CONTRACT)
 def _six(
     start: Int32Array,
     column: Int32Array,

@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 
 from ccfem.base.arrays import Float32Array, FloatArray, Int32Array, IntArray
+from ccfem.base.compiled import compiled
 from ccfem.fem.elasticity.conjugate_gradient import highest_eigenvalue
 from ccfem.fem.elasticity.direct import Apply
 from ccfem.fem.elasticity.gauss_seidel import GaussSeidel, rows_of
@@ -73,7 +73,7 @@ def _strong(matrix: sp.bsr_array, strength: float) -> tuple[Int32Array, Int32Arr
     return start.astype(np.int32), indices[strong]
 
 
-@njit(cache=True)
+@compiled
 def _grouped(start: Int32Array, column: Int32Array) -> tuple[Int32Array, int]:
     """Group of each node, and their number."""
     n, count = start.size - 1, 0
@@ -107,7 +107,7 @@ def _grouped(start: Int32Array, column: Int32Array) -> tuple[Int32Array, int]:
     return joined, count
 
 
-@njit(cache=True)
+@compiled
 def _orthonormal(
     of_node: Int32Array, near_kernel: FloatArray, motions: FloatArray, coarse: FloatArray
 ) -> None:
@@ -151,7 +151,7 @@ def _orthonormal(
                     motions[member[e], p, c] *= 1.0 / length if length > 0.0 else 0.0
 
 
-@njit(cache=True)
+@compiled
 def _product(
     motions: FloatArray, member: Int32Array, first: int, last: int, b: int, c: int
 ) -> float:
@@ -248,7 +248,7 @@ class _Rows(NamedTuple):
     data: FloatArray
 
 
-@njit(cache=True)
+@compiled
 def _restrict(
     indptr: Int32Array,
     indices: Int32Array,
@@ -265,7 +265,7 @@ def _restrict(
                     y[c] += m[p, c] * forces[i, p]
 
 
-@njit(cache=True, fastmath={"contract", "reassoc"})
+@compiled(fastmath={"contract", "reassoc"})
 def _prolong(
     indptr: Int32Array,
     indices: Int32Array,
@@ -284,7 +284,7 @@ def _prolong(
                 x[i, p] += total
 
 
-@njit(cache=True)
+@compiled
 def _neighbour_groups(
     indptr: Int32Array, indices: Int32Array, of_node: Int32Array, count: int
 ) -> tuple[Int32Array, Int32Array]:
@@ -304,7 +304,7 @@ def _neighbour_groups(
     return start, result[:place].copy()
 
 
-@njit(cache=True, fastmath=_CONTRACT)
+@compiled(fastmath=_CONTRACT)
 def _smooth(
     rows: _Rows,
     inverse: FloatArray,
@@ -344,14 +344,14 @@ def _smooth(
                     blocks[s, p, c] = value
 
 
-@njit(cache=True)
+@compiled
 def _set_to_zero(values: FloatArray) -> None:
     for p in range(values.shape[0]):
         for c in range(6):
             values[p, c] = 0.0
 
 
-@njit(cache=True, fastmath=_CONTRACT)
+@compiled(fastmath=_CONTRACT)
 def _add(a: FloatArray, b: FloatArray, total: FloatArray) -> None:
     """Add the product of a (r, d) and b (d, 6) to total (r, 6), a row at a time in registers."""
     for p in range(a.shape[0]):
@@ -384,7 +384,7 @@ def _met(matrix: sp.bsr_array, prolong: Prolongation) -> tuple[Int32Array, Int32
     return met.indptr, met.indices
 
 
-@njit(cache=True, fastmath=_CONTRACT)
+@compiled(fastmath=_CONTRACT)
 def _project(rows: _Rows, prolong: Prolongation, coarse: _Rows) -> None:
     """Add the blocks of ``P^T A P`` up to the diagonal to a matrix of zeros with its pattern."""
     indptr, indices, data = rows
@@ -429,7 +429,7 @@ def _project(rows: _Rows, prolong: Prolongation, coarse: _Rows) -> None:
             place[groups[e]] = -1
 
 
-@njit(cache=True)
+@compiled
 def _reflect(first: Int32Array, other: Int32Array, result: FloatArray) -> None:
     """Copy what is below the diagonal to above it."""
     place = np.empty(first.size - 1, np.int32)

@@ -3,10 +3,10 @@
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.compiled import compiled
 from ccfem.base.tensor import von_mises
 from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity.load_kinds import patches_of, points_of
@@ -217,7 +217,7 @@ def _boxes(points: FloatArray, weights: FloatArray, radius: float, parts: int = 
     return _Boxes(points[order], weights[order], *about)
 
 
-@njit(cache=True)
+@compiled
 def _points_in_ball(
     boxes: _Boxes, centre: FloatArray, box: int, inside: IntArray
 ) -> int:  # pragma: no cover
@@ -238,7 +238,7 @@ def _points_in_ball(
     return count
 
 
-@njit(cache=True)
+@compiled
 def _average(
     boxes: _Boxes, values: FloatArray, centres: FloatArray, box: IntArray, result: FloatArray
 ) -> None:  # pragma: no cover
@@ -258,7 +258,7 @@ _INNER = 1.0 - 1e-9
 """Share of the radius up to which boxes count as wholly inside: rounding lets no point slip."""
 
 
-@njit(cache=True)
+@compiled
 def _average_of_sums(
     boxes: _Boxes, columns: FloatArray, until: FloatArray, centres: FloatArray, result: FloatArray
 ) -> None:  # pragma: no cover
@@ -310,13 +310,13 @@ def _average_of_sums(
             result[k, c - 1] = total[c] / total[0]
 
 
-@njit(cache=True)
+@compiled
 def _reach(place: float, size: float) -> tuple[float, float]:  # pragma: no cover
     """Least and largest distance of a place from an interval that begins at 0."""
     return max(0.0, -place, place - size), max(place, size - place)
 
 
-@njit(cache=True)
+@compiled
 def _share(
     boxes: _Boxes, centres: FloatArray, box: IntArray, values: FloatArray, result: FloatArray
 ) -> None:  # pragma: no cover

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 
 from ccfem.base.arrays import FloatArray, Int32Array, IntArray, freeze, seen_only
 from ccfem.base.checks import check_known, check_number
+from ccfem.base.compiled import compiled
 from ccfem.base.errors import SolveError
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.curved_cells import gradients_at
@@ -53,7 +53,7 @@ def bar_stiffness(
     return result
 
 
-@njit(cache=True)
+@compiled
 def _add_bars(
     cell: IntArray, weight: FloatArray, tangent: FloatArray, result: FloatArray
 ) -> None:  # pragma: no cover
@@ -113,7 +113,7 @@ class Bars:
 
 
 # One loop each, without slices, which would double the time.
-@njit(cache=True)
+@compiled
 def _strain(
     nodes: Int32Array, slope: FloatArray, tangent: FloatArray, u: FloatArray, result: FloatArray
 ) -> None:  # pragma: no cover
@@ -126,7 +126,7 @@ def _strain(
         result[s] = total
 
 
-@njit(cache=True)
+@compiled
 def _bar_forces(
     nodes: Int32Array,
     slope: FloatArray,

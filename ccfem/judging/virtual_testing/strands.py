@@ -6,9 +6,9 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, in_brief
+from ccfem.base.compiled import compiled
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import TetMesh
 from ccfem.geometry.locate import Buckets, bucket
@@ -379,7 +379,7 @@ def _grid(mesh: TetMesh) -> Buckets:
     return bucket(low - 2.0 * margin, high + margin, spacing)
 
 
-@njit(cache=True)
+@compiled
 def _cut_at_faces(
     start: FloatArray,
     step: FloatArray,
@@ -447,7 +447,7 @@ def _cut_at_faces(
     return int(count)
 
 
-@njit(cache=True)
+@compiled
 def _write(
     whole: IntArray, real: FloatArray, count: int, segment: int, cell: int, begin: float, end: float
 ) -> int:  # pragma: no cover
@@ -465,7 +465,7 @@ def _write(
     return count + 1
 
 
-@njit(cache=True)
+@compiled
 def _walk(
     point: FloatArray, step: FloatArray, cell: int, tables: _Tables, met: IntArray, ends: FloatArray
 ) -> int:  # pragma: no cover
@@ -522,7 +522,7 @@ def _walk(
     return 0
 
 
-@njit(cache=True)
+@compiled
 def _least_coordinate(
     point: FloatArray, origin: FloatArray, gradient: FloatArray, cell: int
 ) -> float:  # pragma: no cover
@@ -537,7 +537,7 @@ def _least_coordinate(
     return min(least, rest)
 
 
-@njit(cache=True)
+@compiled
 def _complete(
     point: FloatArray, tables: _Tables, met: IntArray, number: int
 ) -> int:  # pragma: no cover
@@ -559,7 +559,7 @@ def _complete(
     return number
 
 
-@njit(cache=True)
+@compiled
 def _touching(
     point: FloatArray, step: FloatArray, tables: _Tables, met: IntArray, ends: FloatArray
 ) -> tuple[int, int]:  # pragma: no cover
@@ -600,7 +600,7 @@ def _touching(
     return number, size
 
 
-@njit(cache=True)
+@compiled
 def _inside(
     point: FloatArray, step: FloatArray, origin: FloatArray, gradient: FloatArray, cell: int
 ) -> tuple[float, float]:  # pragma: no cover

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
+from ccfem.base.compiled import compiled
 from ccfem.base.errors import InputError
 from ccfem.geometry.locate import locate, nearest_on_triangles
 from ccfem.geometry.polylines import subdivide
@@ -261,7 +261,7 @@ def _rotations(surface: Surface, image: FloatArray) -> FloatArray:
     return rotations
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _nearest_rotations(gradients: FloatArray, triangles: IntArray, image: FloatArray) -> FloatArray:
     rotations = np.empty((len(triangles), 2, 2))
     for t in range(len(triangles)):

@@ -3,10 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.checks import check_number
+from ccfem.base.compiled import compiled
 from ccfem.base.tensor import strongest_in_plane
 from ccfem.geometry.facets import paired
 from ccfem.geometry.locate import locate
@@ -135,7 +135,7 @@ def _usual_size(corners: FloatArray, plane_stress: FloatArray) -> float:
     return float(size[order[np.searchsorted(area, (1.0 - _RARE) * area[-1])]])
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def direction_at(
     field: LineField, cell: int, x: float, y: float, sharpest: float, way: FloatArray
 ) -> tuple[float, float, int, bool]:
@@ -189,7 +189,7 @@ def direction_at(
     return dx, dy, cell, along >= sharpest
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def streamline_step(
     field: LineField, cell: int, x: float, y: float, step: float, way: FloatArray
 ) -> tuple[float, float, int, bool]:
@@ -213,7 +213,7 @@ def streamline_step(
     return x, y, near, True
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _follow_field(
     field: LineField, start: FloatArray, cell: int, step: float, most: int, sense: int
 ) -> tuple[FloatArray, bool]:

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.checks import check_known
+from ccfem.base.compiled import compiled
 from ccfem.base.tensor import in_plane, largest_in_plane, principal, strongest, strongest_in_plane
 from ccfem.fem.elasticity import PartStress
 from ccfem.slicing.layers.layer import Layer, LayerStress
@@ -54,7 +54,7 @@ def incompatible(
     return defined & (against == asked) & (asked > 0)
 
 
-@njit(cache=True)
+@compiled
 def _disagreeing(
     direction: FloatArray, cells: IntArray, defined: BoolArray, cell_of: IntArray, start: IntArray
 ) -> tuple[IntArray, IntArray]:
@@ -260,7 +260,7 @@ def orient(
     return direction * _signs(len(direction), pairs[order], product[order] < 0.0)[:, None]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _signs(count: int, pairs: IntArray, opposite: BoolArray) -> FloatArray:
     parent = np.arange(count)
     parity = np.zeros(count, np.bool_)  # relative to the parent

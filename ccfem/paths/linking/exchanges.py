@@ -7,9 +7,9 @@ part that an exchange changes is recomputed. See `ordering` for what a cluster i
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.compiled import compiled
 from ccfem.base.errors import InputError
 
 _BLOCK = 3
@@ -95,7 +95,7 @@ def greedy_order(clusters: Clusters) -> IntArray:
     return np.array([*order, final] if last >= 0 else order, dtype=np.int64)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _step(
     value: FloatArray, c: int, d: int, clusters: Clusters, entry: FloatArray, out: FloatArray
 ) -> float:
@@ -115,7 +115,7 @@ def _step(
     return least
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _begin(c: int, clusters: Clusters, out: FloatArray) -> float:
     """Write costs of leaving the first cluster c of a way to `out`; return the least."""
     _, visit, offsets, first, _ = clusters
@@ -129,7 +129,7 @@ def _begin(c: int, clusters: Clusters, out: FloatArray) -> float:
     return least
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _table(order: IntArray, clusters: Clusters, ahead: FloatArray, behind: FloatArray) -> float:
     """Fill tables of costs: from the start to leaving each cluster, from entering it to the end."""
     links, visit, offsets, first, last = clusters
@@ -159,7 +159,7 @@ def _table(order: IntArray, clusters: Clusters, ahead: FloatArray, behind: Float
     return least
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _rearranged(window: IntArray, variant: int, out: IntArray) -> bool:
     """Fill `out` with the window reversed, or with a block moved from one of its ends to the other.
 
@@ -196,7 +196,7 @@ class _Costs(NamedTuple):
     entry: FloatArray
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _exchange(order: IntArray, clusters: Clusters) -> float:
     """Rearrange windows of `order`, in place, until no rearrangement helps; the cost."""
     count = len(clusters.links)
@@ -224,7 +224,7 @@ def _exchange(order: IntArray, clusters: Clusters) -> float:
     return least
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _cost_with(
     part: IntArray, i: int, order: IntArray, clusters: Clusters, costs: _Costs, limit: float
 ) -> float:

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.compiled import compiled
 from ccfem.geometry.polylines import along_line, is_closed, line_length, pack, points_along, runs
 from ccfem.geometry.shapes import Region, open_lines
 from ccfem.paths.linking.joining import Joined, Joint, join, link_ends
@@ -267,7 +267,7 @@ class _Grid(NamedTuple):
     following: IntArray
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _drop_near(
     points: FloatArray, offsets: IntArray, grid: _Grid, least_length: float, keep: BoolArray
 ) -> None:
@@ -317,7 +317,7 @@ def _drop_near(
             _enter(points, keep, q, grid)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _enter(points: FloatArray, keep: BoolArray, p: int, grid: _Grid) -> None:
     """Put a point into its cell if it is kept."""
     if keep[p]:
@@ -328,7 +328,7 @@ def _enter(points: FloatArray, keep: BoolArray, p: int, grid: _Grid) -> None:
         grid.head[cell] = p
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _drop_short(
     keep: BoolArray, along: FloatArray, first: int, last: int, least_length: float, closed: bool
 ) -> None:

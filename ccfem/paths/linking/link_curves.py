@@ -8,9 +8,9 @@ plus extra for lengths inside the part or over its voids.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.compiled import compiled
 from ccfem.geometry.dubins import WORDS, advance, curve_points, word_sizes
 from ccfem.geometry.section_grid import SectionGrid, place, place_and_room
 
@@ -90,7 +90,7 @@ def stub_points(end: FloatArray, reach: float, step: float) -> FloatArray:
     return end[:2] + at * [np.cos(end[2]), np.sin(end[2])]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _extended(end: FloatArray, reach: float) -> FloatArray:
     pose = end.copy()
     pose[0] += reach * np.cos(end[2])
@@ -98,14 +98,14 @@ def _extended(end: FloatArray, reach: float) -> FloatArray:
     return pose
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _reversed(pose: FloatArray) -> FloatArray:
     back = pose.copy()
     back[2] += np.pi
     return back
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def curve_cost(
     start: FloatArray,
     turns: IntArray,
@@ -139,7 +139,7 @@ def curve_cost(
     return cost if cost < limit else np.inf
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _link_curves(
     ends: FloatArray,
     reach: FloatArray,

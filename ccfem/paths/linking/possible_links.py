@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import shapely
-from numba import njit
 from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.compiled import compiled
 from ccfem.geometry.dubins import WORDS, shortest_curve, word_sizes
 from ccfem.geometry.polylines import along_line, is_closed, pack, points_along
 from ccfem.geometry.shapes import Region, Shapes, strings
@@ -338,7 +338,7 @@ def _poses(line: FloatArray, side: int, cuts: FloatArray, width: float) -> Float
     return np.column_stack([here, heading])
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _best(
     poses: FloatArray,
     pairs: IntArray,

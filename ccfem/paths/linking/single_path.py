@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.base.checks import check_number
+from ccfem.base.compiled import compiled
 from ccfem.base.errors import InputError
 from ccfem.geometry.dubins import WORDS, curve_points, word_sizes
 from ccfem.geometry.offsets import ring_from
@@ -124,7 +124,7 @@ def _filled(section: Region) -> Shapes:
     return shapely.polygons(shapely.get_exterior_ring(shapely.get_parts(section)))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _leads(
     starts: FloatArray, goal: FloatArray, radius: float, grid: SectionGrid, weights: FloatArray
 ) -> tuple[FloatArray, IntArray]:
@@ -146,7 +146,7 @@ def _leads(
     return cost, word
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def ring_cost(routes: RingRoutes) -> tuple[FloatArray, IntArray]:
     """Cost of the way along the ring between each two ends, and an index of that way.
 
@@ -535,7 +535,7 @@ def costs_between_ends(links: FloatArray) -> FloatArray:
     return table
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _costs_of_sets(clusters: Clusters) -> FloatArray:
     """Least cost of having visited a set of clusters and left at one of its terminals, (2^p, t)."""
     links, visit, offsets, first, _ = clusters

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, seen_only
+from ccfem.base.compiled import compiled
 from ccfem.geometry.polylines import pack
 from ccfem.paths.raster.bitmap import NEIGHBOURS, Bitmap
 from ccfem.paths.raster.patterns import Regions
@@ -112,7 +112,7 @@ def trace(regions: IntArray, linked: BoolArray, seed: int = 0) -> PixelPaths:
 _STEPS = NEIGHBOURS.copy()
 
 
-@njit(cache=True)
+@compiled
 def _crosses(following: IntArray, width: int, i: int, j: int, k: int) -> bool:
     """Whether a step from a pixel would cross a diagonal step of a path."""
     if k % 2 == 0:
@@ -121,7 +121,7 @@ def _crosses(following: IntArray, width: int, i: int, j: int, k: int) -> bool:
     return following[a] == b or following[b] == a
 
 
-@njit(cache=True)
+@compiled
 def _next_sense(
     line: BoolArray,
     regions: IntArray,
@@ -150,7 +150,7 @@ def _next_sense(
     return best
 
 
-@njit(cache=True)
+@compiled
 def _follow_pixels(
     line: BoolArray,
     regions: IntArray,
@@ -188,7 +188,7 @@ def _follow_pixels(
     return size
 
 
-@njit(cache=True)
+@compiled
 def _beside_on(
     line: BoolArray, regions: IntArray, linked: BoolArray, i: int, j: int
 ) -> tuple[int, int]:
@@ -201,7 +201,7 @@ def _beside_on(
     return count, way
 
 
-@njit(cache=True)
+@compiled
 def cut_spurs(line: BoolArray, regions: IntArray, linked: BoolArray, least: int) -> None:
     """Remove branches of fewer pixels than `least`, from a free end to a fork, from the lines."""
     width = regions.shape[1]
@@ -227,7 +227,7 @@ def cut_spurs(line: BoolArray, regions: IntArray, linked: BoolArray, least: int)
                 line[chain[k] // width, chain[k] % width] = True
 
 
-@njit(cache=True)
+@compiled
 def walk(
     line: BoolArray,
     regions: IntArray,
@@ -267,7 +267,7 @@ def walk(
     return count
 
 
-@njit(cache=True)
+@compiled
 def _beside(
     chain: IntArray, size: int, regions: IntArray, linked: BoolArray, used: BoolArray
 ) -> bool:
@@ -282,7 +282,7 @@ def _beside(
     return False
 
 
-@njit(cache=True)
+@compiled
 def fill_corners(
     regions: IntArray, linked: BoolArray, used: BoolArray, following: IntArray, before: IntArray
 ) -> None:
@@ -310,7 +310,7 @@ def fill_corners(
                     break
 
 
-@njit(cache=True)
+@compiled
 def extend_ends(
     regions: IntArray, linked: BoolArray, used: BoolArray, following: IntArray, before: IntArray
 ) -> None:
@@ -348,7 +348,7 @@ def extend_ends(
             at = there
 
 
-@njit(cache=True)
+@compiled
 def join_ends(
     regions: IntArray, linked: BoolArray, used: BoolArray, following: IntArray, before: IntArray
 ) -> None:
@@ -375,7 +375,7 @@ def join_ends(
                 _join(following, before, here, there)
 
 
-@njit(cache=True)
+@compiled
 def _join(following: IntArray, before: IntArray, here: int, there: int) -> None:
     """Join the paths that end at two pixels, or close the one path of more than three pixels."""
     size, at, back = 1, here, following[here] < 0
@@ -408,7 +408,7 @@ def _join(following: IntArray, before: IntArray, here: int, there: int) -> None:
         before[here], following[there] = there, here
 
 
-@njit(cache=True)
+@compiled
 def chains(
     regions: IntArray, used: BoolArray, following: IntArray, before: IntArray
 ) -> tuple[IntArray, IntArray, BoolArray]:
@@ -437,7 +437,7 @@ def chains(
     return pixels[:count].copy(), offsets[: paths + 1].copy(), closed[:paths].copy()
 
 
-@njit(cache=True)
+@compiled
 def absorb(regions: IntArray, linked: BoolArray, isolated: BoolArray, label: IntArray) -> None:
     """Label isolated pixels by a path beside them, best of their region and sharing a side."""
     height, width = regions.shape
@@ -540,7 +540,7 @@ def corners(pixels: IntArray, offsets: IntArray, stairs: bool = True) -> BoolArr
     )
 
 
-@njit(cache=True)
+@compiled
 def _pixel_corners(pixels: IntArray, offsets: IntArray, stairs: int) -> BoolArray:
     keep = np.ones(len(pixels), dtype=np.bool_)
     for path in range(len(offsets) - 1):
@@ -573,7 +573,7 @@ def _pixel_corners(pixels: IntArray, offsets: IntArray, stairs: int) -> BoolArra
     return keep
 
 
-@njit(cache=True)
+@compiled
 def _stair(pixels: IntArray, m: int) -> bool:
     """Whether the steps from point m and m + 1 go along sides, at a right angle."""
     ax, ay = pixels[m + 1, 0] - pixels[m, 0], pixels[m + 1, 1] - pixels[m, 1]
@@ -582,7 +582,7 @@ def _stair(pixels: IntArray, m: int) -> bool:
     return along_sides and ax * bx + ay * by == 0
 
 
-@njit(cache=True)
+@compiled
 def _parallel(pixels: IntArray, m: int) -> bool:
     """Whether the step to point m and that from point m + 1 are the same."""
     for i in range(2):

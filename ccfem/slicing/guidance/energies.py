@@ -2,9 +2,9 @@
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.compiled import compiled
 
 _NEAREST = 0.3
 """Least distance between the centres of neighbouring cells that is used, in cube roots of the mean
@@ -114,7 +114,7 @@ def _volumes(points: FloatArray, cells: IntArray) -> FloatArray:
     return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0
 
 
-@njit(cache=True)
+@compiled
 def _jumps(
     cells: IntArray,
     gradients: FloatArray,

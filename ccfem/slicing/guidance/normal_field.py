@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
 
 from ccfem.base.arrays import FloatArray, IntArray, freeze
+from ccfem.base.compiled import compiled
 from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity.direct import superlu
 from ccfem.slicing.guidance.energies import faces_between
@@ -140,7 +140,7 @@ def _agreeing(form: FloatArray) -> FloatArray:
     return sense
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _jump_energy(
     parts: FloatArray, senses: FloatArray, one: IntArray, other: IntArray, area: FloatArray
 ) -> float:

@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 from scipy.sparse.csgraph import connected_components
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.compiled import compiled
 from ccfem.base.parallel import in_threads
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.round_walls import RoundWall
@@ -322,7 +322,7 @@ class _Fans(NamedTuple):
     border: IntArray
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _gather_fans(triangles: IntArray, fan: IntArray, size: IntArray) -> None:
     """Triangles round each point."""
     for t in range(len(triangles)):
@@ -333,7 +333,7 @@ def _gather_fans(triangles: IntArray, fan: IntArray, size: IntArray) -> None:
             size[p] += 1
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _find_border(
     triangles: IntArray, fan: IntArray, size: IntArray, border: IntArray, locked: BoolArray
 ) -> None:
@@ -364,7 +364,7 @@ def _find_border(
                 border[p, 0] = before
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _normal(points: FloatArray, a: int, b: int, c: int) -> tuple[float, float, float]:
     """Cross product of two sides of a triangle: its normal, twice as long as its area."""
     ux, uy, uz = (
@@ -380,14 +380,14 @@ def _normal(points: FloatArray, a: int, b: int, c: int) -> tuple[float, float, f
     return uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _square(points: FloatArray, a: int, b: int) -> float:
     """Squared distance of two points."""
     x, y, z = points[a, 0] - points[b, 0], points[a, 1] - points[b, 1], points[a, 2] - points[b, 2]
     return x * x + y * y + z * z
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _off_segment(points: FloatArray, p: int, a: int, b: int) -> float:
     """Distance of a point from the segment between two others."""
     nx, ny, nz = _normal(points, a, b, p)
@@ -402,7 +402,7 @@ def _off_segment(points: FloatArray, p: int, a: int, b: int) -> float:
     return np.sqrt((nx * nx + ny * ny + nz * nz) / base)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _shared(triangles: IntArray, fan: IntArray, size: IntArray, u: int, v: int) -> tuple[int, int]:
     """Count the triangles with both points, and the points adjacent to both."""
     both, common = 0, 0
@@ -434,7 +434,7 @@ def _shared(triangles: IntArray, fan: IntArray, size: IntArray, u: int, v: int) 
     return both, common
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _may_move(
     points: FloatArray, triangles: IntArray, fan: IntArray, size: IntArray, u: int, v: int
 ) -> bool:
@@ -466,7 +466,7 @@ def _may_move(
     return thinnest_after >= min(_THIN, thinnest_before)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _collapse(fans: _Fans, locked: BoolArray, shortest: float, sag: float) -> int:
     """Try to move each point to its nearest neighbours; return the number of points removed."""
     points, triangles, _, fan, size, border = fans
@@ -504,7 +504,7 @@ def _collapse(fans: _Fans, locked: BoolArray, shortest: float, sag: float) -> in
     return removed
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _nearest_neighbours(fans: _Fans, u: int, limit: float, near: IntArray, far: FloatArray) -> int:
     """Write the points that u may move to, the nearest first; return their number.
 
@@ -535,7 +535,7 @@ def _nearest_neighbours(fans: _Fans, u: int, limit: float, near: IntArray, far: 
     return count
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _merge(fans: _Fans, u: int, v: int) -> None:
     """Move u to v: triangles with both vanish, the others of u become triangles of v."""
     _, triangles, alive, fan, size, _ = fans
@@ -576,7 +576,7 @@ def _twins(triangles: IntArray, n: int) -> tuple[IntArray, IntArray]:
     return np.where(twin >= 0, twin // 3, -1).reshape(-1, 3), (twin % 3).reshape(-1, 3)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _flip(points: FloatArray, triangles: IntArray, across: IntArray, corner: IntArray) -> int:
     """Flip sides whose opposite angles exceed a half turn (Delaunay); return their number."""
     flipped = 0

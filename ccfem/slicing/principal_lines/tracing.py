@@ -6,9 +6,9 @@ from functools import cached_property
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray, read_only
+from ccfem.base.compiled import compiled
 from ccfem.base.parallel import in_threads, processors
 from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity import cell_gradients
@@ -230,23 +230,23 @@ class _Half(NamedTuple):
     points: FloatArray
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _half(stamp: IntArray) -> _Half:
     return _Half(stamp, np.empty(_MOST + 1, np.int64), np.empty((_MOST + 2, 3)))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _dot(a: _Vector, b: _Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _gradient_of(gradient: FloatArray, cell: int, corner: int) -> _Vector:
     return gradient[cell, corner, 0], gradient[cell, corner, 1], gradient[cell, corner, 2]
 
 
 # The two that follow are inlined into the walk: a tenth of its time (measured).
-@njit(cache=True, nogil=True, inline="always")
+@compiled(inline="always")
 def _heading(
     direction: FloatArray, gradient: FloatArray, cell: int, entry: int, before: _Vector
 ) -> _Vector:
@@ -274,7 +274,7 @@ def _heading(
     return x / size, y / size, z / size
 
 
-@njit(cache=True, nogil=True, inline="always")
+@compiled(inline="always")
 def _exit(
     centre: FloatArray, gradient: FloatArray, cell: int, entry: int, at: _Vector, way: _Vector
 ) -> tuple[int, float]:
@@ -296,7 +296,7 @@ def _exit(
     return leaving, step
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _walk(seed: int, sense: float, field: _Field, mark: int, half: _Half) -> tuple[int, float, int]:
     """Walk from the centre of a cell in one sense.
 
@@ -338,7 +338,7 @@ def _walk(seed: int, sense: float, field: _Field, mark: int, half: _Half) -> tup
         cell = following
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _survey(
     seeds: IntArray, field: _Field, touching: IntArray,
     mask: IntArray, length: FloatArray, ends: IntArray,
@@ -354,7 +354,7 @@ def _survey(
                 mask[s] |= touching[half.cells[k]]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _count_crossings(seeds: IntArray, field: _Field, count: IntArray) -> None:
     """Add one to each cell that a line from one of the seeds crosses."""
     half = _half(np.full(len(field.direction), -1, np.int64))
@@ -366,7 +366,7 @@ def _count_crossings(seeds: IntArray, field: _Field, count: IntArray) -> None:
                 count[half.cells[k]] += 1
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _collect(seed: int, field: _Field, stamp: IntArray) -> FloatArray:
     """Trace one line; return its points from end to end."""
     forth, back = _half(stamp), _half(stamp)

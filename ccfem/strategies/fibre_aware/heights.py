@@ -4,9 +4,9 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.compiled import compiled
 from ccfem.base.tensor import in_plane
 from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.geometry.locate import Buckets, barycentric_maps, bucket, locate
@@ -79,7 +79,7 @@ def areas_in_cells(
     return areas
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _clip_all(
     grid: Buckets,
     cells: _Cells,
@@ -125,7 +125,7 @@ def _clip_all(
     return rest
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _distances(
     cells: _Cells, m: int, corners: FloatArray, rounding: float, away: FloatArray
 ) -> float:
@@ -155,7 +155,7 @@ def _distances(
     return share
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _clipped(away: FloatArray, rounding: float, polygon: FloatArray, clipped: FloatArray) -> float:
     """Share of a triangle inside four faces, from the distances of its corners (4, 3).
 

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.compiled import compiled
 
 _BISECTIONS = 50
 
@@ -54,7 +54,7 @@ class Profile:
         return keep, float(gain)
 
 
-@njit(cache=True)
+@compiled
 def _best_stretches(
     gain: FloatArray, least: int, cost: float, equal: float, keep: BoolArray
 ) -> float:  # pragma: no cover
@@ -116,7 +116,7 @@ def least_price(
     return high
 
 
-@njit(cache=True)
+@compiled
 def _kept_length(
     value: FloatArray, ends: IntArray, step: FloatArray, least: IntArray, price: float, cost: float
 ) -> float:  # pragma: no cover

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray, freeze, in_brief, read_only
+from ccfem.base.compiled import compiled
 from ccfem.base.errors import SolveError
 from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity import StressField, cell_gradients, preconditioned_cg, solve
@@ -362,7 +362,7 @@ def on_linear_cells(stress: StressField, backend: str = "auto") -> StressField:
 
 
 # One loop each, without slices, which would double the time.
-@njit(cache=True)
+@compiled
 def _strains(
     cells: IntArray, slopes: FloatArray, plane: FloatArray, result: FloatArray
 ) -> None:  # pragma: no cover
@@ -378,7 +378,7 @@ def _strains(
         result[c, 0], result[c, 1], result[c, 2] = e1, e2, e12
 
 
-@njit(cache=True)
+@compiled
 def _forces(
     cells: IntArray, slopes: FloatArray, packed: FloatArray, plane: FloatArray, result: FloatArray
 ) -> None:  # pragma: no cover

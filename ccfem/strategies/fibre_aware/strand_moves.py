@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.sparse.linalg import splu
 
 from ccfem.base.arrays import FloatArray, IntArray, freeze, in_brief
 from ccfem.base.checks import check_number
+from ccfem.base.compiled import compiled
 from ccfem.base.errors import InputError
 from ccfem.base.tensor import in_plane, strain_from_voigt
 from ccfem.body.mesh import TetMesh
@@ -297,7 +297,7 @@ class _Segments(NamedTuple):
     slopes: FloatArray
 
 
-@njit(cache=True)
+@compiled
 def _energy(
     segments: _Segments,
     values: FloatArray,
@@ -344,7 +344,7 @@ def _energy(
             gradient[i + 1, 1] += slide * qy + turn * ey - fall * dy
 
 
-@njit(cache=True)
+@compiled
 def _strength(
     segments: _Segments,
     pairs: FloatArray,

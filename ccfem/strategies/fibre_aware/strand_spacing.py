@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 import shapely
-from numba import njit
 from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import FloatArray, IntArray, freeze, in_brief
+from ccfem.base.compiled import compiled
 from ccfem.fem.elasticity.direct import skyline_within
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.strand_lines import StrandLines
@@ -205,7 +205,7 @@ def _solve(matrix: Any, right: FloatArray) -> FloatArray:
     return np.asarray(factor.solve(right))
 
 
-@njit(cache=True)
+@compiled
 def _too_near(
     points: FloatArray, normals: FloatArray, pairs: IntArray, least: float
 ) -> tuple[IntArray, FloatArray, FloatArray]:  # pragma: no cover

@@ -34,11 +34,11 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
 from ccfem.base.arrays import FloatArray, freeze, in_brief
 from ccfem.base.checks import check_known, check_number
+from ccfem.base.compiled import compiled
 from ccfem.base.tensor import largest_in_plane
 from ccfem.fem.elasticity import StressField
 from ccfem.fem.elasticity.stress_field import WeightedCases
@@ -461,7 +461,7 @@ def largest_gathered(strains: FloatArray, factors: FloatArray, mode: str = TENSI
     return result
 
 
-@njit(cache=True)
+@compiled
 def _gathered(
     strains: FloatArray,
     factors: FloatArray,

@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numba import njit
 from scipy.linalg import solveh_banded
 from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.compiled import compiled
 from ccfem.geometry.offsets import rings
 from ccfem.geometry.polylines import (
     farthest_point,
@@ -189,7 +189,7 @@ def evened(
     return np.split(_moved_in(points, section, width), offsets[1:-1])
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _pushes(
     points: FloatArray,
     tangent: FloatArray,

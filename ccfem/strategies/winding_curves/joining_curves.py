@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, seen_only
+from ccfem.base.compiled import compiled
 from ccfem.base.errors import InputError
 from ccfem.strategies.winding_curves.triangle_mesh import EdgePath, TriangleMesh, insert
 
@@ -243,7 +243,7 @@ def straighten(points: FloatArray, path: EdgePath, keep: float) -> EdgePath:
     return replace(path, share=share)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _sweep(
     points: FloatArray,
     start: int,
@@ -277,7 +277,7 @@ def _sweep(
                 share[k] = min(max((s * v + t * u) / (u + v), keep), 1.0 - keep)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _before(
     points: FloatArray, start: int, edges: IntArray, share: FloatArray, k: int, i: int
 ) -> float:
@@ -285,7 +285,7 @@ def _before(
     return points[start, i] if k == 0 else _crossing(points, edges, share, k - 1, i)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _behind(
     points: FloatArray, end: int, edges: IntArray, share: FloatArray, k: int, i: int
 ) -> float:
@@ -293,7 +293,7 @@ def _behind(
     return points[end, i] if k == len(share) - 1 else _crossing(points, edges, share, k + 1, i)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _crossing(points: FloatArray, edges: IntArray, share: FloatArray, k: int, i: int) -> float:
     """Coordinate i of a crossing."""
     return points[edges[k, 0], i] * (1.0 - share[k]) + points[edges[k, 1], i] * share[k]

@@ -6,9 +6,9 @@ from functools import reduce
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.compiled import compiled
 from ccfem.base.tensor import in_plane
 from ccfem.geometry.polylines import starts_segment, subdivide
 from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, PlanePaths
@@ -167,7 +167,7 @@ def _gaps(free: BoolArray) -> float:
     return float(np.count_nonzero(free & ~opened))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _paint_section(
     tension: FloatArray,
     origin: FloatArray,
@@ -201,7 +201,7 @@ def _paint_section(
                 tension[i, j] = max(largest, 0.0)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _paint_paths(
     covered: BoolArray,
     origin: FloatArray,

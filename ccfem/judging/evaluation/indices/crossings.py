@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.compiled import compiled
 from ccfem.geometry.locate import bucket
 from ccfem.geometry.polylines import lengths, starts_segment, subdivide
 from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, PlanePaths
@@ -55,7 +55,7 @@ def find_crossings(points: FloatArray, offsets: IntArray, closed: BoolArray) -> 
     return pairs[_crosses(pairs[:, 0], pairs[:, 1], points, following)]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _near(
     starts: IntArray, items: IntArray, segment: IntArray, points: FloatArray, touch: float
 ) -> IntArray:

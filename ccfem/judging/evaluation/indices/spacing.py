@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ccfem.base.arrays import FloatArray, IntArray
+from ccfem.base.compiled import compiled
 from ccfem.geometry.locate import Buckets, bucket
 from ccfem.geometry.polylines import arc_lengths, sample_midpoints, starts_segment, subdivide
 from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, PlanePaths
@@ -104,7 +104,7 @@ class _Pieces(NamedTuple):
     period: FloatArray
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _nearest(
     pieces: _Pieces, points: FloatArray, line: IntArray, position: FloatArray, reach: float
 ) -> FloatArray:
@@ -147,7 +147,7 @@ def _nearest(
     return distance
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _far_along(apart: float, size: float, period: float, reach: float) -> tuple[float, float]:
     """Shares of a piece between which it is farther than `reach` along its path from a place.
 
