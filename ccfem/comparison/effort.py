@@ -7,7 +7,7 @@ machine that it ran on took for `pace`.
 
 import time
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -154,6 +154,24 @@ def stages(strategies: Sequence[str], prints: bool, tested: bool = True) -> list
     return ["start", "solve", *planned, *judged, *["bound"] * tested, written, "report"]
 
 
+_POINTS = 5
+"""Lengths on a curve, at most."""
+
+LONGEST_CURVE = 300.0
+"""Processor seconds, on the machine of `effort.toml`, above which a curve has to be asked for. Our
+choice."""
+
+
+def curve_steps(steps: Mapping[str, float], strategies: Iterable[str]) -> dict[str, float]:
+    """First words and seconds of the steps of a curve, by those of the comparison itself."""
+    curve: dict[str, float] = {}
+    for name in strategies:
+        planning, judging = steps[f"planning {name}"], steps[f"judging {name}"]
+        curve[f"planning the least and the most of {name}"] = 2.0 * planning
+        curve[f"planning {name} along the curve"] = _POINTS * (planning + judging)
+    return curve
+
+
 # What is said of a part.
 
 
@@ -201,6 +219,9 @@ def about_effort(case: Case, layers: Sequence[Layer]) -> tuple[str, ...]:
             if by > _BEYOND:
                 far[command] = by
             expected.append(f"{command} about {_in_words(seconds)} and {memory:.1f} GB")
+        curve = _curve_effort(known)
+        if curve <= LONGEST_CURVE:
+            expected[0] += f" (a curve over the length {_in_words(slower * curve)} more)"
         kind = "linear" if known.solved <= known.unknowns else "quadratic"
         lines.append(f"on {kind} cells and one processor: {', '.join(expected)}")
     compared, planned = (measured()["within"][command] for command in ("compare", "plan"))
@@ -213,6 +234,13 @@ def about_effort(case: Case, layers: Sequence[Layer]) -> tuple[str, ...]:
         f"{compared[1]} comparisons and {planned[0]} of {planned[1]} plans, and of "
         f"{max(compared[2], planned[2])} for all",
     )
+
+
+def _curve_effort(known: Counts) -> float:
+    """CPU seconds of a curve of the default strategies, where one length does not suit all."""
+    steps = {f"planning {name}": stage_effort(planning_stage(name), known) for name in STRATEGIES}
+    judging = {f"judging {name}": stage_effort("judge", known) for name in STRATEGIES}
+    return sum(curve_steps(steps | judging, STRATEGIES).values())
 
 
 def _in_words(seconds: float) -> str:

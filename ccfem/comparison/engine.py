@@ -25,8 +25,8 @@ from ccfem.cases.load_cases import weighted_cases
 from ccfem.comparison.bounds import bounded, bounds_of
 from ccfem.comparison.curve import Curve, one_length_suits
 from ccfem.comparison.curve_stages import along_curve
-from ccfem.comparison.effort import Counts, stage_effort
-from ccfem.comparison.expected import LONGEST_CURVE, Schedule, curve_steps, expected_steps
+from ccfem.comparison.effort import LONGEST_CURVE, Counts, curve_steps, stage_effort
+from ccfem.comparison.expected import Schedule, expected_steps
 from ccfem.comparison.plan_to_stiffness import plan_to_stiffness
 from ccfem.comparison.request import (
     DEFAULT_STRAND,

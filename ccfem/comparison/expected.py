@@ -1,6 +1,6 @@
 """Progress of a run, in shares of the time that its steps are expected to take."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from ccfem.base.progress import Progress
@@ -12,13 +12,6 @@ from ccfem.comparison.effort import (
     stage_effort,
 )
 from ccfem.comparison.request import Request
-
-_POINTS = 5
-"""Lengths on a curve, at most."""
-
-LONGEST_CURVE = 300.0
-"""Processor seconds, on the machine of `effort.toml`, above which a curve has to be asked for. Our
-choice."""
 
 _BREAKING = 10.0
 """Time of a breaking load over that of judging: a guess, so that the bar moves on."""
@@ -82,16 +75,6 @@ def expected_steps(request: Request, known: Mapping[str, Counts], cases: int) ->
         if request.bound and tested and not slicing:
             steps["bounding"] = cases * stage_effort("bound", part)
     return steps
-
-
-def curve_steps(steps: Mapping[str, float], strategies: Iterable[str]) -> dict[str, float]:
-    """First words and seconds of the steps of a curve, by those of the comparison itself."""
-    curve: dict[str, float] = {}
-    for name in strategies:
-        planning, judging = steps[f"planning {name}"], steps[f"judging {name}"]
-        curve[f"planning the least and the most of {name}"] = 2.0 * planning
-        curve[f"planning {name} along the curve"] = _POINTS * (planning + judging)
-    return curve
 
 
 def share_before_writing(request: Request) -> float:

@@ -214,7 +214,7 @@ class Request:
     curve : bool, optional
         Test every strategy at three to five lengths of fibre. By default only if a strategy cannot
         change its amount of fibre to the wanted length, and the part is not large
-        (`ccfem.comparison.expected.LONGEST_CURVE`).
+        (`ccfem.comparison.effort.LONGEST_CURVE`).
     bound : bool, default True
         Whether to compute what no paths can exceed.
     print_plans : bool, default False

@@ -388,7 +388,7 @@ class Comparison:
         if self._without_curve:
             lines.append(
                 "one length of fibre does not suit all strategies, and a curve over the length "
-                "would take minutes on this part: --curve follows it (curve=True)"
+                "would take minutes on this part: ccfem compare --curve follows it (curve=True)"
             )
         if self.several_cases:
             others = bool(self.case.alternative_supports)
@@ -404,9 +404,10 @@ class Comparison:
     def _without_curve(self) -> bool:
         """Whether a curve is missing that would be followed on a smaller part."""
         request = self.request
-        possible = request.strand is not None and not request.named and not self.several_cases
-        unsaid = self.curve is None and request.curve is None
-        return possible and unsaid and not one_length_suits(self.runs, self.wanted)
+        if self.curve is not None or request.curve is False or request.named or self.several_cases:
+            return False
+        tested = any(run.tested is not None for run in self.runs)
+        return tested and not one_length_suits(self.runs, self.wanted)
 
     @property
     def notes(self) -> list[str]:

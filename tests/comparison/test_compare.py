@@ -288,6 +288,8 @@ def test_a_curve_that_takes_long_has_to_be_asked_for(monkeypatch, along):
     result = compare(strip(), rings, layers=1, fibre_per_layer=50.0)
     assert result.curve is None
     assert any("--curve follows it" in line for line in result.remarks)
+    untested = compare(strip(), rings, layers=1, fibre_per_layer=50.0, strand=None)
+    assert not any("--curve" in line for line in untested.remarks)
 
 
 def test_a_curve_runs_through_a_length_that_is_a_whole_number():

@@ -13,10 +13,11 @@ from ccfem.comparison.effort import (
     Counts,
     about_effort,
     counts,
+    curve_steps,
     stage_effort,
     stages,
 )
-from ccfem.comparison.expected import Schedule, curve_steps
+from ccfem.comparison.expected import Schedule
 from ccfem.fem.elasticity import Force, Problem, Support
 from ccfem.fem.materials import isotropic
 from ccfem.machine import Machine
