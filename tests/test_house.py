@@ -212,6 +212,9 @@ def test_compiled_functions_have_few_parameters_of_known_types():
     """More than eight are a value: a `NamedTuple`, which compiled functions take as it is."""
     functions = dict(compiled())
     assert len(functions) > 100
+    texts = {name: path.read_text(encoding="utf-8") for name, path in modules().items()}
+    numba = [name for name, text in texts.items() if "njit" in text]
+    assert numba == ["ccfem.base.compiled"]  # all are compiled by one decorator
     assert not [name for name, node in functions.items() if len(node.args.args) > 8]
     untyped = [
         name

@@ -62,11 +62,11 @@ def shared_rows(values: ArrayLike, dtype: DTypeLike = float) -> NDArray[Any]:
     array = np.asarray(values)
     if len(array) < 2 or array.dtype != dtype:
         array = read_only(array, dtype)
-    if len(array) < 2 or is_shared(array):
+    if len(array) < 2:
         return array
-    return (
-        np.broadcast_to(array[0].copy(), array.shape) if _alike(array) else read_only(array, dtype)
-    )
+    if is_shared(array) or _alike(array):
+        return np.broadcast_to(array[0].copy(), array.shape)
+    return read_only(array, dtype)
 
 
 def _alike(rows: NDArray[Any]) -> bool:

@@ -20,7 +20,7 @@ def compiled(
     function : callable
         With at most eight parameters, working number by number.
     fastmath : bool or set of str, default False
-        What may be rearranged in sums, as of numba; such a function calls nothing of numpy.
+        What may be rearranged in sums, as of numba.
     inline : {"never", "always"}
         Whether it becomes a part of its callers before they are compiled.
     """

@@ -93,13 +93,15 @@ class OptimisationOptions:
         bool, typer.Option("--in-space", help="Optimise a flat part in 3D too (simp).")
     ] = False
 
+    def __post_init__(self) -> None:
+        check_number("--iterations", self.iterations, at_least=1)
+        if self.radius is not None:
+            check_number("--radius", self.radius, above=0.0, unit="mm")
+
     def asked(self, part: "Case") -> "Optimisation":
         """Return what is asked of an optimisation of a part."""
         from ccfem.cases.optimised import Optimisation
 
-        check_number("--iterations", self.iterations, at_least=1)
-        if self.radius is not None:
-            check_number("--radius", self.radius, above=0.0, unit="mm")
         weights = dict(assignment(text) for text in self.weight or ())
         return Optimisation(
             volume_fraction=self.volume_fraction,

@@ -10,6 +10,7 @@ import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -109,8 +110,10 @@ def _planned_layers(layers: Sequence[Layer]) -> int:
     count = len(layers)
     if count <= MOST_LAYERS or curved_layers(layers):
         return count
-    # Those that cut the same cells share the array that says so.
-    unequal = {(corners_only(layer.plane.polygon), id(layer.cell)) for layer in layers}
+    # Those that cut the same cells mostly share the array that says so; regions have their own.
+    arrays = {id(layer.cell): layer.cell for layer in layers}
+    cells = {key: sha256(np.unique(array).tobytes()).digest() for key, array in arrays.items()}
+    unequal = {(corners_only(layer.plane.polygon), cells[id(layer.cell)]) for layer in layers}
     return min(_OF_EQUAL * len(unequal), count)
 
 

@@ -194,7 +194,7 @@ def solved(
         problem = case.printed_problem(request.only_slicer)
         given = None if foreign is None else _stress_on(foreign, problem)
         progress(f"solving {case.name}", 0.0)
-        fields = solve(problem, backend=backend, progress=progress)
+        fields = solve(problem, backend=backend, progress=progress, keep=strand is not None)
         if request.all_cases:
             cases = weighted_cases(case, fields)
         else:
@@ -592,7 +592,8 @@ def _curve(
     tests = basis.tests
     if request.named or tests is None or request.curve is False or len(basis.cases) > 1:
         return None
-    steps = curve_steps(tell.steps, request.strategies)
+    planned = [name for name, s in request.strategies.items() if not isinstance(s, GivenPaths)]
+    steps = curve_steps(tell.steps, planned)
     long = sum(steps.values()) > LONGEST_CURVE
     if request.curve is None and (long or one_length_suits(runs, wanted)):
         return None

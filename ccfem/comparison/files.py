@@ -453,7 +453,7 @@ def _of_strategies(comparison: Comparison) -> dict[str, Any]:
 
 
 def _of_bound(comparison: Comparison) -> dict[str, Any]:
-    """Say what no paths exceed, and what was compared at several lengths."""
+    """Say what no paths exceed, what was compared at several lengths, and what to know of it."""
     alone = None if comparison.several_cases else comparison.bound
     curve = comparison.curve
     return {
@@ -461,6 +461,7 @@ def _of_bound(comparison: Comparison) -> dict[str, Any]:
         "upper_bound_gap": None if alone is None else alone.duality_gap,
         "load_cases": _load_cases(comparison) if comparison.several_cases else None,
         "curve": None if curve is None else curve.frame.to_dict(orient="records"),
+        "remarks": comparison.remarks,
     }
 
 

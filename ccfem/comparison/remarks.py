@@ -39,6 +39,7 @@ _IMPORTANT = (
     ("no paths of", "trust neither number", "bring the worst case above"),
     ("planned for ", "takes ", "the stress of another program"),
     (" copies, of all of which ", "begins at layer ", " spools, change before "),
+    ("a curve over the length",),
     ("strands cross", "no fibre on", "so it is placed below", "links lie"),
     ("estimated error", "lock", "tensile strength"),
 )

@@ -265,7 +265,8 @@ class Comparison:
             return {"": self}
         parts = {}
         for name, layers in self.stacks.items():
-            request = replace(self.request, slicings={"": self.request.slicings[name]})
+            slicing = {"": self.request.slicings[name]}
+            request = replace(self.request, slicings=slicing, curve=False)
             runs = [
                 replace(run, name=run.strategy_name, slicing="")
                 for run in self.runs

@@ -49,8 +49,12 @@ def flat_stack(
         )
 
     same = strands.repeated(used)
-    first = sorted(set(same.values()))
     sections = sections_of([layer for layer in used if same[layer.index] == layer.index], mesh)
+    # Layers that are cut down to regions do not show where the part's own sections differ.
+    if any(layer.weights.ndim > 1 for layer in used):
+        sections = sections_of(used, mesh)
+        same = strands.repeated(used, sections)
+    first = sorted(set(same.values()))
     borders = {index: seen(section) for index, section in sections.items()}
     placed = _Strands(strands, place, borders)
     above = in_processes(

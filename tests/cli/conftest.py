@@ -11,7 +11,9 @@ from ccfem.comparison import effort
 @pytest.fixture(scope="session")
 def pace():
     """CPU seconds that the work takes here by which machines differ, measured once."""
-    return effort.pace()
+    measured = effort.pace()
+    assert 0.0 < measured < 10.0  # seconds
+    return measured
 
 
 @pytest.fixture

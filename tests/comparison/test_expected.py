@@ -4,6 +4,7 @@ import math
 import tomllib
 
 import pytest
+import shapely
 
 from benchmarks.speed import effort as benchmark
 from ccfem.body.mesh import box_mesh
@@ -21,6 +22,7 @@ from ccfem.comparison.expected import Schedule
 from ccfem.fem.elasticity import Force, Problem, Support
 from ccfem.fem.materials import isotropic
 from ccfem.machine import Machine
+from ccfem.paths.placement.fibre_places import cut_layer
 from ccfem.slicing.slicers import Planar
 
 
@@ -85,3 +87,13 @@ def test_progress_is_the_share_of_the_time_that_is_behind():
     tell("planning the least and the most of a")
     tell("planning a along the curve")
     assert [share for _, share in told[4:]] == pytest.approx([10.0 / 44.0, 14.0 / 44.0])
+
+
+def test_layers_that_cut_the_same_cells_count_once_in_regions_too():
+    mesh = box_mesh((20.0, 10.0, 7.0), (4, 2, 2))
+    layers = Planar(count=70).cut(mesh)
+    region = shapely.box(1.0, 1.0, 12.0, 9.0)
+    parts = [layer for layer in (cut_layer(layer, region, mesh) for layer in layers) if layer]
+    for those in (layers, parts):
+        known = Counts.of(mesh, those, Machine())
+        assert known.some_room < 0.5 * known.room

@@ -112,7 +112,7 @@ _PACKED = 50_000_000
 def _array(name: str, given: ArrayLike, folder: Path, more: str = "") -> Iterator[str]:
     """Yield one DataArray: one block of zlib with its sizes in bytes before it."""
     values = given if isinstance(given, RowBlocks | range) else np.asarray(given)
-    begin = np.asarray(values[:1])
+    begin = np.asarray(values[:1], dtype=np.int64 if isinstance(values, range) else None)
     size, name_of_type = _TYPES.get(begin.dtype.kind, ("i8", "Int64"))
     if begin.dtype == np.uint8:
         size, name_of_type = _TYPES["b"]

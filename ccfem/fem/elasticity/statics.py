@@ -151,8 +151,8 @@ def check_pressed(held: Held, reactions: FloatArray, forces: FloatArray) -> None
 
 
 EQUATIONS = "equations"
-"""Where a field on many quadratic cells keeps the system, matrix and solver that it was solved by:
-its virtual tests take them over, since it takes long to set them up."""
+"""Where a field keeps the system, matrix and solver that it was solved by, if it is to be tested:
+on many quadratic cells it takes long to set them up."""
 
 FieldT = TypeVar("FieldT", covariant=True)
 
@@ -166,6 +166,7 @@ def solve(
     backend: str = "auto",
     tolerance: float = 1e-8,
     progress: Progress = silent,
+    keep: bool = False,
 ) -> dict[str, StressField]:
     """Solve a problem for all its load cases, with one factorisation for each set of supports.
 
@@ -186,6 +187,9 @@ def solve(
         the energy of its error is below 1e-4 of that of the displacement.
     progress : callable, optional
         Receives what quadratic cells that "auto" takes cost, and why, before they are solved.
+    keep : bool, default False
+        Whether virtual tests follow. Fields on many quadratic cells under one set of supports then
+        keep matrix and solver until the first test takes them over: some 4 kB a node.
 
     Returns
     -------
@@ -210,7 +214,7 @@ def solve(
     sets = support_sets(problem)
     for subproblem in sets:
         try:
-            fields |= _solved(subproblem, backend, tolerance, progress)
+            fields |= _solved(subproblem, backend, tolerance, progress, keep and len(sets) == 1)
         except InputError as error:
             if len(sets) == 1:
                 raise
@@ -225,12 +229,12 @@ def solve(
 
 
 def _solved(
-    problem: Problem, backend: str, tolerance: float, progress: Progress
+    problem: Problem, backend: str, tolerance: float, progress: Progress, keep: bool
 ) -> dict[str, StressField]:
     """Solve a problem with one set of supports."""
     if problem.order != "auto" or problem.mesh.order == 2:
         wanted = on_quadratic(problem) if problem.order == 2 else problem
-        return _solved_as_it_is(wanted, backend, tolerance, "")
+        return _solved_as_it_is(wanted, backend, tolerance, "", keep)
     if len(problem.mesh.cells) > MOST_CELLS:
         why = f"more than {MOST_CELLS:,} cells"
         return _solved_as_it_is(replace(problem, order=1), backend, tolerance, why)
@@ -242,15 +246,15 @@ def _solved(
         if not why:
             return fields
     progress(f"solving on {about_quadratic(problem, why)}", 0.0)
-    return _solved_as_it_is(on_quadratic(problem), backend, tolerance, why)
+    return _solved_as_it_is(on_quadratic(problem), backend, tolerance, why, keep)
 
 
 def _solved_as_it_is(
-    problem: Problem, backend: str, tolerance: float, why: str
+    problem: Problem, backend: str, tolerance: float, why: str, keep: bool = False
 ) -> dict[str, StressField]:
     """Solve a problem on its own cells."""
     try:
-        fields = solve_system(partial(prepare, problem), backend, tolerance)
+        fields = solve_system(partial(prepare, problem), backend, tolerance, keep)
     except SolveError as error:
         raise SolveError(f"{error}; {about_conditioning(problem)}") from error
     for case, field in fields.items():
@@ -294,7 +298,7 @@ class _Equations(Protocol[FieldT]):
 
 
 def solve_system(
-    prepare: Callable[[], _Equations[FieldT]], backend: str, tolerance: float
+    prepare: Callable[[], _Equations[FieldT]], backend: str, tolerance: float, keep: bool = False
 ) -> dict[str, FieldT]:
     """Prepare a problem and solve it for all its load cases: see `solve`."""
     started = perf_counter()
@@ -336,7 +340,7 @@ def solve_system(
             solve_seconds=now - started,
         )
         fields[case] = system.field(case, displacement[case], matrix, record)
-        if solver.backend == "two-level" and linear:
+        if keep and linear and solver.backend == "two-level":
             vars(fields[case])[EQUATIONS] = (system, matrix, solver)
         started = perf_counter()
     # Superposition: combinations of linear load cases need no solve.

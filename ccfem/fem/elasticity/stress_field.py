@@ -305,6 +305,10 @@ class StressField(Shown):
     def __post_init__(self) -> None:
         freeze(self, displacement=float, stress=float, nodal=float, reactions=float)
 
+    def __getstate__(self) -> dict[str, object]:
+        """State for another process, which sets up matrix and solver itself where it tests."""
+        return {name: value for name, value in vars(self).items() if name != "equations"}
+
     def __repr__(self) -> str:
         largest = float(np.linalg.norm(self.displacement, axis=1).max())
         return (

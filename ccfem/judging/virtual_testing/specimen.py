@@ -62,14 +62,13 @@ class Specimen:
     @classmethod
     def _made(cls, unreinforced: StressField, backend: str) -> "Specimen":
         solved = unreinforced.__dict__.pop(EQUATIONS, None)
-        if solved is not None and solved[-1].backend == backend:
-            system, matrix, solver = solved
-            made = cls(unreinforced, system, matrix, backend)
-            made.__dict__["solver"] = solver
-        else:
-            system = prepare(unreinforced.problem)
-            made = cls(unreinforced, system, system.assemble(), backend)
+        taken = solved is not None and solved[-1].backend == backend
+        system = solved[0] if taken else prepare(unreinforced.problem)
         _check_case(system, unreinforced.case)
+        if not taken:
+            return cls(unreinforced, system, system.assemble(), backend)
+        made = cls(unreinforced, system, solved[1], backend)
+        made.__dict__["solver"] = solved[2]
         return made
 
     def under(self, other: StressField) -> "Specimen":
@@ -86,6 +85,7 @@ class Specimen:
             As `of`.
         """
         known = other.__dict__.setdefault("specimens", {})
+        other.__dict__.pop(EQUATIONS, None)
         if self.backend not in known:
             same = other.problem is self.system.problem
             system = self.system if same else prepare(other.problem)

@@ -64,6 +64,10 @@ class Strands:
     def __len__(self) -> int:
         return len(self.cell)
 
+    def __getstate__(self) -> dict[str, object]:
+        """State for another process, which applies the pieces to its mesh anew."""
+        return {name: value for name, value in vars(self).items() if name != "bars"}
+
     @classmethod
     def none(cls) -> "Strands":
         """Return no fibre at all."""

@@ -30,6 +30,8 @@ def alike_layers(layers: Sequence[Layer], stress: PartStress) -> IntArray:
     alike, form a run; the middle one of a run stands for all. Curved layers stand for themselves.
     """
     source = np.arange(len(layers))
+    if not layers:
+        return source
     first, leading = 0, copy(layers[0])
     for k in range(1, len(layers) + 1):
         if k < len(layers) and _alike(leading, layers[k], stress.nodal):

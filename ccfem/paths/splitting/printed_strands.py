@@ -18,7 +18,7 @@ from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import TetMesh
 from ccfem.geometry.polylines import along_line, between, is_closed, line_length, points_along, runs
-from ccfem.geometry.shapes import Region, strings
+from ccfem.geometry.shapes import Region, corners_only, strings
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.unfolding import part_of_line
 from ccfem.paths.repeated import repeated_layers
@@ -68,9 +68,15 @@ class PrintedStrands:
         """Indices of the layers that anything lies on."""
         return {*self.fibre.layer.tolist(), *self.short.layer.tolist()}
 
-    def repeated(self, layers: Sequence[Layer]) -> dict[int, int]:
-        """Index of the first of some layers that each one repeats at its own height."""
-        fibre = repeated_layers(self.fibre, layers).tolist()
+    def repeated(
+        self, layers: Sequence[Layer], sections: Mapping[int, Region] | None = None
+    ) -> dict[int, int]:
+        """Index of the first of some layers that each one repeats at its own height.
+
+        Sections of the part, by index, have to be equal where layers are regions of them.
+        """
+        whole = None if sections is None else [corners_only(sections[k.index]) for k in layers]
+        fibre = repeated_layers(self.fibre, layers, whole).tolist()
         source = repeated_layers(self.short, layers, fibre)
         return {layer.index: layers[k].index for layer, k in zip(layers, source, strict=True)}
 

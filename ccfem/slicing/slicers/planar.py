@@ -142,7 +142,7 @@ class Planar:
         """Yield the sections of a mesh, with the place of their layers: `cut` without triangles.
 
         Each is cut when it is asked for, and those between the same nodes only once as far as they
-        are equal: hundreds of layers need no more memory than one.
+        are equal: hundreds of layers of a prism need little more memory than one.
 
         Raises
         ------

@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+import pickle
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import given, settings, strategies as st
 
 from ccfem.base.errors import InputError, SolveError
 from ccfem.body.mesh.box import box_mesh
+from ccfem.comparison.studies.transport import parted, unpacked
 from ccfem.fem.elasticity import Displacement, prepare
 from ccfem.fem.elasticity.problem import Force, PointForce, Problem, Support
 from ccfem.fem.elasticity.statics import solve
@@ -432,9 +434,24 @@ def test_a_test_takes_over_the_equations_of_the_solve():
     mesh = box_mesh((24.0, 12.0, 6.0), (12, 6, 3))
     support, load = (Support("x_min"),), {"pull": (Force("x_max", (50.0, 0.0, 0.0)),)}
     problem = Problem(mesh, isotropic(3500.0, 0.35), support, load, order=2)
-    field = solve(problem)["pull"]
+    plain, field = solve(problem)["pull"], solve(problem, keep=True)["pull"]
+    assert "equations" not in vars(unpacked(*parted(field)))  # each process sets up its own
     solver = field.__dict__["equations"][-1]
     taken, made = Specimen.of(field), prepare(field.problem)
     assert field.record.backend == "two-level"
     assert taken.solver is solver
     np.testing.assert_array_equal(taken.matrix.data, made.assemble().data)
+    strands = toolpaths(np.array([[1.0, 3.0, 3.0], [23.0, 9.0, 3.0]]))
+    ratios = [virtual_test(strands, kind, mode=BONDED).ratio for kind in (plain, field)]
+    assert ratios[0] == pytest.approx(ratios[1], rel=1e-9)
+    assert "equations" not in vars(field)
+
+
+def test_strands_on_two_meshes_in_turn():
+    field = solve(clamped())["load"]
+    strands = cut_strands(toolpaths(*random_lines()), field.mesh)
+    finer = dataclasses.replace(field.mesh, points=2.0 * field.mesh.points)
+    slopes = [bars(strands, mesh).slope.copy() for mesh in (field.mesh, finer, field.mesh)]
+    np.testing.assert_allclose(slopes[1], 0.5 * slopes[0], rtol=1e-12)
+    np.testing.assert_array_equal(slopes[2], slopes[0])
+    assert len(pickle.dumps(strands)) == len(pickle.dumps(dataclasses.replace(strands)))

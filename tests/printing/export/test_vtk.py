@@ -57,6 +57,7 @@ def test_what_repeats_is_packed(tmp_path):
 def test_no_paths(tmp_path):
     write_paths(Toolpaths.empty(), tmp_path / "none.vtp")
     assert pyvista.read(tmp_path / "none.vtp").n_cells == 0
+    assert b'type="Int64" Name="connectivity"' in (tmp_path / "none.vtp").read_bytes()
 
 
 def test_names_are_escaped(tmp_path):
