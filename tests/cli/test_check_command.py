@@ -12,7 +12,10 @@ def test_check_says_and_draws(ccfem, tmp_path):
     assert (code, err) == (0, "")
     assert "60 x 20 x 5 mm, 6 cm^3, pla" in out
     assert "nothing keeps this part from being solved" in out
-    took = r"compare about [\d.]+ s and 0.\d GB, plan --gcode about [\d.]+ s and 0.\d GB"
+    took = (
+        r"compare about [\d.]+ s and 0.\d GB \(a curve over the length [\d.]+ \w+ more\), "
+        r"plan --gcode about [\d.]+ s and 0.\d GB"
+    )
     for kind in ("linear", "quadratic"):
         assert re.search(f"expected: on {kind} cells and one processor: {took}", out)
     assert {path.name for path in tmp_path.iterdir()} == {
