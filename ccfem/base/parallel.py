@@ -25,6 +25,7 @@ from typing import IO, Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from ccfem.base.arrays import is_shared
 from ccfem.base.errors import InputError
@@ -36,6 +37,7 @@ _CODE = (type, ModuleType, FunctionType, BuiltinFunctionType)
 _PLAIN = (str, bytes, int, float, type(None))
 
 Result = TypeVar("Result")
+FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 
 
 def processors() -> int:
@@ -58,6 +60,16 @@ def _granted() -> int:
     """Processors that the system grants."""
     granted = getattr(os, "sched_getaffinity", None)
     return len(granted(0)) if granted is not None else os.cpu_count() or 1
+
+
+def one_blas_thread(function: FunctionT) -> FunctionT:
+    """Make a function compute with one thread of BLAS, as all that shares out its work here.
+
+    Threads of BLAS cost more than they save on matrices of the size that occurs, and their number
+    would change the last digits, by which paths can differ. Where none was set, all calls of the
+    function and all that they call are equal to the bit on one processor and on many.
+    """
+    return cast(FunctionT, threadpool_limits.wrap(limits=1, user_api="blas")(function))
 
 
 def in_threads(

@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from ccfem.base.arrays import BoolArray, FloatArray, in_brief
 from ccfem.base.checks import check_known, check_number
 from ccfem.base.errors import InputError
+from ccfem.base.parallel import one_blas_thread
 from ccfem.base.progress import Progress, silent
 from ccfem.cases.case import Case
 from ccfem.cases.designed import LAMINATE
@@ -165,6 +166,7 @@ class Optimisation:
         check_places("void", self.void)
 
 
+@one_blas_thread
 def optimise(
     case: Case,
     volume_fraction: float,

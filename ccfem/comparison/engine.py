@@ -14,11 +14,10 @@ from inspect import signature
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from ccfem.base.checks import member_name, refuse_keywords
 from ccfem.base.errors import InputError, SolveError
-from ccfem.base.parallel import beside, processors
+from ccfem.base.parallel import beside, one_blas_thread, processors
 from ccfem.base.progress import Progress, silent
 from ccfem.cases.case import Case
 from ccfem.cases.load_cases import weighted_cases
@@ -167,6 +166,7 @@ class Solved:
         return Part(stress, stack, case.machine, self.cases, *about, *more)
 
 
+@one_blas_thread
 def solved(
     request: Request, seconds: dict[str, float] | None = None, progress: Progress = silent
 ) -> Solved:
@@ -241,9 +241,7 @@ def otherwise_held(case: Case, field: StressField, backend: str) -> StressField:
         raise InputError(f"alternative supports: {error}") from None
 
 
-# Threads of BLAS cost more than they save on matrices of this size, and their number would change
-# the last digits.
-@threadpool_limits.wrap(limits=1, user_api="blas")
+@one_blas_thread
 def answer(
     request: Request,
     progress: Progress = silent,

@@ -8,6 +8,7 @@ import numpy as np
 
 from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
+from ccfem.base.parallel import one_blas_thread
 from ccfem.base.progress import Progress, silent
 from ccfem.cases.case import Case
 from ccfem.comparison.bounds import presses
@@ -28,6 +29,7 @@ from ccfem.paths.planning.strategy import Strategy
 from ccfem.slicing.slicers.planar import Planar
 
 
+@one_blas_thread
 def fibre_front(
     case: Case,
     stress: StressField | WeightedCases,

@@ -6,6 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from ccfem.base import parallel
 from ccfem.base.arrays import is_shared, read_only, shared_rows
@@ -15,6 +16,7 @@ from ccfem.base.parallel import (
     done_elsewhere,
     in_processes,
     in_threads,
+    one_blas_thread,
     processors,
     repeating,
 )
@@ -220,3 +222,12 @@ def test_what_repeats_is_made_once_and_comes_in_order(two):
     for number, word in enumerate("abacbda"):
         again = number != "abacbda".index(word)
         assert results[number] == ((first[word], number) if again else first[word])
+
+
+def test_threads_of_blas_are_off_within_and_back_after():
+    def threads():
+        return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
+
+    with threadpool_limits(2, user_api="blas"):
+        assert one_blas_thread(threads)() == {1}
+        assert threads() == {2}

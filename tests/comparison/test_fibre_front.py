@@ -5,10 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
+from ccfem.comparison import engine
 from ccfem.comparison.engine import Solved
 from ccfem.comparison.front_plans import fibre_front, front_of
 from ccfem.comparison.front_points import FibreFront, FrontPoint
@@ -201,6 +203,21 @@ def test_refused(bar):
         fibre_front(*bar, "zigzag", create("zigzag", ALONG), ())
     with pytest.raises(InputError, match="number of layers must be at least 1"):
         fibre_front(*bar, "zigzag", create("zigzag", ALONG), (0,))
+
+
+def test_a_front_solves_with_one_thread_of_blas(bar, monkeypatch):
+    """Their number would change the last digits, by which paths can differ."""
+    threads, solved = set(), engine.solve
+
+    def solving(*about, **more):
+        blas = (pool for pool in threadpool_info() if pool["user_api"] == "blas")
+        threads.update(pool["num_threads"] for pool in blas)
+        return solved(*about, **more)
+
+    monkeypatch.setattr(engine, "solve", solving)
+    with threadpool_limits(2, user_api="blas"):
+        front_of(Request(bar[0], {"zigzag": create("zigzag", ALONG)}), (2,), points=2)
+    assert threads == {1}
 
 
 def test_no_plan_says_why(bar):

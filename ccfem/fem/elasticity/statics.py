@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.checks import KnownNames, check_number
 from ccfem.base.errors import InputError, SolveError
+from ccfem.base.parallel import one_blas_thread
 from ccfem.base.progress import Progress, silent
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.bisection import bisected
@@ -161,6 +162,7 @@ _ENERGY = 1e-4
 hundredth of the discretisation error of the cells themselves."""
 
 
+@one_blas_thread
 def solve(
     problem: Problem,
     backend: str = "auto",

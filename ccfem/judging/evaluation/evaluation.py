@@ -13,7 +13,7 @@ from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.base.checks import check_number
 from ccfem.base.display import Shown
 from ccfem.base.errors import InputError
-from ccfem.base.parallel import in_processes
+from ccfem.base.parallel import in_processes, one_blas_thread
 from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity import PartStress
 from ccfem.fem.materials import Material, named_material
@@ -122,6 +122,7 @@ class Evaluation(Shown):
         return frame
 
 
+@one_blas_thread
 def evaluate(
     toolpaths: Toolpaths,
     layers: Sequence[Layer],

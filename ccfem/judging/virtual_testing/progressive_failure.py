@@ -31,6 +31,7 @@ import numpy as np
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, in_brief
 from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError, SolveError
+from ccfem.base.parallel import one_blas_thread
 from ccfem.base.tensor import from_voigt, principal
 from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity import Solver, StressField, cell_gradients
@@ -567,6 +568,7 @@ WORTH = (
 """What its numbers are worth; to be shown wherever they are."""
 
 
+@one_blas_thread
 def breaking_load(
     fibres: Toolpaths | Strands | None,
     part: StressField | Specimen,

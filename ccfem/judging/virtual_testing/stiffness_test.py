@@ -9,6 +9,7 @@ import numpy as np
 from ccfem.base.arrays import FloatArray, freeze, in_brief
 from ccfem.base.display import Shown
 from ccfem.base.errors import InputError
+from ccfem.base.parallel import one_blas_thread
 from ccfem.fem.elasticity import SolveRecord, StressField
 from ccfem.judging.virtual_testing.equilibrium import (
     IN_COMPRESSION,
@@ -107,6 +108,7 @@ class Bracket:
     __repr__ = in_brief
 
 
+@one_blas_thread
 def virtual_test(
     fibres: Toolpaths | Strands,
     part: StressField | Specimen,

@@ -8,7 +8,7 @@ import numpy as np
 from ccfem.base.arrays import IntArray
 from ccfem.base.checks import check_instance
 from ccfem.base.errors import InputError
-from ccfem.base.parallel import in_processes, in_threads
+from ccfem.base.parallel import in_processes, in_threads, one_blas_thread
 from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.even_steps import OFF, even_steps
 from ccfem.machine.machine import Machine
@@ -21,6 +21,7 @@ from ccfem.slicing.layers.layer import Layer, curved_layers, stress_on
 from ccfem.slicing.layers.slicer import check_pitch
 
 
+@one_blas_thread
 def plan(
     strategy: Strategy,
     layers: Sequence[Layer],
