@@ -23,8 +23,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from ccfem.base import display
-from ccfem.base.lazy_modules import imported
-from ccfem.base.moved import MOVED, find_moved
+from ccfem.base.lazy_modules import MOVED, find_moved, imported
 
 if TYPE_CHECKING:
     from ccfem.cases.case import Case

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import ndimage
 from threadpoolctl import threadpool_limits
 
-from ccfem.fem.infill_moduli import infill_stiffness
+from ccfem.paths.plastic.as_printed import infill_stiffness
 from ccfem.paths.plastic.plastic import GYROID
 
 __all__ = ["cell_of", "homogenised", "moduli"]

@@ -8,7 +8,7 @@ import warnings
 import pytest
 
 import ccfem
-from ccfem.base.moved import GONE, MOVED
+from ccfem.base.lazy_modules import GONE, MOVED
 from ccfem.slicing.slicers.planar import Planar
 
 

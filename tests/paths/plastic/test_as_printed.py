@@ -11,12 +11,12 @@ from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.case import Case
 from ccfem.fem.elasticity import Force, Problem, Support, solve
 from ccfem.fem.elasticity.load_kinds import Gravity
-from ccfem.fem.infill_moduli import infill_stiffness, infill_strength
 from ccfem.fem.materials import isotropic, transversely_isotropic
 from ccfem.judging.virtual_testing.failure_laws.matrix import matrix_peak
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.machine import Machine
 from ccfem.paths.plastic import Plastic
+from ccfem.paths.plastic.as_printed import infill_stiffness, infill_strength
 from ccfem.slicing.slicers.planar import Planar
 
 PLA = replace(isotropic(3000.0, 0.35), tensile_strength=50.0, mass_density=1.24)
