@@ -178,7 +178,7 @@ def _solve(
     from ccfem.base.whole import check_writable
     from ccfem.cli.screen import print_solution
     from ccfem.fem.elasticity.statics import solve
-    from ccfem.printing.export.vtu_result import result_path, write_result
+    from ccfem.printing.export.vtk import result_path, write_result
 
     part = given.read(refine)
     names = part.problem.cases

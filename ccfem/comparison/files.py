@@ -271,7 +271,7 @@ def write_printed(
 
 def files_of_print(folder: Path, name: str, run: Printed, cell: bool) -> list[_Write]:
     """Files of the same chain of moves for a cell of robots, and of where strands are trimmed."""
-    from ccfem.printing.export.robot_cell import write_robot_cell
+    from ccfem.printing.export.robot_waypoints import write_robot_cell
 
     files: list[_Write] = []
     if cell and run.moves is not None:

@@ -1,11 +1,18 @@
-"""All actions of a machine from the first line to the last: a table, one row a move or event."""
+"""All actions of a machine from the first line to the last: a table, one row a move or event.
 
-from dataclasses import dataclass
+Arcs stand in place of chains of short straight moves, for firmware that knows G2 and G3.
+"""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import DTypeLike
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze, in_brief, shared_rows
+from ccfem.machine.gcode_profile import GcodeProfile
+from ccfem.machine.machine import Machine
+from ccfem.printing.laid_layer import COORDINATE_DIGITS
 
 EVENTS = (
     *("travel", "lay", "feed", "cut", "tool", "standby", "preheat", "heat", "work"),
@@ -137,3 +144,165 @@ class Moves:
         roles = [role(name) for name in names]
         beside = np.isin(self.role, [role("fibre"), role("tail")]) & (self.strand < 0)
         return (self.event == LAY) & np.isin(self.role, roles) & ~beside
+
+
+_LONGER = 1e-3
+"""Share by which an arc may be longer than the moves that it replaces."""
+_LEAST, _COMPACT = 3, 2
+"""Moves that an arc replaces at least, as it is written in the space of two; in a compact file,
+where it is written in less."""
+_SPEEDS = 1e-2
+"""Share by which the speeds of these moves may differ: the arc has the least of them."""
+_LARGEST = 1000.0
+"""Largest radius, mm: flatter arcs lose their way in the rounding of firmware."""
+_SWEEP = np.radians(350.0)
+"""Largest angle: one that ends where it starts would not be told from none."""
+
+
+def with_arcs(moves: Moves, machine: Machine) -> Moves:
+    """Find the arcs that stand for chains of moves; what is fed grows with the length.
+
+    An arc begins and ends where the chain does, and is nowhere farther from it than
+    `GcodeProfile.arc_tolerance`. It replaces level moves that lay the same line of matrix or fibre,
+    at one speed to a hundredth, and is at most 0.1 % longer than they are. From each move on it is
+    made as long as it can be. In a compact file a straight line may be such an arc, of no angle.
+    """
+    starts = moves.start[:, :2]
+    laying = (moves.event == LAY) & (moves.place[:, 2] == moves.start[:, 2])
+    about = (moves.tool, moves.role, moves.width, moves.height, moves.strand, moves.layer)
+    same = laying[1:] & laying[:-1]
+    for column in about:
+        same &= column[1:] == column[:-1]
+    # Chains: rows from `begins` to `ends`, both included.
+    chain = np.flatnonzero(np.append(laying[:1], laying[1:] & ~same))
+    ends = np.append(same, False)
+    last = np.flatnonzero(laying & ~ends)
+    arcs_of_chains: list[tuple[int, int, float, float, float]] = []
+    for begin, end in zip(chain.tolist(), last.tolist(), strict=True):
+        if end == begin:
+            continue
+        rows = slice(begin, end + 1)
+        points = np.concatenate([starts[begin : begin + 1], moves.place[rows, :2]])
+        arcs_of_chains += [
+            (begin + arc.first, begin + arc.last, *arc.circle)
+            for arc in _chain_arcs(points, moves.speed[rows], moves.feed[rows], machine.gcode)
+        ]
+    if not arcs_of_chains:
+        return moves
+    table = np.array(arcs_of_chains)
+    arcs = Arcs(table[:, 0], table[:, 1], table[:, 2:4], table[:, 4])
+    return _fed_along(moves, arcs)
+
+
+def _fed_along(moves: Moves, arcs: Arcs) -> Moves:
+    """Let moves feed for the length of their arcs, at one speed along each."""
+    feed, beside, speed = moves.feed.copy(), moves.beside.copy(), moves.speed.copy()
+    length, starts = moves.length, moves.start[:, :2]
+    for first, last, centre, sweep in zip(
+        arcs.first.tolist(), arcs.last.tolist(), arcs.centre, arcs.sweep.tolist(), strict=True
+    ):
+        rows = slice(first, last + 1)
+        way = np.linalg.norm(starts[first] - (centre if sweep else moves.place[last, :2]))
+        longer = float(way) * (abs(sweep) or 1.0) / float(length[rows].sum())
+        feed[rows] *= longer
+        beside[rows] *= longer
+        speed[rows] = speed[rows].min()
+    return replace(moves, feed=feed, beside=beside, speed=speed, arcs=arcs)
+
+
+class _ChainArc(NamedTuple):
+    """First and last move of an arc in a chain, its centre, mm, and its angle, radians."""
+
+    first: int
+    last: int
+    circle: tuple[float, float, float]
+
+
+def _chain_arcs(
+    points: FloatArray, speeds: FloatArray, feed: FloatArray, profile: GcodeProfile
+) -> list[_ChainArc]:
+    """Arcs in a chain of moves between points (n, 2), each as long as it can be."""
+    count, fed = len(speeds), np.append(0.0, np.cumsum(feed))
+    least = _COMPACT if profile.compact else _LEAST
+    if count < least:
+        return []
+    window = np.arange(count - least + 1)[:, None]
+    firsts = points[window + np.arange(least + 1)], speeds[window + np.arange(least)]
+    starts = np.flatnonzero(_fitted(*firsts, profile)[0])
+
+    def fitted(first: int, moves: int) -> _ChainArc | None:
+        """Arc of so many moves from one on; None where they are on none."""
+        if first + moves > count or fed[first + moves] - fed[first] > profile.longest_feed:
+            return None
+        span = points[None, first : first + moves + 1], speeds[None, first : first + moves]
+        good, circles = _fitted(*span, profile)
+        x, y, sweep = circles[0].tolist()
+        return _ChainArc(first, first + moves - 1, (x, y, sweep)) if good[0] else None
+
+    arcs: list[_ChainArc] = []
+    free = 0
+    for start in starts.tolist():
+        arc = fitted(start, least) if start >= free else None
+        if arc is None:
+            continue
+        # Twice as many moves as long as they fit, then by halves between the last two numbers.
+        fit, most = least, 2 * least
+        while (longer := fitted(start, most)) is not None:
+            arc, fit, most = longer, most, 2 * most
+        while most - fit > 1:
+            middle = (fit + most) // 2
+            if (longer := fitted(start, middle)) is None:
+                most = middle
+            else:
+                arc, fit = longer, middle
+        arcs.append(arc)
+        free = start + fit
+    return arcs
+
+
+def _fitted(
+    points: FloatArray, speeds: FloatArray, profile: GcodeProfile
+) -> tuple[BoolArray, FloatArray]:
+    """Circles through the first and last of rows of points (m, k, 2), nearest to those between.
+
+    Returns
+    -------
+    good : (m,) bool array
+        Whether the arc may stand for the moves between the points.
+    circles : (m, 3) array
+        Centre and angle; zeros for a straight line.
+    """
+    tolerance = profile.arc_tolerance
+    first, last = points[:, 0], points[:, -1]
+    chord = last - first
+    size = np.linalg.norm(chord, axis=1)
+    along = chord / np.maximum(size, 1e-9)[:, None]
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    middle = 0.5 * (first + last)
+    off = points - middle[:, None]
+    u, v = np.einsum("mki,mi->mk", off, along), np.einsum("mki,mi->mk", off, across)
+    # Points at the distance of the ends from a centre on the perpendicular of the chord:
+    # u^2 + v^2 - 2 v h = (size / 2)^2, for h by least squares.
+    excess = u**2 + v**2 - (0.5 * size[:, None]) ** 2
+    height = (v * excess).sum(axis=1) / np.maximum(2.0 * (v**2).sum(axis=1), 1e-12)
+    centre = (middle + height[:, None] * across).round(COORDINATE_DIGITS)
+    ray = points - centre[:, None]
+    radius = np.linalg.norm(ray[:, 0], axis=1)
+    halves = 0.5 * (ray[:, 1:] + ray[:, :-1])
+    apart = [np.abs(np.linalg.norm(x, axis=2) - radius[:, None]).max(axis=1) for x in (ray, halves)]
+    turn = np.arctan2(
+        ray[:, :-1, 0] * ray[:, 1:, 1] - ray[:, :-1, 1] * ray[:, 1:, 0],
+        np.einsum("mki,mki->mk", ray[:, :-1], ray[:, 1:]),
+    )
+    sweep = turn.sum(axis=1)
+    length = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1)
+    good = (np.maximum(*apart) <= tolerance) & (radius <= _LARGEST) & (size > 1e-3)
+    good &= (np.sign(turn) == np.sign(sweep)[:, None]).all(axis=1) & (np.abs(sweep) <= _SWEEP)
+    good &= np.abs(radius * np.abs(sweep) / np.maximum(length, 1e-9) - 1.0) <= _LONGER
+    circles = np.column_stack([centre, sweep])
+    if profile.compact:
+        straight = (np.abs(v).max(axis=1) <= tolerance) & (length <= (1.0 + _LONGER) * size)
+        straight &= (np.diff(u, axis=1) > 0.0).all(axis=1)
+        good, circles[straight] = good | straight, 0.0
+    good &= speeds.max(axis=1) <= (1.0 + _SPEEDS) * speeds.min(axis=1)
+    return good, circles

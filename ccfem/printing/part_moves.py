@@ -14,7 +14,6 @@ from ccfem.geometry.polylines import along_line, extent, line_length, points_alo
 from ccfem.machine.machine import Machine
 from ccfem.machine.speeds import step_curvatures, table_speeds
 from ccfem.paths.toolpaths import FIBRE, SUPPORT
-from ccfem.printing.arcs import with_arcs
 from ccfem.printing.beside import Beside, beside
 from ccfem.printing.duration import durations
 from ccfem.printing.laid_layer import COORDINATE_DIGITS
@@ -36,6 +35,7 @@ from ccfem.printing.moves import (
     WORK,
     Moves,
     is_any,
+    with_arcs,
 )
 from ccfem.printing.print_plan import PrintPlan
 from ccfem.printing.recorder import Recorder, Steps, steps_along

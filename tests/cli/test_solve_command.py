@@ -16,7 +16,7 @@ from ccfem.cases.part_file import read_part
 from ccfem.comparison.report.report_views import read_solution
 from ccfem.fem.elasticity import solve
 from ccfem.fem.stress_files import read_stress
-from ccfem.printing.export.vtu_result import result_path
+from ccfem.printing.export.vtk import result_path
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "how_to" / "foreign_stress.md").read_text()

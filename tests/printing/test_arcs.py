@@ -12,9 +12,8 @@ from benchmarks.print_checks.printer import follow
 from ccfem.body.meshing import extrude
 from ccfem.machine import Machine, machine_names, machine_table, updated
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.printing.arcs import with_arcs
 from ccfem.printing.export.gcode import gcode
-from ccfem.printing.moves import LAY, Moves, role
+from ccfem.printing.moves import LAY, Moves, role, with_arcs
 from ccfem.printing.part_moves import part_moves
 from ccfem.printing.print_plan import plan_print
 from ccfem.slicing.slicers.planar import Planar

@@ -11,7 +11,7 @@ import pytest
 from benchmarks.print_checks.all_checks import CHECKS
 from benchmarks.print_checks.job import FILAMENT, PART, own
 from ccfem.machine import machine_names
-from ccfem.printing.export.robot_cell import write_robot_cell
+from ccfem.printing.export.robot_waypoints import write_robot_cell
 from ccfem.printing.part_moves import part_moves
 
 

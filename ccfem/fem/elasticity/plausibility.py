@@ -23,8 +23,7 @@ from ccfem.base.checks import BED, SPRING
 from ccfem.base.errors import InputError, SolveError
 from ccfem.base.tensor import von_mises
 from ccfem.body.mesh import TetMesh
-from ccfem.body.mesh.check import about_size, about_slivers
-from ccfem.body.mesh.wall_cells import coarse_wall
+from ccfem.body.mesh.check import about_size, about_slivers, coarse_wall
 from ccfem.fem.elasticity.error_estimate import ErrorEstimate
 from ccfem.fem.elasticity.held import Held, rigid_modes
 from ccfem.fem.elasticity.load_kinds import (

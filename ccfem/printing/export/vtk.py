@@ -1,4 +1,4 @@
-"""Toolpaths as a VTK PolyData file (.vtp), for ParaView and PyVista."""
+"""Toolpaths (.vtp) and results of a solve (.vtu) as files of VTK, for ParaView and others."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -7,9 +7,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ccfem.base.arrays import FloatArray
-from ccfem.base.errors import InputError
+from ccfem.base.errors import InputError, shown
+from ccfem.base.tensor import principal
 from ccfem.base.whole import whole_file
-from ccfem.body.files.vtk_xml import write_vtk_xml
+from ccfem.body.files.formats import vtu
+from ccfem.body.files.vtk_xml import as_bytes, write_vtk_xml
+from ccfem.fem.elasticity.stress_field import StressField
+from ccfem.fem.stress_files.stress_file import UNIT, VTK_COMPONENTS, vtk_tensors
 from ccfem.paths.toolpaths import Toolpaths
 
 
@@ -60,4 +64,66 @@ def write_paths(
                     "offsets": toolpaths.offsets[1:],
                 },
             },
+        )
+
+
+def result_path(path: str | Path, case: str = "") -> Path:
+    """Name of the file of a load case; of the whole result without one.
+
+    Raises
+    ------
+    InputError
+        When the name does not end in ``.vtu``, or that of the case cannot stand in one of a file.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".vtu":
+        raise InputError(f"a result is a VTK unstructured grid; got {path}: end it in .vtu")
+    if {"/", "\\", "\0"} & set(case):
+        raise InputError(
+            f"the name of load case {shown(case)} cannot stand in that of a file: rename it, or "
+            "take it alone by --load-case"
+        )
+    return path.with_name(f"{path.stem}-{case}{path.suffix}") if case else path
+
+
+def write_result(field: StressField, path: str | Path) -> None:
+    """Write a solution to a ``.vtu`` file, whole or not at all.
+
+    At the nodes: displacement, reaction, and recovered stress and strain. In the cells: stress,
+    strain, principal stresses, largest first, with a unit vector along the axis of each, and the
+    estimated error over the mean stress. Patches are field data ``patch:NAME``; units of stress and
+    length, and the load case, are field data too, as the bytes of their UTF-8, since meshio reads
+    no strings. Tensors have six components by name, shear of the strain being half the engineering
+    one.
+
+    Raises
+    ------
+    InputError
+        When the name does not end in ``.vtu``, or the file cannot be written.
+    """
+    path = result_path(path)
+    values, axes = principal(field.stress)
+    with whole_file(path) as temporary:
+        vtu.write(
+            field.mesh,
+            temporary,
+            {
+                "displacement": field.displacement,
+                "reaction": field.reactions,
+                "stress": vtk_tensors(field.nodal),
+                "strain": vtk_tensors(field.nodal_strain),
+            },
+            {
+                "stress": vtk_tensors(field.stress),
+                "strain": vtk_tensors(field.strain),
+                "principal_stress": values,
+                **{f"principal_direction_{k + 1}": axes[:, :, k] for k in range(3)},
+                "error": field.error.densities(field.mesh.volumes),
+            },
+            {
+                "load case": as_bytes(field.case),
+                UNIT: as_bytes("MPa"),
+                "unit of length": as_bytes("mm"),
+            },
+            dict.fromkeys(("stress", "strain"), VTK_COMPONENTS),
         )

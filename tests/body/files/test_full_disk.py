@@ -17,8 +17,7 @@ from ccfem.comparison.plot.canvas import new_figure, save
 from ccfem.fem.elasticity import Force, Problem, Support, solve
 from ccfem.fem.materials import isotropic
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
-from ccfem.printing.export.vtk import write_paths
-from ccfem.printing.export.vtu_result import write_result
+from ccfem.printing.export.vtk import write_paths, write_result
 
 MESH = box_mesh((20.0, 10.0, 5.0), (16, 8, 4))
 

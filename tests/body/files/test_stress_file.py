@@ -28,7 +28,7 @@ from ccfem.fem.materials import isotropic
 from ccfem.fem.stress_files import read_stress
 from ccfem.machine import Machine
 from ccfem.paths.planning import plan
-from ccfem.printing.export.vtu_result import write_result
+from ccfem.printing.export.vtk import write_result
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
 

@@ -10,7 +10,7 @@ from ccfem.fem.elasticity.assembly import assemble
 from ccfem.fem.elasticity.conjugate_gradient import highest_eigenvalue
 from ccfem.fem.elasticity.gauss_seidel import GaussSeidel
 from ccfem.fem.elasticity.held import rigid_modes
-from ccfem.fem.elasticity.quick_aggregation import aggregates, galerkin, quick_aggregation, smoothed
+from ccfem.fem.elasticity.multigrid import aggregates, galerkin, quick_aggregation, smoothed
 from ccfem.fem.materials import isotropic
 
 

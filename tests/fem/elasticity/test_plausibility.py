@@ -9,7 +9,7 @@ import ccfem
 from ccfem.base.checks import EXPANSION, FORCE, MASS_DENSITY, MODULUS, SPRING, STRENGTH, TRACTION
 from ccfem.base.errors import InputError, SolveError
 from ccfem.body.mesh import box_mesh
-from ccfem.body.mesh.wall_cells import coarse_wall
+from ccfem.body.mesh.check import coarse_wall
 from ccfem.cases.case import Case
 from ccfem.fem.elasticity import (
     Displacement,

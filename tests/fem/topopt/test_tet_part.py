@@ -11,8 +11,8 @@ from ccfem.body.mesh.box import box_mesh
 from ccfem.body.mesh.check import check_mesh
 from ccfem.fem.elasticity import Force, PointForce, Problem, Support, solve
 from ccfem.fem.materials import isotropic, transversely_isotropic
-from ccfem.fem.topopt import Design, Simp, as_problem, part_shape, tet_part as cut_module
-from ccfem.fem.topopt.tet_part import cut_mesh, relaxed, volume_above
+from ccfem.fem.topopt import Design, Simp, as_problem, part as cut_module, part_shape
+from ccfem.fem.topopt.part import cut_mesh, relaxed, volume_above
 
 PLA = isotropic(3000.0, 0.35)
 BOX = box_mesh((20.0, 20.0, 20.0), (16, 16, 16), alternating=True)
