@@ -27,10 +27,10 @@ from ccfem.body.mesh.face_rules import (
     Faces,
     Holes,
     OnBody,
+    about_patches,
     numbered_faces,
     without_faces,
 )
-from ccfem.body.mesh.patch_findings import about_patches
 from ccfem.body.mesh.patches import PatchRule, face_name, patches_from_rules, unit_vector
 from ccfem.body.mesh.shell import Shell, refined
 from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE, smooth_faces

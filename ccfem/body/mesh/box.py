@@ -49,11 +49,6 @@ def box_mesh(
     TetMesh
         Linear; cells brick by brick, six each, bricks and nodes numbered along x first; patches
         x_min, x_max, y_min, y_max, z_min, z_max.
-
-    Raises
-    ------
-    InputError
-        When a size is not positive or there are no divisions along an axis.
     """
     for length, count in zip(size, divisions, strict=True):
         check_number("size of a box", length, above=0.0, unit="mm")

@@ -88,13 +88,7 @@ class BodyFaces:
         return float(np.linalg.norm(np.ptp(self.points[self.triangles], axis=(0, 1))))
 
     def face(self, number: int) -> Face:
-        """Face of a number.
-
-        Raises
-        ------
-        InputError
-            Where there is none.
-        """
+        """Face of a number."""
         if number not in self.numbers:
             raise InputError(
                 f"the part has {len(self.faces)} faces; got number {number}: see ccfem faces for "

@@ -307,13 +307,7 @@ def match_boundary(mesh: Bounded, facets: IntArray) -> IntArray:
 
 
 def unit_vector(value: str | ArrayLike, what: str) -> FloatArray:
-    """Make a unit vector (3,) of "x", "-y", ... or of a vector that is not zero.
-
-    Raises
-    ------
-    InputError
-        That names `what`.
-    """
+    """Make a unit vector (3,) of "x", "-y", ... or of a vector that is not zero."""
     if isinstance(value, str):
         if value.removeprefix("-") not in _AXES:
             raise InputError(

@@ -161,11 +161,6 @@ def smooth_faces(
     tuple of Face
         The largest first, those of equal area by their centres: the order depends on the shape
         alone.
-
-    Raises
-    ------
-    InputError
-        For an angle out of range.
     """
     check_number("feature angle", angle, above=0.0, below=180.0, unit="degrees")
     points = np.asarray(points, dtype=np.float64)

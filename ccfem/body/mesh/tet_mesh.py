@@ -153,13 +153,7 @@ class CellMesh(ABC):
         return replace(self, patches={**self.patches, **patches}, axes={**kept, **axes})
 
     def patch(self, name: str) -> IntArray:
-        """Facets of a named patch.
-
-        Raises
-        ------
-        InputError
-            When there is no patch of that name; the known ones are listed.
-        """
+        """Facets of a named patch."""
         check_known("patch", name, sorted(self.patches))
         return self.patches[name]
 

@@ -11,8 +11,7 @@ from ccfem.base.errors import InputError
 from ccfem.body.files.surface import Surface
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.box import box_mesh
-from ccfem.body.mesh.face_rules import Faces, Holes, without_faces
-from ccfem.body.mesh.patch_findings import about_patches
+from ccfem.body.mesh.face_rules import Faces, Holes, about_patches, without_faces
 from ccfem.body.mesh.patches import Box, Cylinder, Plane, patches_from_rules
 from ccfem.body.mesh.smooth_faces import smooth_faces
 from ccfem.body.meshing import extrude, with_faces_of
