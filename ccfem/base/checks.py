@@ -171,13 +171,7 @@ def check_fields(value: object, *names: str, **bounds: Any) -> None:
 
 
 def check_choices(value: object) -> None:
-    """Refuse a dataclass with a field annotated as ``Literal[...]`` that holds none of its values.
-
-    Raises
-    ------
-    InputError
-        With the values that the field may hold.
-    """
+    """Refuse a dataclass with a field annotated as ``Literal[...]`` that holds another value."""
     for name, hint in get_type_hints(type(value)).items():
         if get_origin(hint) is Literal and getattr(value, name) not in get_args(hint):
             words = ", ".join(map(repr, get_args(hint)))
@@ -188,13 +182,7 @@ def check_choices(value: object) -> None:
 
 
 def check_known(kind: str, name: str, known: Iterable[str], cure: str = "") -> None:
-    """Refuse an unknown name, such as that of a material.
-
-    Raises
-    ------
-    InputError
-        With the known names, and what to do otherwise where `cure` says it.
-    """
+    """Refuse an unknown name, such as that of a material."""
     names = list(known)
     if name not in names:
         there = known_names(name, names) or "none"

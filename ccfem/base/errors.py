@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 
 class InputError(ValueError):
-    """Invalid input.
+    """Invalid input: whatever is outside what a function's parameters and files may be.
 
     The message is one line that says what was expected, what came and the cure; the command line
     prints it and exits with code 2.

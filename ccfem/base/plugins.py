@@ -91,13 +91,7 @@ def create(
 
 
 def by_class(package: str, name: str) -> Any:
-    """Find a member of a package by the name of its class, for attributes of the package.
-
-    Raises
-    ------
-    AttributeError
-        When no module of the package holds a class of that name.
-    """
+    """Find a member of a package by the name of its class, for attributes of the package."""
     module = re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
     if class_name(module) == name and importlib.util.find_spec(f"{package}.{module}"):
         return getattr(importlib.import_module(f"{package}.{module}"), name)

@@ -115,13 +115,7 @@ TomlTable = Mapping[str, Any]
 
 
 def read_toml(path: str | os.PathLike[str], what: str) -> dict[str, Any]:
-    """Read a TOML file.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be read or is none; with the line, and what helps.
-    """
+    """Read a TOML file."""
     return toml_of(text_of(path, what), f"{what} {path}")
 
 

@@ -27,11 +27,6 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
         When the block raises, `path` stays as it was. A link in its place is replaced, not
         followed.
 
-    Raises
-    ------
-    InputError
-        When the file cannot be written.
-
     Examples
     --------
     >>> import tempfile
@@ -83,13 +78,7 @@ def check_writable(path: str | os.PathLike[str]) -> Path:
 
 
 def existing_file(path: str | os.PathLike[str], what: str) -> Path:
-    """Return `path` when it is a file that can be read.
-
-    Raises
-    ------
-    InputError
-        When it is not; the message begins with `what`.
-    """
+    """Return `path` when it is a file that can be read."""
     path = Path(path)
     if not str(path).isprintable():  # a path of Windows whose \\t and \\n were read as escapes
         raise InputError(
@@ -106,13 +95,7 @@ def existing_file(path: str | os.PathLike[str], what: str) -> Path:
 
 
 def text_of(path: str | os.PathLike[str], what: str) -> str:
-    """Text of a file in UTF-8, with or without a byte order mark.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be read, or is in another encoding; the message begins with `what`.
-    """
+    """Text of a file in UTF-8, with or without a byte order mark."""
     path = existing_file(path, what)
     try:
         data = path.read_bytes()

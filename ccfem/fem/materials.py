@@ -259,13 +259,7 @@ def material_names() -> tuple[str, ...]:
 
 
 def named_material(name: str) -> Material:
-    """Material of the table; its `source` says which of its numbers are assumed.
-
-    Raises
-    ------
-    InputError
-        For an unknown name; the known ones are listed.
-    """
+    """Material of the table; its `source` says which of its numbers are assumed."""
     check_known("material", name, material_names())
     if name == "printed_pla":
         return printed_pla()  # as in the cases that come with ccfem

@@ -114,11 +114,6 @@ def medial_axis(
     -------
     MedialAxis
         Every part of the section has a segment or a node; a hole stays surrounded by a cycle.
-
-    Raises
-    ------
-    InputError
-        For a step that is not above 0.
     """
     check_number("step of the medial axis", step, above=0.0, unit="mm")
     border = _Border.of(section, step)

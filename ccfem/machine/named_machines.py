@@ -54,11 +54,6 @@ def machine_table(name: str | Path) -> dict[str, Any]:
     name : str or Path
         Of a machine (`machine_names`), or of a TOML file with a table ``[machine]``, as in part
         files. A file that names its ``last_table`` must end with it; otherwise it is cut off.
-
-    Raises
-    ------
-    InputError
-        For an unknown name, and for a file that describes no machine or is cut off.
     """
     text = str(name)
     if not text.endswith(".toml") and not {"/", "\\"} & set(text):
@@ -95,13 +90,7 @@ def _whole_table(table: TomlTable) -> dict[str, Any]:
 
 
 def machine_from(table: object, where: str = "machine") -> Machine:
-    """Make a machine of a table as in part files, with a ``profile`` or none.
-
-    Raises
-    ------
-    InputError
-        For an unknown key or a value of a wrong type, as `ccfem.base.toml.from_table`.
-    """
+    """Make a machine of a table as in part files, with a ``profile`` or none."""
     whole = _whole_table(table) if isinstance(table, Mapping) else table
     return from_table(Machine, whole, where)
 

@@ -165,12 +165,6 @@ def check_ranges(value: object) -> None:
     ----------
     value : Machine, SpeedTable, GcodeProfile, Process, Kinematics, Spools, Costs or Limits
         A field that is None passes; of a tuple every number is checked.
-
-    Raises
-    ------
-    InputError
-        With the range, and with the value in the unit that was meant where another one was
-        probably given.
     """
     table, hints = member_name(value), get_type_hints(type(value))
     for name, allowed in RANGES[table].items():

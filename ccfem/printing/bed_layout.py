@@ -36,11 +36,6 @@ class BedLayout:
         that of the bed, as far as there is room for what is printed beside them.
     copies : tuple of 1 or 2 ints
         How many, or how many along X and along Y.
-
-    Raises
-    ------
-    InputError
-        For numbers of copies below 1 or above 1000.
     """
 
     spin: float = 0.0
@@ -132,11 +127,6 @@ def turned(build: Sequence[float], turns: Sequence[str], spin: float = 0.0) -> t
     spin : float, degrees
         Above -180 and up to 180.
 
-    Raises
-    ------
-    InputError
-        For a text that is no turn.
-
     Examples
     --------
     >>> turned((0.0, 0.0, 1.0), ["x=90"])
@@ -163,13 +153,7 @@ def _about(axis: str, angle: float) -> FloatArray:
 
 
 def axis_and_angle(text: str) -> tuple[str, float]:
-    """Read a turn, ``x=90``, as an axis and its angle in degrees.
-
-    Raises
-    ------
-    InputError
-        For anything else.
-    """
+    """Read a turn, ``x=90``, as an axis and its angle in degrees."""
     axis, equals, angle = text.replace(" ", "").lower().partition("=")
     try:
         degrees = float(angle)
@@ -184,13 +168,7 @@ _COPIES = re.compile(r"\s*(\d{1,9})\s*(?:[xX*]\s*(\d{1,9})\s*)?")
 
 
 def copies_of(given: int | str) -> tuple[int, ...]:
-    """Read a number of copies, ``4``, or how many along X and Y, ``2x3``.
-
-    Raises
-    ------
-    InputError
-        For anything else.
-    """
+    """Read a number of copies, ``4``, or how many along X and Y, ``2x3``."""
     match = _COPIES.fullmatch(str(given))
     if match is None:
         raise InputError(
@@ -234,11 +212,6 @@ def bed_of(
         What stands in the file.
     base : BedLayout
         What the table changes; turns come after those that there are.
-
-    Raises
-    ------
-    InputError
-        For an unknown key, or a value of another kind.
     """
     given = from_table(BedTable, table, "bed")
     turns = [given.turn] if isinstance(given.turn, str) else given.turn

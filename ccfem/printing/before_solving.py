@@ -67,13 +67,7 @@ def check_room(
     machine: Machine,
     names: Sequence[str] = ("",),
 ) -> None:
-    """Print the outlines of the boxes of parts, each once at its top, with all beside them.
-
-    Raises
-    ------
-    InputError
-        For parts that do not fit on the bed.
-    """
+    """Print the outlines of the boxes of parts, each once at its top, with all beside them."""
     plans, many = [], sum(layout.count for layout in layouts) > 1
     for mesh, build, layout in zip(meshes, builds, layouts, strict=True):
         corners = mesh.points[np.unique(mesh.corners)] @ layout.frame(plane_frame(build)).T

@@ -75,13 +75,7 @@ class CalibrationSquare:
 
 
 def calibration_square(machine: Machine) -> CalibrationSquare:
-    """Plan the square for a machine.
-
-    Raises
-    ------
-    InputError
-        Where it does not fit on the bed, or the machine cannot print it.
-    """
+    """Plan the square for a machine."""
     machine = replace(machine, process=replace(machine.process, cover=0.0))
     length = machine.shortest_strand + _LONGER
     side, high = length + 2.0 * ALONG, _BASE + machine.strand_height
@@ -138,13 +132,7 @@ class Measured:
 
     @classmethod
     def of(cls, values: Mapping[str, float]) -> "Measured":
-        """Take named values.
-
-        Raises
-        ------
-        InputError
-            For a name or value that is none, a missing one, and one that is far off.
-        """
+        """Take named values."""
         names = [field.name for field in fields(cls)]
         for name in values:
             if name not in names:
@@ -178,11 +166,6 @@ def corrections(machine: Machine, measured: Measured) -> dict[str, float]:
         ``x`` and ``y``, mm, by which fibre lies too far to the right and to the back; ``start`` and
         ``end``, mm, by which a strand begins and ends too late; ``flow``, matrix that is fed over
         what was to be fed.
-
-    Raises
-    ------
-    InputError
-        For a mass that no matrix gives.
     """
     square = calibration_square(machine)
     x = 0.5 * (measured.left - measured.right)

@@ -26,11 +26,6 @@ class Course:
         or heights, as ``3.4mm``: it halts when what lies up to there is printed.
     from_layer : int
         Layer with which the file begins; what lies below is printed already.
-
-    Raises
-    ------
-    InputError
-        For a text that is neither, and a layer below 0.
     """
 
     pauses: tuple[str, ...] = ()

@@ -26,11 +26,6 @@ def check_matrix_lines(mesh: TetMesh, build: Sequence[float], machine: Machine) 
         The part: its volume is filled with lines as long as its mean section is wide.
     build : 3 floats
         Build direction.
-
-    Raises
-    ------
-    InputError
-        With the estimate, before anything is computed.
     """
     height, section = _mean_section(mesh, build)
     layers = height / machine.matrix_height
@@ -58,13 +53,7 @@ def about_strands(mesh: TetMesh, layers: int, build: Sequence[float], machine: M
 
 
 def check_strands(layers: Sequence[Layer], machine: Machine) -> None:
-    """Refuse layers that hold more than half a million strands side by side.
-
-    Raises
-    ------
-    InputError
-        With the estimate, before anything is planned.
-    """
+    """Refuse layers that hold more than half a million strands side by side."""
     areas: FloatArray = np.array([layer.areas.sum() for layer in layers])
     strands = float(np.sqrt(areas).sum()) / machine.fibre_width
     if strands > MOST_STRANDS:

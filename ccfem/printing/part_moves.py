@@ -54,11 +54,6 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
     ----------
     machine : Machine
         The machine that the plan was made for.
-
-    Raises
-    ------
-    InputError
-        Where a nozzle would leave the bed.
     """
     recorder, paths = Recorder(machine), plan.paths
     sites, lowest = _sites(plan, machine), plan.lowest

@@ -202,11 +202,6 @@ def _head_room(plan: PrintPlan, machine: Machine) -> float:
     Flat layers lie as high as all that is printed. On curved ones the tip of the head is lower, and
     its cone reaches aside as far as the others are higher; it leaves along its own axis, by which
     it goes away from what stands beside it.
-
-    Raises
-    ------
-    InputError
-        Where the tip is lower than the head is known to be long.
     """
     paths = plan.paths
     lower = plan.top[np.repeat(paths.layer, np.diff(paths.offsets))] - paths.points[:, 2]

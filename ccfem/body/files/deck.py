@@ -443,13 +443,7 @@ class Model:
 
 
 def read_deck(path: Path) -> tuple[Model, Deck]:
-    """Read a deck: its nodes, elements and sets, and what else it says.
-
-    Raises
-    ------
-    InputError
-        For data that does not read.
-    """
+    """Read a deck: its nodes, elements and sets, and what else it says."""
     deck = Deck()
     for block in _blocks(path):
         try:

@@ -11,13 +11,7 @@ from ccfem.base.errors import InputError
 
 
 def layer_files(folder: str | os.PathLike[str]) -> tuple[Path, ...]:
-    """Files of the layers in a folder, by the numbers in their names.
-
-    Raises
-    ------
-    InputError
-        When there is none.
-    """
+    """Files of the layers in a folder, by the numbers in their names."""
     files = sorted(Path(folder).glob("*.obj"), key=lambda file: by_number(file.stem))
     if not files:
         raise InputError(

@@ -32,11 +32,6 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0, check: bool = Tr
     check : bool, default True
         Normalise and mend the mesh with `ccfem.body.mesh.check.check_mesh`; a `UserWarning` says, a
         line each, what it found and mended. Without it the mesh comes as it stands in the file.
-
-    Raises
-    ------
-    InputError
-        When the file is missing, or is not a valid tetrahedral mesh.
     """
     path = existing_file(path, "mesh file")
     suffix = path.suffix.lower()
@@ -76,11 +71,6 @@ def write_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:
     path : path
         ``.vtu`` or ``.npz`` (patches kept) or ``.tet`` (linear meshes only, patches left out: the
         format has no place for them).
-
-    Raises
-    ------
-    InputError
-        For another suffix, a mesh that the format cannot hold, or a file that cannot be written.
     """
     path = Path(path)
     suffix = check_mesh_name(path)
@@ -91,13 +81,7 @@ def write_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:
 
 
 def check_mesh_name(path: Path) -> str:
-    """Return the suffix of a mesh file that can be written.
-
-    Raises
-    ------
-    InputError
-        For another suffix.
-    """
+    """Return the suffix of a mesh file that can be written."""
     suffix = path.suffix.lower()
     known = suffixes(writable=True)
     if suffix not in known:

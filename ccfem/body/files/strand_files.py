@@ -41,11 +41,6 @@ def read_strand_files(path: str | Path) -> list[list[FloatArray]]:
     """Strands (k, 3), mm, of each layer: of a file, or of all such files (.obj, .txt) of a folder.
 
     Files of a folder are layers in the order of the numbers in their names.
-
-    Raises
-    ------
-    InputError
-        For a folder without such files, and what does not read.
     """
     path = Path(path)
     if not path.is_dir():
@@ -59,13 +54,7 @@ def read_strand_files(path: str | Path) -> list[list[FloatArray]]:
 
 
 def check_near(points: FloatArray, name: str) -> None:
-    """Raise on points (n, 3) of paths that no printer reaches.
-
-    Raises
-    ------
-    InputError
-        The message begins with `name`.
-    """
+    """Raise on points (n, 3) of paths that no printer reaches."""
     farthest = float(np.abs(points).max())
     if farthest > _FARTHEST:
         raise InputError(

@@ -112,13 +112,7 @@ def read_surface(path: str | os.PathLike[str], scale: float = 1.0) -> Surface:
 
 
 def write_stl(path: Path, points: FloatArray, triangles: IntArray) -> None:
-    """Write triangles as binary STL, without normals: readers make them of the order of corners.
-
-    Raises
-    ------
-    OSError
-        When the file cannot be written; VTK's own writer then ends the process.
-    """
+    """Write triangles as binary STL, without normals: readers make them of the order of corners."""
     facets = np.zeros(
         len(triangles), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")]
     )

@@ -67,11 +67,6 @@ def triangulate(
         Boundary points, exactly on the outline, first.
     triangles : (t, 3) int array
         Counter-clockwise.
-
-    Raises
-    ------
-    InputError
-        When the polygon is empty or not valid, or the edge length is too long or too short for it.
     """
     _check_planform(polygon, edge_length)
     places = None if keep is None else tuple(map(tuple, np.asarray(keep).tolist()))

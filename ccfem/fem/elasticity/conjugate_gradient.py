@@ -182,13 +182,7 @@ def reached(solution: Solution, tolerance: float) -> bool:
 
 
 def checked(solution: Solution, tolerance: float, backend: str) -> Solution:
-    """Return a solution that is accurate enough.
-
-    Raises
-    ------
-    SolveError
-        Where it is not.
-    """
+    """Return a solution that is accurate enough."""
     if not reached(solution, tolerance):
         raise SolveError(
             f"{backend}: relative residual {solution.residual:.1e} after {solution.iterations} "

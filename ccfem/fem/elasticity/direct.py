@@ -521,11 +521,6 @@ def skyline(matrix: sp.bsr_array) -> Callable[[FloatArray], FloatArray]:
     ----------
     matrix : bsr_array (n, n)
         Symmetric positive definite.
-
-    Raises
-    ------
-    SolveError
-        When the matrix is not positive definite.
     """
     return _factor(matrix, *_ordering(matrix))
 

@@ -280,13 +280,7 @@ def load_case(problem: SupportedProblem, name: str) -> FloatArray:
 
 
 def load_cases(problem: SupportedProblem) -> dict[str, FloatArray]:
-    """Nodal forces of every load case of a problem: see `load_case`.
-
-    Raises
-    ------
-    InputError
-        For a bad load, and for a problem without one.
-    """
+    """Nodal forces of every load case of a problem: see `load_case`."""
     if not problem.loads:
         raise InputError("the part has no load case: give at least one load")
     return {name: load_case(problem, name) for name in problem.loads}
@@ -418,11 +412,6 @@ def free_strain(problem: Problem, case: str) -> FloatArray | None:
     """Free thermal strain (m, 4, 6) at the corners of each cell, linear between; None without heat.
 
     Voigt, with engineering shear, in the global frame; of a load case or a combination.
-
-    Raises
-    ------
-    InputError
-        When a material has no expansion.
     """
     mesh = problem.mesh
     change = np.zeros(len(mesh.points))

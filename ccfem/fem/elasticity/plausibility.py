@@ -283,11 +283,6 @@ def check_effect(problem: Problem, case: str, held: Held, forces: FloatArray, si
         Of the case.
     size : float, N
         Sum of the sizes of the forces that it is added up from.
-
-    Raises
-    ------
-    InputError
-        With the cause: cases of a combination that cancel, or loads on held nodes alone.
     """
     if held.value.any():
         return
@@ -324,11 +319,6 @@ def check_balance(
     forces, reactions : (n, 3) array, N
     moved : bool
         Whether supports move: the reactions are then loads, too.
-
-    Raises
-    ------
-    SolveError
-        With what is left of force and moment.
     """
     mesh, both = problem.mesh, forces + reactions
     arm = mesh.points - mesh.points[mesh.corners].mean(axis=(0, 1))
@@ -348,13 +338,7 @@ def check_balance(
 
 
 def check_size_of_motion(problem: Problem, case: str, displacement: FloatArray) -> None:
-    """Refuse a displacement (n, 3), mm, of more than ten times the part: see the top.
-
-    Raises
-    ------
-    InputError
-        That names a part which hardly anything holds as such.
-    """
+    """Refuse a displacement (n, 3), mm, of more than ten times the part: see the top."""
     far, size = _largest_difference(displacement), _size(problem)
     if not far <= _FARTHEST * size:
         raise InputError(f"load case '{case}': {_about_far(problem, displacement, far, size)}")

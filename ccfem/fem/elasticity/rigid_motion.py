@@ -66,11 +66,6 @@ def check_motion(mesh: CellMesh, points: FloatArray, holds: Holds) -> None:
     ----------
     points : (n, 3) array, mm
         Of its nodes, in space.
-
-    Raises
-    ------
-    InputError
-        Names the free motion.
     """
     body = connected(mesh.neighbours, len(mesh.cells))
     count = int(body.max()) + 1

@@ -97,13 +97,6 @@ class Solver:
         ----------
         matrix : bsr_array (n, n)
             Symmetric positive definite.
-
-        Raises
-        ------
-        InputError
-            When its pattern is another one.
-        SolveError
-            When the factorisation fails.
         """
         known = self.matrix
         if not (
@@ -188,11 +181,6 @@ def preconditioned_cg(
     solver : Solver
         For this matrix or a similar one (another stiffness on the same mesh and supports).
     x0 : (n,) array, optional
-
-    Raises
-    ------
-    SolveError
-        When the relative residual stays above the tolerance.
     """
     # The recursive residual drifts from the true one: aim lower, and restart from the result if the
     # true one is still too large.

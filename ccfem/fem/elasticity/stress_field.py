@@ -161,13 +161,7 @@ class Probe:
 
 
 def located(mesh: TetMesh, points: FloatArray, tolerance: float) -> tuple[IntArray, FloatArray]:
-    """Cell (k,) that holds each point (k, 3), and barycentric coordinates (k, 4) in it.
-
-    Raises
-    ------
-    InputError
-        When a point lies farther than the tolerance, mm, outside the part.
-    """
+    """Cell (k,) that holds each point (k, 3), and barycentric coordinates (k, 4) in it."""
     points = np.asarray(points, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
         raise InputError(f"points must be finite and of shape (k, 3), mm; got {points.shape}")
@@ -373,11 +367,6 @@ class StressField(Shown):
         -------
         (k, 3, 3) array, MPa
             Interpolated linearly between the corner nodes of the cell that holds each point.
-
-        Raises
-        ------
-        InputError
-            When a point lies further outside.
         """
         cell, weights = located(self.mesh, points, tolerance)
         return np.einsum("qk,qkij->qij", weights, self.nodal[self.mesh.corners[cell]])
@@ -401,11 +390,6 @@ class StressField(Shown):
         points : (k, 3) array, mm
         tolerance : float, mm
             As in `at`.
-
-        Raises
-        ------
-        InputError
-            When a point lies further outside.
         """
         points = np.asarray(points, dtype=np.float64)
         mesh = self.mesh
@@ -479,11 +463,6 @@ class WeightedCases:
         One for each case, with different names.
     weights : (n,) array
         Of the cases: positive, scaled so that their sum is 1.
-
-    Raises
-    ------
-    InputError
-        For no case, duplicate names, different meshes, and weights that are not positive numbers.
     """
 
     fields: tuple[StressField, ...]
@@ -530,11 +509,6 @@ class WeightedCases:
             Weighted cases without other weights are returned as they are.
         weights : mapping of name to float, optional
             Positive; cases that are not named do not count. Default: all count equally.
-
-        Raises
-        ------
-        InputError
-            For weights of unknown cases, and as the class.
         """
         if isinstance(fields, WeightedCases):
             if weights is None:

@@ -71,11 +71,6 @@ def held_in(problem: SupportedProblem, case: str, at_rest: Held) -> Held:
     ----------
     at_rest : Held
         From `held`.
-
-    Raises
-    ------
-    InputError
-        For a displacement of a patch that no support holds.
     """
     loads = problem.loads[case]
     moves = {load.patch: load.vector for load in loads if isinstance(load, Displacement)}
@@ -102,11 +97,6 @@ def check_support(mesh: CellMesh, fixed: BoolArray) -> None:
     Parameters
     ----------
     fixed : (n, 3) bool array, or (n, 2) in the plane
-
-    Raises
-    ------
-    InputError
-        Names the free motion.
     """
     check_motion(mesh, _in_space(mesh.points), Holds(*_axis_holds(fixed)))
 

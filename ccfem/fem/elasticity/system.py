@@ -120,13 +120,7 @@ class System:
         )
 
     def reactions(self, case: str, displacement: FloatArray, internal: FloatArray) -> FloatArray:
-        """Reactions (n, 3), N, to a displacement (n, 3), mm, that needs the given forces (n, 3).
-
-        Raises
-        ------
-        SolveError
-            Where they do not balance the loads.
-        """
+        """Reactions (n, 3), N, to a displacement (n, 3), mm, that needs the given forces (n, 3)."""
         forces, held = self.forces_in(case), self.held_in(case)
         residual = internal - forces
         result = held.supported(residual)

@@ -45,11 +45,6 @@ def tied_nodes(
     """Tie nodes (k,) to facets (f, 3); those farther away than a distance, mm, stay free.
 
     Nodes of the facets are not tied to themselves.
-
-    Raises
-    ------
-    InputError
-        When all of them are too far away.
     """
     of_facet = mesh.facet_nodes(facets)
     nodes = np.setdiff1d(nodes, of_facet)

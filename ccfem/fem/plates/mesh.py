@@ -148,11 +148,6 @@ def raster_mesh(
         values`` puts them back. Corners from the lower left one, counter-clockwise. Nodes are
         numbered along the shorter side first. Patches x_min, x_max, y_min, y_max: the edges on
         the sides of the box that holds the part.
-
-    Raises
-    ------
-    InputError
-        For an image without a true pixel, and a size that is not positive.
     """
     mask = np.asarray(mask, dtype=bool)
     if mask.ndim != 2 or not mask.any() or not size > 0.0:
@@ -200,13 +195,7 @@ class Raster(NamedTuple):
 
 
 def raster_image(mesh: PlaneMesh, values: FloatArray) -> Raster:
-    """Values (m,) of the cells of a raster mesh as an image: `raster_mesh` backwards.
-
-    Raises
-    ------
-    InputError
-        When the cells are not squares of one size on one grid.
-    """
+    """Values (m,) of the cells of a raster mesh as an image: `raster_mesh` backwards."""
     low, high = (mesh.points[mesh.cells].min(axis=1), mesh.points[mesh.cells].max(axis=1))
     size = float((high - low)[0, 0])
     place = (low - mesh.bounds[0]) / size

@@ -296,13 +296,7 @@ class PlaneSystem:
 
 
 def prepare(problem: PlaneProblem, elements: PlaneElements | None = None) -> PlaneSystem:
-    """Check a plate and collect what its solves share; elements of an earlier system of its mesh.
-
-    Raises
-    ------
-    InputError
-        For an invalid mesh, stiffness, support or load.
-    """
+    """Check a plate and collect what solves share; elements of an earlier system of its mesh."""
     mesh = problem.mesh
     if not np.isfinite(mesh.points).all():
         raise InputError("the mesh has points that are NaN or infinite: correct its coordinates")
@@ -360,13 +354,6 @@ def solve_plane(
     Returns
     -------
     dict of load case name to PlaneField
-
-    Raises
-    ------
-    InputError
-        For an invalid mesh, stiffness, support, load or backend.
-    SolveError
-        When a relative residual stays above the tolerance.
     """
     fields = solve_system(partial(prepare, problem, elements), backend, tolerance)
     return KnownNames("load case", fields)

@@ -60,13 +60,7 @@ def component_of(name: str) -> int:
 
 
 def component_order(names: Sequence[str], what: str) -> list[int]:
-    """Column of each Voigt component by the names of the columns.
-
-    Raises
-    ------
-    InputError
-        Where a component is missing or comes twice.
-    """
+    """Column of each Voigt component by the names of the columns."""
     components = [component_of(name) for name in names]
     if sorted(k for k in components if k >= 0) != list(range(6)):
         given = ", ".join(repr(name) for name in names)

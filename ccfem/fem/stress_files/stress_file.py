@@ -300,11 +300,6 @@ def table_stress(path: Path) -> StressData:
     from 1, every one once in any order; and the six components as ``Sxx [MPa]``, ``S12`` or ``xy``,
     all with the same unit or none. Other columns are left out. Columns are separated by commas,
     semicolons or tabs; lines that start with ``#`` are left out.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be read, a column or a line is missing, or a value is no number.
     """
     lines = {
         number: line

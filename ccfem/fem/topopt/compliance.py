@@ -98,13 +98,7 @@ class Compliance:
         self.centres = self.cells.mean(self._equations.centres, volumes)
 
     def __call__(self, factor: FloatArray, stiffness: FloatArray | None = None) -> Response:
-        """Response with factors (g,) in (0, 1], and where given with another stiffness.
-
-        Raises
-        ------
-        SolveError
-            When a solve misses its tolerance.
-        """
+        """Response with factors (g,) in (0, 1], and where given with another stiffness."""
         equations, member = self._equations, self.cells.member
         elements = equations.elements(None if stiffness is None else stiffness[member])
         self._displacements(equations.assemble(factor[member], elements))
@@ -193,13 +187,7 @@ class PlateEquations:
 
 
 class TetEquations:
-    """Equations of linear tetrahedra; their elements are the stiffness, (6, 6) or (m, 6, 6), MPa.
-
-    Raises
-    ------
-    InputError
-        For quadratic tetrahedra, and a problem that has a density already.
-    """
+    """Equations of linear tetrahedra; elements are the stiffness, (6, 6) or (m, 6, 6), MPa."""
 
     def __init__(self, problem: Problem) -> None:
         if problem.mesh.order != 1:

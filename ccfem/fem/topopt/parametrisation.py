@@ -38,11 +38,6 @@ class ConeFilter:
         ----------
         radius : float, mm
             Above 0; below the distance of the centres, nothing is averaged.
-
-        Raises
-        ------
-        InputError
-            For a radius so large that it reaches too many cells.
         """
         m = len(centres)
         tree = cKDTree(centres)

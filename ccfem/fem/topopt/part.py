@@ -198,11 +198,6 @@ def part_mesh(
     TetMesh
         The piece that joins all loads and supports: cut where the density, averaged at the nodes,
         passes the threshold; small enclosed voids filled; smoothed.
-
-    Raises
-    ------
-    InputError
-        When no piece joins them.
     """
     problem = design.full
     assert isinstance(problem, Problem)
@@ -408,11 +403,6 @@ def part_shape(
     shapely Polygon or Surface, mm
         Of a plate on a raster its outline, of tetrahedra a closed surface: of the piece that joins
         all loads and supports, smoothed, within the domain.
-
-    Raises
-    ------
-    InputError
-        When no piece joins them.
     """
     if isinstance(design.full, PlaneProblem):
         return plate_outline(design, volume_fraction, threshold, domain)
@@ -493,13 +483,7 @@ def plate_outline(
     threshold: float | None = None,
     domain: Any = None,
 ) -> Any:
-    """Outline of a design of squares: see `part_shape`.
-
-    Raises
-    ------
-    InputError
-        When no piece joins all loads and supports, and for a mesh that is no raster.
-    """
+    """Outline of a design of squares: see `part_shape`."""
     plate = design.full
     assert isinstance(plate, PlaneProblem)
     raster = raster_image(plate.mesh, design.density)
@@ -623,13 +607,7 @@ class Walls:
         return cls(facets, middle, normal[upright, :2], pixel, edge_length)
 
     def patches(self, plate: PlaneMesh, needed: tuple[str, ...]) -> dict[str, IntArray]:
-        """Patches of the walls by those of the plate; those without a wall are dropped.
-
-        Raises
-        ------
-        InputError
-            When a needed one is dropped.
-        """
+        """Patches of the walls by those of the plate; those without a wall are dropped."""
         patches = {}
         for name, edges in plate.patches.items():
             if edges.shape[1] == 1:

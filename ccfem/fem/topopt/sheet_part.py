@@ -54,11 +54,6 @@ def sheet_problem(
         In plane stress.
     prism : (m,) int array
         Cells that are to share their density.
-
-    Raises
-    ------
-    InputError
-        For loads across the plane.
     """
     for name, loads in problem.loads.items():
         for load in loads:
@@ -119,11 +114,6 @@ def sheet_outline(design: Design, flat: FlatPart, edge_length: float, solid: Any
         Of its mesh.
     solid, void : shapely geometries, mm
         Areas that stay full, and empty, exactly.
-
-    Raises
-    ------
-    InputError
-        When no piece joins all loads and supports.
     """
     problem = design.full
     assert isinstance(problem, Problem)
@@ -183,13 +173,7 @@ def _at_nodes(design: Design) -> FloatArray:
 
 
 def sheet_part(problem: Problem, flat: FlatPart, planform: Any, edge_length: float) -> Problem:
-    """Part of another planform within that of a flat part, held and loaded as that one.
-
-    Raises
-    ------
-    InputError
-        When a patch that is held or loaded is gone.
-    """
+    """Part of another planform within that of a flat part, held and loaded as that one."""
     mesh = extrude(planform, flat.high - flat.low, edge_length, keep=flat.ends())
     mesh = TetMesh(mesh.points + np.array([0.0, 0.0, flat.low]), mesh.cells)
     patches = flat.patches(mesh)

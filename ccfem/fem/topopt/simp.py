@@ -43,11 +43,6 @@ class Simp(Parameters):
     max_iterations : int, default 200
     backend : str, default "auto"
         Of the solves.
-
-    Raises
-    ------
-    InputError
-        For a parameter out of its range.
     """
 
     def __call__(

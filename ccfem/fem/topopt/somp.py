@@ -132,11 +132,6 @@ class Somp(Parameters):
         "principal", "gradient" (steps of at most 5 degrees down the filtered gradient) or "fixed".
     relaxation : float in (0, 1], default 0.5
         Share of the way to the principal direction that is gone in an iteration.
-
-    Raises
-    ------
-    InputError
-        For a parameter out of its range.
     """
 
     minimum_stiffness: float = 1e-3
@@ -184,13 +179,6 @@ class Somp(Parameters):
         -------
         Design
             With `angle`, in (-pi/2, pi/2].
-
-        Raises
-        ------
-        InputError
-            As in `Simp`, and for a material that is not symmetric about the x-y plane.
-        SolveError
-            When a solve misses its tolerance.
         """
         m = len(problem.mesh.cells)
         first, stiffness = _first_angle(angle, m), _checked_stiffness(problem, stiffness)

@@ -131,11 +131,6 @@ def fit_cone(
     ----------
     surface, direction, density, weight, width, spacing_weight
         As in `fit_constrained`.
-
-    Raises
-    ------
-    SolveError
-        With the status of the solver if it did not find the optimum.
     """
     import cvxpy
 

@@ -310,11 +310,6 @@ def link_tracks(
     -------
     LinkedPath
         Empty without tracks; a single track is returned as it is.
-
-    Raises
-    ------
-    InputError
-        For points that are not finite, an empty section, or a width that is not positive.
     """
     wanted = [[_clean(track) for track in group if len(track) > 1] for group in groups]
     wanted = [[track for track in group if len(track) > 1] for group in wanted]
@@ -482,11 +477,6 @@ def order_clusters(clusters: Clusters, exact: int = _EXACT, rounds: int = 30) ->
     -------
     (p, 2) int array
         Terminals entered and left, in order.
-
-    Raises
-    ------
-    InputError
-        For arrays that do not fit together, or where no way exists.
     """
     links, visit = (np.ascontiguousarray(cost, dtype=np.float64) for cost in clusters[:2])
     offsets = np.ascontiguousarray(clusters.offsets, dtype=np.int64)

@@ -209,11 +209,6 @@ def plan_to_length(
         Length on a few layers with the strategy's own value (`sampled_length`), if known.
     alike : (n,) int array, optional
         As of `plan`.
-
-    Raises
-    ------
-    InputError
-        When `wanted` is not a positive number, or whatever the strategy raises.
     """
     known = () if start is None else (start,)
     lengths = (wanted,)

@@ -58,11 +58,6 @@ class GivenPaths:
         ----------
         direction : (3,) array
             Unit vector of the build direction.
-
-        Raises
-        ------
-        InputError
-            When a path is not flat across the build direction.
         """
         return np.unique(self._levels(np.asarray(direction, dtype=np.float64)).round(3))
 
@@ -101,11 +96,6 @@ class GivenPaths:
         ----------
         layers : sequence of Layer
             Where one is curved, the points are moved onto the layer that is nearest to their path.
-
-        Raises
-        ------
-        InputError
-            When a path lies on none of them: farther from it than half its height.
         """
         if curved_layers(layers):
             return self._on_curved(layers)

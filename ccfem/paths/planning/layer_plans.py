@@ -115,14 +115,7 @@ def plan_layers(
 
 
 def check_layers(strategy: Strategy, layers: Sequence[Layer], machine: Machine) -> None:
-    """Refuse layers that no strategy, or not this strategy, can plan on.
-
-    Raises
-    ------
-    InputError
-        When the strategy plans on flat layers only and a layer is curved, and when layers are
-        nearer than a strand is high.
-    """
+    """Refuse layers that no strategy, or not this strategy, can plan on."""
     curved = [layer.index for layer in curved_layers(layers)]
     if curved and getattr(strategy, "flat_layers_only", False):
         raise InputError(

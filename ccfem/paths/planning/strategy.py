@@ -201,13 +201,7 @@ class ByCoverage:
         machine: Machine,
         lengths: Sequence[float],
     ) -> "Sequence[tuple[Strategy, LayerPlanner]]":
-        """Plan for one load case by `for_cases`.
-
-        Raises
-        ------
-        InputError
-            As `for_part`.
-        """
+        """Plan for one load case by `for_cases`."""
         cases = WeightedCases.of(solved(stress, member_name(self)))
         return self.for_cases(cases, layers, machine, lengths)
 

@@ -89,11 +89,6 @@ def as_printed(
         Of solid plastic.
     fibre : sequence of Layer
         Flat layers that may get fibre; at least one.
-
-    Raises
-    ------
-    InputError
-        For a material that is not isotropic.
     """
     share, frame = infill_share(problem.mesh, fibre, plastic, machine)
     stiffness = np.array(np.broadcast_to(problem.cell_stiffness, (len(share), 6, 6)))

@@ -107,11 +107,6 @@ def bitmap(section: Region, pixel: float) -> Bitmap:
     section : shapely (Multi)Polygon, mm
         Its bitmap may be empty.
     pixel : float, mm
-
-    Raises
-    ------
-    InputError
-        For a pixel that is not above 0, or that is far too small for the section.
     """
     check_number("the pixel of a bitmap", pixel, above=0.0, unit="mm")
     section = shapely.force_2d(section)  # a copy of its own, to be prepared

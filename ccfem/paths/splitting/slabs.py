@@ -110,11 +110,6 @@ def check_cover(slabs: Sequence[Slab], machine: Machine) -> list[str]:
     list of str
         A warning for each side where it is one layer alone, and for layers of matrix that are
         lower than the machine's least line.
-
-    Raises
-    ------
-    InputError
-        Where it is less than `Process.cover`.
     """
     fibre = [k for k, slab in enumerate(slabs) if slab.fibre is not None]
     if not fibre:

@@ -91,11 +91,6 @@ def write_gcode(path: str | Path, plan: PrintPlan, machine: Machine, title: str 
         The one that the plan was made for.
     title : str, optional
         Said at the head of the file.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be written, or a nozzle would leave the bed.
     """
     pieces = gcode_pieces(part_moves(plan, machine), plan, machine, title)
     with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:

@@ -39,11 +39,6 @@ def draw_layer(paths: Toolpaths, layer: Layer, width: float, file: str | Path) -
         Of a strand.
     file : path
         ``.svg`` or ``.dxf``.
-
-    Raises
-    ------
-    InputError
-        For a curved layer, another suffix, and a file that cannot be written.
     """
     if layer.flat is None:
         raise InputError(

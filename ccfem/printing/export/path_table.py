@@ -88,11 +88,6 @@ def read_path_table(path: str | Path, axes: FloatArray, normal: FloatArray) -> T
         Rows: the axes of the coordinates in the frame of the mesh.
     normal : (3,) array
         Of the layers.
-
-    Raises
-    ------
-    InputError
-        With the line that is not what the format says.
     """
     try:
         first, *rows = [*csv.reader(text_of(path, "path table").splitlines())] or [[]]

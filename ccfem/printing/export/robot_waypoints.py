@@ -41,11 +41,6 @@ def write_robot_waypoints(
     Notes
     -----
     x, y, z and height (of the layer at the point) in mm, in the frame of the mesh.
-
-    Raises
-    ------
-    InputError
-        When a path lies on a layer that is not given, or the file cannot be written.
     """
     fibre, known = toolpaths.of_kind(kind), {layer.index: layer for layer in layers}
     missing = set(fibre.layer.tolist()) - set(known)
@@ -80,11 +75,6 @@ def write_layer_waypoints(path: str | Path, toolpaths: Toolpaths, layer: int) ->
     ----------
     layer : int
         Index of the layer.
-
-    Raises
-    ------
-    InputError
-        When the layer has no fibre, or the file cannot be written.
     """
     fibre = toolpaths.of_kind(FIBRE).on_layer(layer)
     if not len(fibre):
@@ -110,11 +100,6 @@ def read_layer_waypoints(path: str | Path, layer: Layer) -> Toolpaths:
     ----------
     layer : Layer
         That the strands lie on.
-
-    Raises
-    ------
-    InputError
-        When the file is none of this kind.
     """
     file = existing_file(path, "waypoint file")
     try:
@@ -158,11 +143,6 @@ def write_robot_cell(path: str | Path, moves: Moves) -> None:
     ``end`` of a strand, ``cut``, ``tool N``, and those with a value: ``standby``, ``preheat``,
     ``heat`` and ``work`` with the temperature of the tool, ``heat bed``, ``fan`` with a share,
     ``wait`` with seconds, ``layer`` and ``pause`` with its number.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be written.
     """
     with whole_file(path) as temporary, temporary.open("w", encoding="ascii") as file:
         file.write(_CELL_HEADER + "\n")

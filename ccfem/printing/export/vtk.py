@@ -30,11 +30,6 @@ def write_paths(
     ----------
     path_data : mapping of name to (K,) array, optional
         Further values, one per path.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be written, or an array has the wrong length.
     """
     points: dict[str, ArrayLike] = {"normals": toolpaths.normals, "link": toolpaths.link}
     paths: dict[str, ArrayLike] = {
@@ -68,13 +63,7 @@ def write_paths(
 
 
 def result_path(path: str | Path, case: str = "") -> Path:
-    """Name of the file of a load case; of the whole result without one.
-
-    Raises
-    ------
-    InputError
-        When the name does not end in ``.vtu``, or that of the case cannot stand in one of a file.
-    """
+    """Name of the file of a load case; of the whole result without one."""
     path = Path(path)
     if path.suffix.lower() != ".vtu":
         raise InputError(f"a result is a VTK unstructured grid; got {path}: end it in .vtu")
@@ -95,11 +84,6 @@ def write_result(field: StressField, path: str | Path) -> None:
     length, and the load case, are field data too, as the bytes of their UTF-8, since meshio reads
     no strings. Tensors have six components by name, shear of the strain being half the engineering
     one.
-
-    Raises
-    ------
-    InputError
-        When the name does not end in ``.vtu``, or the file cannot be written.
     """
     path = result_path(path)
     values, axes = principal(field.stress)

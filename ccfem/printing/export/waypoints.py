@@ -41,11 +41,6 @@ def read_waypoints(path: str | Path, frame: FloatArray) -> Toolpaths:
     Toolpaths
         In the frame of the mesh, layers numbered as in the file. A path is closed when its ends lie
         within 0.001 mm of each other, which are then made equal.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be read, or a line is not what the format says.
     """
     lines, layers = _parse(text_of(path, "waypoint file"), str(path))
     if not lines:
@@ -139,11 +134,6 @@ def write_waypoints(
         Layers that the paths lie on; every one of them gets its line in the file.
     pattern : str, default ""
         Name of a published pattern that turns back by design, for the first line.
-
-    Raises
-    ------
-    InputError
-        When a path lies on a layer that is not given, or the file cannot be written.
     """
     fibre = toolpaths.of_kind(FIBRE)
     missing = set(fibre.layer.tolist()) - {layer.index for layer in layers}

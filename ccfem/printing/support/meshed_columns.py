@@ -98,11 +98,6 @@ def support_columns(
         Height of the lowest point of the part above the bed.
     pitch : float, mm, default 0.25
         Distance of the columns.
-
-    Raises
-    ------
-    InputError
-        For an angle outside 0 to 90 degrees, a lift below 0, or a pitch that is not above 0.
     """
     check_number("angle", angle, at_least=0.0, below=90.0, unit="degrees")
     check_number("lift", lift, at_least=0.0, unit="mm")

@@ -82,11 +82,6 @@ def joint_of(mesh: TetMesh, name: str, rings: int = 4, direction: ArrayLike | No
         Extent of its region in edges round the wall (Fang et al. 2024: 4).
     direction : (3,) array, optional
         Replaces the axis of the hole, and that which the rule of the patch states.
-
-    Raises
-    ------
-    InputError
-        When the mesh has no such patch, or it is empty.
     """
     facets = mesh.patch(name)
     if not len(facets):
@@ -279,11 +274,6 @@ def joint_lines(stress: PartStress, joints: Sequence[Joint], keep: Keep) -> Join
     Parameters
     ----------
     keep : {"joining", "touching", "all"}
-        As in `critical_region`.
-
-    Raises
-    ------
-    InputError
         As in `critical_region`.
     """
     known = vars(stress).setdefault(_KNOWN, {})

@@ -217,13 +217,7 @@ class Layer(Shown):
 
     @cached_property
     def plane(self) -> "FlatLayer":
-        """The layer seen in its plane.
-
-        Raises
-        ------
-        InputError
-            When the layer is curved.
-        """
+        """The layer seen in its plane."""
         if self.flat is None:
             raise InputError(
                 f"layer {self.index} is curved and lies in no plane: choose a planar slicing, or "
@@ -291,13 +285,7 @@ class FlatLayer(Plane):
 
 
 def holes_on(layer: Layer, patches: Iterable[str]) -> list[shapely.Polygon]:
-    """Holes of a flat layer whose edge touches one of the patches, as shapely Polygons.
-
-    Raises
-    ------
-    InputError
-        For a patch that the part does not have.
-    """
+    """Holes of a flat layer whose edge touches one of the patches, as shapely Polygons."""
     touched: set[int] = set()
     for name in patches:
         check_known("patch", name, sorted(layer.patches))

@@ -22,14 +22,7 @@ def named() -> Mapping[str, type[Slicer]]:
 
 
 def create(name: str, parameters: Mapping[str, Any] | None = None) -> Slicer:
-    """Make a slicer from its name and parameters.
-
-    Raises
-    ------
-    InputError
-        For an unknown slicer or parameter (the message lists the known ones), and for a value of
-        the wrong type.
-    """
+    """Make a slicer from its name and parameters."""
     return plugins.create("slicer", named(), name, parameters)
 
 
@@ -38,11 +31,6 @@ def from_text(text: str) -> Slicer:
 
     A value without a name belongs to the parameter that the slicer names in `shorthand`:
     ``planar:z`` is ``planar:axis=z``.
-
-    Raises
-    ------
-    InputError
-        As in `create`.
     """
     method, _, rest = (part.strip() for part in text.partition(":"))
     parameters = {}
@@ -78,11 +66,6 @@ def as_slicer(layers: "int | Sequence[float] | str | Slicer") -> Slicer:
     layers : int, sequence of float, str or Slicer
         A number of flat layers, their heights in mm, the name of a slicer with parameters as in
         `from_text`, or a slicer itself.
-
-    Raises
-    ------
-    InputError
-        For anything else, as the class of a slicer.
     """
     if isinstance(layers, str):
         return from_text(layers)

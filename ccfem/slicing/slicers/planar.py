@@ -83,24 +83,12 @@ class Planar:
             object.__setattr__(self, "heights", _rising(self.heights))
 
     def __call__(self, stress: PartStress, build: Vector, machine: Machine) -> tuple[Layer, ...]:
-        """Cut a part into flat layers; the stress has no influence.
-
-        Raises
-        ------
-        InputError
-            As of `cut`, and when layers are nearer than a strand of the machine is high.
-        """
+        """Cut a part into flat layers; the stress has no influence."""
         self.check(stress.mesh, build, machine)  # before thousands of layers are cut
         return self.cut(stress.mesh, build)
 
     def check(self, mesh: TetMesh, build: Vector, machine: Machine) -> FloatArray:
-        """Refuse layers nearer to each other than a strand of a machine is high; their heights.
-
-        Raises
-        ------
-        InputError
-            Also for a height outside the part, and a slab that is higher than the part.
-        """
+        """Refuse layers nearer to each other than a strand of a machine is high; their heights."""
         stack = self._stack(mesh, plane_frame(_AXES.get(self.axis, build)))
         check_heights(stack, machine)
         return stack
@@ -143,11 +131,6 @@ class Planar:
 
         Each is cut when it is asked for, and those between the same nodes only once as far as they
         are equal: hundreds of layers of a prism need little more memory than one.
-
-        Raises
-        ------
-        InputError
-            As of `cut`.
         """
         frame = plane_frame(_AXES.get(self.axis, build))
         cells = _CellsByHeight.of(mesh, frame)

@@ -54,13 +54,7 @@ class Surfaces:
         )
 
     def check(self, mesh: TetMesh, build: Vector, machine: Machine) -> None:
-        """Refuse files that cannot be read, and layers that miss the box of a part.
-
-        Raises
-        ------
-        InputError
-            As `layer_from_surface`.
-        """
+        """Refuse files that cannot be read, and layers that miss the box of a part."""
         low, high = mesh.bounds
         for k, (points, triangles) in enumerate(self._sheets()):
             corners = points[np.unique(triangles)]

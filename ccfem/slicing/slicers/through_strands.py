@@ -77,13 +77,7 @@ class ThroughStrands:
         )
 
     def check(self, mesh: TetMesh, build: Vector, machine: Machine) -> None:
-        """Refuse files that cannot be read, and layers whose strands miss the box of a part.
-
-        Raises
-        ------
-        InputError
-            As when layers are cut.
-        """
+        """Refuse files that cannot be read, and layers whose strands miss the box of a part."""
         low, high = mesh.bounds[0] - self.reach, mesh.bounds[1] + self.reach
         for k, cloud in enumerate(self._clouds()):
             if not ((cloud >= low) & (cloud <= high)).all(axis=1).any():

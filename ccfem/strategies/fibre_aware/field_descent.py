@@ -49,13 +49,7 @@ class FieldMetric:
 
     @classmethod
     def of(cls, matrix: Any) -> "FieldMetric":
-        """Metric of a symmetric positive definite sparse matrix (c, c).
-
-        Raises
-        ------
-        SolveError
-            When the matrix is not positive definite.
-        """
+        """Metric of a symmetric positive definite sparse matrix (c, c)."""
         options = {"SymmetricMode": True}
         order = "MMD_AT_PLUS_A"
         factor = splu(sp.csc_array(matrix), order, diag_pivot_thresh=0.0, options=options)

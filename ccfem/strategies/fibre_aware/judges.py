@@ -43,11 +43,6 @@ class Goal:
         (`ccfem.strategies.fibre_aware.upper_bound.measures`); of one case any number.
     objective : {"worst", "sum", "least"}
         What counts: the case that is farthest below what it is measured by, or the weighted mean.
-
-    Raises
-    ------
-    InputError
-        For an unknown objective.
     """
 
     parts: tuple[Specimen, ...]

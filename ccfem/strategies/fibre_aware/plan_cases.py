@@ -53,11 +53,6 @@ def plan_cases(
         nothing is taken off.
     strand : Strand, optional
         Of the tests; default rho = EA/E = 4 mm^2.
-
-    Raises
-    ------
-    InputError
-        Whatever the strategy raises.
     """
     check_layers(strategy, layers, machine)
     if wanted is None and isinstance(strategy, LengthStrategy):

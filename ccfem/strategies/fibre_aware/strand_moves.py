@@ -124,13 +124,7 @@ def moved(
 
 
 def check_moves(moves: int, layers: Sequence[Layer]) -> None:
-    """Refuse to move strands on curved layers.
-
-    Raises
-    ------
-    InputError
-        When strands are to move and a layer is curved.
-    """
+    """Refuse to move strands on curved layers."""
     if moves and curved_layers(layers):
         raise InputError("strands move on flat layers only; got a curved one: set moves to 0")
 

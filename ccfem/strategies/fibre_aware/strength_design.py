@@ -91,13 +91,7 @@ class StrengthProblem:
         field: FloatArray,
         solutions: tuple[SmearedSolution, ...],
     ) -> "StrengthProblem":
-        """Problem whose indices are exact at the given fields, and follow their norms from there.
-
-        Raises
-        ------
-        InputError
-            Where no fibre is stretched.
-        """
+        """Problem whose indices are exact at given fields, and follow their norms from there."""
         judges = tuple(MatrixPeaks(part.specimen.unreinforced) for part in problem.parts)
         bare = cls(problem, limits, strength, judges, {})
         peaks = bare._peaks(problem.smeared(field), solutions)

@@ -83,13 +83,7 @@ class Worth:
 
     @classmethod
     def of(cls, parts: Sequence[Specimen], strand: Strand | None, strength: float) -> "Worth":
-        """Worth of strands in a part of one material, under one or several load cases.
-
-        Raises
-        ------
-        InputError
-            When `strength` is outside [0, 1], or the strength of matrix or fibre is missing.
-        """
+        """Worth of strands in a part of one material, under one or several load cases."""
         check_number("strength", strength, at_least=0.0, at_most=1.0)
         strand = Strand() if strand is None else strand
         limits = Limits.of(parts[0].system.problem.material, strand)
@@ -132,11 +126,6 @@ class Worth:
             Of all layers. Without it the bond between layers does not count.
         counts : (n,) array, optional
             Weight of each load case in the stiffness, 1 in all; default equal.
-
-        Raises
-        ------
-        InputError
-            Where no fibre is stretched.
         """
         share = np.full(len(equilibria), 1.0 / len(equilibria)) if counts is None else counts
         axial, w = self.strand.stiffness(self.parts[0].modulus), self.strength

@@ -209,11 +209,6 @@ def upper_bound(
         Default 0.005 for one case, 0.01 for several.
     objective : {"worst", "sum", "least"}
         How several cases count.
-
-    Raises
-    ------
-    InputError
-        When the length is not positive, there is no layer, or for an unknown mode or objective.
     """
     cases = WeightedCases.of(stress)
     check_number("length of fibre", length, above=0.0, unit="mm")

@@ -31,13 +31,7 @@ from ccfem.geometry.facets import are_among
 
 
 def read(path: Path) -> TetMesh:
-    """Read an Abaqus or CalculiX input deck.
-
-    Raises
-    ------
-    InputError
-        When the deck has no tetrahedra, or data that does not read.
-    """
+    """Read an Abaqus or CalculiX input deck."""
     try:
         model = read_deck(path)[0]
         return mesh_of(model, tetrahedra(model.points, model.blocks, path), path)
@@ -89,13 +83,7 @@ def _of_nodes(model: Model, scope: str, members: list[Members], border: IntArray
 
 
 def facets_of_surface(model: Model, name: str, border: IntArray) -> IntArray:
-    """Facets (k, 3) of a surface by its name, of nodes those of the outside.
-
-    Raises
-    ------
-    InputError
-        For a name that no surface has.
-    """
+    """Facets (k, 3) of a surface by its name, of nodes those of the outside."""
     scope, _, tail = name.upper().rpartition(".")
     for key, title in ((scope, tail), ("", name.upper())):
         content = model.scopes.get(key)

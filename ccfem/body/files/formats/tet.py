@@ -18,13 +18,7 @@ from ccfem.body.mesh import TetMesh
 
 
 def read(path: Path) -> TetMesh:
-    """Read a ``.tet`` file.
-
-    Raises
-    ------
-    InputError
-        When the file is not of this format; the message says where.
-    """
+    """Read a ``.tet`` file."""
     content = path.read_bytes().lstrip()
     lines = content.split(b"\n", 2)
     try:

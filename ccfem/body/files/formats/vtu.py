@@ -181,13 +181,6 @@ def write(
         Data of points, of cells, and of the whole.
     components : mapping of name to names, optional
         Names of the components of data of points and cells.
-
-    Raises
-    ------
-    InputError
-        When a name has characters that XML does not know.
-    OSError
-        When the file cannot be written.
     """
     number, corners = mesh.cells.shape
     write_vtk_xml(
