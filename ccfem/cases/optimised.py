@@ -19,8 +19,14 @@ from ccfem.fem.elasticity.load_kinds import patches_in_use
 from ccfem.fem.elasticity.problem import Problem
 from ccfem.fem.materials import plane_stress
 from ccfem.fem.topopt import Design, Simp, Somp, as_problem
-from ccfem.fem.topopt.flat_part import FlatPart, flat_part
-from ccfem.fem.topopt.sheet_part import plane_stiffness, sheet_outline, sheet_part, sheet_problem
+from ccfem.fem.topopt.flat_part import (
+    FlatPart,
+    flat_part,
+    plane_stiffness,
+    sheet_outline,
+    sheet_part,
+    sheet_problem,
+)
 
 # Places that an optimisation leaves full or empty: round and square areas, and boxes.
 

@@ -5,10 +5,10 @@ import pytest
 import shapely
 
 from ccfem.base.errors import InputError
+from ccfem.body.files.layer_files import stack_surface
 from ccfem.body.files.surface import Surface
 from ccfem.body.mesh import TetMesh
 from ccfem.body.meshing.planform import extrude
-from ccfem.geometry.layer_stack import stack_surface
 from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.slicing.layers.level_surfaces import level_surfaces
 

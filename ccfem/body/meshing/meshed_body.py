@@ -17,7 +17,7 @@ import numpy as np
 from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
 from ccfem.base.whole import existing_file, whole_file
-from ccfem.body.files.layer_files import layer_files, read_layer
+from ccfem.body.files.layer_files import layer_files, median_gap, read_layer, stack_surface
 from ccfem.body.files.surface import Surface, read_surface
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.face_places import BodyFaces
@@ -26,7 +26,6 @@ from ccfem.body.mesh.round_walls import RoundWall
 from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE, given_faces, smooth_faces
 from ccfem.body.meshing.cad import Joined, is_cad, mesh_cad, read_cad
 from ccfem.body.meshing.volume import Mesher, fill
-from ccfem.geometry.layer_stack import median_gap, stack_surface
 
 
 def mesh_body(
@@ -44,8 +43,8 @@ def mesh_body(
     ----------
     path : path
         A folder holds the curved layers of a part, OBJ files from the first to the last by the
-        numbers in their names: see `ccfem.geometry.layer_stack`. The mesh then has no patches, and
-        is made by fTetWild by default.
+        numbers in their names: see `ccfem.body.files.layer_files`. The mesh then has no patches,
+        and is made by fTetWild by default.
     edge_length : float, mm
     scale : float, default 1
         Factor on the coordinates, to make them mm.

@@ -3,8 +3,9 @@
 T. Wang, N. Li, G. Link, J. Jelonnek, J. Fleischer, J. Dittus, D. Kupzik, Load-dependent path
 planning method for 3D printing of continuous fiber reinforced plastics, Composites Part A 140
 (2021) 106181: one start, one end, most sharp turns outside the part. The paper does not say how the
-links are made. Here they are Dubins curves or ways round the part (`link_curves`, `ring_routes`),
-and the tracks are laid in the order whose links cost least (`ordering`).
+links are made. Here they are Dubins curves (`link_curves`), the cheapest of several straight
+extensions of the strands, or ways round the part (`ring_routes`), and the tracks are laid in the
+order whose links cost least (`ordering`).
 """
 
 from collections.abc import Sequence
@@ -19,19 +20,197 @@ from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.base.checks import check_number
 from ccfem.base.compiled import compiled
 from ccfem.base.errors import InputError
-from ccfem.geometry.dubins import WORDS, curve_points, word_sizes
+from ccfem.geometry.dubins import WORDS, advance, curve_points, word_sizes
 from ccfem.geometry.offsets import ring_from
 from ccfem.geometry.polylines import between, is_closed, line_length, resample, runs
-from ccfem.geometry.section_grid import SectionGrid, section_grid
+from ccfem.geometry.section_grid import SectionGrid, place, place_and_room, section_grid
 from ccfem.geometry.shapes import INSIDE, VOID, Region, Shapes, cut_at_section
-from ccfem.paths.linking.exchanges import Clusters, greedy_order, improved_order, strands
-from ccfem.paths.linking.link_curves import (
-    LinkCurves,
-    curve_cost,
-    link_curve,
-    link_curves,
-    stub_points,
+from ccfem.paths.linking.ordering import (
+    Clusters,
+    costs_between_ends,
+    improved_order,
+    order_clusters,
+    strands,
 )
+
+# Links between the ends of strands: curves of a least radius, cheapest outside the part.
+
+
+_SAMPLE = 0.25
+"""Step, mm, at which a curve is sampled close to the border."""
+_STRAIGHT = np.zeros(3, dtype=np.int64)
+"""Word of a straight line, constant like `WORDS` so that numba compiles one signature."""
+_FAR = 15.0
+"""Distance, in radii and longest extensions, beyond which only the first extension is tried: others
+change little on a long way."""
+
+
+class LinkCurves(NamedTuple):
+    """The cheapest curve between each two ends.
+
+    Attributes
+    ----------
+    cost : (t, t) array, mm
+        Symmetric; inf between the two ends of one strand, and where no curve is below the bound.
+    reach : (t, t) array, mm
+        Straight extension at the first end; that at the second is ``reach[b, a]``.
+    word : (t, t) int array
+        Word from the end with the smaller number to the other.
+    """
+
+    cost: FloatArray
+    reach: FloatArray
+    word: IntArray
+
+
+def link_curves(
+    ends: FloatArray,
+    reach: FloatArray,
+    radius: float,
+    grid: SectionGrid,
+    weights: FloatArray,
+    bound: FloatArray,
+) -> LinkCurves:
+    """Cheapest curves between all ends.
+
+    Parameters
+    ----------
+    ends : (t, 3) array
+        Poses at the ends of strands, heading out of the strand; 2k and 2k + 1 belong to strand k.
+    reach : (t, v) array, mm
+        Extensions to choose from; the first is the usual one.
+    radius : float, mm
+    weights : (3,) array
+        Extra cost of each mm inside the part, over its voids, and outside.
+    bound : (t, t) array, mm
+        Cost of the link by other means: more expensive curves are not searched for.
+    """
+    return LinkCurves(*_link_curves(ends, reach, radius, grid, weights, bound))
+
+
+def link_curve(
+    ends: FloatArray, a: int, b: int, curves: LinkCurves, radius: float, step: float
+) -> FloatArray:
+    """Points (n, 2), mm, of the link from end a to end b, including both ends."""
+    if a > b:
+        return link_curve(ends, b, a, curves, radius, step)[::-1]
+    first, second = curves.reach[a, b], curves.reach[b, a]
+    start, end = _extended(ends[a], first), _reversed(_extended(ends[b], second))
+    sizes = np.empty((6, 3))
+    word_sizes(start, end, radius, sizes)
+    word = int(curves.word[a, b])
+    turns = WORDS[word] * np.where(sizes[word] < 0.0, -1, 1)
+    curve = curve_points(start, end, turns, np.abs(sizes[word]), radius, step)
+    before, after = stub_points(ends[a], first, step), stub_points(ends[b], second, step)[::-1]
+    return np.concatenate([before, curve, after])
+
+
+def stub_points(end: FloatArray, reach: float, step: float) -> FloatArray:
+    """Points (n, 2), mm, from an end along its straight extension, without the last one."""
+    parts = max(1, int(np.ceil(reach / step))) if reach > 0.0 else 0
+    at = reach * np.arange(parts)[:, None] / max(parts, 1)
+    return end[:2] + at * [np.cos(end[2]), np.sin(end[2])]
+
+
+@compiled
+def _extended(end: FloatArray, reach: float) -> FloatArray:
+    pose = end.copy()
+    pose[0] += reach * np.cos(end[2])
+    pose[1] += reach * np.sin(end[2])
+    return pose
+
+
+@compiled
+def _reversed(pose: FloatArray) -> FloatArray:
+    back = pose.copy()
+    back[2] += np.pi
+    return back
+
+
+@compiled
+def curve_cost(
+    start: FloatArray,
+    turns: IntArray,
+    sizes: FloatArray,
+    radius: float,
+    grid: SectionGrid,
+    weights: FloatArray,
+    limit: float,
+) -> float:
+    """Length of a curve plus `weights` times its length in each place; inf above the limit."""
+    cost = abs(sizes[0]) + abs(sizes[1]) + abs(sizes[2])
+    x, y, heading = start[0], start[1], start[2]
+    for piece in range(3):
+        turn, size = turns[piece], sizes[piece]
+        total, done = abs(size), 0.0
+        sense = 1.0 if size >= 0.0 else -1.0
+        while done < total:
+            if cost >= limit:
+                return np.inf
+            px, py, _ = advance(x, y, heading, turn, sense * done, radius)
+            # A circle free of border: the place is the same for as long as the curve stays in it.
+            where, room = place_and_room(grid, px, py)
+            move = min(max(room, _SAMPLE), total - done)
+            if room < move:
+                middle = sense * (done + 0.5 * move)
+                px, py, _ = advance(x, y, heading, turn, middle, radius)
+                where = place(grid, px, py)
+            cost += weights[where] * move
+            done += move
+        x, y, heading = advance(x, y, heading, turn, size, radius)
+    return cost if cost < limit else np.inf
+
+
+@compiled
+def _link_curves(
+    ends: FloatArray,
+    reach: FloatArray,
+    radius: float,
+    grid: SectionGrid,
+    weights: FloatArray,
+    bound: FloatArray,
+) -> tuple[FloatArray, FloatArray, IntArray]:
+    count, variants = reach.shape
+    cost = np.full((count, count), np.inf)
+    chosen = np.zeros((count, count))
+    word = np.zeros((count, count), np.int64)
+    sizes, straight = np.empty((6, 3)), np.zeros(3)
+    stub = np.empty(reach.shape)
+    # Straight extensions of the ends, which curves begin after.
+    for a in range(count):
+        for v in range(variants):
+            straight[1] = reach[a, v]
+            stub[a, v] = curve_cost(ends[a], _STRAIGHT, straight, radius, grid, weights, np.inf)
+    for a in range(count):
+        for b in range(a + 1, count):
+            if a // 2 == b // 2:
+                continue
+            apart = np.hypot(ends[a, 0] - ends[b, 0], ends[a, 1] - ends[b, 1])
+            best = limit = min(bound[a, b], bound[b, a])
+            for variant in range(variants * variants):
+                v, w = variant // variants, variant % variants
+                # Far apart, longer extensions change little.
+                if variant and apart > _FAR * radius + reach[a, v] + reach[b, w]:
+                    continue
+                start = _extended(ends[a], reach[a, v])
+                end = _reversed(_extended(ends[b], reach[b, w]))
+                word_sizes(start, end, radius, sizes)
+                stubs = stub[a, v] + stub[b, w]
+                for k in range(6):
+                    length = abs(sizes[k, 0]) + abs(sizes[k, 1]) + abs(sizes[k, 2])
+                    if stubs + length >= best:
+                        continue
+                    total = stubs + curve_cost(
+                        start, WORDS[k], sizes[k], radius, grid, weights, best - stubs
+                    )
+                    if total < best - 1e-9:
+                        best = total
+                        chosen[a, b], chosen[b, a] = reach[a, v], reach[b, w]
+                        word[a, b] = k
+            if best < limit:
+                cost[a, b] = cost[b, a] = best
+    return cost, chosen, word
+
 
 # Links that lead round a part, along a ring outside it.
 
@@ -264,8 +443,8 @@ class LinkedPath:
         size = np.linalg.norm(self.points[steps + 1] - self.points[steps], axis=1)[cut.step]
         owner = np.repeat(np.arange(len(stretches)), np.diff(stretches)[:, 0])[cut.step]
         left_out = np.zeros(len(stretches), dtype=bool)
-        for place, longest in ((INSIDE, inside), (VOID, over_void)):
-            there = size * (cut.end - cut.begin) * (cut.place == place)
+        for where, longest in ((INSIDE, inside), (VOID, over_void)):
+            there = size * (cut.end - cut.begin) * (cut.place == where)
             left_out |= np.bincount(owner, there, len(stretches)) > longest + _ON_BORDER
         return left_out
 
@@ -447,130 +626,3 @@ def _assembled(tracks: Sequence[FloatArray], visits: IntArray, network: _Network
         parts.append(track[::-1] if entered % 2 else track)
         marks.append(np.zeros(len(track), dtype=bool))
     return LinkedPath(np.concatenate(parts), np.concatenate(marks))
-
-
-# Order in which items with several ends are visited so that the links between them cost least.
-#
-# A cluster is visited once: it is entered at one of its terminals and left at another. A strand is
-# a cluster of two terminals; a group of strands that are laid together is a cluster of all their
-# ends. The order of the clusters and their terminals are found together. For few clusters, dynamic
-# programming over sets of clusters gives the optimum (M. Held, R. M. Karp, A dynamic programming
-# approach to sequencing problems, Journal of SIAM 10 (1962) 196). Otherwise stretches of the order
-# are exchanged (2-opt, Or-opt), each order being evaluated with its best terminals.
-
-
-_EXACT = 12
-"""Maximum number of clusters for which the order is optimal."""
-
-
-def order_clusters(clusters: Clusters, exact: int = _EXACT, rounds: int = 30) -> IntArray:
-    """Order of clusters, and the terminals at which each is entered and left.
-
-    Parameters
-    ----------
-    exact : int, default 12
-        Up to this many clusters the order is optimal; the work is 2^p t^2.
-    rounds : int, default 30
-        Rounds of the search above that (`improved_order`); fewer for more than fifty clusters.
-
-    Returns
-    -------
-    (p, 2) int array
-        Terminals entered and left, in order.
-    """
-    links, visit = (np.ascontiguousarray(cost, dtype=np.float64) for cost in clusters[:2])
-    offsets = np.ascontiguousarray(clusters.offsets, dtype=np.int64)
-    count = len(offsets) - 1
-    size = (int(offsets[-1]), int(offsets[-1]))
-    if links.shape != size or visit.shape != size or not (np.diff(offsets) > 0).all():
-        raise InputError(
-            f"links and visit must have the shape {size} of the terminals in offsets, and every "
-            f"cluster a terminal; got {links.shape} and {visit.shape}"
-        )
-    if count == 0:
-        return np.zeros((0, 2), dtype=np.int64)
-    clusters = Clusters(links, visit, offsets, clusters.first, clusters.last)
-    if count <= exact:
-        return _traced(_costs_of_sets(clusters), clusters)
-    return improved_order(greedy_order(clusters), clusters, rounds)
-
-
-def costs_between_ends(links: FloatArray) -> FloatArray:
-    """Least cost of laying all strands of a group from one of their ends to another.
-
-    Parameters
-    ----------
-    links : (2k, 2k) array
-        Cost of the link between each two ends, the same both ways; strand i has the ends 2i and
-        2i + 1.
-
-    Returns
-    -------
-    (2k, 2k) array
-        inf where the strands cannot be laid that way, as from an end to itself. For more than 12
-        strands only pairs of ends that a search finds to be good have a finite cost.
-    """
-    if len(links) <= 2 * _EXACT:
-        every = range(len(links))
-        return np.stack([_costs_of_sets(strands(links, first))[-1] for first in every])
-    table = np.full(links.shape, np.inf)
-    starts = [-1]
-    while starts:
-        way = order_clusters(strands(links, starts.pop(0)), rounds=5)
-        a, b = int(way[0, 0]), int(way[-1, 1])
-        cost = float(links[way[:-1, 1], way[1:, 0]].sum())
-        if not np.isfinite(table).any():
-            starts = [a ^ 1, b, b ^ 1]
-        table[a, b] = table[b, a] = min(cost, table[a, b])
-    return table
-
-
-@compiled
-def _costs_of_sets(clusters: Clusters) -> FloatArray:
-    """Least cost of having visited a set of clusters and left at one of its terminals, (2^p, t)."""
-    links, visit, offsets, first, _ = clusters
-    count, terminals = len(offsets) - 1, len(links)
-    best = np.full((1 << count, terminals), np.inf)
-    entry = np.empty(terminals)
-    # Held and Karp: a set of clusters is a number, and larger sets come after those that they hold.
-    for done in range((1 << count) - 1):
-        for c in range(count):
-            if done >> c & 1:
-                continue
-            for a in range(offsets[c], offsets[c + 1]):
-                entry[a] = np.inf
-                if done == 0:
-                    entry[a] = 0.0 if first < 0 or first == a else np.inf
-                    continue
-                # Entered from the best exit of any cluster before.
-                for d in range(count):
-                    if done >> d & 1:
-                        for t in range(offsets[d], offsets[d + 1]):
-                            entry[a] = min(entry[a], best[done, t] + links[t, a])
-            more = done | 1 << c
-            for a in range(offsets[c], offsets[c + 1]):
-                if entry[a] < np.inf:
-                    for b in range(offsets[c], offsets[c + 1]):
-                        best[more, b] = min(best[more, b], entry[a] + visit[a, b])
-    return best
-
-
-def _traced(best: FloatArray, clusters: Clusters) -> IntArray:
-    """Terminals entered and left on the best way, read from the costs of sets backwards."""
-    links, visit, offsets, first, last = clusters
-    cluster = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
-    done = len(best) - 1
-    left = last if last >= 0 else int(np.argmin(best[done]))
-    if not np.isfinite(best[done, left]):
-        raise InputError("there is no way through all clusters: some visit must be possible")
-    way: list[tuple[int, int]] = []
-    while True:
-        nodes = np.arange(offsets[cluster[left]], offsets[cluster[left] + 1])
-        done &= ~(1 << int(cluster[left]))
-        if not done:
-            way.append((first if first >= 0 else int(nodes[np.argmin(visit[nodes, left])]), left))
-            return np.array(way[::-1])
-        through = best[done][:, None] + links[:, nodes] + visit[nodes, left]
-        t, a = np.unravel_index(int(np.argmin(through)), through.shape)
-        way.append((int(nodes[a]), left))
-        left = int(t)

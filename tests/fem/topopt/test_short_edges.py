@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from ccfem.body.meshing.planform import extrude
-from ccfem.fem.topopt.sheet_part import without_short_edges
+from ccfem.fem.topopt.flat_part import without_short_edges
 
 WHOLE = shapely.box(0, 0, 40, 20)
 CUT = shapely.Polygon(

@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 
 from ccfem.base.errors import InputError
-from ccfem.paths.linking.exchanges import Clusters, improved_order, strands
-from ccfem.paths.linking.single_path import costs_between_ends, order_clusters
+from ccfem.paths.linking.ordering import (
+    Clusters,
+    costs_between_ends,
+    improved_order,
+    order_clusters,
+    strands,
+)
 
 
 def distances(seed: int, count: int) -> np.ndarray:

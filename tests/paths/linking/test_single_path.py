@@ -10,8 +10,7 @@ from ccfem.geometry.polylines import runs
 from ccfem.geometry.section_grid import contains, place, place_and_room, section_grid
 from ccfem.geometry.shapes import INSIDE, OUTSIDE, VOID
 from ccfem.paths.linking import single_path
-from ccfem.paths.linking.link_curves import curve_cost
-from ccfem.paths.linking.single_path import LinkedPath, link_tracks
+from ccfem.paths.linking.single_path import LinkedPath, curve_cost, link_tracks
 
 RADIUS, WIDTH = 1.5, 0.9
 WINDOWED = shapely.box(0, 0, 40, 30).difference(shapely.Point(14, 15).buffer(8.0))
