@@ -18,7 +18,7 @@ import numpy as np
 
 from ccfem.base.errors import InputError, Mistakes, shown
 from ccfem.base.toml import TomlTable, from_table, read_toml
-from ccfem.body.files.surface import Surface
+from ccfem.body.files.surface import Shell, Surface, refined
 from ccfem.body.mesh.face_places import BodyFaces
 from ccfem.body.mesh.face_rules import (
     CellBox,
@@ -32,7 +32,6 @@ from ccfem.body.mesh.face_rules import (
     without_faces,
 )
 from ccfem.body.mesh.patches import PatchRule, face_name, patches_from_rules, unit_vector
-from ccfem.body.mesh.shell import Shell, refined
 from ccfem.body.mesh.smooth_faces import FEATURE_ANGLE, smooth_faces
 from ccfem.body.mesh.tet_mesh import CellMesh, TetMesh
 from ccfem.body.meshing.cad import is_cad

@@ -10,7 +10,7 @@ from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.strategies.fibre_aware import cut_and_move
-from ccfem.strategies.fibre_aware.exchange import exchanged
+from ccfem.strategies.fibre_aware.cut_and_move import exchanged
 from ccfem.strategies.fibre_aware.judges import Goal, stiffness_judge
 from ccfem.strategies.fibre_aware.prune import prune
 
