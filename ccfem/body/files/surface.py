@@ -1,4 +1,4 @@
-"""Closed triangulated surfaces: from STL, OBJ, PLY and 3MF files, and to try rules of patches on."""
+"""Closed triangulated surfaces: from files (STL, OBJ, PLY, 3MF), and to try rules on."""
 
 import os
 from dataclasses import dataclass
