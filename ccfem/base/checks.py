@@ -218,13 +218,7 @@ class KnownNames(dict[str, V]):
 
 
 def check_instance(kind: str, value: object) -> None:
-    """Refuse a class in place of an instance of it, and what cannot be called.
-
-    Parameters
-    ----------
-    kind : str
-        What is expected, as "strategy".
-    """
+    """Refuse a class in place of an instance of it, and what is no `kind`, as "strategy"."""
     if isinstance(value, type):
         raise InputError(
             f"a {kind} must be an instance; got the class {value.__name__}: write "

@@ -13,10 +13,7 @@ _FORMULA = re.compile(r"(^|[;\t\r\n])(?=\s*[=+\-@\uff1d\uff0b\uff0d\uff20])|^(?=
 def write_csv(file: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
     """Write a table with a line of names; what is None or not a number is an empty cell.
 
-    Parameters
-    ----------
-    rows : iterable of sequences
-        As long as `columns`; texts go through `as_text`.
+    Rows are as long as `columns`; texts go through `as_text`.
     """
     with file.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")

@@ -64,13 +64,8 @@ class SolveError(RuntimeError):
 def spared(what: str, left_out: list[str]) -> Iterator[None]:
     """Go on without a picture or a view that fails in the block: the numbers behind it stand.
 
-    What is left out, and why, is added to `left_out` as one line, and is a warning. A file that
-    cannot be written is an error as elsewhere.
-
-    Parameters
-    ----------
-    what : str
-        What the block draws.
+    What is left out, by what it draws, and why, is added to `left_out` as one line, and is a
+    warning. A file that cannot be written is an error as elsewhere.
     """
     try:
         yield

@@ -32,13 +32,7 @@ _PRIVATE: set[str] = set()
 
 
 class Folder:
-    """A folder held open; made by `Folder.opened` and `Folder.inner`.
-
-    Attributes
-    ----------
-    path : Path
-        For messages.
-    """
+    """A folder held open; made by `Folder.opened` and `Folder.inner`; its path is for messages."""
 
     def __init__(self, path: Path, handle: int | None) -> None:
         self.path, self._handle = path, handle

@@ -25,10 +25,7 @@ def imported(name: str) -> ModuleType:
 def submodules(package: str) -> Callable[[str], ModuleType]:
     """Return the ``__getattr__`` of a package: ``ccfem.fem.elasticity`` needs no import of its own.
 
-    Parameters
-    ----------
-    package : str
-        Its ``__name__``.
+    The package is named by its ``__name__``.
     """
 
     def of(name: str) -> ModuleType:

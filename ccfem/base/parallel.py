@@ -200,14 +200,8 @@ def beside(
 
     It takes what time other work of this process leaves: where that may use every processor of the
     system, the process has a low priority, else one processor less is left until it is done. Where
-    there is no room for it (`has_room_beside`), it is done here when its result is asked for.
-
-    Parameters
-    ----------
-    work : callable
-        Called without anything, at most once.
-    shared : sequence, optional
-        As of `in_processes`.
+    there is no room for it (`has_room_beside`), it is done here when its result is asked for. It is
+    called at most once; `shared` is as of `in_processes`.
     """
     if not has_room_beside():
         yield work

@@ -273,15 +273,9 @@ def _search(
 
 @dataclass(frozen=True)
 class Nearest:
-    """Points of a surface that are nearest to others.
+    """Points (q, 3) of a surface that are nearest to others, and the distance (q,), mm.
 
-    Attributes
-    ----------
-    triangle : (q,) int array
-    weights : (q, 3) array
-        Barycentric coordinates in it, in [0, 1].
-    points : (q, 3) array, mm
-    distance : (q,) array, mm
+    They lie on triangles (q,), at barycentric `weights` (q, 3) in [0, 1].
     """
 
     triangle: IntArray

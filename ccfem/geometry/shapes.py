@@ -28,19 +28,11 @@ _HAIR = 1e-6
 
 
 def bands(lines: Shapes | Sequence[shapely.Geometry], reach: float, **style: Any) -> Shapes:
-    """Area within a distance of each of some lines, valid whatever the lines do.
+    """Area within a distance, mm, of each of some lines, valid whatever the lines do.
 
     GEOS's buffer of rows that lie side by side, so that their borders coincide, crosses itself now
     and then. What is made valid afterwards may lack area, or stay invalid; rows that overlap by a
-    hair do not come to that.
-
-    Parameters
-    ----------
-    lines : sequence of LineStrings or MultiLineStrings
-    reach : float, mm
-        Distance, half of the width.
-    style
-        Further arguments of `shapely.buffer`.
+    hair do not come to that. `style` goes to `shapely.buffer`.
     """
     lines = np.asarray(lines, dtype=object)
     areas = np.asarray(shapely.buffer(lines, reach, **style), dtype=object)
@@ -196,14 +188,7 @@ def _places(points: FloatArray, section: Region) -> IntArray:
 def cut_at_section(
     starts: FloatArray, ends: FloatArray, section: Region, tolerance: float = TOLERANCE
 ) -> Pieces:
-    """Cut straight steps at the boundary of a section.
-
-    Parameters
-    ----------
-    starts, ends : (s, 2) arrays, mm
-    section, tolerance
-        As in `section_places`.
-    """
+    """Cut straight steps (s, 2), mm, at the boundary of a section, as far as `section_places`."""
     grown = shapely.buffer(section, tolerance, quad_segs=2)
     boundary = shapely.boundary(grown)
     shapely.prepare(boundary)

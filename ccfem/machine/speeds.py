@@ -68,14 +68,9 @@ class SpeedTable:
         check_ranges(self)
 
     def at(self, curvature: ArrayLike, length: ArrayLike, angle: ArrayLike) -> FloatArray:
-        """Speed, mm/s, of pieces of a path.
+        """Speed, mm/s, of pieces of a path: by curvature, 1/mm, length, mm, and angle, degrees.
 
-        Parameters
-        ----------
-        curvature : array_like, 1/mm
-        length : array_like, mm
-        angle : array_like, degrees
-            Smallest angle to a neighbour.
+        The angle is the smallest one to a neighbour.
         """
         length, angle = np.asarray(length), np.asarray(angle)
         by_length = 1 - (length < self.length[0]) + (length > self.length[1])

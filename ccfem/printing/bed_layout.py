@@ -56,13 +56,7 @@ class BedLayout:
         return int(np.prod(self.copies))
 
     def frame(self, upright: FloatArray) -> FloatArray:
-        """Axes of the bed, rows of a (3, 3) array, of the frame that the part stands in unturned.
-
-        Parameters
-        ----------
-        upright : (3, 3) array
-            As `ccfem.slicing.layers.layer.plane_frame` returns it.
-        """
+        """Axes of the bed, as rows, of the `plane_frame` that the part stands in unturned."""
         return upright if not self.spin else _about("z", self.spin) @ upright
 
 

@@ -75,13 +75,8 @@ class BuildDirection:
 def tension_share(stress: PartStress, up: Sequence[float]) -> float:
     """Share of the tension in a part that flat layers hold: 1 where all of it lies in their plane.
 
-    The largest tension in the plane of the layers over the largest one in space, each summed over
-    the volume; 0 where there is no tension.
-
-    Parameters
-    ----------
-    up : 3 floats
-        Direction across the layers.
+    The largest tension in the plane across `up` over the largest one in space, each summed over the
+    volume; 0 where there is no tension.
     """
     tensor, volume = stress.stress, stress.mesh.volumes
     most = np.maximum(np.linalg.eigvalsh(tensor)[:, -1], 0.0)

@@ -245,15 +245,7 @@ def rests_on(islands: Islands) -> BoolArray:
 
 
 def clashes(islands: Islands, build: FloatArray, machine: Machine) -> FloatArray:
-    """Area, mm^2, of each island (row) over which the head would touch each other one (k, k).
-
-    Parameters
-    ----------
-    build : (3,) array
-        Unit vector.
-    machine : Machine
-        Its head, and how far it tilts.
-    """
+    """Area, mm^2, of each island (row) over which the head would touch each other one (k, k)."""
     axes = poses(islands.normals, build, machine)
     size = (machine.head_angle, machine.head_length)
     met = groups_in_cones(islands.points, axes, islands.points, islands.owner, *size)
@@ -346,10 +338,7 @@ def curved_stack(
 ) -> Stack:
     """Lay matrix and fibre on curved layers, piece by piece in an order that the head clears.
 
-    Parameters
-    ----------
-    build : tuple of 3 floats
-        Direction in which the part was to stand.
+    `build` is the direction in which the part was to stand.
     """
     filled = filled_layers(strands.fibre, layers, support, machine)
     islands = islands_of([layer.layer for layer in filled])

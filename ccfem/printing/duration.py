@@ -25,21 +25,12 @@ _TOGETHER = 100_000
 
 
 def durations(moves: Moves, machine: Machine, heating: bool = True) -> FloatArray:
-    """Seconds that each row takes.
+    """Seconds that each row takes, (n,); with or without the waits for tools.
 
     Moves speed up and slow down at `Process.acceleration`. At a corner the speed is that on the arc
     that deviates from it by `Process.junction` (junction deviation). The nozzle stands still while
     only filament is fed, at cuts and at tool changes. Waiting tools cool and heat at their heating
     rates. The first heating of bed and nozzles is not counted, nor is how long a pause takes.
-
-    Parameters
-    ----------
-    heating : bool, default True
-        Whether the waits for tools count.
-
-    Returns
-    -------
-    (n,) array, s
     """
     seconds = np.zeros(len(moves))
     fed = moves.event == FEED

@@ -50,16 +50,7 @@ warning, and with one. Our choice."""
 
 @dataclass(frozen=True)
 class Below:
-    """Fibre layers since the last layer of matrix.
-
-    Attributes
-    ----------
-    strands : list of (n, 2) arrays, mm
-    sections : list of float, mm^2
-        Of each strand.
-    height : float, mm
-        Of these layers.
-    """
+    """Fibre since the last layer of matrix: strands (n, 2), mm, sections, mm^2, and height, mm."""
 
     strands: list[FloatArray] = field(default_factory=list)
     sections: list[float] = field(default_factory=list)

@@ -58,18 +58,11 @@ def parallel_lines(region: Region, pitch: float, angle: float) -> list[FloatArra
 
 
 def gyroid_lines(region: Region, height: float, period: float) -> list[FloatArray]:
-    """Lines (k, 2), mm, in which a plane at a height cuts a gyroid.
+    """Lines (k, 2), mm, in which a plane at a height, mm, cuts a gyroid of a period > 0, mm.
 
     The surface is ``sin x cos y + sin y cos z + sin z cos x = 0`` with coordinates in ``period / 2
     pi`` (Schoen, Infinite periodic minimal surfaces, NASA TN D-5541, 1970, in the usual nodal
     approximation).
-
-    Parameters
-    ----------
-    region : shapely (Multi)Polygon, mm
-    height : float, mm
-    period : float, mm
-        > 0.
     """
     if region.is_empty:
         return []

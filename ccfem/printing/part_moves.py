@@ -44,16 +44,11 @@ _UP = np.array([0.0, 0.0, 1.0])
 
 
 def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
-    """Turn the plan of a print into moves.
+    """Turn the plan of a print into moves of the machine that it was made for.
 
     Layer by layer: tool changes with their lifts and temperatures, first filament on a block beside
     the part and on a bar, the skirt, lines of matrix, strands with their cuts, pauses. Of a plan
     whose file begins above the lowest layer, the rest of what is laid, at its place.
-
-    Parameters
-    ----------
-    machine : Machine
-        The machine that the plan was made for.
     """
     recorder, paths = Recorder(machine), plan.paths
     sites, lowest = _sites(plan, machine), plan.lowest

@@ -58,14 +58,7 @@ _EVERY = 2.0
 
 @dataclass(frozen=True)
 class Matter:
-    """Points that represent printed material, first step first.
-
-    Attributes
-    ----------
-    points : (n, 3) array, mm
-    step : (n,) int array
-        In which they are printed, ascending.
-    """
+    """Points (n, 3), mm, that represent printed material, and their steps (n,), ascending."""
 
     points: FloatArray
     step: IntArray
@@ -85,11 +78,7 @@ class Matter:
 class Obstacles:
     """Printed material on the bed, in the order of layers and in the order of printing.
 
-    Attributes
-    ----------
-    by_layer, by_step : Matter
-    layer : (s,) int array
-        Layer of each step of the print.
+    Each of the s steps of the print has a layer.
     """
 
     by_layer: Matter

@@ -462,14 +462,10 @@ class CoarseWall:
 
 
 def coarse_wall(mesh: TetMesh) -> CoarseWall | None:
-    """Find walls with one cell across.
+    """Find walls with one cell across; None where all have more, but for a patch of the surface.
 
-    A ray from the middle of each boundary facet goes straight into the part. Where it comes out
-    at a face that lies opposite, without a node near it halfway, one cell lies across.
-
-    Returns
-    -------
-    CoarseWall, or None where all walls have more, but for a patch of the surface.
+    A ray from the middle of each boundary facet goes straight into the part. Where it comes out at
+    a face that lies opposite, without a node near it halfway, one cell lies across.
     """
     facets = np.flatnonzero(mesh.partners < 0)
     area, normal = mesh.facet_areas(mesh.facets[facets])

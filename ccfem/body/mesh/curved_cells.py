@@ -97,20 +97,11 @@ def nodes_on_walls(
     walls: Sequence[RoundWall],
     wall_of: IntArray,
 ) -> tuple[IntArray, FloatArray]:
-    """Nodes of the facets on round walls, and where they lie on these walls.
+    """Nodes (k,) of the facets on round walls, and where they lie on these walls, (k, 3), mm.
 
     What meshed the triangles of a surface anew put them on chords. Nodes at the end of a wall keep
-    to the face beyond, and those where more than two faces meet stay.
-
-    Parameters
-    ----------
-    points, boundary, normals, walls, wall_of
-        As in `side_middles`.
-
-    Returns
-    -------
-    nodes : (k,) int array
-    places : (k, 3) array, mm
+    to the face beyond, and those where more than two faces meet stay. Parameters are as in
+    `side_middles`.
     """
     n, node, wall = len(points), boundary.reshape(-1), np.repeat(wall_of, 3)
     first, second = np.full(n, len(walls)), np.full(n, -1)
@@ -133,15 +124,7 @@ def nodes_on_walls(
 
 
 def unfolded(points: FloatArray, cells: IntArray, middles: IntArray) -> FloatArray:
-    """Points with those middles back on their chords that would fold a cell.
-
-    Parameters
-    ----------
-    points : (n, 3) array, mm
-    cells : (m, 10) int array
-    middles : (k,) int array
-        Nodes that may lie off their chords.
-    """
+    """Points (n, 3) with those `middles` (k,) back on their chords that would fold a cell."""
     off = np.zeros(len(points), dtype=bool)
     off[middles] = True
     points = points.copy()

@@ -130,10 +130,7 @@ class Faces:
 class OnBody:
     """A rule for faces, looked up on the body that a mesh is made of: before, and whatever mesh.
 
-    Attributes
-    ----------
-    body : BodyFaces
-        Whose faces the mesh has as groups.
+    The mesh has the faces of `body` as groups.
     """
 
     rule: Faces

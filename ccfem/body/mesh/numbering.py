@@ -69,23 +69,13 @@ _PIECE = 20
 
 
 def nested_dissection(points: FloatArray, start: IntArray, neighbour: IntArray) -> IntArray:
-    """Order of nodes in which halves come before what parts them.
+    """Order (n,), as of `reverse_cuthill_mckee`, in which halves come before what parts them.
 
-    The nodes are halved across the longest side of their box; those of the second half that have
-    neighbours in the first one come last, and both halves are ordered likewise (George, SIAM
-    Journal on Numerical Analysis 10 (1973) 345). Minimum degree fills a factor less, but takes
-    seconds on tens of thousands of nodes of a regular mesh, which all have the same degree.
-
-    Parameters
-    ----------
-    points : (n, d) array, mm
-    start, neighbour
-        As of `reverse_cuthill_mckee`.
-
-    Returns
-    -------
-    (n,) int array
-        Old numbers in new order.
+    The nodes at points (n, d), mm, are halved across the longest side of their box; those of the
+    second half that have neighbours in the first one come last, and both halves are ordered
+    likewise (George, SIAM Journal on Numerical Analysis 10 (1973) 345). Minimum degree fills a
+    factor less, but takes seconds on tens of thousands of nodes of a regular mesh, which all have
+    the same degree.
     """
     order = np.empty(len(points), dtype=np.int64)
     first_half = np.zeros(len(points), dtype=bool)

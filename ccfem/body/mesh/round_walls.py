@@ -170,11 +170,7 @@ def walls_of_facets(
 ) -> IntArray:
     """Wall (k,) that each facet lies on, -1 for none; the nearest of several.
 
-    Parameters
-    ----------
-    corners : (k, 3, 3) array, mm
-    normals : (k, 3) array
-        Outward.
+    Facets have corners (k, 3, 3), mm, and outward normals (k, 3).
     """
     result = np.full(len(corners), -1)
     least = np.full(len(corners), np.inf)

@@ -303,14 +303,7 @@ def _chords(
 
 
 def guessed_walls(points: FloatArray, boundary: IntArray) -> tuple[tuple[RoundWall, ...], IntArray]:
-    """Round walls of a mesh that nothing is known of, and the wall (b,) of each boundary facet.
-
-    Parameters
-    ----------
-    points : (n, 3) array, mm
-    boundary : (b, 3) int array
-        Outward.
-    """
+    """Round walls of a mesh that nothing is known of, and the wall (b,) of each outward facet."""
     walls: list[RoundWall] = []
     wall_of = np.full(len(boundary), -1)
     rest = np.arange(len(boundary))

@@ -12,10 +12,7 @@ from ccfem.base.compiled import compiled
 def times(matrix: Any, x: FloatArray) -> FloatArray:
     """Product ``matrix @ x``; with 3 x 3 blocks in two thirds of the time, to the same last bit.
 
-    Parameters
-    ----------
-    matrix : bsr_array (n, k), or anything that ``@`` applies to a (k,) array
-    x : (k,) array
+    The matrix may be anything that ``@`` applies to a (k,) array.
     """
     blocks = isinstance(matrix, sp.bsr_array) and matrix.blocksize == (3, 3)
     if not blocks or matrix.indices.dtype != np.int32:

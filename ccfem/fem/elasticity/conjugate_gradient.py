@@ -53,13 +53,9 @@ def conjugate_gradient(
 
 
 def highest_eigenvalue(matrix: Any, precondition: Callable[[FloatArray], FloatArray]) -> float:
-    """Highest eigenvalue of a preconditioned matrix, or slightly less, by the Lanczos method.
+    """Highest eigenvalue of a matrix preconditioned as in `conjugate_gradient`, or slightly less.
 
-    Parameters
-    ----------
-    matrix : sparse array (n, n)
-    precondition : callable
-        As in `conjugate_gradient`.
+    By the Lanczos method.
     """
     rhs = np.random.default_rng(0).normal(size=matrix.shape[0])
     _, steps, ratios = _iterate(matrix, rhs, precondition, None, 0.0, _LANCZOS)

@@ -55,13 +55,9 @@ def superlu(matrix: sp.bsr_array, often: bool = False) -> Apply:
 class Pardiso:
     """Cholesky factorisation by PARDISO of the MKL, of the upper triangle (matrix type 2).
 
-    One analysis of the pattern (ordering and symbolic factorisation) serves any number of matrices.
-    The memory is released with the object. Threads may share it.
-
-    Parameters
-    ----------
-    matrix : bsr_array (n, n)
-        Symmetric positive definite, columns sorted; its pattern is analysed.
+    One analysis of the pattern (ordering and symbolic factorisation) of a symmetric positive
+    definite matrix with sorted columns serves any number of matrices. The memory is released with
+    the object. Threads may share it.
     """
 
     def __init__(self, matrix: sp.bsr_array) -> None:
@@ -175,13 +171,7 @@ class Supernodes(NamedTuple):
 
 
 def supernodes(factor: SuperLU) -> Supernodes | None:
-    """Factor of a symmetric matrix by supernodes; None if pivots are off the diagonal.
-
-    Parameters
-    ----------
-    factor : SuperLU
-        Made in symmetric mode.
-    """
+    """Factor by supernodes of one made in symmetric mode; None if pivots are off the diagonal."""
     if (factor.perm_r != factor.perm_c).any():
         return None
     lower = factor.L
@@ -515,13 +505,7 @@ def _operations(matrix: sp.bsr_array, lowest: IntArray) -> float:
 
 
 def skyline(matrix: sp.bsr_array) -> Callable[[FloatArray], FloatArray]:
-    """Cholesky factorisation within the skyline.
-
-    Parameters
-    ----------
-    matrix : bsr_array (n, n)
-        Symmetric positive definite.
-    """
+    """Cholesky factorisation of a symmetric positive definite matrix within the skyline."""
     return _factor(matrix, *_ordering(matrix))
 
 

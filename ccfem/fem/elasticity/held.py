@@ -315,16 +315,10 @@ class Held:
         return self.with_contact(self.along_pressing(displacement) >= back)
 
     def following(self, displacement: FloatArray, reactions: FloatArray) -> "Held":
-        """Contact that follows from a solution; self if it is unchanged.
+        """Contact that follows from a displacement, mm, and reactions, N, (n, 3); self if the same.
 
         Components that pull are released, those that sink in are held: the primal-dual active set
         method (Hintermueller, Ito and Kunisch, SIAM J. Optimization 13, 2002, 865-888).
-
-        Parameters
-        ----------
-        displacement : (n, 3) array, mm
-        reactions : (n, 3) array, N
-            Of all supports on the part.
         """
         if self.presses is None:
             return self

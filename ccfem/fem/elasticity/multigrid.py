@@ -206,15 +206,9 @@ class Prolongation(NamedTuple):
 def smoothed(
     matrix: sp.bsr_array, inverse: FloatArray, groups: Aggregates, damping: float
 ) -> Prolongation:
-    """Motions of groups after one damped Jacobi step: ``(I - damping D^-1 A) T``.
+    """Motions T of groups after one damped Jacobi step: ``(I - damping D^-1 A) T``.
 
-    Parameters
-    ----------
-    matrix : bsr_array (d n, d n) with d x d blocks, A
-    inverse : (n, d, d) array
-        Of the diagonal blocks, D^-1.
-    groups : Aggregates
-        Whose motions are T.
+    A has d x d blocks, and `inverse` (n, d, d) those of D^-1.
     """
     of_node, motions = groups.of_node, groups.motions
     count = len(groups.near_kernel)
@@ -227,12 +221,7 @@ def smoothed(
 
 
 def galerkin(matrix: sp.bsr_array, prolong: Prolongation) -> sp.bsr_array:
-    """Stiffness (6 c, 6 c) of the groups: ``P^T A P``.
-
-    Parameters
-    ----------
-    matrix : bsr_array (d n, d n) with d x d blocks
-    """
+    """Stiffness (6 c, 6 c) of the groups: ``P^T A P``, of a matrix with d x d blocks."""
     rows, count = _Rows(matrix.indptr, matrix.indices, matrix.data), prolong.groups
     indptr, indices = _met(matrix, prolong)
     coarse = _Rows(indptr, indices, np.zeros((len(indices), 6, 6)))
@@ -468,14 +457,9 @@ _SLOW = 0.8
 def quick_aggregation(matrix: sp.bsr_array, near_kernel: FloatArray) -> Apply:
     """One V-cycle of smoothed aggregation with a damped Jacobi step to smooth the prolongation.
 
-    Besides the matrix it stores half of it in single precision for the sweeps. The stiffness of the
-    groups has full double precision, so that the cycle stays positive definite on slender parts.
-
-    Parameters
-    ----------
-    matrix : bsr_array (3n, 3n) with 3x3 blocks
-    near_kernel : (3n, 6) array
-        Rigid motions.
+    Besides the matrix (3n, 3n) of 3x3 blocks it stores half of it in single precision for the
+    sweeps. The stiffness of the groups has full double precision, so that the cycle stays positive
+    definite on slender parts. The near kernel (3n, 6) are rigid motions.
     """
     # Compiled once, for indices of one kind.
     level = (

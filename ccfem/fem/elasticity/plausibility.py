@@ -311,14 +311,9 @@ def check_balance(
     reactions: FloatArray,
     moved: bool,
 ) -> None:
-    """Refuse a solution whose reactions do not balance its loads.
+    """Refuse a displacement (n, 3), mm, whose reactions do not balance its forces (n, 3), N.
 
-    Parameters
-    ----------
-    displacement : (n, 3) array, mm
-    forces, reactions : (n, 3) array, N
-    moved : bool
-        Whether supports move: the reactions are then loads, too.
+    Where supports are moved, the reactions are loads, too.
     """
     mesh, both = problem.mesh, forces + reactions
     arm = mesh.points - mesh.points[mesh.corners].mean(axis=(0, 1))

@@ -36,12 +36,7 @@ _SYMMETRIC = 1e-9
 
 @dataclass(frozen=True)
 class Region:
-    """Cells of another material than the rest of the part.
-
-    Attributes
-    ----------
-    cells : (k,) int array
-    """
+    """Cells (k,) of another material than the rest of the part."""
 
     material: Material
     cells: IntArray

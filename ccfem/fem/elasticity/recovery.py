@@ -110,14 +110,10 @@ def cell_stress(
 def nodal_stress(
     mesh: TetMesh, displacement: FloatArray, stiffness: FloatArray, free: FloatArray | None = None
 ) -> FloatArray:
-    """Stress at the nodes: volume-weighted average over the cells round each node.
+    """Stress (n, 3, 3), MPa, at the nodes: volume-weighted average over the cells round each node.
 
-    In quadratic cells the stress of a cell is taken at the node itself.
-
-    Returns
-    -------
-    (n, 3, 3) array, MPa
-        Zero at nodes without a cell.
+    In quadratic cells the stress of a cell is taken at the node itself. It is zero at nodes without
+    a cell.
     """
     m, q = mesh.cells.shape
     if mesh.order == 1:

@@ -60,13 +60,7 @@ class Holds:
 
 
 def check_motion(mesh: CellMesh, points: FloatArray, holds: Holds) -> None:
-    """Check that no piece of the part can move as a rigid body.
-
-    Parameters
-    ----------
-    points : (n, 3) array, mm
-        Of its nodes, in space.
-    """
+    """Check that no piece of the part, nodes at points (n, 3), mm, can move as a rigid body."""
     body = connected(mesh.neighbours, len(mesh.cells))
     count = int(body.max()) + 1
     used = np.zeros(len(points), dtype=bool)

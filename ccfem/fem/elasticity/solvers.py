@@ -92,11 +92,6 @@ class Solver:
         """Factorise another matrix of the same pattern, such as another stiffness on the mesh.
 
         "pypardiso" keeps its ordering, and this solver is invalidated; the others refactorise.
-
-        Parameters
-        ----------
-        matrix : bsr_array (n, n)
-            Symmetric positive definite.
         """
         known = self.matrix
         if not (
@@ -210,11 +205,7 @@ def direct_backend() -> str:
 def choose_direct(matrix: sp.bsr_array, renewed: bool = False) -> str:
     """Name the direct backend that suits a plane system and what is installed.
 
-    Parameters
-    ----------
-    matrix : bsr_array (n, n)
-    renewed : bool, default False
-        Whether many matrices of its pattern will follow.
+    Where it is renewed, many matrices of its pattern will follow.
     """
     best = direct_backend()
     limit = _SKYLINE_RENEWED if renewed and best == "pypardiso" else _SKYLINE

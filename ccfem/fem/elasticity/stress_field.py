@@ -132,15 +132,9 @@ class GivenStress:
 
 @dataclass(frozen=True)
 class Probe:
-    """Results of a solution at points.
+    """Results of a solution at points (k, 3), mm: displacement, mm, strain and stress, MPa.
 
-    Attributes
-    ----------
-    points : (k, 3) array, mm
-    displacement : (k, 3) array, mm
-    strain : (k, 3, 3) array
-        Tensor: shear entries are half the engineering ones.
-    stress : (k, 3, 3) array, MPa
+    Shear entries of the strain tensor are half the engineering ones.
     """
 
     points: FloatArray
@@ -188,13 +182,8 @@ def displacement_at(
 def support_forces(problem: Problem, reactions: FloatArray) -> dict[str, FloatArray]:
     """Force (3,), N, of each support on the part, by the patch, edge or point that it holds.
 
-    Where supports share a node, each component is divided equally among those that hold it, so that
-    all forces together are the total reaction.
-
-    Parameters
-    ----------
-    reactions : (n, 3) array, N
-        As `StressField.reactions`.
+    Where supports share a node, each component of the reactions (n, 3), N, is divided equally among
+    those that hold it, so that all forces together are the total reaction.
     """
     mesh = problem.mesh
     holding = (
@@ -383,14 +372,7 @@ class StressField(Shown):
         return read_only(strain_from_voigt(to_voigt(engineering)))
 
     def probe(self, points: FloatArray, tolerance: float = 1e-3) -> Probe:
-        """Displacement, and recovered strain and stress, at points.
-
-        Parameters
-        ----------
-        points : (k, 3) array, mm
-        tolerance : float, mm
-            As in `at`.
-        """
+        """Displacement, recovered strain and stress at points (k, 3), mm; tolerance as in `at`."""
         points = np.asarray(points, dtype=np.float64)
         mesh = self.mesh
         cell, weights = located(mesh, points, tolerance)

@@ -65,13 +65,7 @@ def held(problem: SupportedProblem) -> Held:
 
 
 def held_in(problem: SupportedProblem, case: str, at_rest: Held) -> Held:
-    """Return the held components at the values of one load case.
-
-    Parameters
-    ----------
-    at_rest : Held
-        From `held`.
-    """
+    """Return the components of `held` at the values of one load case."""
     loads = problem.loads[case]
     moves = {load.patch: load.vector for load in loads if isinstance(load, Displacement)}
     if not moves:
@@ -92,12 +86,7 @@ def held_in(problem: SupportedProblem, case: str, at_rest: Held) -> Held:
 
 
 def check_support(mesh: CellMesh, fixed: BoolArray) -> None:
-    """Check that no piece of the part can move as a rigid body.
-
-    Parameters
-    ----------
-    fixed : (n, 3) bool array, or (n, 2) in the plane
-    """
+    """Check that no piece can move as a rigid body with fixed components (n, 3), or (n, 2)."""
     check_motion(mesh, _in_space(mesh.points), Holds(*_axis_holds(fixed)))
 
 

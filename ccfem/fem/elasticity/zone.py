@@ -121,16 +121,9 @@ BALL = 2.0
 def ball_averages(
     points: FloatArray, values: FloatArray, weights: FloatArray, judged: IntArray, radius: float
 ) -> FloatArray:
-    """Weighted averages over the points within a radius of each judged point: (k, c).
+    """Weighted averages (k, c) of values (n, c) over the points within a radius, mm.
 
-    Parameters
-    ----------
-    points : (n, 3) array, mm
-    values : (n, c) array
-    weights : (n,) array
-    judged : (k,) int array
-        Points whose averages are wanted.
-    radius : float, mm
+    Of points (n, 3), mm, those `judged` (k,) are the middles.
     """
     result = np.zeros((len(judged), values.shape[1]))
     apart = float(np.cbrt(np.prod(np.ptp(points, axis=0)) / len(points)))

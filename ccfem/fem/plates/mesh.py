@@ -73,12 +73,7 @@ class PlaneMesh(CellMesh):
 
 @dataclass(frozen=True)
 class Sheet:
-    """A plane mesh with the thickness of its cells: what loads act on.
-
-    Attributes
-    ----------
-    thickness : (m,) array, mm
-    """
+    """A plane mesh with the thickness (m,), mm, of its cells: what loads act on."""
 
     mesh: PlaneMesh
     thickness: FloatArray

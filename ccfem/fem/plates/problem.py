@@ -127,10 +127,7 @@ def rotate_plane(stiffness: FloatArray, angle: ArrayLike) -> FloatArray:
 def fitted_harmonics(turned: Callable[[FloatArray], FloatArray]) -> FloatArray:
     """Five matrices (5, k, k) that `turned_by` combines to a stiffness turned about z.
 
-    Parameters
-    ----------
-    turned : callable
-        Stiffness (a, k, k) at angles (a,), radians.
+    `turned` gives the stiffness (a, k, k) at angles (a,), radians.
     """
     angles = np.asarray(np.arange(5) * np.pi / 5.0, dtype=np.float64)
     return np.tensordot(np.linalg.inv(turned_by(angles)), turned(angles), axes=1)

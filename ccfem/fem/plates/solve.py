@@ -223,13 +223,7 @@ class PlaneSystem:
     """The equations of a plate: everything that stays when only the stiffness changes.
 
     For many solves on one mesh keep one system and call ``system.assemble(matrices)`` with
-    ``matrices = system.matrices_of(stiffness)``.
-
-    Attributes
-    ----------
-    held : Held
-        The supports.
-    forces : dict of load case name to (n, 2) array, N
+    ``matrices = system.matrices_of(stiffness)``. `forces` (n, 2), N, are by load case.
     """
 
     problem: PlaneProblem

@@ -239,15 +239,7 @@ EntryT = TypeVar("EntryT", bound=np.generic)
 
 @dataclass(frozen=True)
 class CellGroups:
-    """Groups of cells, numbered from 0 without gaps.
-
-    Attributes
-    ----------
-    member : (m,) int array
-        Group of each cell.
-    first : (g,) int array
-        A cell of each group.
-    """
+    """Groups of cells, numbered from 0: of each cell (m,), and a first cell of each group (g,)."""
 
     member: IntArray
     first: IntArray

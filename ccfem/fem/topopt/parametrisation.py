@@ -72,11 +72,7 @@ class ConeFilter:
     def sensitivities(self, density: FloatArray, gradient: FloatArray) -> FloatArray:
         """Sigmund's filtered sensitivities (Struct. Multidisc. Optim. 21 (2001) 120, eq. 5).
 
-        Parameters
-        ----------
-        density : (m,) array
-        gradient : (m,) array
-            Of the objective by the density of each cell.
+        The gradient (m,) is that of the objective by the density (m,) of each cell.
         """
         mean = np.asarray(self.weights @ (density * gradient / self.volumes)) / self._total
         return self.volumes * mean / np.maximum(density, 1e-3)
@@ -196,11 +192,7 @@ class Parametrisation:
     def gradient(self, density: FloatArray, energy: FloatArray) -> FloatArray:
         """Differentiate the compliance by the variables, exactly: (g,) array.
 
-        Parameters
-        ----------
-        density : (g,) array
-        energy : (g,) array, N mm
-            ``u^T k u`` of each group at full density.
+        `energy` (g,), N mm, is ``u^T k u`` of each group at full density.
         """
         penalty, least = self.parameters.penalty, self.parameters.minimum_stiffness
         slope = penalty * density ** (penalty - 1.0) * (1.0 - least)

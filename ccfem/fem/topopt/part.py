@@ -81,18 +81,11 @@ def volume_above(mesh: TetMesh, values: FloatArray, level: float) -> float:
 
 
 def cut_mesh(mesh: TetMesh, values: FloatArray, level: float) -> CutMesh:
-    """Cut out the part of a mesh where a piecewise linear field is above a level.
+    """Cut out the part of a mesh where a piecewise linear field (n,) is above a level.
 
     Marching tetrahedra (Doi and Koide, IEICE Trans. E74 (1991) 214); the prisms that are left are
     split by their least node, so that neighbours agree (Dompierre et al., How to subdivide
     pyramids, prisms and hexahedra into tetrahedra, 8th International Meshing Roundtable, 1999).
-
-    Parameters
-    ----------
-    mesh : TetMesh
-        Linear.
-    values : (n,) array
-        At the nodes; some above the level.
     """
     n, inside = len(mesh.points), values > level
     # Edges with one end above the level, each once, and where they are cut: not at their very ends.
@@ -281,21 +274,12 @@ _THIN = 0.02
 
 
 def relaxed(cut: CutMesh, passes: int = 30) -> TetMesh:
-    """Smooth a cut mesh.
+    """Smooth a cut mesh; cells and patches stay.
 
     Its surface is smoothed by Taubin's passes 0.5 and -0.53 (Curve and surface smoothing without
     shrinkage, ICCV 1995), where nodes on the border of the whole mesh slide along it, and stay
     where a patch ends; inner nodes move to the mean of their neighbours. A step that would flatten
     a cell is not taken.
-
-    Parameters
-    ----------
-    passes : int, default 30
-
-    Returns
-    -------
-    TetMesh
-        Of the same cells and patches.
     """
     mesh = cut.mesh
     n, surface = len(mesh.points), np.unique(mesh.boundary)

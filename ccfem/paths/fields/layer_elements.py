@@ -55,15 +55,10 @@ _THIN = 1e-9
 
 @dataclass(frozen=True)
 class Surface:
-    """Triangles in the plane or in space, with the operators that the fields need.
+    """Triangles (t, 3) between points (n, 2 or 3), mm, with the operators that the fields need.
 
     Gradients and metrics have two components: in the plane, or in space along the `frames` of each
     triangle.
-
-    Attributes
-    ----------
-    points : (n, 2) or (n, 3) array, mm
-    triangles : (t, 3) int array
     """
 
     points: FloatArray
@@ -136,10 +131,7 @@ class Surface:
     def energy(self, metric: FloatArray) -> Any:
         """Matrix (n, n) of the quadratic form ``sum_f grad s . metric_f grad s``.
 
-        Parameters
-        ----------
-        metric : (t, 2, 2) array
-            Symmetric, including the area of the triangle.
+        The metric (t, 2, 2) is symmetric, and includes the area of the triangle.
         """
         gx, gy = self.gradients[:, :, 0], self.gradients[:, :, 1]
         fx = metric[:, 0, 0, None] * gx + metric[:, 0, 1, None] * gy

@@ -126,11 +126,6 @@ def fit_cone(
 
     It uses Clarabel through cvxpy, and serves as the reference for `fit_constrained`; it is about
     fifteen times slower.
-
-    Parameters
-    ----------
-    surface, direction, density, weight, width, spacing_weight
-        As in `fit_constrained`.
     """
     import cvxpy
 

@@ -118,18 +118,12 @@ class Tension:
 
 
 def spatial_tension(stress: FloatArray, compression_limit: float = 3.0) -> Tension:
-    """Tension of stress tensors in space, by the paper's rule.
+    """Tension of stress (k, 3, 3), MPa, in space, by the paper's rule with the limit mu.
 
     Principal stresses are sorted by absolute value, largest first. The first is used if it is
     tensile. Otherwise the second is used if it is tensile, and the first is less than
     `compression_limit` times as large. Otherwise there is no tensile direction, and the first
     direction replaces it.
-
-    Parameters
-    ----------
-    stress : (k, 3, 3) array, MPa
-    compression_limit : float, default 3.0
-        The paper's mu.
     """
     values, directions = principal(stress)
     order = np.argsort(-np.abs(values), axis=1, kind="stable")

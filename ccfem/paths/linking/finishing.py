@@ -78,13 +78,7 @@ def linked_paths(
 
 
 def long_enough(joined: Joined, least_length: float) -> Joined:
-    """Close short rings, and drop what is too short to be cut.
-
-    Parameters
-    ----------
-    least_length : float, mm
-        Of a path.
-    """
+    """Close short rings, and drop paths below a least length, mm, which are too short to be cut."""
     kept = Joined([], [])
     for line, link in zip(*joined, strict=True):
         closed = close_short_ring(line, least_length)
@@ -153,17 +147,10 @@ def parallel_curve(boundary: shapely.Polygon, distance: float, section: Region) 
 def lead_into(
     lines: Sequence[FloatArray], boundary: shapely.Polygon, distance: float, section: Region
 ) -> list[FloatArray]:
-    """Cut lines (n, 2) back to a distance from a boundary and join the cut ends along it.
+    """Cut lines (n_i, 2), mm, back to a distance from a boundary and join the cut ends along it.
 
-    The ends lie on the curve at `distance`. Neighbouring ends are joined in pairs along that curve;
-    of the possible pairings the one of smallest total length is taken.
-
-    Parameters
-    ----------
-    lines : sequence of (n_i, 2) arrays, mm
-    distance : float, mm
-    section : shapely (Multi)Polygon
-        Pieces of the curve outside it join nothing.
+    The ends lie on the curve at `distance`. Neighbouring ends are joined in pairs along that curve,
+    where it is in the section; of the possible pairings the one of smallest total length is taken.
     """
     zone = shapely.buffer(boundary, distance, quad_segs=32)
     ring = zone.exterior

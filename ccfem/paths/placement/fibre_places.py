@@ -153,15 +153,7 @@ class NearPatch:
 
 @dataclass(frozen=True)
 class InBody:
-    """The inside of a closed surface.
-
-    Attributes
-    ----------
-    surface : Surface
-        In the frame of the mesh.
-    name : str
-        Of its file.
-    """
+    """The inside of a closed surface in the frame of the mesh, and the name of its file."""
 
     surface: Surface = field(repr=False)
     name: str = ""

@@ -52,13 +52,7 @@ class GivenPaths:
         return self.toolpaths.on_layer(layer.index)
 
     def heights(self, direction: FloatArray) -> FloatArray:
-        """Heights of the layers that the paths lie on, mm, from the bottom to the top.
-
-        Parameters
-        ----------
-        direction : (3,) array
-            Unit vector of the build direction.
-        """
+        """Heights, mm, of the layers that the paths lie on, upwards along a unit vector (3,)."""
         return np.unique(self._levels(np.asarray(direction, dtype=np.float64)).round(3))
 
     def are_flat(self, direction: FloatArray) -> bool:

@@ -180,12 +180,9 @@ def full_length(layers: Sequence[Layer], machine: Machine) -> float:
 
 
 class ByCoverage:
-    """A `CasesStrategy` with a coverage, which plans for one load case as for several.
+    """A `CasesStrategy` that plans for one load case as for several, by a coverage.
 
-    Attributes
-    ----------
-    coverage : float
-        Length of fibre over that which fills all layers.
+    That is the length of fibre over that which fills all layers.
     """
 
     coverage: float
@@ -208,13 +205,7 @@ class ByCoverage:
 
 @dataclass(frozen=True)
 class WholePart:
-    """Paths of a whole part, returned layer by layer: a `LayerPlanner`.
-
-    Attributes
-    ----------
-    toolpaths : Toolpaths
-        Of all layers.
-    """
+    """Paths of all layers of a part, returned layer by layer: a `LayerPlanner`."""
 
     toolpaths: Toolpaths
 

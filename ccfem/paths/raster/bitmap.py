@@ -97,16 +97,10 @@ class Bitmap:
 
 
 def bitmap(section: Region, pixel: float) -> Bitmap:
-    """Bitmap of a section.
+    """Bitmap, which may be empty, of a section in pixels of a size, mm.
 
     A box of a whole number of pixels is divided into exactly those; otherwise the pixels are
     centred on it, so that a symmetric section has a symmetric bitmap.
-
-    Parameters
-    ----------
-    section : shapely (Multi)Polygon, mm
-        Its bitmap may be empty.
-    pixel : float, mm
     """
     check_number("the pixel of a bitmap", pixel, above=0.0, unit="mm")
     section = shapely.force_2d(section)  # a copy of its own, to be prepared

@@ -461,13 +461,7 @@ def absorb(regions: IntArray, linked: BoolArray, isolated: BoolArray, label: Int
 
 @dataclass(frozen=True)
 class RasterPlan:
-    """Paths planned on a bitmap.
-
-    Attributes
-    ----------
-    regions : Regions
-        The pattern.
-    """
+    """Paths planned on a bitmap, and the pattern of regions."""
 
     raster: Bitmap
     regions: Regions

@@ -151,15 +151,7 @@ it, in fibre widths: strands a width apart then have the same density everywhere
 
 @dataclass(frozen=True)
 class StrandDensity:
-    """Volume of strands per area on a grid.
-
-    Attributes
-    ----------
-    values : (a, b) array, mm
-    low : (2,) array, mm
-        Corner of the grid.
-    cell : float, mm
-    """
+    """Volume of strands per area, mm, on a grid (a, b) of cells, mm, from its `low` corner on."""
 
     values: FloatArray
     low: FloatArray

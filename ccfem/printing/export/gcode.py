@@ -117,10 +117,7 @@ def gcode_pieces(
 ) -> Iterator[str]:
     """Yield the text of `gcode_of_moves` layer by layer: that of a large print fills memory.
 
-    Parameters
-    ----------
-    totals : PrintTotals, optional
-        Of the moves, if they are counted already.
+    The totals of the moves may be counted already.
     """
     totals = print_totals(moves, machine) if totals is None else totals
     progress = _progress(totals, machine)

@@ -66,15 +66,10 @@ def write_robot_waypoints(
 
 
 def write_layer_waypoints(path: str | Path, toolpaths: Toolpaths, layer: int) -> None:
-    """Write one layer as the files published with Fang et al. 2024.
+    """Write one layer, by its index, as the files published with Fang et al. 2024.
 
     Rows of ``x y z nx ny nz`` and three flags: the third last is 0, the second last 1 in the first
     row only, the last 2; the strands follow each other.
-
-    Parameters
-    ----------
-    layer : int
-        Index of the layer.
     """
     fibre = toolpaths.of_kind(FIBRE).on_layer(layer)
     if not len(fibre):
@@ -90,16 +85,11 @@ def write_layer_waypoints(path: str | Path, toolpaths: Toolpaths, layer: int) ->
 
 
 def read_layer_waypoints(path: str | Path, layer: Layer) -> Toolpaths:
-    """Read one layer of fibre from a file as published with Fang et al. 2024.
+    """Read the fibre on a layer from a file as published with Fang et al. 2024.
 
-    Steps longer than 3 mm are travel: the strands are cut there, and those whose ends lie within
-    3 mm of each other are closed. Points are put on the layer, whose normals they take, since some
-    of the published ones are missing.
-
-    Parameters
-    ----------
-    layer : Layer
-        That the strands lie on.
+    Steps longer than 3 mm are travel: the strands are cut there, and those whose ends lie within 3
+    mm of each other are closed. Points are put on the layer, whose normals they take, since some of
+    the published ones are missing.
     """
     file = existing_file(path, "waypoint file")
     try:

@@ -24,12 +24,8 @@ def write_paths(
 
     Every path is one polyline, in the frame of the mesh, mm. The file holds the normals and, at
     each point, ``link`` (1 where the step to the next point is one); for each path ``layer``,
-    ``kind`` (index into `toolpaths.KINDS`), ``closed`` and ``length``. Its arrays are compressed.
-
-    Parameters
-    ----------
-    path_data : mapping of name to (K,) array, optional
-        Further values, one per path.
+    ``kind`` (index into `toolpaths.KINDS`), ``closed`` and ``length``, and further data (K,) by
+    name. Its arrays are compressed.
     """
     points: dict[str, ArrayLike] = {"normals": toolpaths.normals, "link": toolpaths.link}
     paths: dict[str, ArrayLike] = {

@@ -94,18 +94,11 @@ class Overhang:
 
 
 def overhang(mesh: TetMesh, build: Sequence[float], machine: Machine) -> Overhang | None:
-    """Find what flat layers would lay in air; None where all of it lies on something.
+    """Find what layers of a part across `build` would lay in air; None where all lies on something.
 
     That is below faces that lean over by more than `Limits.overhang`. A gap no wider than
     `Limits.free_span` is bridged: what stands on both sides of it holds the lines. Places where
     less than two lines side by side lie in air, as on edges that are rounded below, pass.
-
-    Parameters
-    ----------
-    mesh : TetMesh
-        The part.
-    build : 3 floats
-        Build direction, across which the layers lie.
     """
     limits, width = machine.limits, machine.matrix_width
     thickness = machine.highest_matrix(0.0)

@@ -271,10 +271,7 @@ class JointLines(NamedTuple):
 def joint_lines(stress: PartStress, joints: Sequence[Joint], keep: Keep) -> JointLines:
     """Trace the lines of the strongest stress from every cell; the stress stores the result.
 
-    Parameters
-    ----------
-    keep : {"joining", "touching", "all"}
-        As in `critical_region`.
+    Those to keep are as in `critical_region`.
     """
     known = vars(stress).setdefault(_KNOWN, {})
     key = (tuple(joint.name for joint in joints), keep)

@@ -366,15 +366,9 @@ def _energies(product: FloatArray, wanted: Sequence[int] | None) -> dict[tuple[i
 def slabs(
     points: FloatArray, nodes: IntArray, direction: FloatArray, height: float
 ) -> tuple[IntArray, int]:
-    """Group nodes by slabs normal to a direction; return each node's group and their number.
+    """Group nodes (k,) by slabs normal to a direction; return each node's group and their number.
 
-    Parameters
-    ----------
-    points : (n, 3) array, mm
-    nodes : (k,) int array
-    direction : (3,) array
-    height : float, mm
-        Of a slab; infinite for one group of all.
+    The height of a slab, mm, is infinite for one group of all.
     """
     along = points[nodes] @ direction
     slab = np.zeros(len(nodes), dtype=np.int64)

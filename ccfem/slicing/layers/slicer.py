@@ -85,11 +85,6 @@ def standing(layers: Sequence[Layer], build: Vector) -> Vector:
     support. If layers do, as seen along the build direction, the part is rotated so that their mean
     normal points up, as Kipping and Schueppstuhl 2023 do with all parts (section 2.3). Flat layers
     stay as they are.
-
-    Parameters
-    ----------
-    build : tuple of 3 floats
-        Build direction.
     """
     up = np.asarray(build, dtype=np.float64) / np.linalg.norm(build)
     area = np.concatenate([layer.areas for layer in layers])

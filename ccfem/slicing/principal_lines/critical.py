@@ -141,12 +141,7 @@ class Strongest:
 
 
 def strongest_stress(stress: FloatArray) -> Strongest:
-    """Find the principal stress of the largest size (Fang et al. 2024, section 2.1).
-
-    Parameters
-    ----------
-    stress : (m, 3, 3) array, MPa
-    """
+    """Find the principal stress of the largest size (Fang et al. 2024, section 2.1)."""
     values, directions = np.linalg.eigh(stress)
     order = np.argsort(-np.abs(values), axis=1, kind="stable")
     row = np.arange(len(values))

@@ -176,17 +176,9 @@ def _in_parts(part: Callable[[int, int], Part], count: int) -> list[Part]:
 
 
 def trace(mesh: TetMesh, direction: FloatArray, seeds: IntArray) -> list[FloatArray]:
-    """Trace lines along a direction field from the centres of cells, in both senses.
+    """Trace lines (n_i, 3), mm, along a direction field from the centres of seeds (s,), both ways.
 
-    Parameters
-    ----------
-    direction : (m, 3) array
-        Unit vectors per cell, lines without a sign.
-    seeds : (s,) int array
-
-    Returns
-    -------
-    list of (n_i, 3) arrays, mm
+    Directions (m, 3) are unit vectors per cell, lines without a sign.
     """
     return Tracer.of(mesh, direction).lines(seeds)
 

@@ -49,16 +49,9 @@ class Across:
 def across_layers(
     stress: FloatArray, volume: FloatArray, critical: BoolArray, normal: FloatArray
 ) -> Across:
-    """Measure layers of given normals.
+    """Measure layers of given normals, (m, 3) or (3,), of any length.
 
-    Parameters
-    ----------
-    stress : (m, 3, 3) array, MPa
-    volume : (m,) array, mm^3
-    critical : (m,) bool array
-        Cells that count, at least one.
-    normal : (m, 3) or (3,) array
-        Of any length.
+    Of stress (m, 3, 3), MPa, and volumes (m,), mm^3, the critical cells count, at least one.
     """
     normal = np.broadcast_to(normal, (len(stress), 3))[critical]
     normal = normal / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]

@@ -236,13 +236,7 @@ def _upwards(layers: Sequence[Layer]) -> IntArray:
 
 
 def group_layers(layers: Sequence[Layer], groups: int) -> IntArray:
-    """Divide layers into groups of about the same number, from the bottom to the top.
-
-    Returns
-    -------
-    (n,) int array
-        Group of each layer; every group has a layer.
-    """
+    """Group (n,) of each layer, from the bottom to the top: about as many in each, none empty."""
     order = _upwards(layers)
     group = np.empty(len(layers), dtype=np.int64)
     group[order] = np.arange(len(layers)) * min(groups, len(layers)) // len(layers)
@@ -304,10 +298,6 @@ def layers_of_one_kind(
     """Numbers of the layers of each kind: they share a group, and a section up to a distance, mm.
 
     No two curved layers are equal; up to a larger distance neighbours of a group count as alike.
-
-    Parameters
-    ----------
-    group : (layers,) int array
     """
     if curved_layers(layers):
         kind_of = np.arange(len(layers))
@@ -338,14 +328,9 @@ def middle_layers(layers: Sequence[Layer], group: IntArray) -> list[Layer]:
 
 
 def layer_counts(weights: FloatArray, count: int) -> IntArray:
-    """Share out layers among cases by the largest remainder: the number of each, (n,).
+    """Share out layers among cases of positive weights (n,): the number of each, (n,).
 
-    Parameters
-    ----------
-    weights : (n,) array
-        Positive.
-    count : int
-        Of layers.
+    By the largest remainder.
     """
     wanted = weights / weights.sum() * count
     counts = np.floor(wanted + 1e-9).astype(np.int64)

@@ -318,15 +318,7 @@ class _Operator:
 
 
 def smeared_cases(fields: Sequence[StressField], frame: FloatArray) -> tuple[SmearedPart, ...]:
-    """Parts of several load cases; those of one problem share one factorisation.
-
-    Parameters
-    ----------
-    fields : sequence of StressField
-        Of one mesh.
-    frame : (3, 3) or (m, 3, 3) array
-        Of the layers.
-    """
+    """Parts of several load cases of a mesh; those of one problem share one factorisation."""
     leaders: dict[int, SmearedPart] = {}
     for field in fields:
         backend, leader = _backend(field), leaders.get(id(field.problem))

@@ -207,12 +207,7 @@ class PlaneStrain:
 def plane_strain(mesh: TetMesh, worths: Sequence[StrainWorth], frame: FloatArray) -> PlaneStrain:
     """Average the strain of displacements at the corners of the cells, weighted by volume.
 
-    Parameters
-    ----------
-    worths : sequence of StrainWorth
-        One for each load case.
-    frame : (3, 3) array
-        Axes of the layers.
+    Each load case has a worth; rows of the frame (3, 3) are the axes of the layers.
     """
     corners, n = mesh.corners, len(mesh.points)
     weight = np.repeat(mesh.volumes, 4)

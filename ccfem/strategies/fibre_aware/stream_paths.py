@@ -212,13 +212,8 @@ class Extraction:
     ) -> tuple[list[FloatArray], int]:
         """Lead strands that end at the wall of a hole round it, as many as there is room for.
 
-        Of none and the numbers tried on each side, take what leaves most in printable strands.
-
-        Returns
-        -------
-        lines : list of (n_i, 2) arrays, mm
-        number : int
-            Strands on each side of a hole.
+        Of none and the numbers tried on each side, take what leaves most in printable strands:
+        these lines (n_i, 2), and their number on each side.
         """
         machine, section = self.machine, layer.plane.polygon
         width = machine.fibre_width

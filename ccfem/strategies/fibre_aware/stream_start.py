@@ -136,12 +136,7 @@ def _tension_in_cells(stress: StressField, axes: LayerAxes) -> Tension:
 def mixed_tension(tensions: Sequence[Tension], factors: FloatArray) -> Tension:
     """Tension of ``sum of factor s t t^T`` over the tensions s along t of several load cases.
 
-    Parameters
-    ----------
-    tensions : sequence of Tension
-        In the plane of one layer.
-    factors : (n,) array
-        Not negative.
+    The tensions lie in the plane of one layer, and the factors (n,) are not negative.
     """
     if len(tensions) == 1:  # only its size would change, which no field depends on
         return tensions[0]
