@@ -154,14 +154,8 @@ WARMTH = Range("K", (1e-12, 1e12), (1e-6, 1e3), {})
 def check_fields(value: object, *names: str, **bounds: Any) -> None:
     """Refuse a dataclass with a field that is not a finite number within bounds.
 
-    None passes where the annotation has it. The message names a field as in ``eqs.spacing``.
-
-    Parameters
-    ----------
-    *names : str
-        The fields.
-    **bounds
-        `at_least`, `above`, `at_most`, `below` and `unit` of `check_number`.
+    None passes where the annotation has it. The message names a field as in ``eqs.spacing``. Bounds
+    are those of `check_number`.
     """
     for name in names:
         given = getattr(value, name)
@@ -233,15 +227,7 @@ def check_instance(kind: str, value: object) -> None:
 def refuse_keywords(
     function: str, unknown: Iterable[str], known: Iterable[str], replaced: Mapping[str, str]
 ) -> None:
-    """Refuse keywords that a function does not have.
-
-    Parameters
-    ----------
-    unknown, known : iterable of str
-        What was given beyond its keywords, and these.
-    replaced : mapping of str to str
-        What takes the place of a keyword that might be expected.
-    """
+    """Refuse keywords that a function does not have; `replaced` says what stands for some."""
     for name in unknown:
         cure = f": give it as {replaced[name]}" if name in replaced else ""
         raise InputError(

@@ -165,10 +165,7 @@ class Folder:
 def private_folder(parent: Path | None = None) -> Iterator[Path]:
     """Yield a new folder that no other user may enter; it is removed at the end, with all in it.
 
-    Parameters
-    ----------
-    parent : Path, optional
-        Where it is made; default the system's folder for temporary files.
+    It is made in `parent`, by default the system's folder for temporary files.
     """
     name = tempfile.mkdtemp(prefix=_prefix(), dir=parent)
     _PRIVATE.add(name)

@@ -41,13 +41,7 @@ FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 
 
 def processors() -> int:
-    """Processors that the program may use: CCFEM_THREADS, by default all that the system grants.
-
-    Raises
-    ------
-    InputError
-        When CCFEM_THREADS is not a whole number from 1 on.
-    """
+    """Processors that the program may use: CCFEM_THREADS, by default all that the system grants."""
     wanted = os.environ.get("CCFEM_THREADS", "")
     if not wanted:
         return _granted()

@@ -100,19 +100,7 @@ def von_mises(stress: FloatArray) -> FloatArray:
 
 
 def in_plane(stress: FloatArray, frame: FloatArray) -> FloatArray:
-    """Components of stress tensors in the plane of two unit vectors.
-
-    Parameters
-    ----------
-    stress : (..., 3, 3) array, MPa
-    frame : (2 or 3, 3) array
-        The first two rows are the unit vectors of the plane.
-
-    Returns
-    -------
-    (..., 3) array, MPa
-        s11, s22, s12 in the plane.
-    """
+    """Components s11, s22, s12 of stress (..., 3, 3) in the plane of two rows of a frame."""
     e1, e2 = frame[0], frame[1]
     first, second = stress @ e1, stress @ e2
     return np.stack([first @ e1, second @ e2, first @ e2], axis=-1)
@@ -124,19 +112,10 @@ def in_axes(tensor: FloatArray, axes: FloatArray) -> FloatArray:
 
 
 def largest_in_plane(plane_stress: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Principal values of plane stress and the angle of the larger one.
+    """Larger and smaller principal value of plane stress (..., 3), and the angle of the larger one.
 
-    Parameters
-    ----------
-    plane_stress : (..., 3) array, MPa
-        s11, s22, s12.
-
-    Returns
-    -------
-    largest, smallest : (...,) arrays, MPa
-    angle : (...,) array, radians
-        Angle of the direction of `largest` to axis 1, in (-pi/2, pi/2]. If both values coincide it
-        is 0 and meaningless.
+    The stress is s11, s22, s12. The angle, radians, is to axis 1, in (-pi/2, pi/2]; where both
+    values coincide it is 0 and meaningless.
     """
     s11, s22, s12 = np.moveaxis(plane_stress, -1, 0)
     mean, half = 0.5 * (s11 + s22), 0.5 * (s11 - s22)

@@ -60,13 +60,7 @@ def reason_and_cure(error: OSError, folder: str = "a folder you may write to") -
 
 
 def check_writable(path: str | os.PathLike[str]) -> Path:
-    """Return `path` when a file of that name can be written: to be checked before long work.
-
-    Raises
-    ------
-    InputError
-        When its folder does not exist or may not be written to, or `path` is a folder itself.
-    """
+    """Return `path` when a file of that name can be written: to be checked before long work."""
     path = Path(path)
     if path.is_dir():
         raise InputError(f"cannot write {path}: it is a folder: name the file in it")

@@ -43,15 +43,7 @@ def _ascending(table: IntArray) -> list[IntArray]:
 
 
 def paired(facets: IntArray) -> tuple[IntArray, IntArray]:
-    """Find the facets (k, c) that coincide with another one, and those that stand alone.
-
-    Returns
-    -------
-    pairs : (f, 2) int array
-        Rows of `facets` with the same nodes, the smaller row first.
-    single : (s,) int array
-        The other rows, ascending.
-    """
+    """Pairs (f, 2) of facets (k, c) that have the same nodes, and those (s,) that stand alone."""
     (key,) = facet_keys(facets)
     order = np.argsort(key, kind="stable")
     first = np.flatnonzero(np.diff(key[order]) == 0)

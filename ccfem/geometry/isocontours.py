@@ -168,14 +168,9 @@ def chained(link: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def least_distance(curves: Isocontours, reach: float, enough: float) -> float:
-    """Smallest distance between isocurves of neighbouring levels, mm, as far as `reach`.
+    """Smallest distance between isocurves of neighbouring levels, mm, at most `reach`.
 
-    Parameters
-    ----------
-    reach : float, mm
-        Larger distances are not looked for; the result is at most `reach`.
-    enough : float, mm
-        The search stops at the first distance below this.
+    The search stops at the first distance below `enough`.
     """
     start = np.flatnonzero(starts_segment(curves.offsets))
     if not len(start):

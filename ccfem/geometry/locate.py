@@ -100,12 +100,8 @@ def _boxes_by_cell(first: IntArray, last: IntArray, shape: IntArray) -> tuple[In
 class Simplices:
     """Triangles of the plane, or tetrahedra in space, prepared once to be searched for points.
 
-    Attributes
-    ----------
-    corners : (m, d + 1, d) array, mm
-        In d = 2 or 3 dimensions, of either orientation; flat ones are never found.
-    rounding : float, mm
-        Distance outside within which a point counts as held.
+    Corners (m, d + 1, d) may have either orientation; flat ones are never found. A point counts as
+    held up to `rounding`, mm, outside.
     """
 
     corners: FloatArray

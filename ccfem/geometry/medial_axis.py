@@ -66,14 +66,9 @@ class MedialSegment:
 
 @dataclass(frozen=True)
 class MedialAxis:
-    """The medial axis of a section.
+    """The medial axis of a section: segments between nodes, and their distance to the border.
 
-    Attributes
-    ----------
-    nodes : (k, 2) array, mm
-        Ends, junctions, and the centres of parts whose axis is a point (discs).
-    radius : (k,) array, mm
-        Distance of each node to the border.
+    Nodes are ends, junctions, and the centres of parts whose axis is a point (discs).
     """
 
     nodes: FloatArray

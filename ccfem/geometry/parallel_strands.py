@@ -246,18 +246,7 @@ def _fill_rest(
 
 
 def lengthened(line: FloatArray, region: Region, near: float, length: float) -> FloatArray:
-    """Extend an open line straight at ends that lie near the border of a region.
-
-    Parameters
-    ----------
-    line : (m, 2) array, mm
-        Returned unchanged if closed.
-    region : shapely (Multi)Polygon, mm
-    near : float, mm
-        Distance to the border up to which an end is extended.
-    length : float, mm
-        Length of the extension.
-    """
+    """Extend an open line (m, 2) straight, by a length, at ends near the border of a region, mm."""
     if is_closed(line):
         return line
     gap = shapely.distance(region.boundary, shapely.points(line[[0, -1]]))

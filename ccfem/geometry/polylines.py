@@ -201,12 +201,7 @@ def subdivide(
 ) -> tuple[FloatArray, IntArray, IntArray]:
     """Cut segments longer than `longest` into equal pieces; every given point stays.
 
-    Returns
-    -------
-    points, offsets
-        The subdivided polylines.
-    segment : (P',) int array
-        Index of the given point that starts the segment on which each new point lies.
+    Returns points and offsets, and the given point that starts the segment of each new one, (P',).
     """
     steps = _steps(points, offsets)
     # Pieces of the segment that each point starts; the last point of a polyline starts none.
@@ -224,14 +219,8 @@ def merge_repeated(
 ) -> tuple[FloatArray, IntArray, IntArray]:
     """Drop every point that lies within `tolerance` of the one before it.
 
-    First points always stay, so a polyline of no length keeps one point.
-
-    Returns
-    -------
-    points, offsets
-        The polylines without those points.
-    kept : (P',) int array
-        Index of each point among those given.
+    First points always stay, so a polyline of no length keeps one point. Returns points and
+    offsets, and the numbers of the points kept, (P',).
     """
     keep = _steps(points, offsets) > tolerance
     starts = offsets[:-1][np.diff(offsets) > 0]
@@ -368,17 +357,10 @@ _OWN = 3.0
 
 
 def until_itself(line: FloatArray, start: FloatArray, width: float) -> FloatArray:
-    """Cut a line (n, 2), from a point on it ahead and back, where it comes near itself.
+    """Cut a line (n, 2), mm, from the point nearest to `start`, where it comes near itself.
 
     Streamlines may circle a hole many times, slightly displaced each time. A closed line stays
     closed if only its ends meet.
-
-    Parameters
-    ----------
-    line : (n, 2) array, mm
-    start : (2,) array, mm
-        The point of the line nearest to this is kept.
-    width : float, mm
     """
     if len(line) < 2:
         return line

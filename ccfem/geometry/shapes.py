@@ -55,17 +55,9 @@ def open_lines(shapes: shapely.Geometry | Shapes) -> list[FloatArray]:
 
 
 def bends(line: FloatArray, kept: IntArray, tolerance: float) -> IntArray:
-    """Points of a polyline (n, 2), n > 1, between which it is straight to a tolerance, mm.
+    """Points (m,) of a polyline (n, 2), n > 1, between which it is straight to a tolerance, mm.
 
-    Parameters
-    ----------
-    kept : (k,) int array
-        Inner points that stay whatever the line does there, in their order.
-
-    Returns
-    -------
-    (m,) int array
-        Indices of points: both ends, those kept, and the bends between them.
+    The inner points `kept` (k,), in their order, stay whatever the line does there.
     """
     first, last = np.append(0, kept), np.append(kept, len(line) - 1)
     piece, number = repeated(last - first + 1)
@@ -101,16 +93,8 @@ def corners_only(section: Region) -> Region:
     """Section without the points on its straight sides, which slicing leaves where edges cross.
 
     Layers of an extruded part become equal, so that everything that depends only on the section can
-    be planned once for all of them.
-
-    Parameters
-    ----------
-    section : shapely (Multi)Polygon, mm
-
-    Returns
-    -------
-    shapely (Multi)Polygon, mm
-        Each ring starts at its lowest corner in x, then y; coordinates are rounded to 1e-11 mm.
+    be planned once for all of them. Each ring starts at its lowest corner in x, then y; coordinates
+    are rounded to 1e-11 mm.
     """
     parts = []
     for part in shapely.get_parts(section):

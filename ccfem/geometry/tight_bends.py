@@ -80,21 +80,9 @@ def tight_bends(
 
 
 def tight_samples(line: FloatArray, closed: bool, radius: float, width: float) -> FloatArray:
-    """Places at which the evaluator finds a line to be as tight as the radius, or tighter.
+    """Places (k,), mm, at which the evaluator finds a line to be as tight as a radius, or tighter.
 
     It checks the ends of equal steps of about a width; their number is nearest to the length.
-
-    Parameters
-    ----------
-    line : (n, d) array, mm
-    closed : bool
-        Whether the line also turns where it closes.
-    radius, width : float, mm
-
-    Returns
-    -------
-    (k,) array, mm
-        By arc length.
     """
     points, offsets = resample(line, np.array([0, len(line)]), width)
     number = np.flatnonzero(inner_points(offsets, np.array([closed])))

@@ -162,13 +162,9 @@ class Machine:
         return self.line_shape * self.matrix_width
 
     def highest_matrix(self, over: float) -> float:
-        """Largest height of a layer of matrix whose lines fill what is open below them too, mm.
+        """Largest height, mm, of a layer of matrix whose lines fill what is open below them too.
 
-        Parameters
-        ----------
-        over : float, mm
-            Height of the fibre layer below it, between the strands of which they reach down; 0 on
-            matrix.
+        They reach down between strands over a height of the fibre layer below; 0 on matrix.
         """
         highest = max(self.highest_line - over, min(self.least_line, self.highest_line))
         return min(self.matrix_height, highest) if self.matrix_height else highest

@@ -161,10 +161,7 @@ _MEANT = {
 def check_ranges(value: object) -> None:
     """Refuse a table of a machine with a number outside its range.
 
-    Parameters
-    ----------
-    value : Machine, SpeedTable, GcodeProfile, Process, Kinematics, Spools, Costs or Limits
-        A field that is None passes; of a tuple every number is checked.
+    A field that is None passes; of a tuple every number is checked.
     """
     table, hints = member_name(value), get_type_hints(type(value))
     for name, allowed in RANGES[table].items():

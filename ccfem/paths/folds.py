@@ -306,12 +306,7 @@ def _begun_alike(
 ) -> tuple[FloatArray, FloatArray]:
     """Begin closed polylines at their point farthest from their middle, wherever they began.
 
-    Returns
-    -------
-    points : (P, d) array
-        Changed in place.
-    begin : (K,) array, mm
-        Arc length of that point on the polyline as it was given.
+    Points are changed in place; the arc length (K,), mm, of that point as it was is returned too.
     """
     begin = np.zeros(len(offsets) - 1)
     for k in np.flatnonzero(closed & (np.diff(offsets) > 2)):

@@ -16,15 +16,7 @@ def repeated_layers(
 ) -> IntArray:
     """Position of the first layer that each one repeats, (n,); its own where it repeats none.
 
-    Parameters
-    ----------
-    more : sequence of hashable, optional
-        What else has to be the same, for each layer.
-
-    Returns
-    -------
-    (n,) int array
-        Curved layers repeat none.
+    Curved layers repeat none. What `more` says of each layer has to be the same too.
     """
     source, known = np.arange(len(layers)), dict[Hashable, int]()
     for k, layer in enumerate(layers):

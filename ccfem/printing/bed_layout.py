@@ -196,16 +196,9 @@ class BedTable:
 def bed_of(
     build: Sequence[float], table: object, base: BedLayout = AS_IT_STANDS
 ) -> tuple[Vector, BedLayout]:
-    """Build direction and layout by a table ``[bed]``.
+    """Build direction and layout by a table ``[bed]``, which changes a base.
 
-    Parameters
-    ----------
-    build : 3 floats
-        Build direction before it is turned.
-    table : object
-        What stands in the file.
-    base : BedLayout
-        What the table changes; turns come after those that there are.
+    Turns come after those that there are.
     """
     given = from_table(BedTable, table, "bed")
     turns = [given.turn] if isinstance(given.turn, str) else given.turn

@@ -94,13 +94,9 @@ def _box(stress: PartStress, up: Sequence[float]) -> FloatArray:
 def better_direction(stress: PartStress, build: Vector, machine: Machine) -> str:
     """Propose the direction whose layers let fibre take much more of the tension, with reasons.
 
-    Of directions along the axes whose box fits on the bed the one of most tension in its layers;
-    of those alike in it the one that lays least in air, and then the lowest.
-
-    Returns
-    -------
-    str
-        One line; empty where none adds a fifth of the tension.
+    Of directions along the axes whose box fits on the bed the one of most tension in its layers; of
+    those alike in it the one that lays least in air, and then the lowest. Empty where none adds a
+    fifth of the tension.
     """
     now = tension_share(stress, build)
     shares = {

@@ -39,18 +39,9 @@ _HALF_WIDTHS = 0.5
 def layer_matrix(layers: Sequence[Layer], machine: Machine) -> Toolpaths:
     """Fill layers with matrix: rings a line's width apart, measured in the chart of curved layers.
 
-    A line has the width of the machine and the height that the layer has where it lies, so that
-    its cross-section changes along it: `ccfem.printing.export.robot_waypoints` writes that height.
-
-    Parameters
-    ----------
-    machine : Machine
-        Its `matrix_width`.
-
-    Returns
-    -------
-    Toolpaths
-        Closed paths of matrix, from the border inwards, layer by layer.
+    Closed paths, from the border inwards, layer by layer. A line has the width of the machine and
+    the height that the layer has where it lies, so that its cross-section changes along it:
+    `ccfem.printing.export.robot_waypoints` writes that height.
     """
     return Toolpaths.concatenate(in_threads(lambda layer: _rings(layer, machine), layers))
 
@@ -96,17 +87,9 @@ class FilledLayer:
 def filled_layers(
     fibre: Toolpaths, layers: Sequence[Layer], support: SupportLayers | None, machine: Machine
 ) -> list[FilledLayer]:
-    """Fill layers with matrix and fibre, and those of the support in between.
+    """Fill layers with matrix and fibre, from the first printed to the last, and those of support.
 
-    Parameters
-    ----------
-    layers : sequence of Layer
-        From the first printed to the last.
-
-    Returns
-    -------
-    list of FilledLayer
-        A layer of support stands just before the layer of the part at its level.
+    A layer of support stands just before the layer of the part at its level.
     """
     props = None if support is None else support_paths(support, machine, layers=layers)
     filled = []

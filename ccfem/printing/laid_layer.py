@@ -329,15 +329,7 @@ def matrix_layer(
     thickness: float,
     machine: Machine,
 ) -> LaidLayer:
-    """Lay matrix over the layers below, and pads.
-
-    Parameters
-    ----------
-    pads : sequence of (n, 2) arrays, mm
-        Lines of pads.
-    height, thickness : float, mm
-        Top of the layer over the bed, and its own height.
-    """
+    """Lay matrix over the layers below, and lines of pads; `height` is the top over the bed, mm."""
     solid = fill.lines[: len(fill.lines) - fill.sparse]
     ways = [np.zeros(len(line), dtype=bool) for line in solid] + fill.ways
     matrix, which = _printed(fill.lines, height, MATRIX, ways)

@@ -20,12 +20,7 @@ mostly alike and take a quarter of an hour; where all layers differ, it takes so
 def check_matrix_lines(mesh: TetMesh, build: Sequence[float], machine: Machine) -> None:
     """Refuse a print whose matrix would need more than a million lines.
 
-    Parameters
-    ----------
-    mesh : TetMesh
-        The part: its volume is filled with lines as long as its mean section is wide.
-    build : 3 floats
-        Build direction.
+    They fill the volume of the part, and are as long as its mean section is wide.
     """
     height, section = _mean_section(mesh, build)
     layers = height / machine.matrix_height

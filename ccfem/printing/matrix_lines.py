@@ -35,15 +35,9 @@ _SIMPLER = 1e-3
 
 
 def parallel_lines(region: Region, pitch: float, angle: float) -> list[FloatArray]:
-    """Parallel lines (k, 2), mm, whose distances from the origin are multiples of a pitch.
+    """Parallel lines (k, 2), mm, whose distances from the origin are multiples of a pitch > 0.
 
-    Parameters
-    ----------
-    region : shapely (Multi)Polygon, mm
-    pitch : float, mm
-        Distance of the lines, > 0.
-    angle : float, radians
-        Direction of the lines to the first axis.
+    The angle, radians, is that to the first axis.
     """
     if region.is_empty:
         return []
@@ -88,18 +82,8 @@ def border_joints(
     """Ways along the border of a region that join the ends of lines clipped to it.
 
     Only ends that follow each other on a ring are joined, the nearest first, so that no way crosses
-    a line; none of the lines becomes a ring.
-
-    Parameters
-    ----------
-    lines : sequence of (n, 2) arrays, mm
-    longest : float, mm
-        Of a way.
-
-    Returns
-    -------
-    list of (int, int, (k, 2) array)
-        Two ends, of which line k has 2 k and 2 k + 1, and the points between them.
+    a line or is longer than `longest`, mm; none of the lines becomes a ring. Returns two ends, of
+    which line k has 2 k and 2 k + 1, and the points (k, 2) between them.
     """
     ends = np.array([line[[0, -1]] for line in lines]).reshape(-1, 2)
     ways: list[tuple[float, int, int, FloatArray]] = []
@@ -172,20 +156,10 @@ def matrix_fills(
     machine: Machine,
     plastic: Plastic = SOLID,
 ) -> list[MatrixFill | None]:
-    """Find the lines that fill each slab of matrix; None for a slab of fibre.
+    """Find the lines that fill each slab, from the bed up; None for a slab of fibre.
 
-    The zigzag turns from one layer of matrix to the next.
-
-    Parameters
-    ----------
-    slabs : sequence of Slab
-        From the bed to the top.
-    fibre : sequence of Layer
-        Flat layers that may get fibre.
-    mesh : TetMesh
-        The part.
-    plastic : Plastic
-        Default: solid.
+    The zigzag turns from one layer of matrix to the next. `fibre` are flat layers that may get
+    fibre.
     """
     width, profile = machine.matrix_width, machine.gcode
     of_matrix = [k for k, slab in enumerate(slabs) if slab.fibre is None]

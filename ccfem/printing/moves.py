@@ -265,12 +265,8 @@ def _fitted(
 ) -> tuple[BoolArray, FloatArray]:
     """Circles through the first and last of rows of points (m, k, 2), nearest to those between.
 
-    Returns
-    -------
-    good : (m,) bool array
-        Whether the arc may stand for the moves between the points.
-    circles : (m, 3) array
-        Centre and angle; zeros for a straight line.
+    Returns whether the arc may stand for the moves between them, (m,), and its centre and angle,
+    (m, 3), which are zeros for a straight line.
     """
     tolerance = profile.arc_tolerance
     first, last = points[:, 0], points[:, -1]

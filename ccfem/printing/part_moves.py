@@ -346,12 +346,9 @@ def _fan(tool: int, top: float, machine: Machine) -> float:
 def begin_layer(
     recorder: Recorder, number: int, top: float, below: float, machine: Machine
 ) -> None:
-    """Begin a layer: from a height on, nozzle and bed get less hot, and the fan of the tool runs.
+    """Begin a layer between two heights, mm.
 
-    Parameters
-    ----------
-    top, below : float, mm
-        Tops of this layer and of the one below it.
+    From a height on, nozzle and bed get less hot, and the fan of the tool runs.
     """
     recorder.begin_layer(number)
     warm = machine.process.warm_height
@@ -399,15 +396,9 @@ def _draw_back(recorder: Recorder, machine: Machine) -> None:
 def line_sizes(heights: FloatArray, room: float, machine: Machine) -> tuple[FloatArray, FloatArray]:
     """Width and height, mm, of a line of matrix of a given section on each of its steps.
 
-    A line is as wide as its room. Where it would then be higher than its shape allows, the same
-    section is wider: what stands beside it presses it into the room.
-
-    Parameters
-    ----------
-    heights : (n,) array, mm
-        That the section has at the width of the machine's lines.
-    room : float
-        Width of the room over that width.
+    A line is as wide as its room, over the width of the machine's lines. Where it would then be
+    higher than its shape allows, the same section, `heights` (n,) at that width, is wider: what
+    stands beside it presses it into the room.
     """
     section = machine.matrix_width * heights
     width = np.maximum(room * machine.matrix_width, np.sqrt(section / machine.line_shape))

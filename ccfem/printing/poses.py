@@ -229,10 +229,7 @@ def _spread(paths: Toolpaths, axes: FloatArray, at: IntArray, turned: FloatArray
 def contact_words(touched: tuple[float, float, float], place: FloatArray | None) -> list[str]:
     """Say where the head touches what is printed, and what was done about it.
 
-    Parameters
-    ----------
-    touched : tuple of 3 floats, mm
-        Layer by layer, in the order chosen, and as it leans.
+    Lengths, mm, are those layer by layer, in the order chosen, and as it leans.
     """
     level, ordered, after = touched
     if not level > 0.0 and not after > 0.0:

@@ -223,12 +223,7 @@ def _head_room(plan: PrintPlan, machine: Machine) -> float:
 def outline(low: FloatArray, high: FloatArray, layer: float, fibre: bool) -> PrintPlan:
     """Plan of the lines round a box (3,) on the bed, at its top: as much room as a part needs.
 
-    Parameters
-    ----------
-    layer : float, mm
-        Least height of its layers of matrix.
-    fibre : bool
-        Whether fibre comes as far as matrix.
+    Its layers of matrix are at least `layer` mm high; `fibre` says whether that comes as far.
     """
     turns = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])
     ring = np.column_stack([low[:2] + turns * (high - low)[:2], np.full(5, high[2])])

@@ -26,16 +26,7 @@ from ccfem.body.files.cells import CELL_FACES, CORNERS, triangles_of
 
 @dataclass(frozen=True)
 class Block:
-    """A keyword with its parameters and data lines.
-
-    Attributes
-    ----------
-    file : Path
-    number : int
-        Of the line of the keyword, from 1.
-    numbers : list of int
-        Of the data lines.
-    """
+    """A keyword with its parameters and data lines, and the numbers of these lines in its file."""
 
     keyword: str
     parameters: dict[str, str]

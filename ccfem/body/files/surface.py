@@ -22,18 +22,9 @@ _NOTHING = 1e-12
 
 @dataclass(frozen=True)
 class Surface:
-    """A closed surface of triangles, outward.
+    """A closed surface of triangles (t, 3), outward, between points (n, 3), mm.
 
-    Attributes
-    ----------
-    points : (n, 3) array, mm
-    triangles : (t, 3) int array
-
-    Raises
-    ------
-    InputError
-        When the surface has no triangle, a coordinate that is not finite, is open, or encloses
-        nothing.
+    One that is open, has no triangle, or encloses nothing is an `InputError`.
     """
 
     points: FloatArray
@@ -225,22 +216,10 @@ class Shell(CellMesh):
 def refined(
     points: ArrayLike, triangles: ArrayLike, length: float
 ) -> tuple[FloatArray, IntArray, IntArray]:
-    """Cut triangles until no side is longer than a length, or there are very many.
+    """Cut triangles (t, 3) until no side is longer than a length, mm, or there are very many.
 
-    Parameters
-    ----------
-    points : (n, 3) array, mm
-    triangles : (t, 3) int array
-        Closed.
-    length : float, mm
-
-    Returns
-    -------
-    points : (p, 3) array
-    triangles : (q, 3) int array
-        Closed as before.
-    origin : (q,) int array
-        The triangle that each is a piece of.
+    A closed surface stays closed. Returns points, triangles, and the triangle that each is a piece
+    of.
     """
     points = np.asarray(points, dtype=np.float64)
     triangles = np.asarray(triangles, dtype=np.int64)

@@ -15,20 +15,10 @@ from ccfem.geometry.facets import unique_edges
 
 
 def bisected(mesh: TetMesh, chosen: BoolArray) -> tuple[TetMesh, IntArray]:
-    """Halve chosen cells at their longest edges, and what of their neighbours has to follow.
+    """Halve chosen linear cells at their longest edges, and what of their neighbours has to follow.
 
-    Parameters
-    ----------
-    mesh : TetMesh
-        Linear.
-    chosen : (m,) bool array
-
-    Returns
-    -------
-    mesh : TetMesh
-        The first nodes are those of before; patches are cut as their cells are.
-    parent : (k,) int array
-        Cell that each cell is a piece of.
+    Returns the mesh, whose first nodes are those of before, with its patches cut as their cells
+    are; and the cell (k,) that each cell is a piece of.
     """
     edges, edge = unique_edges(mesh.cells[:, mesh.edges].reshape(-1, 2))
     edge = edge.reshape(-1, 6)

@@ -320,13 +320,9 @@ _TOUCH = 1e-6
 def hanging_nodes(mesh: TetMesh) -> IntArray:
     """Nodes of the boundary (k,) that hang on a boundary facet, inside it or on one of its sides.
 
-    In a mesh whose cells meet face to face there are none, unless pieces touch that are meant to
-    be apart. Nodes that lie on a corner of the facet are no hanging ones, but coincident.
-
-    Parameters
-    ----------
-    mesh : TetMesh
-        Of a quadratic mesh the corners are looked at; its middles follow them.
+    In a mesh whose cells meet face to face there are none, unless pieces touch that are meant to be
+    apart. Nodes that lie on a corner of the facet are no hanging ones, but coincident. Of a
+    quadratic mesh the corners are looked at; its middles follow them.
     """
     facets = mesh.boundary
     nodes = np.unique(facets)

@@ -56,23 +56,10 @@ def side_middles(
     walls: Sequence[RoundWall],
     wall_of: IntArray,
 ) -> tuple[IntArray, FloatArray]:
-    """Middles of the sides that lie on round walls.
+    """Middles (k, 3), mm, of the sides (k, 2) that lie on round walls.
 
-    Where a wall ends, the middle lies on the line in which it meets the face beyond.
-
-    Parameters
-    ----------
-    points : (n, 3) array, mm
-    boundary : (b, 3) int array
-    normals : (b, 3) array
-        Of these facets, outward.
-    wall_of : (b,) int array
-        Wall of each facet, -1 for none.
-
-    Returns
-    -------
-    sides : (k, 2) int array
-    places : (k, 3) array, mm
+    Where a wall ends, the middle lies on the line in which it meets the face beyond. The boundary
+    facets (b, 3) have outward normals (b, 3), and lie on a wall (b,), or -1.
     """
     sides = boundary[:, _SIDES].reshape(-1, 2)
     (key,) = facet_keys(sides)
@@ -199,11 +186,8 @@ def integrals(nodes: FloatArray) -> FloatArray:
 def facet_integrals(nodes: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Integrals of the shape functions over quadratic facets with nodes (k, 6, 3).
 
-    Returns
-    -------
-    area : (k, 6) array, mm^2
-    vector : (k, 6, 3) array, mm^2
-        Times the unit normal, which their corners go round counter-clockwise.
+    Of the area, (k, 6), mm^2, and of the vector, (k, 6, 3): times the unit normal, which their
+    corners go round counter-clockwise.
     """
     area, vector = np.zeros(nodes.shape[:2]), np.zeros(nodes.shape)
     for weight, at in zip(_FACET_WEIGHTS, _FACET_POINTS, strict=True):

@@ -109,11 +109,8 @@ class BodyFaces:
     def place(self, number: int) -> dict[str, Any]:
         """Place and kind of a face, as the rule `face` of a part file has it.
 
-        Returns
-        -------
-        dict
-            ``at``, a point on it, with its ``axis`` and ``radius`` where it is round, else with its
-            outward ``normal`` there.
+        ``at``, a point on it, with its ``axis`` and ``radius`` where it is round, else with its
+        outward ``normal`` there.
         """
         face = self.face(number)
         at = self.point_on(face)

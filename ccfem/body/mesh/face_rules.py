@@ -344,16 +344,7 @@ _ASIDE = np.cos(np.radians(30.0))
 def about_patches(mesh: TetMesh, rules: Mapping[str, PatchRule]) -> tuple[str, ...]:
     """Say what rules may have caught, or missed, against their author's intention.
 
-    Parameters
-    ----------
-    mesh : TetMesh
-        With the patches of the rules.
-    rules : mapping of patch name to rule
-
-    Returns
-    -------
-    tuple of str
-        One line for each doubt, with the cure; empty where every patch looks as meant.
+    One line for each doubt, with the cure, of a mesh with the patches of the rules.
     """
     guessed = {n: r for n, r in rules.items() if isinstance(r, Box | Cylinder | Plane)}
     if not guessed:

@@ -192,13 +192,7 @@ def given_faces(
 ) -> tuple[Face, ...]:
     """Find what kind faces are whose triangles are known, as those of a CAD file.
 
-    Parameters
-    ----------
-    points : (n, 3) array, mm
-    triangles : (t, 3) int array
-        Outward.
-    groups : iterable of (k,) int arrays
-        Rows of the triangles of each face, at least one.
+    Triangles (t, 3) are outward; groups are the rows of those of each face, at least one.
     """
     surface = _surface(np.asarray(points, dtype=float), np.asarray(triangles, dtype=np.int64))
     return tuple(_face(surface, np.asarray(rows, dtype=np.int64)) for rows in groups)

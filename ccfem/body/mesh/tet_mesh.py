@@ -392,14 +392,7 @@ class TetMesh(CellMesh, Shown):
 def first_flaw(points: FloatArray, cells: IntArray, volumes: FloatArray, partners: IntArray) -> str:
     """Say what is wrong with a mesh of tetrahedra; empty for a sound one.
 
-    Parameters
-    ----------
-    points : (n, 3) array, mm
-        Finite.
-    cells : (m, 4) or (m, 10) int array
-    volumes : (m,) array, mm^3
-    partners : (4 m,) int array
-        From `ccfem.body.mesh.tet_mesh.pair_facets`.
+    Its points are finite, and partners (4 m,) are those of `pair_facets`.
     """
     if not volumes.min() > 0.0:
         return (

@@ -139,14 +139,8 @@ def kept(
 ) -> tuple[TetMesh, tuple[str, ...]]:
     """Return the mesh made of some content before, or make it and keep it.
 
-    Parameters
-    ----------
-    content : bytes
-        Of the file.
-    asked : dict
-        Everything else that the mesh depends on.
-    make : callable
-        Returns the mesh, and what is to be said of it.
+    `content` is that of the file, `asked` all else that the mesh depends on; `make` returns the
+    mesh and what is to be said of it.
     """
     folder = cache_folder()
     if folder is None:
@@ -239,19 +233,8 @@ def with_faces_of(surface: Surface, mesh: TetMesh, angle: float = FEATURE_ANGLE)
     """Mesh with the smooth faces of its surface as groups ``face_1``, ``face_2``, ...
 
     So the numbers that ``ccfem faces`` gives for a surface hold whatever mesh is made of it. Each
-    boundary facet belongs to the face of the triangle that its centre is nearest to.
-
-    Parameters
-    ----------
-    mesh : TetMesh
-        Made from it.
-    angle : float, degrees
-        Feature angle.
-
-    Returns
-    -------
-    TetMesh
-        Faces so small that no facet lies on them are no groups.
+    boundary facet belongs to the face of the triangle that its centre is nearest to; faces so small
+    that no facet lies on them are no groups.
     """
     import pyvista
 

@@ -79,13 +79,10 @@ def grouped(values: IntArray | Int32Array, count: int) -> tuple[Int32Array, Int3
 
 
 def cell_gradients(mesh: TetMesh) -> FloatArray:
-    """Gradients of the four barycentric coordinates in each cell.
+    """Gradients (m, 4, 3), 1/mm, of the four barycentric coordinates in each cell.
 
-    Returns
-    -------
-    (m, 4, 3) array, 1/mm
-        In a linear cell the displacement gradient is ``u.T @ gradients`` with the (4, 3)
-        displacement of its corners.
+    In a linear cell the displacement gradient is ``u.T @ gradients`` with the (4, 3) displacement
+    of its corners.
     """
     result = np.empty((len(mesh.cells), 4, 3))
     _gradients(mesh.points, mesh.cells, result, np.empty(len(mesh.cells)))

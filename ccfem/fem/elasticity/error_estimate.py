@@ -19,15 +19,7 @@ from ccfem.fem.elasticity.recovery import slopes_at, times, voigt_strain
 
 @dataclass(frozen=True)
 class ErrorEstimate:
-    """Estimated energy of the discretisation error of the cells.
-
-    Attributes
-    ----------
-    cells : (m,) array, N mm
-        Twice the energy of the error of the stress in each cell.
-    energies : (m,) array, N mm
-        Twice the energy of the stress of each cell.
-    """
+    """Estimated error of the stress of the cells: twice its energy, and that of stress, N mm."""
 
     cells: FloatArray
     energies: FloatArray

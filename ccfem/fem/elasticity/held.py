@@ -180,15 +180,8 @@ class Ties:
     def prolongation(self, ends: IntArray) -> sp.bsr_array:
         """From the corners of a quadratic mesh and the rigid bodies to all remaining nodes.
 
-        Parameters
-        ----------
-        ends : (n, 2) int array
-            The two corners of which each node is the midpoint; a corner is its own.
-
-        Returns
-        -------
-        bsr_array (3 n', 3 n')
-            Columns of midpoints are empty.
+        A node is the midpoint of two `ends` (n, 2); a corner is its own. Columns of midpoints are
+        empty.
         """
         n = len(self.points)
         node = np.arange(n)
@@ -453,16 +446,8 @@ class Held:
     def prolongation(self, ends: IntArray) -> tuple[sp.bsr_array, IntArray]:
         """Linear displacements among the solutions, where there are ties.
 
-        Parameters
-        ----------
-        ends : (n, 2) int array
-            The two corners of each node; a corner is its own.
-
-        Returns
-        -------
-        prolong : bsr_array (3k, 3c)
-        nodes : (c,) int array
-            Rows of nodes that stand for corners and rigid bodies.
+        (3k, 3c), with the rows (c,) of nodes that stand for corners and rigid bodies; ends (n, 2)
+        as there.
         """
         assert self.ties is not None
         rows = (3 * self.nodes[:, None] + np.arange(3)).reshape(-1)
@@ -474,10 +459,7 @@ class Held:
     def parents(self, ends: IntArray) -> IntArray:
         """Rows of the two corners that each row's node is the middle of; -1 for a held corner.
 
-        Parameters
-        ----------
-        ends : (n, 2) int array
-            The two corners of each node; a corner is its own.
+        The two ends (n, 2) of a corner are itself.
         """
         place = np.full(len(self.free), -1)
         place[self.nodes] = np.arange(len(self.nodes))

@@ -451,14 +451,10 @@ def heat_forces(problem: Problem, case: str) -> FloatArray:
 
 
 def strain_forces(mesh: TetMesh, stress: FloatArray) -> FloatArray:
-    """Find the forces at the nodes (n, 3), N, of a stress in each cell.
+    """Find the forces at the nodes (n, 3), N, of a stress (m, 6), MPa, Voigt, in each cell.
 
-    They are ``int B^T s dV``: the effect of an initial stress -s on the part.
-
-    Parameters
-    ----------
-    stress : (m, 6) or (m, 4, 6) array, MPa
-        Voigt; constant in each cell, or at its corners and linear between.
+    They are ``int B^T s dV``: the effect of an initial stress -s on the part. Stress (m, 4, 6) at
+    the corners of the cells is linear between.
     """
     corner = stress if stress.ndim == 3 else stress[:, None]
     s = corner[..., [0, 5, 4, 5, 1, 3, 4, 3, 2]].reshape(*corner.shape[:2], 3, 3)

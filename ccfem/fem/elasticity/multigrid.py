@@ -174,13 +174,8 @@ _CONTRACT = {"contract"}
 class Prolongation(NamedTuple):
     """Interpolation from the motions of groups to those of their nodes.
 
-    Attributes
-    ----------
-    indptr : (n + 1,) int array
-    indices : (b,) int array
-        Groups that move a node.
-    blocks : (b, d, 6) array, single precision
-        Used for both the prolongation and its transpose, so that they match exactly.
+    Blocks (b, d, 6) in single precision are used both for it and its transpose, so that they match
+    exactly; `indices` are the groups that move a node.
     """
 
     indptr: Int32Array
@@ -521,15 +516,7 @@ _ENERGY = ("energy", {"krylov": "cg", "maxiter": 4, "degree": 1})
 
 @dataclass(frozen=True)
 class Coarse:
-    """Linear displacements as a subspace of those of a quadratic mesh.
-
-    Attributes
-    ----------
-    prolong : bsr_array (3n, 3c)
-        From linear displacements to all displacements.
-    nodes : (c,) int array
-        Rows of the nodes of the linear displacements.
-    """
+    """Linear displacements as a subspace (3n, 3c) of those of a quadratic mesh, and nodes (c,)."""
 
     prolong: sp.bsr_array
     nodes: IntArray

@@ -275,14 +275,7 @@ def _about_chords(mesh: TetMesh) -> str:
 def check_effect(problem: Problem, case: str, held: Held, forces: FloatArray, size: float) -> None:
     """Refuse a load case, or a combination, under which nothing moves.
 
-    Parameters
-    ----------
-    held : Held
-        At its values in the case.
-    forces : (n, 3) array, N
-        Of the case.
-    size : float, N
-        Sum of the sizes of the forces that it is added up from.
+    The forces (n, 3), N, are added up from forces whose sizes are `size` together.
     """
     if held.value.any():
         return
@@ -526,14 +519,7 @@ _CONTRAST = 1e5
 def incompressibility(stiffness: FloatArray) -> float:
     """Bulk modulus over the least shear modulus, as the maximum over all cells.
 
-    Parameters
-    ----------
-    stiffness : (6, 6) or (m, 6, 6) array, MPa
-
-    Returns
-    -------
-    float
-        ``2 (1 + nu) / (3 (1 - 2 nu))`` of an isotropic material: 2.2 at nu 0.3, 9.7 at 0.45.
+    ``2 (1 + nu) / (3 (1 - 2 nu))`` of an isotropic material: 2.2 at nu 0.3, 9.7 at 0.45.
     """
     compliance = np.linalg.inv(stiffness.reshape(-1, 6, 6))
     bulk = 1.0 / compliance[:, :3, :3].sum(axis=(1, 2))

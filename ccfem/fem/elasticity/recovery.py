@@ -96,12 +96,7 @@ def cell_stress(
 ) -> FloatArray:
     """Stress of each cell, at its centroid: (m, 3, 3) MPa.
 
-    Parameters
-    ----------
-    displacement : (n, 3) array, mm
-    stiffness : (6, 6) or (m, 6, 6) array, MPa
-    free : (m, 4, 6) array, optional
-        Stress-free strain at the corners of each cell, Voigt, such as thermal strain.
+    `free` (m, 4, 6), Voigt, is a strain without stress at the corners, such as thermal strain.
     """
     strain = cell_strain(mesh, displacement)
     return from_voigt(times(stiffness, strain if free is None else strain - free.mean(axis=1)))

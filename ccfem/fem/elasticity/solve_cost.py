@@ -17,17 +17,9 @@ _PROGRAM = 0.4e9
 
 @dataclass(frozen=True)
 class Cost:
-    """What a solve will take, to a factor of two or so.
+    """What a solve will take, to a factor of two or so: CPU seconds a load case, and bytes.
 
-    Attributes
-    ----------
-    order : int
-        Of the cells.
-    unknowns : int
-        Before supports.
-    seconds : float
-        CPU time of one load case.
-    memory : float, bytes
+    Unknowns are counted before supports; the order is that of the cells.
     """
 
     order: int

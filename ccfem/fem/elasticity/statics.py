@@ -132,14 +132,9 @@ def find_contact(
 
 
 def check_pressed(held: Held, reactions: FloatArray, forces: FloatArray) -> None:
-    """Refuse a part that the load lifts off its supports.
+    """Refuse a part that the forces (n, 3), N, of the load lift off its supports.
 
-    Parameters
-    ----------
-    reactions : (n, 3) array, N
-        Reactions of all supports, and of what keeps a loose part in place.
-    forces : (n, 3) array, N
-        Of the load.
+    The reactions are those of all supports, and of what keeps a loose part in place.
     """
     if held.presses is None:
         return

@@ -146,20 +146,7 @@ def ball_averages(
 def ball_shares(
     points: FloatArray, values: FloatArray, weights: FloatArray, judged: IntArray, radius: float
 ) -> FloatArray:
-    """Apply the transpose of `ball_averages`: turn derivatives by averages into those by values.
-
-    Parameters
-    ----------
-    points, weights, judged, radius
-        As there.
-    values : (k, c) array
-        Derivatives by the averages of the judged points.
-
-    Returns
-    -------
-    (n, c) array
-        Derivatives by the values of all points.
-    """
+    """Transpose `ball_averages`: from derivatives (k, c) by averages to those (n, c) by values."""
     boxes, spread = _boxes(points, weights, radius), np.zeros((len(points), values.shape[1]))
     _share(boxes, points[judged], boxes.number[judged], values, spread)
     result = np.empty_like(spread)

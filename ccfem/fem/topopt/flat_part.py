@@ -29,15 +29,7 @@ _ON = 1e-6
 
 @dataclass(frozen=True)
 class Trace:
-    """Where a patch of a flat part lies.
-
-    Attributes
-    ----------
-    wall : shapely geometry, mm
-        Lines along the outline.
-    faces : tuple of 2 shapely geometries, mm
-        Areas on the bottom and on the top.
-    """
+    """Where a patch of a flat part lies: lines of its outline, and areas on bottom and top, mm."""
 
     wall: Any
     faces: tuple[Any, Any]

@@ -34,10 +34,7 @@ class ConeFilter:
     def of_cells(cls, centres: FloatArray, volumes: FloatArray, radius: float) -> "ConeFilter":
         """Filter of cells with given centres (m, d), mm, and volumes (m,).
 
-        Parameters
-        ----------
-        radius : float, mm
-            Above 0; below the distance of the centres, nothing is averaged.
+        The radius is above 0; below the distance of the centres, nothing is averaged.
         """
         m = len(centres)
         tree = cKDTree(centres)

@@ -49,14 +49,9 @@ _PAIRS = ((0, 1, 2, 3), (2, 3, 0, 1), (0, 2, 3, 1), (3, 1, 0, 2), (0, 3, 1, 2), 
 
 
 class CutMesh(NamedTuple):
-    """A part of a mesh.
+    """A part of a mesh with what is left of the patches.
 
-    Attributes
-    ----------
-    mesh : TetMesh
-        With what is left of the patches.
-    facet : (b,) int array
-        Boundary facet of the whole mesh that each boundary facet lies on; -1 on the cut.
+    Each boundary facet lies on one of the whole mesh, (b,); -1 on the cut.
     """
 
     mesh: TetMesh

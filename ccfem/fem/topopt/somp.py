@@ -30,12 +30,8 @@ _LARGEST_TURN = np.radians(5.0)
 class OrientedCompliance:
     """Compliance of a part whose material axis turns from group to group, about z.
 
-    Attributes
-    ----------
-    harmonics : (5, k, k) array, MPa
-        Of the material: see `ccfem.fem.topopt.design.harmonics`.
-    angle : (g,) array, radians
-        From global axis x to the material axis.
+    The angles (g,), radians, are from global axis x to the material axis; `harmonics` (5, k, k),
+    MPa, are those of the material.
     """
 
     part: Compliance

@@ -25,12 +25,8 @@ def positive_definite(matrix: Any) -> Any:
 def dissected(matrix: Any, points: FloatArray) -> Callable[[FloatArray], FloatArray]:
     """Factorise as `positive_definite`, quickly on regular triangles too; return the solve.
 
-    Parameters
-    ----------
-    matrix : sparse array (k n, k n)
-        With k rows for each point, one after the other.
-    points : (n, d) array, mm
-        By which it is ordered (`ccfem.body.mesh.numbering.nested_dissection`).
+    The matrix has k rows for each point (n, d), mm, one after the other, and is ordered by
+    `nested_dissection`.
     """
     columns = sparse.csc_array(matrix)
     each = columns.shape[0] // len(points)

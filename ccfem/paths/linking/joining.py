@@ -58,15 +58,7 @@ class Joined(NamedTuple):
 
 
 def join(lines: Sequence[FloatArray], joints: Sequence[Joint]) -> Joined:
-    """Join polylines at their ends.
-
-    Parameters
-    ----------
-    lines : sequence of (n_i, 2) arrays, mm
-        Open polylines, and closed ones, which have no joint.
-    joints : sequence of Joint
-        Each end belongs to at most one of them.
-    """
+    """Join polylines at their ends, each in one joint at most; closed ones have none."""
     partner: dict[int, tuple[int, FloatArray, bool]] = {}
     for joint in joints:
         partner[joint.first] = (joint.second, joint.between, joint.marked)

@@ -257,16 +257,9 @@ class RingRoutes(NamedTuple):
 def ring_routes(
     starts: FloatArray, section: Region, radius: float, grid: SectionGrid, weights: FloatArray
 ) -> RingRoutes:
-    """Ring round a part, and the cheapest leads to it.
+    """Ring round a part, and the cheapest leads to it from poses (t, 3) that head out of strands.
 
-    Parameters
-    ----------
-    starts : (t, 3) array
-        Poses heading out of strands.
-    section : shapely (Multi)Polygon, mm
-    radius : float, mm
-    weights : (3,) array
-        Extra cost of each mm inside the part, over its voids, and outside.
+    Weights (3,) are extra costs of each mm inside the part, over its voids, and outside.
     """
     ring = _ring(section, max(_DISTANCE, radius))
     line = shapely.LineString(ring)
@@ -327,14 +320,9 @@ def _leads(
 
 @compiled
 def ring_cost(routes: RingRoutes) -> tuple[FloatArray, IntArray]:
-    """Cost of the way along the ring between each two ends, and an index of that way.
+    """Cost (t, t), mm, of the way along the ring between each two ends, and an index of that way.
 
-    Returns
-    -------
-    cost : (t, t) array, mm
-        Symmetric.
-    way : (t, t) int array
-        Sense and leads, encoded as a number that `ring_curve` reads.
+    The index encodes sense and leads, as `ring_curve` reads them.
     """
     position, lead, length = routes.position, routes.cost, routes.length
     count, _, variants = position.shape

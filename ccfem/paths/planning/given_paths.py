@@ -86,10 +86,7 @@ class GivenPaths:
     def on(self, layers: Sequence[Layer]) -> "GivenPaths":
         """Return these paths, each with the number of the layer that it lies on.
 
-        Parameters
-        ----------
-        layers : sequence of Layer
-            Where one is curved, the points are moved onto the layer that is nearest to their path.
+        Where one is curved, the points are moved onto the layer that is nearest to their path.
         """
         if curved_layers(layers):
             return self._on_curved(layers)

@@ -202,12 +202,8 @@ _Places = Callable[[FloatArray], FloatArray]
 class _Turns(NamedTuple):
     """Bends of a line that are too tight, by arc length, mm.
 
-    Attributes
-    ----------
-    end, begin : (t,) arrays
-        Where the strand before a turn would end, and the one after it begin.
-    cost : (t,) array
-        Length that is bent too tightly.
+    The strand before a turn would end at `end` (t,), and the one after it begin at `begin`; `cost`
+    is the length that is bent too tightly.
     """
 
     end: FloatArray

@@ -19,12 +19,7 @@ _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 class Mixed:
     """Toolpaths of which some layers come from the longer plan, the others from the shorter one.
 
-    Attributes
-    ----------
-    more : int
-        Number of layers from the longer plan.
-    cut : int
-        Number of layers on which strands are cut back.
+    The numbers of layers from the longer plan, and of those on which strands are cut back.
     """
 
     toolpaths: Toolpaths

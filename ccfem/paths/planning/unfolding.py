@@ -96,12 +96,8 @@ def unfolded_paths(paths: Toolpaths, layer: Layer | None, machine: Machine) -> T
     """Fibre of one layer, led round its folds or cut there; on a curved layer it is only cut.
 
     Points of jags are left out first: where levels cross the corner of a triangle, or rings that of
-    a section, strands of smooth fields waver by hundredths of a width.
-
-    Parameters
-    ----------
-    layer : Layer or None
-        None for paths that are final: they are only cut, and folds looked for without a margin.
+    a section, strands of smooth fields waver by hundredths of a width. Paths that are final have no
+    layer: they are only cut, and folds looked for without a margin.
     """
     least, radius = machine.shortest_strand, machine.minimum_radius
     radius *= MARGIN if layer is not None else 1.0
@@ -193,12 +189,8 @@ def part_of_line(
 ) -> _Marked:
     """Part of a line (n, c) between two places of its arc length, and which of its steps are links.
 
-    On a closed line `stop` may exceed the length; the part then runs on over the start.
-
-    Parameters
-    ----------
-    along : (n,) array, mm
-        Arc length at its points; all its columns are interpolated by it.
+    All columns are interpolated by the arc length (n,), mm. On a closed line `stop` may exceed the
+    length; the part then runs on over the start.
     """
     size = float(along[-1])
     if start >= size:

@@ -78,17 +78,11 @@ _PLACES = 5
 def as_printed(
     problem: Problem, fibre: Sequence[Layer], plastic: Plastic, machine: Machine
 ) -> Problem:
-    """Give each cell the mean stiffness, strength and mass of what is printed in it.
+    """Give each cell of solid plastic the mean stiffness, strength and mass of what is printed.
 
     The share of a cell that lies in sparse infill (`matrix_sections`) is found at 35 places. Solid
-    plastic and infill in one cell share its strain.
-
-    Parameters
-    ----------
-    problem : Problem
-        Of solid plastic.
-    fibre : sequence of Layer
-        Flat layers that may get fibre; at least one.
+    plastic and infill in one cell share its strain. `fibre` are flat layers that may get fibre, at
+    least one.
     """
     share, frame = infill_share(problem.mesh, fibre, plastic, machine)
     stiffness = np.array(np.broadcast_to(problem.cell_stiffness, (len(share), 6, 6)))

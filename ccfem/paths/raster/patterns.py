@@ -50,20 +50,10 @@ def inside_shells(mask: BoolArray, shells: int) -> BoolArray:
 
 
 def rings_round(guides: IntArray, inside: BoolArray) -> tuple[IntArray, IntArray]:
-    """Find the ring round the nearest guide that each pixel lies in, and that guide.
+    """Find the ring round the nearest guide that each pixel (H, W) lies in, and that guide.
 
-    Distances are straight, so that rings are round and a pixel apart at every angle.
-
-    Parameters
-    ----------
-    guides : (H, W) int array
-        Guide of each pixel; negative where there is none, some not.
-    inside : (H, W) bool array
-
-    Returns
-    -------
-    ring, guide : (H, W) int arrays
-        Ring 0 is the guides; -1 outside.
+    Distances are straight, so that rings are round and a pixel apart at every angle. Pixels without
+    a guide have negative numbers; ring 0 is the guides, and -1 outside.
     """
     distance, nearest = ndimage.distance_transform_edt(guides < 0, return_indices=True)
     ring = np.floor(distance + 0.5).astype(np.int64)

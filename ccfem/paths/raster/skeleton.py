@@ -43,21 +43,12 @@ class Segment:
 
 
 def skeleton(mask: BoolArray) -> BoolArray:
-    """Medial axis of the solid pixels.
+    """Medial axis of the solid pixels (H, W): at least one for every connected piece.
 
-    Branches that are spurs are removed and the rest is thinned again, until none is left. Then
-    one half of a bitmap that is its own mirror image is copied onto the other; a line along an
-    axis that falls between two rows of pixels becomes two pixels wide.
-
-    Parameters
-    ----------
-    mask : (H, W) bool array
-        Its outermost rows and columns are empty.
-
-    Returns
-    -------
-    (H, W) bool array
-        At least one pixel for every connected piece.
+    Branches that are spurs are removed and the rest is thinned again, until none is left. Then one
+    half of a bitmap that is its own mirror image is copied onto the other; a line along an axis
+    that falls between two rows of pixels becomes two pixels wide. The outermost rows and columns
+    are empty.
     """
     line = thin(np.where(mask, 0, -1))
     far = depth(mask)
@@ -105,18 +96,9 @@ def _topology(line: BoolArray) -> tuple[int, int]:
 
 
 def segments(line: BoolArray) -> tuple[tuple[Segment, ...], IntArray]:
-    """Lines between forks and free ends, and the number of the fork that each pixel is part of.
+    """Lines between forks and free ends, and the fork that each pixel is part of, or -1.
 
-    Parameters
-    ----------
-    line : (H, W) bool array
-        A thinned image; its outermost rows and columns are empty.
-
-    Returns
-    -------
-    segments : tuple of Segment
-    forks : (H, W) int array
-        -1 where there is none.
+    The image is thinned, and its outermost rows and columns are empty.
     """
     around = ndimage.convolve(line.astype(np.int64), _ALL.astype(np.int64), mode="constant")
     forks = ndimage.label(line & (around > 3), _ALL)[0].astype(np.int64) - 1

@@ -105,11 +105,8 @@ def _matrix_slabs(
 def check_cover(slabs: Sequence[Slab], machine: Machine) -> list[str]:
     """Check the matrix below the first and over the last layer of fibre, and between them.
 
-    Returns
-    -------
-    list of str
-        A warning for each side where it is one layer alone, and for layers of matrix that are
-        lower than the machine's least line.
+    Returns a warning for each side where it is one layer alone, and for layers of matrix that are
+    lower than the machine's least line.
     """
     fibre = [k for k, slab in enumerate(slabs) if slab.fibre is not None]
     if not fibre:

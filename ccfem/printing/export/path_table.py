@@ -157,10 +157,7 @@ def _toolpaths(values: FloatArray, axes: FloatArray, normal: FloatArray, name: s
 def read_strands(path: str | Path, axes: FloatArray, normal: FloatArray) -> Toolpaths:
     """Read strands of a layer from a file, or of all layers from a folder (`read_strand_files`).
 
-    Parameters
-    ----------
-    axes, normal
-        As in `read_path_table`. Which layer a strand lies on is found by its place.
+    Which layer a strand lies on is found by its place.
     """
     of_layers = read_strand_files(path)
     lines = [line for layer in of_layers for line in layer]

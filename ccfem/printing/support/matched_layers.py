@@ -395,10 +395,7 @@ def _regions(
 ) -> tuple[Region, Region]:
     """Regions of a layer that are laid, and that are full, in the plane that it is seen in.
 
-    Parameters
-    ----------
-    heads : (f, 3, 3) array, mm
-        Corners of the facets that hang over, along the axes of the build direction.
+    Heads (f, 3, 3), mm, are the facets that hang over, along the axes of the build direction.
     """
     process, whole = machine.process, areas(seen.flat.plane.polygon)
     room = _room_above(layer.points @ frame.T, heads)

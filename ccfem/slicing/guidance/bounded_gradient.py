@@ -24,15 +24,7 @@ _INSIDE = 0.02
 
 @dataclass(frozen=True)
 class Bounds:
-    """Bounds of a gradient.
-
-    Attributes
-    ----------
-    least, most : float
-        Of its size.
-    up : (3,) array
-        Unit vector along which it must not fall.
-    """
+    """Bounds of the size of a gradient, and a unit vector (3,) along which it must not fall."""
 
     least: float
     most: float

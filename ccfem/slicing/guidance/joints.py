@@ -113,13 +113,8 @@ def joints_of(
 ) -> tuple[Joint, ...]:
     """Find the joints of a part in the order of their names, each hole once.
 
-    Parameters
-    ----------
-    names : sequence of str, default ()
-        Patches; by default all that are held or loaded.
-    rings : int, default 4
-    directions : mapping of patch to three numbers, optional
-        As in `joint_of`.
+    Names are of patches, by default all that are held or loaded; rings and directions as in
+    `joint_of`.
     """
     names, directions = tuple(names) or stress.held_or_loaded, directions or {}
     for name in directions:

@@ -53,11 +53,8 @@ class NormalField:
 def normal_field(mesh: TetMesh, regions: StressRegions, build: FloatArray) -> NormalField:
     """Fill the part with directions that vary least between the regions of critical stress.
 
-    Parameters
-    ----------
-    build : (3,) array
-        Unit vector, used as the direction of pieces of the part without a region. The field as a
-        whole does not point against it.
+    Pieces of the part without a region take the unit vector `build` (3,). The field as a whole does
+    not point against it.
     """
     one, other, vector, apart = faces_between(mesh.points, mesh.corners, mesh.faces, mesh.across)
     area = np.linalg.norm(vector, axis=1)

@@ -111,14 +111,9 @@ class Tracer:
         )
 
     def survey(self, seeds: IntArray, touching: IntArray) -> Traced:
-        """Trace from the seeds, and see which regions each line touches.
+        """Trace from the cells `seeds` (s,), and see which regions each line touches.
 
-        Parameters
-        ----------
-        seeds : (s,) int array
-            Cells.
-        touching : (m,) int array
-            Bit k is set in the cells of region k, of at most 62.
+        Bit k of `touching` (m,) is set in the cells of region k, of at most 62.
         """
         order = np.argsort(self._place_of_cell[seeds], kind="stable")
         start, touching = self._place_of_cell[seeds][order], touching[self._order].astype(np.int64)

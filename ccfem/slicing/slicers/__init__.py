@@ -61,11 +61,8 @@ def split(text: str) -> tuple[str, ...]:
 def as_slicer(layers: "int | Sequence[float] | str | Slicer") -> Slicer:
     """Make a slicer from one of the short forms.
 
-    Parameters
-    ----------
-    layers : int, sequence of float, str or Slicer
-        A number of flat layers, their heights in mm, the name of a slicer with parameters as in
-        `from_text`, or a slicer itself.
+    A number of flat layers, their heights in mm, the name of a slicer with parameters as in
+    `from_text`, or a slicer itself.
     """
     if isinstance(layers, str):
         return from_text(layers)

@@ -71,12 +71,8 @@ class Surfaces:
 def facing_up(sheets: Sequence[Sheet], build: Vector) -> list[Sheet]:
     """Turn over the sheets of a stack whose triangles face the bed.
 
-    Parameters
-    ----------
-    sheets : sequence of (points, triangles)
-        In the order in which they are printed, each consistently oriented.
-    build : tuple of 3 floats
-        What a sheet that is alone faces; others face the next one.
+    Sheets are in the order in which they are printed, each consistently oriented; one faces the
+    next, and one that is alone the build direction.
     """
     turned = []
     for k, (points, triangles) in enumerate(sheets):

@@ -171,16 +171,8 @@ def write(
 ) -> None:
     """Write a mesh as VTK unstructured grid, its patches as field data ``patch:NAME``.
 
-    The axes of round ones are in ``axis:NAME``.
-
-    To be called with a file of `whole_file`.
-
-    Parameters
-    ----------
-    point, cell, field : mapping of name to array, optional
-        Data of points, of cells, and of the whole.
-    components : mapping of name to names, optional
-        Names of the components of data of points and cells.
+    The axes of round ones are in ``axis:NAME``. To be called with a file of `whole_file`, and with
+    data of points, of cells, and of the whole, and the names of its components.
     """
     number, corners = mesh.cells.shape
     write_vtk_xml(
