@@ -25,8 +25,7 @@ from ccfem.cases import create_case
 from ccfem.cases.case import Case
 from ccfem.fem.elasticity import solve
 from ccfem.fem.elasticity.stress_field import StressField
-from ccfem.paths.planning.equal_fibre import TOLERANCE, extremes, plan_to_length
-from ccfem.paths.planning.mixing import layer_lengths
+from ccfem.paths.planning.equal_fibre import TOLERANCE, extremes, layer_lengths, plan_to_length
 from ccfem.paths.planning.strategy import LengthStrategy, Planned
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.slicers.planar import Planar

@@ -9,8 +9,7 @@ from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.materials import isotropic
 from ccfem.machine import Machine
 from ccfem.paths.planning import plan
-from ccfem.paths.planning.equal_fibre import extremes, plan_to_lengths
-from ccfem.paths.planning.mixing import layer_lengths
+from ccfem.paths.planning.equal_fibre import extremes, layer_lengths, plan_to_lengths
 from ccfem.paths.planning.strategy import LengthStrategy
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create, named

@@ -12,18 +12,188 @@ from typing import Any
 
 import numpy as np
 
-from ccfem.base.arrays import IntArray
+from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.checks import check_number
 from ccfem.fem.elasticity import PartStress
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.bracketing import around, close_in, interpolated
 from ccfem.paths.planning.infill import about_short_pieces
 from ccfem.paths.planning.layer_plans import check_layers, plan, plan_layers
-from ccfem.paths.planning.mixing import cut_to_length, layer_lengths, mixed
 from ccfem.paths.planning.strategy import LengthStrategy, Planned, Strategy
 from ccfem.paths.planning.unfolding import may_fold
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
+
+# Plans mixed to a length in between: some layers from one, the others from the other.
+
+
+_SPARE = 0.005
+"""Share of the wanted length that may stay unused before strands are cut to fill it."""
+_GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+"""Multiples of the golden ratio spread any number of layers over the stack."""
+
+
+@dataclass(frozen=True)
+class Mixed:
+    """Toolpaths of which some layers come from the longer plan, the others from the shorter one.
+
+    The numbers of layers from the longer plan, and of those on which strands are cut back.
+    """
+
+    toolpaths: Toolpaths
+    more: int
+    cut: int
+
+
+def layer_lengths(toolpaths: Toolpaths, layers: Sequence[Layer]) -> FloatArray:
+    """Length of fibre on each layer, (n,), mm."""
+    index = [layer.index for layer in layers]
+    fibre = toolpaths.of_kind(FIBRE)
+    by_index = np.bincount(fibre.layer, fibre.lengths, minlength=max(index, default=0) + 1)
+    return np.asarray(by_index[index], dtype=np.float64)
+
+
+def mixed(
+    less: Toolpaths, more: Toolpaths, layers: Sequence[Layer], total: float, minimum: float
+) -> Mixed:
+    """Mix two plans to a length; layers from the longer plan are spread evenly over the stack.
+
+    Layers that the shorter plan leaves empty are always taken from the longer one. Where whole
+    layers leave more than half a per cent unused, one more layer takes strands that are cut to fit,
+    to no less than a minimum, mm. Where the always-taken layers already exceed the length, strands
+    are cut back on all layers. The total, mm, is exceeded only where the minimum on layers that
+    would be empty requires it.
+    """
+    a, b = layer_lengths(less, layers), layer_lengths(more, layers)
+    taken = (a == 0.0) & (b > 0.0)
+    room = total - float(np.where(taken, b, a).sum())
+    if room < 0.0:
+        return _cut_evenly(less, more, layers, taken, total, minimum)
+    for k in np.argsort((np.arange(len(layers)) * _GOLDEN) % 1.0, kind="stable"):
+        gain = b[k] - a[k]
+        if not taken[k] and 0.0 < gain <= room:
+            taken[k], room = True, room - gain
+    parts = _parts(less, more, layers, taken)
+    gain = np.where(taken, 0.0, b - a)
+    cut = 0
+    for k in np.argsort(gain, kind="stable"):
+        if gain[k] <= 0.0 or room <= _SPARE * total:
+            continue
+        shorter = cut_to_length(more.on_layer(layers[k].index), a[k] + room, minimum)
+        won = float(shorter.of_kind(FIBRE).lengths.sum()) - a[k]
+        if won > 0.0:
+            parts[k], taken[k], room, cut = shorter, True, room - won, cut + 1
+    return Mixed(Toolpaths.concatenate(parts), int(taken.sum()), cut)
+
+
+def _parts(
+    less: Toolpaths, more: Toolpaths, layers: Sequence[Layer], taken: Sequence[bool]
+) -> list[Toolpaths]:
+    return [
+        (more if chosen else less).on_layer(layer.index)
+        for layer, chosen in zip(layers, taken, strict=True)
+    ]
+
+
+def _cut_evenly(
+    less: Toolpaths,
+    more: Toolpaths,
+    layers: Sequence[Layer],
+    taken: Sequence[bool],
+    total: float,
+    minimum: float,
+) -> Mixed:
+    """Cut the strands of every layer back in the same proportion, but none completely."""
+    parts = _parts(less, more, layers, taken)
+    lengths = np.array([float(part.of_kind(FIBRE).lengths.sum()) for part in parts])
+    share, carried, cut = total / float(lengths.sum()), 0.0, 0
+    for k, part in enumerate(parts):
+        wanted = max(share * lengths[k] + carried, min(lengths[k], minimum))
+        parts[k] = cut_to_length(part, wanted, minimum)
+        left = float(parts[k].of_kind(FIBRE).lengths.sum())
+        carried += share * lengths[k] - left
+        cut += left < lengths[k]
+    return Mixed(Toolpaths.concatenate(parts), int(np.sum(taken)), cut)
+
+
+# Paths cut back to a wanted length so that all remaining pieces can be printed.
+
+
+_ENOUGH = 1e-9
+"""Length, mm, below which nothing more is cut."""
+_SAME = 1e-6
+"""Distance along a path, mm, within which a cut is moved to a point of the path."""
+
+
+def cut_to_length(toolpaths: Toolpaths, length: float, minimum: float) -> Toolpaths:
+    """Leave out and shorten fibre until no more than a length, mm, is left.
+
+    The shortest paths are left out as a whole. The remaining excess is cut from the end of the
+    shortest path that stays as long as the minimum, mm, or from the ends of several. No path ends
+    in a link, and a closed path becomes open when cut. Less than the length is left where paths of
+    at least the minimum cannot add up to it.
+    """
+    size = np.where(toolpaths.kind == FIBRE, toolpaths.lengths, 0.0)
+    left = _lengths(size, length, minimum)
+    changed = np.flatnonzero(left < size - _ENOUGH)
+    return _shortened(toolpaths, {int(k): float(left[k]) for k in changed}, minimum)
+
+
+def _lengths(size: FloatArray, length: float, minimum: float) -> FloatArray:
+    """Remaining lengths of paths of the given sizes."""
+    left, excess = size.copy(), float(size.sum()) - length
+    for k in np.argsort(np.where(size > 0.0, size, np.inf), kind="stable"):
+        if excess <= _ENOUGH:
+            break
+        spare = np.where(left > 0.0, np.maximum(left - minimum, 0.0), 0.0)
+        if left[k] > excess and spare.sum() >= excess - _ENOUGH:
+            alone = np.flatnonzero(spare >= excess - _ENOUGH)
+            if len(alone):
+                left[alone[np.argmin(left[alone])]] -= excess
+            else:
+                left -= spare * (excess / spare.sum())
+            break
+        excess -= left[k]
+        left[k] = 0.0
+    return left
+
+
+def _shortened(toolpaths: Toolpaths, wanted: dict[int, float], minimum: float) -> Toolpaths:
+    """Toolpaths, some of them cut to a wanted initial length, by path number; 0 removes a path."""
+    if not wanted:
+        return toolpaths
+    points, keep = toolpaths.points.copy(), np.ones(len(toolpaths.points), dtype=bool)
+    link, closed = toolpaths.link.copy(), toolpaths.closed.copy()
+    stays, sizes = np.ones(len(toolpaths), dtype=bool), np.diff(toolpaths.offsets)
+    for k, length in wanted.items():
+        first, end = toolpaths.offsets[k], toolpaths.offsets[k + 1]
+        line = toolpaths.points[first:end]
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+        last = max(int(np.searchsorted(along, length - _SAME)), 1)
+        share = min((length - along[last - 1]) / (along[last] - along[last - 1]), 1.0)
+        # A path does not end on a link: back to where it begins. Else at the exact length.
+        if toolpaths.link[first + last - 1]:
+            while last > 0 and toolpaths.link[first + last - 1]:
+                last -= 1
+            length = along[last]
+        else:
+            points[first + last] = line[last - 1] + share * (line[last] - line[last - 1])
+        if length <= _SAME or length < minimum - _SAME:
+            keep[first:end], stays[k] = False, False
+            continue
+        keep[first + last + 1 : end], link[first + last], closed[k] = False, False, False
+        sizes[k] = last + 1
+    return replace(
+        toolpaths,
+        points=points[keep],
+        normals=toolpaths.normals[keep],
+        offsets=np.concatenate([[0], np.cumsum(sizes[stays])]).astype(np.int64),
+        layer=toolpaths.layer[stays],
+        kind=toolpaths.kind[stays],
+        closed=closed[stays],
+        link=link[keep],
+    )
+
 
 # A single dial for how much fibre a strategy lays, over all parameters named in its amount.
 
@@ -99,22 +269,11 @@ class Dial:
         return ", ".join(f"{n} = {getattr(strategy, n):.6g}" for n in changed or names[:1])
 
     def guess(self, lengths: Mapping[float, float], target: float, beyond: float = 0.0) -> float:
-        """Turn at which the length may be the target.
+        """Turn at which the length may be the target, mm, by the lengths, mm, at some turns.
 
-        Parameters
-        ----------
-        lengths : mapping of turn to float, mm
-            Known lengths, at least one.
-        target : float, mm
-        beyond : float, default 0
-            Share by which to overshoot while lengths are known on one side of the target only, so
-            that it comes to lie between two of them.
-
-        Returns
-        -------
-        float
-            A turn between the nearest known lengths on both sides. While one side is unknown, it
-            follows in proportion from the nearest length, or is an end of the dial.
+        It lies between the nearest known lengths on both sides. While one side is unknown, it
+        follows in proportion from the nearest length, overshot by the share `beyond`, so that the
+        target comes to lie between two of them, or is an end of the dial.
         """
         low, high = around(lengths, target)
         if low is not None and high is not None:
@@ -211,9 +370,8 @@ def plan_to_length(
         As of `plan`.
     """
     known = () if start is None else (start,)
-    lengths = (wanted,)
     about = (known, tolerance, sampled, alike)
-    return plan_to_lengths(strategy, layers, stress, machine, lengths, *about)[0]
+    return plan_to_lengths(strategy, layers, stress, machine, (wanted,), *about)[0]
 
 
 def sampled_length(
@@ -240,17 +398,8 @@ def plan_to_lengths(
 ) -> list[Planned]:
     """Plan to several lengths of fibre, mm per layer, reusing the plans for one for the others.
 
-    Parameters
-    ----------
-    strategy, layers, stress, machine
-        As in `plan_to_length`.
-    lengths : sequence of float, mm
-    known : sequence of Planned
-        Plans of the strategy with its own value or at its extremes, if there are any.
-    tolerance : float, default 0.01
-        Share by which less may be laid.
-    sampled, alike
-        As in `plan_to_length`.
+    Plans of the strategy with its own value, or at its extremes, may be known. The other parameters
+    are those of `plan_to_length`.
     """
     for wanted in lengths:
         check_wanted(wanted)
@@ -298,16 +447,11 @@ def _plans_at_lengths(
 ) -> list[Planned]:
     """Plan a strategy that takes the length itself."""
     planners = strategy.to_lengths(stress, layers, machine, lengths)
-    return [
-        _plan_at_length(
-            asked,
-            plan_layers(planner, layers, layers, stress, machine, may_fold(asked)),
-            layers,
-            machine,
-            wanted,
-        )
-        for (asked, planner), wanted in zip(planners, lengths, strict=True)
-    ]
+    plans = []
+    for (asked, planner), wanted in zip(planners, lengths, strict=True):
+        paths = plan_layers(planner, layers, layers, stress, machine, may_fold(asked))
+        plans.append(_plan_at_length(asked, paths, layers, machine, wanted))
+    return plans
 
 
 def _by_cutting(
@@ -364,11 +508,7 @@ def about_shortfall(
 ) -> str:
     """Say why less is laid than was asked for: no more fits, or a strand more would be too much.
 
-    Parameters
-    ----------
-    length, wanted : float, mm per layer
-    cases : str
-        What the plan is for, where that is several load cases.
+    Lengths are mm per layer; `cases` says what the plan is for, where that is several load cases.
     """
     if (wanted - length) * len(layers) < machine.shortest_strand:
         return f"{about_lengths(length, wanted)}: {_of_strands(machine)}"
@@ -422,9 +562,7 @@ class _Search:
     def sample(self, turn: float) -> float:
         """Length per layer on the few layers, mm."""
         if turn not in self.sampled:
-            known = self.tried.get(turn)
-            if known is None and self.few is self.layers:
-                known = self.whole(turn)
+            known = self.whole(turn) if self.few is self.layers else self.tried.get(turn)
             if known is None:
                 paths = plan(self.dial.at(turn), self.few, self.stress, self.machine)
                 self.sampled[turn] = length_per_layer(paths, self.few)
@@ -440,11 +578,9 @@ class _Search:
 
     def filled(self, attempt: Planned) -> bool:
         """Whether a plan lays fibre on every layer that any known one does."""
-        filled = layer_lengths(attempt.toolpaths, self.layers) > 0.0
-        return not any(
-            (~filled & (layer_lengths(other.toolpaths, self.layers) > 0.0)).any()
-            for other in self.tried.values()
-        )
+        plans = (attempt, *self.tried.values())
+        filled = [layer_lengths(plan.toolpaths, self.layers) > 0.0 for plan in plans]
+        return bool((filled[0] >= np.any(filled, axis=0)).all())
 
     def least_filled(self) -> Planned:
         """Plan with the least fibre that leaves no layer empty which some amount fills."""
@@ -520,16 +656,9 @@ class _Search:
 
     def between(self, wanted: float, close: float) -> Planned | None:
         """Mix the known plans on either side of a length, if they are close enough."""
-        below = [
-            attempt
-            for attempt in self.tried.values()
-            if attempt.length_per_layer <= wanted * (1 + 1e-9)
-        ]
-        above = [
-            attempt
-            for attempt in self.tried.values()
-            if attempt.length_per_layer > wanted * (1 + 1e-9)
-        ]
+        plans, most = self.tried.values(), wanted * (1 + 1e-9)
+        below = [attempt for attempt in plans if attempt.length_per_layer <= most]
+        above = [attempt for attempt in plans if attempt.length_per_layer > most]
         less = max(below, key=_length, default=None)
         more = min(above, key=_length, default=None)
         if less is not None and self.meets(less.length_per_layer, wanted) and self.filled(less):
@@ -538,14 +667,8 @@ class _Search:
             return None
         if more.length_per_layer - less.length_per_layer > close * wanted:
             return None
-        count = len(self.layers)
-        planned = mixed(
-            less.toolpaths,
-            more.toolpaths,
-            self.layers,
-            wanted * count,
-            self.machine.shortest_strand,
-        )
+        count, least = len(self.layers), self.machine.shortest_strand
+        planned = mixed(less.toolpaths, more.toolpaths, self.layers, wanted * count, least)
         length = length_per_layer(planned.toolpaths, self.layers)
         if not self.meets(length, wanted) and np.isfinite(close):
             return None
@@ -561,9 +684,6 @@ class _Search:
         plans = [self.tried[turn] for turn in sorted(self.tried)]
         much = min(map(_length, plans)) > wanted
         best = min(plans, key=_length) if much else max(plans[::-1], key=_length)
-        end = "least" if much else "most"
-        note = (
-            f"{about_lengths(best.length_per_layer, wanted)}: its {end}, at "
-            f"{self.dial.says(best.strategy)}"
-        )
-        return Planned(best.strategy, best.toolpaths, best.length_per_layer, note, reached=False)
+        length, end = best.length_per_layer, "least" if much else "most"
+        note = f"{about_lengths(length, wanted)}: its {end}, at {self.dial.says(best.strategy)}"
+        return Planned(best.strategy, best.toolpaths, length, note, reached=False)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ccfem.paths.planning.mixing import cut_to_length
+from ccfem.paths.planning.equal_fibre import cut_to_length
 from ccfem.paths.toolpaths import Toolpaths
 
 
