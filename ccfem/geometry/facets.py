@@ -123,6 +123,14 @@ def counter_clockwise(points: FloatArray, triangles: IntArray) -> IntArray:
     return np.where((signed_areas(points, triangles) < 0.0)[:, None], turned, triangles)
 
 
+def areas_and_normals(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Areas (t,), mm^2, and unit normals (t, 3), zero without an area, of triangles in space."""
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    across = 0.5 * np.cross(b - a, c - a)
+    area = np.linalg.norm(across, axis=1)
+    return area, across / np.maximum(area, 1e-300)[:, None]
+
+
 def signed_volumes(points: FloatArray, corners: IntArray) -> FloatArray:
     """Volume of straight-sided tetrahedra (m, 4), (m,), mm^3; negative where turned inside out."""
     a, b, c, d = np.moveaxis(points[corners], 1, 0)

@@ -14,6 +14,7 @@ from ccfem.base.errors import InputError
 from ccfem.base.whole import existing_file
 from ccfem.body.isolated.process import ChildError, read_isolated
 from ccfem.body.mesh.tet_mesh import CellMesh
+from ccfem.geometry.facets import areas_and_normals
 
 SUFFIXES = (".3mf", ".obj", ".ply", ".stl")
 _NOTHING = 1e-12
@@ -44,9 +45,9 @@ class Surface:
                 f"{self.triangles.min()} to {self.triangles.max()}: repair the file"
             )
         _check_closed(self.points, self.triangles)
-        if abs(self.volume) <= _NOTHING * float(
-            np.prod(_size_and_area(self.points, self.triangles))
-        ):
+        size = float(np.linalg.norm(np.ptp(self.points[self.triangles], axis=(0, 1))))
+        area = float(areas_and_normals(self.points, self.triangles)[0].sum())
+        if abs(self.volume) <= _NOTHING * size * area:
             raise InputError(
                 f"the surface encloses no volume ({abs(self.volume):.3g} mm^3): give the outside "
                 "of a solid, each wall once"
@@ -130,13 +131,6 @@ def _merged_points(points: FloatArray, triangles: IntArray) -> tuple[FloatArray,
     return points[first], triangles[(a != b) & (b != c) & (c != a)]
 
 
-def _size_and_area(points: FloatArray, triangles: IntArray) -> tuple[float, float]:
-    """Diagonal, mm, and area, mm^2."""
-    a, b, c = np.moveaxis(points[triangles], 1, 0)
-    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
-    return float(np.linalg.norm(np.ptp(points[triangles], axis=(0, 1)))), area
-
-
 def _check_near(points: FloatArray) -> None:
     """Raise on coordinates that are not finite, or so large that their squares overflow."""
     if not np.isfinite(points).all():
@@ -207,10 +201,7 @@ class Shell(CellMesh):
 
     def facet_areas(self, facets: IntArray) -> tuple[FloatArray, FloatArray]:
         """Areas (k,), mm^2, and unit normals (k, 3) of triangles (k, 3)."""
-        a, b, c = np.moveaxis(self.points[facets], 1, 0)
-        across = 0.5 * np.cross(b - a, c - a)
-        area = np.linalg.norm(across, axis=1)
-        return area, across / np.maximum(area, 1e-300)[:, None]
+        return areas_and_normals(self.points, facets)
 
 
 def refined(

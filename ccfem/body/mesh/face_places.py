@@ -10,6 +10,7 @@ from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.check import in_metres
 from ccfem.body.mesh.smooth_faces import Face, direction_text, place_text
+from ccfem.geometry.facets import areas_and_normals
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -121,7 +122,8 @@ class BodyFaces:
             return table | {"normal": face.direction}
         triangles = self.triangles[face.facets]
         nearest = int(np.argmin(_distances(at, self.points, triangles)))
-        return table | {"normal": _unit_normals(self.points, triangles[nearest : nearest + 1])[0]}
+        _, normals = areas_and_normals(self.points, triangles[nearest : nearest + 1])
+        return table | {"normal": normals[0]}
 
     def number_at(
         self,
@@ -157,7 +159,7 @@ class BodyFaces:
         away = _distances(at, self.points, self.triangles)
         fits: BoolArray = np.ones(len(away), dtype=bool)
         if normal is not None:
-            fits = _unit_normals(self.points, self.triangles) @ normal > _FACING
+            fits = areas_and_normals(self.points, self.triangles)[1] @ normal > _FACING
         distance = np.full(len(self.faces), np.inf)
         for k, face in enumerate(self.faces):
             rows = face.facets[fits[face.facets]]
@@ -206,17 +208,10 @@ def _is_wall(face: Face, axis: FloatArray, radius: float) -> bool:
     )
 
 
-def _unit_normals(points: FloatArray, triangles: IntArray) -> FloatArray:
-    """Find the unit normals (t, 3) of triangles; zero of those without an area."""
-    a, b, c = np.moveaxis(points[triangles], 1, 0)
-    across = np.cross(b - a, c - a)
-    return np.asarray(across / np.maximum(np.linalg.norm(across, axis=1), 1e-300)[:, None])
-
-
 def _distances(place: FloatArray, points: FloatArray, triangles: IntArray) -> FloatArray:
     """Distance (t,), mm, of a place from each triangle."""
     corners = np.moveaxis(points[triangles] - place, 1, 0)
-    normal = _unit_normals(points, triangles)
+    normal = areas_and_normals(points, triangles)[1]
     inside = normal.any(axis=1)
     least = np.full(len(triangles), np.inf)
     for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):

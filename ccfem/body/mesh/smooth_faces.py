@@ -6,13 +6,11 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.base.checks import check_number
 from ccfem.body.mesh.round_walls import RoundWall
-from ccfem.geometry.facets import facet_keys
+from ccfem.geometry.facets import areas_and_normals, connected, facet_keys
 
 FEATURE_ANGLE = 30.0
 """Angle between facets, degrees, from which an edge separates two faces."""
@@ -169,8 +167,8 @@ def smooth_faces(
     area = surface.area
     pairs = _adjacent_triangles(triangles)
     cosine = np.einsum("ij,ij->i", surface.normal[pairs[:, 0]], surface.normal[pairs[:, 1]])
-    label = _components(len(triangles), pairs[cosine > np.cos(np.radians(angle))])
-    flat = _components(len(triangles), pairs[cosine > np.cos(np.radians(_SEAM))])
+    label = connected(pairs[cosine > np.cos(np.radians(angle))], len(triangles))
+    flat = connected(pairs[cosine > np.cos(np.radians(_SEAM))], len(triangles))
     faces: list[Face] = []
     for group in _rows_by_label(label):
         face = _face(surface, group)
@@ -180,7 +178,7 @@ def smooth_faces(
         wide = _wide_planes(flat[group], area[group])
         smooth = pairs[np.isin(pairs, group[~wide]).all(axis=1)]
         smooth = smooth[np.isin(smooth[:, 0], group)]
-        parts = _components(len(triangles), smooth)
+        parts = connected(smooth, len(triangles))
         faces += [_face(surface, piece) for piece in _rows_by_label(flat, group[wide])]
         faces += [_face(surface, piece) for piece in _rows_by_label(parts, group[~wide])]
     size = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
@@ -321,10 +319,7 @@ class _Surface:
 
 
 def _surface(points: FloatArray, triangles: IntArray) -> _Surface:
-    a, b, c = np.moveaxis(points[triangles], 1, 0)
-    across = 0.5 * np.cross(b - a, c - a)
-    area = np.linalg.norm(across, axis=1)
-    return _Surface(points, triangles, area, across / np.maximum(area, 1e-300)[:, None])
+    return _Surface(points, triangles, *areas_and_normals(points, triangles))
 
 
 def _order(face: Face, size: float) -> tuple[float, ...]:
@@ -340,13 +335,6 @@ def _adjacent_triangles(triangles: IntArray) -> IntArray:
     order = np.argsort(key, kind="stable")
     same = np.flatnonzero(np.diff(key[order]) == 0)
     return np.stack([order[same], order[same + 1]], axis=1) // 3
-
-
-def _components(count: int, pairs: IntArray) -> IntArray:
-    """Label things (count,) by the piece that pairs (k, 2) of them connect."""
-    ones = np.ones(len(pairs), dtype=bool)
-    graph = coo_array((ones, (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
 def _rows_by_label(label: IntArray, among: IntArray | None = None) -> list[IntArray]:

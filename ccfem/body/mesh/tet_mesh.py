@@ -27,7 +27,14 @@ from ccfem.body.mesh.curved_cells import (
 )
 from ccfem.body.mesh.round_walls import RoundWall, walls_of_facets
 from ccfem.body.mesh.smooth_faces import guessed_walls
-from ccfem.geometry.facets import facet_keys, paired, positions, signed_volumes, unique_edges
+from ccfem.geometry.facets import (
+    areas_and_normals,
+    facet_keys,
+    paired,
+    positions,
+    signed_volumes,
+    unique_edges,
+)
 
 # What meshes in space and in the plane share: nodes, cells, their facets, and named patches.
 
@@ -324,10 +331,7 @@ class TetMesh(CellMesh, Shown):
 
     def facet_areas(self, facets: IntArray) -> tuple[FloatArray, FloatArray]:
         """Areas (k,), mm^2, and unit normals (k, 3) of facets (k, 3)."""
-        a, b, c = np.moveaxis(self.points[facets], 1, 0)
-        normal = 0.5 * np.cross(b - a, c - a)
-        area = np.linalg.norm(normal, axis=1)
-        return area, normal / np.maximum(area, 1e-300)[:, None]
+        return areas_and_normals(self.points, facets)
 
     def facet_nodes(self, facets: IntArray) -> IntArray:
         """Nodes of facets: their corners, and on a quadratic mesh the middles of their sides.

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import eigsh
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
@@ -149,9 +148,8 @@ def _merged_bodies(
         if not stiff.any():
             break
         # Such bodies are one; this may give others three nodes in common, so it is repeated.
-        ends = pair[stiff] // members.bodies, pair[stiff] % members.bodies
-        graph = sp.coo_array((np.ones(len(ends[0]), dtype=bool), ends), shape=2 * (members.bodies,))
-        label = connected_components(graph, directed=False)[1]
+        ends = np.column_stack(np.divmod(pair[stiff], members.bodies))
+        label = connected(ends, members.bodies)
         number = label[number]
         bodies = int(label.max()) + 1
         key = np.unique(members.node * bodies + label[members.owner])

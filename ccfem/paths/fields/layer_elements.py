@@ -11,7 +11,7 @@ from scipy.sparse.linalg import splu
 
 from ccfem.base.arrays import FloatArray, IntArray, read_only
 from ccfem.body.mesh.numbering import nested_dissection
-from ccfem.geometry.facets import paired, signed_areas
+from ccfem.geometry.facets import areas_and_normals, paired, signed_areas
 from ccfem.geometry.isocontours import triangle_edges
 from ccfem.slicing.layers.layer import Layer
 
@@ -72,9 +72,7 @@ class Surface:
         The first is the projection onto the triangle of an axis: of those not almost normal to the
         triangle, the one along which the surface is longest.
         """
-        a, b, c = np.moveaxis(self.points[self.triangles], 1, 0)
-        normal = np.cross(b - a, c - a)
-        normal = normal / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+        _, normal = areas_and_normals(self.points, self.triangles)
         longest, second = np.argsort(-np.ptp(self.points, axis=0), kind="stable")[:2]
         steep = np.abs(normal[:, longest]) > _STEEP
         axis = np.where(steep[:, None], np.eye(3)[second], np.eye(3)[longest])

@@ -11,6 +11,7 @@ import numpy as np
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.errors import InputError
+from ccfem.geometry.facets import areas_and_normals
 from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.strategy import Amount
@@ -121,10 +122,8 @@ class GivenPaths:
         for k in np.unique(nearest).tolist():
             here, layer = of_point == k, layers[k]
             foot = nearest_on_triangles(layer.points, layer.triangles, paths.points[here])
-            a, b, c = np.moveaxis(layer.points[layer.triangles[foot.triangle]], 1, 0)
-            normal = np.cross(b - a, c - a)
             points[here], apart[here] = foot.points, foot.distance
-            normals[here] = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+            _, normals[here] = areas_and_normals(layer.points, layer.triangles[foot.triangle])
         far = np.maximum.reduceat(apart, start)
         off = far > 0.5 * np.array([layer.thickness for layer in layers])[nearest] + _SAME
         if off.any():

@@ -5,6 +5,7 @@ import scipy.sparse as sp
 
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.compiled import compiled
+from ccfem.geometry.facets import signed_volumes
 
 _NEAREST = 0.3
 """Least distance between the centres of neighbouring cells that is used, in cube roots of the mean
@@ -105,13 +106,8 @@ def faces_between(
     area = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     centre = points[cells].mean(axis=1)
     apart = np.linalg.norm(centre[first] - centre[second], axis=1)
-    least = _NEAREST * float(np.cbrt(np.abs(_volumes(points, cells)).mean()))
+    least = _NEAREST * float(np.cbrt(np.abs(signed_volumes(points, cells)).mean()))
     return first, second, area, np.maximum(apart, least)
-
-
-def _volumes(points: FloatArray, cells: IntArray) -> FloatArray:
-    a, b, c, d = np.moveaxis(points[cells], 1, 0)
-    return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0
 
 
 @compiled

@@ -5,15 +5,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import ArrayLike
-from scipy.sparse.csgraph import connected_components
 
 from ccfem.base.arrays import FloatArray, IntArray, read_only
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.smooth_faces import fitted_cylinder
 from ccfem.fem.elasticity import PartStress
+from ccfem.geometry.facets import connected
 from ccfem.slicing.principal_lines.critical import (
     CriticalRegion,
     Keep,
@@ -228,10 +227,7 @@ def _whole_wall(
     _, normal = mesh.facet_areas(facets)
     facets = facets[np.abs(normal @ axis) < 0.3]
     n = len(mesh.points)
-    ones = np.ones(2 * len(facets))
-    rows, columns = np.repeat(facets[:, 0], 2), facets[:, 1:].ravel()
-    graph = sp.coo_array((ones, (rows, columns)), shape=(n, n))
-    _, piece = connected_components(graph, directed=False)
+    piece = connected(facets[:, [[0, 1], [0, 2]]].reshape(-1, 2), n)
     on_wall = np.zeros(n, dtype=bool)
     on_wall[facets] = True
     on_wall &= np.isin(piece, piece[nodes])

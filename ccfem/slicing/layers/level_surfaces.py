@@ -5,8 +5,6 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.compiled import compiled
@@ -14,7 +12,7 @@ from ccfem.base.parallel import in_threads
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.round_walls import RoundWall
 from ccfem.fem.elasticity import cell_gradients
-from ccfem.geometry.facets import border_edges, sides_at
+from ccfem.geometry.facets import areas_and_normals, border_edges, connected, sides_at
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.level_cut import chain, cut_at_zero
 
@@ -161,7 +159,8 @@ def _surface(
     patches = {name: border[on[used][border].all(axis=1)] for name, on in member.items()}
     # Thickness at the points, between the ends of their edges; its mean by area.
     local = (1.0 - weights) * thickness[nodes[:, 0]] + weights * thickness[nodes[:, 1]]
-    mean = np.average(local[triangles].mean(axis=1), weights=_areas(points[used], triangles))
+    area, _ = areas_and_normals(points[used], triangles)
+    mean = np.average(local[triangles].mean(axis=1), weights=area)
     surface = {
         "points": points[used],
         "triangles": triangles,
@@ -211,11 +210,6 @@ def along_walls(
             yield wall, border[on][facing]
 
 
-def _areas(points: FloatArray, triangles: IntArray) -> FloatArray:
-    a, b, c = np.moveaxis(points[triangles], 1, 0)
-    return np.asarray(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
-
-
 def _ends_of_patches(triangles: IntArray, member: dict[str, BoolArray], n: int) -> BoolArray:
     """Border points at which a patch begins or ends, (n,), which cleaning must keep."""
     border = border_edges(triangles, n)
@@ -231,11 +225,10 @@ def _worthwhile(
 ) -> tuple[BoolArray, int, int]:
     """Triangles of the pieces that are kept, and the numbers of bubbles and specks left out."""
     n = len(points)
-    ends = (np.repeat(triangles[:, 0], 2), triangles[:, 1:].ravel())
-    graph = sp.coo_array((np.ones(len(ends[0]), dtype=np.int8), ends), shape=(n, n))
-    count, piece = connected_components(graph, directed=False)
+    piece = connected(triangles[:, [[0, 1], [0, 2]]].reshape(-1, 2), n)
+    count = int(piece.max()) + 1
     of_triangle = piece[triangles[:, 0]]
-    total = np.bincount(of_triangle, _areas(points, triangles), count)
+    total = np.bincount(of_triangle, areas_and_normals(points, triangles)[0], count)
     number = np.bincount(of_triangle, minlength=count)
     open_ = np.zeros(count, dtype=bool)
     open_[piece[border_edges(triangles, n)[:, 0]]] = True
