@@ -200,17 +200,24 @@ class Toolpaths(Shown):
         chosen = np.flatnonzero(wanted)
         if len(chosen) and chosen[-1] - chosen[0] + 1 == len(chosen):
             return self._between(int(chosen[0]), int(chosen[-1]) + 1)
-        mask = np.repeat(wanted, np.diff(self.offsets))
-        sizes = np.diff(self.offsets)[wanted]
+        return self.with_points(np.repeat(wanted, np.diff(self.offsets)))
+
+    def with_points(self, wanted: BoolArray) -> "Toolpaths":
+        """Paths of the points where the (P,) mask `wanted` is true; those without any are left out.
+
+        No path may end in a link then.
+        """
+        before = np.concatenate([[0], np.cumsum(wanted)])[self.offsets]
+        stays = np.diff(before) > 0
         return replace(
             self,
-            points=self.points[mask],
-            normals=self.normals[mask],
-            offsets=np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
-            layer=self.layer[wanted],
-            kind=self.kind[wanted],
-            closed=self.closed[wanted],
-            link=self.link[mask],
+            points=self.points[wanted],
+            normals=self.normals[wanted],
+            offsets=np.append(0, before[1:][stays]),
+            layer=self.layer[stays],
+            kind=self.kind[stays],
+            closed=self.closed[stays],
+            link=self.link[wanted],
         )
 
     def _between(self, first: int, last: int) -> "Toolpaths":

@@ -15,6 +15,7 @@ import numpy as np
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.checks import check_number
 from ccfem.fem.elasticity import PartStress
+from ccfem.geometry.polylines import along_line
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.bracketing import around, close_in, interpolated
 from ccfem.paths.planning.infill import about_short_pieces
@@ -164,11 +165,10 @@ def _shortened(toolpaths: Toolpaths, wanted: dict[int, float], minimum: float) -
         return toolpaths
     points, keep = toolpaths.points.copy(), np.ones(len(toolpaths.points), dtype=bool)
     link, closed = toolpaths.link.copy(), toolpaths.closed.copy()
-    stays, sizes = np.ones(len(toolpaths), dtype=bool), np.diff(toolpaths.offsets)
     for k, length in wanted.items():
         first, end = toolpaths.offsets[k], toolpaths.offsets[k + 1]
         line = toolpaths.points[first:end]
-        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+        along = along_line(line)
         last = max(int(np.searchsorted(along, length - _SAME)), 1)
         share = min((length - along[last - 1]) / (along[last] - along[last - 1]), 1.0)
         # A path does not end on a link: back to where it begins. Else at the exact length.
@@ -179,20 +179,10 @@ def _shortened(toolpaths: Toolpaths, wanted: dict[int, float], minimum: float) -
         else:
             points[first + last] = line[last - 1] + share * (line[last] - line[last - 1])
         if length <= _SAME or length < minimum - _SAME:
-            keep[first:end], stays[k] = False, False
+            keep[first:end] = False
             continue
         keep[first + last + 1 : end], link[first + last], closed[k] = False, False, False
-        sizes[k] = last + 1
-    return replace(
-        toolpaths,
-        points=points[keep],
-        normals=toolpaths.normals[keep],
-        offsets=np.concatenate([[0], np.cumsum(sizes[stays])]).astype(np.int64),
-        layer=toolpaths.layer[stays],
-        kind=toolpaths.kind[stays],
-        closed=closed[stays],
-        link=link[keep],
-    )
+    return replace(toolpaths, points=points, link=link, closed=closed).with_points(keep)
 
 
 # A single dial for how much fibre a strategy lays, over all parameters named in its amount.

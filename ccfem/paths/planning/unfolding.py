@@ -166,14 +166,7 @@ def _without_jags(paths: Toolpaths, width: float, least: float) -> Toolpaths:
         jag[at[too_short[path]]] = False
         if not jag.any():
             break
-        before = np.concatenate([[0], np.cumsum(~jag)])
-        paths = replace(
-            paths,
-            points=paths.points[~jag],
-            normals=paths.normals[~jag],
-            offsets=before[paths.offsets],
-            link=paths.link[~jag],
-        )
+        paths = paths.with_points(~jag)
     return paths
 
 
