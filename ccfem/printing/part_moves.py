@@ -60,11 +60,13 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
             if len(mine):
                 site.printed(float(plan.top[number]), mine == FIBRE)
     numbers = [k for k in numbers if k >= plan.first]
-    prepared = repeating(
-        lambda k: _prepared(plan, numbers[k], lowest, machine),
-        [_what(plan, number, lowest) for number in numbers],
-        lambda lines, k: _at_height(lines, float(plan.paths.points[_first(plan, numbers[k]), 2])),
-    )
+
+    def at_height(lines: "Sequence[Steps | StrandSteps]", k: int) -> "list[Steps | StrandSteps]":
+        first = paths.offsets[int((paths.layer == numbers[k]).argmax())]
+        return [line.at(float(paths.points[first, 2])) for line in lines]
+
+    digests = [_what(plan, number, lowest) for number in numbers]
+    prepared = repeating(lambda k: _prepared(plan, numbers[k], lowest, machine), digests, at_height)
     for number, lines in zip(numbers, prepared, strict=True):
         top, thickness = float(plan.top[number]), float(plan.thickness[number])
         begin_layer(recorder, number, top, below[number], machine)
@@ -128,18 +130,6 @@ def _prepared(
         speed = _speed(bool(lowest[k]), machine)
         lines.append(matrix_steps(line, normals, heights, what, machine, speed, room))
     return lines
-
-
-def _at_height(
-    lines: "Sequence[Steps | StrandSteps]", height: float
-) -> "list[Steps | StrandSteps]":
-    """Lay the lines of a flat layer at another height, mm."""
-    return [line.at(height) for line in lines]
-
-
-def _first(plan: PrintPlan, number: int) -> int:
-    """Find the first point of a layer."""
-    return int(plan.paths.offsets[int((plan.paths.layer == number).argmax())])
 
 
 def _what(plan: PrintPlan, number: int, lowest: BoolArray) -> Hashable:
@@ -301,7 +291,9 @@ def _preheats(moves: Moves, machine: Machine) -> tuple[list[int], list[float], l
         for k in works.tolist():
             before = waits[waits < k]
             if not len(before):
-                standby, first = _waiting(tool, machine), 0
+                # Before its first use; the start of the file waits for the heat of T0.
+                waiting = machine.fibre_standby if tool else machine.matrix_temperature + 1e3
+                standby, first = waiting, 0
             else:
                 standby, first = float(moves.amount[before[-1]]), int(before[-1])
             need = max(float(moves.amount[k]) - standby, 0.0) / rate[tool]
@@ -314,11 +306,6 @@ def _preheats(moves: Moves, machine: Machine) -> tuple[list[int], list[float], l
                 values.append(float(moves.amount[k]))
                 tools.append(tool)
     return places, values, tools
-
-
-def _waiting(tool: int, machine: Machine) -> float:
-    """Temperature of a tool before its first use; the start of the file waits for that of T0."""
-    return machine.fibre_standby if tool else machine.matrix_temperature + 1e3
 
 
 # What each tool needs before and after it lays something: heat, fan, its first filament, a cut.

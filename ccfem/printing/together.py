@@ -135,7 +135,8 @@ def arranged(
         room = max(GAP, *(_head_room(plan, machine) for plan in plans))
         borders = [_borders(plan, machine) for plan in plans]
         parts = [_Part(*one) for one in zip(borders, layouts, stacks, names, strict=True)]
-        spots = _fitting(parts, room + 2.0 * _brim(machine), machine)
+        brim = machine.process.brim_loops * machine.matrix_width
+        spots = _fitting(parts, room + 2.0 * brim, machine)
     moved = count > 1 or layouts[0].centre is not None
     whole = _merged(plans, spots, stacks) if moved else plans[0]
     standing = [
@@ -161,11 +162,6 @@ def _said(plans: Sequence[PrintPlan], names: Sequence[str], count: int) -> tuple
 def _ends(plan: PrintPlan) -> tuple[FloatArray, FloatArray]:
     """Least and largest coordinates (3,) of the lines of a plan."""
     return extent(plan.paths.points)
-
-
-def _brim(machine: Machine) -> float:
-    """Width of the brim of a part, mm."""
-    return machine.process.brim_loops * machine.matrix_width
 
 
 def _only_place(plan: PrintPlan, layout: BedLayout, machine: Machine) -> FloatArray:

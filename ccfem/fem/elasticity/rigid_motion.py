@@ -237,7 +237,7 @@ def _words(motions: FloatArray, centre: FloatArray, radius: float) -> list[str]:
     words = []
     translations = np.linalg.qr(motions[:3] @ combination[:, moving])[0]
     if translations.shape[1]:
-        words.append("move along " + " and ".join(_directions(translations)))
+        words.append("move along " + " and ".join(map(_name, _axes(translations))))
     rotating = motions @ combination[:, ~moving]
     # Free translations say nothing about where an axis of rotation lies.
     rotating[:3] -= translations @ (translations.T @ rotating[:3])
@@ -265,10 +265,6 @@ def _axes(span: FloatArray) -> list[FloatArray]:
     rest = basis - sum((np.outer(axis, axis @ basis) for axis in inside), np.zeros_like(basis))
     more, size, _ = np.linalg.svd(rest, full_matrices=False)
     return inside + [more[:, k] for k in np.flatnonzero(size > 1e-6)]
-
-
-def _directions(span: FloatArray) -> list[str]:
-    return [_name(direction) for direction in _axes(span)]
 
 
 def _name(direction: FloatArray) -> str:

@@ -511,9 +511,8 @@ def soft_holds(
     if isinstance(support, Foundation):
         # At the corners of each facet, since directions differ between them on a curved patch.
         facets = patch_facets(surface, support.patch)
-        across = _normal_frames(
-            facet_normals(surface, facets, surface.points[facets]).reshape(-1, 3)
-        )
+        normals = facet_normals(surface, facets, surface.points[facets]).reshape(-1, 1, 3)
+        across = np.linalg.svd(normals)[2]  # orthonormal, the first along the normal
         chosen = [across[:, 0]] if support.normal > 0.0 else []
         chosen += [across[:, 1], across[:, 2]] if support.tangential > 0.0 else []
         return [(facets.reshape(-1), held) for held in chosen]
@@ -564,8 +563,3 @@ def _elements(mesh: LoadedBody, support: Soft) -> tuple[IntArray, FloatArray]:
         bed += support.tangential * np.einsum("kail,kblj->kabij", along, along)
         blocks = np.einsum("k,ab,kabij->kaibj", area, shapes, bed)
     return nodes, blocks.reshape(len(nodes), 3 * nodes.shape[1], -1)
-
-
-def _normal_frames(normal: FloatArray) -> FloatArray:
-    """Orthonormal rows (k, 3, 3), the first along a normal (k, 3)."""
-    return np.asarray(np.linalg.svd(normal[:, None])[2])

@@ -34,7 +34,8 @@ def alike_layers(layers: Sequence[Layer], stress: PartStress) -> IntArray:
         return source
     first, leading = 0, copy(layers[0])
     for k in range(1, len(layers) + 1):
-        if k < len(layers) and _alike(leading, layers[k], stress.nodal):
+        same = k < len(layers) and _equal(leading, layers[k])
+        if same and _apart(leading, layers[k], stress.nodal) <= ALIKE:
             continue
         source[first:k] = (first + k) // 2
         # What it is searched by fills memory: it goes with the copy.
@@ -57,10 +58,6 @@ def on_layer(paths: Toolpaths, layer: Layer) -> Toolpaths:
         return paths
     points = layer.plane.to_space(layer.plane.project(paths.points))
     return replace(paths, points=points, layer=np.full(len(paths), layer.index))
-
-
-def _alike(one: Layer, other: Layer, nodal: FloatArray) -> bool:
-    return _equal(one, other) and _apart(one, other, nodal) <= ALIKE
 
 
 def _equal(one: Layer, other: Layer) -> bool:
