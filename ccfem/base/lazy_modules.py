@@ -43,6 +43,9 @@ def submodules(package: str) -> Callable[[str], ModuleType]:
     return of
 
 
+# Names that modules had before: they still work, or say what replaces them.
+
+
 _LINES = Path(__file__).with_name("moved.txt").read_text(encoding="utf-8").splitlines()[1:]
 _NAMES = {old: new for new, *names in map(str.split, _LINES) for old in names}
 MOVED = {old: new for old, new in _NAMES.items() if not old.endswith("!")}

@@ -146,6 +146,9 @@ class Moves:
         return (self.event == LAY) & np.isin(self.role, roles) & ~beside
 
 
+# Arcs in place of chains of moves.
+
+
 _LONGER = 1e-3
 """Share by which an arc may be longer than the moves that it replaces."""
 _LEAST, _COMPACT = 3, 2

@@ -64,6 +64,9 @@ def read_layer(path: Path) -> tuple[FloatArray, IntArray]:
     return vertices, corners
 
 
+# The solid that a stack of layers fills.
+
+
 Triangles = tuple[FloatArray, IntArray]
 
 _STEP = 0.75

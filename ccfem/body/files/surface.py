@@ -171,6 +171,9 @@ def _place(point: FloatArray) -> str:
     return "(" + ", ".join(f"{x:.4g}" for x in point) + ")"
 
 
+# The boundary of a part that has no cells yet, to try rules of patches on.
+
+
 _MOST = 400_000
 """Triangles at which a surface is fine enough."""
 _SIDES = np.array([[0, 1], [1, 2], [2, 0]])

@@ -422,6 +422,9 @@ def about_size(points: FloatArray) -> str:
     return in_metres(points)
 
 
+# Walls with one cell across, found along rays from the surface into the part.
+
+
 _STEPS = 12
 """Cells that a ray is followed through: more than three are not those of one layer."""
 _MIDDLE = 0.15

@@ -332,6 +332,9 @@ def _chosen(inside: BoolArray, label: str, mesh: TetMesh) -> IntArray:
     return np.flatnonzero(inside)
 
 
+# What rules may have caught, or missed.
+
+
 _ALL = 0.98
 """Share of the area of a wall from which it counts as taken whole."""
 _SOME = 0.01

@@ -433,6 +433,9 @@ def _reflect(first: Int32Array, other: Int32Array, result: FloatArray) -> None:
             place[j] += 1
 
 
+# Cycles over aggregates: with a fast set-up and little memory, and by pyamg, smoothed with care.
+
+
 _STRENGTH_QUICK = 0.02
 """Size of a block above which it is a strong connection, where one Jacobi step smooths."""
 

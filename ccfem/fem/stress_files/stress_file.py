@@ -29,6 +29,10 @@ from ccfem.fem.stress_files.stress_arrays import (
 )
 from ccfem.geometry.facets import positions
 
+
+# Results of CalculiX (``.frd``).
+
+
 _SOLIDS = {1: (8, 8), 2: (6, 6), 3: (4, 4), 4: (8, 20), 5: (6, 15), 6: (4, 10)}
 """Corners and nodes of the solids by element type (CalculiX 2.20 user's manual, section 11)."""
 _STARTS = (13, 25, 37, 49, 61, 73)
@@ -237,6 +241,9 @@ def _mapped(
 _MPA = {"pa": 1e-6, "kpa": 1e-3, "mpa": 1.0, "n/mm^2": 1.0, "n/mm2": 1.0, "gpa": 1e3}
 _SAME = 1e-5
 """Distance over the size of the part within which nodes are the same: files have six digits."""
+
+
+# Stress of any program, put onto a mesh.
 
 
 def read_stress(

@@ -165,6 +165,9 @@ def _foot(mesh: TetMesh, wall: IntArray, level: float) -> Any:
     return shapely.union_all(shapely.linestrings(mesh.points[edges][..., :2]))
 
 
+# The sheet in plane stress, and the part that a design of it stands for.
+
+
 _IN_PLANE = np.ix_([0, 1, 5], [0, 1, 5])
 _FACES = ("sheet_bottom", "sheet_top")
 _SHORTEST = 0.05

@@ -113,6 +113,9 @@ def read_layer_waypoints(path: str | Path, layer: Layer) -> Toolpaths:
     return Toolpaths.in_space(lines, across, layer)
 
 
+# What a cell of robots does: the moves of the G-code, and how the head stands.
+
+
 _CELL_HEADER = "path,tool,layer,x,y,z,nx,ny,nz,speed,feed,beside,width,height,event"
 _ROW = 14 * "%.8g," + "%s\n"
 

@@ -58,6 +58,9 @@ def write_paths(
         )
 
 
+# The result of a solve.
+
+
 def result_path(path: str | Path, case: str = "") -> Path:
     """Name of the file of a load case; of the whole result without one."""
     path = Path(path)

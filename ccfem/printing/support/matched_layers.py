@@ -324,6 +324,9 @@ def slice_with_support(
     return layers, support_layers(stress.mesh, layers, up, values, step, angle, lift)
 
 
+# Paths of matrix that fill the layers.
+
+
 _ON = 1e-6
 """Distance from a facet, mm, seen from above, within which a point lies below it."""
 _BESIDE = 0.01

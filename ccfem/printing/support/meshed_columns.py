@@ -30,6 +30,10 @@ from ccfem.machine.machine import Machine
 from ccfem.printing.support.overhang import hanging_facets, overhang
 from ccfem.slicing.layers.layer import plane_frame
 
+
+# Upright columns on a square grid.
+
+
 _OFF = 0.381966
 """Where columns stand between lines of the grid: off the corners and edges of parts."""
 _MOST = 5e7
@@ -147,6 +151,9 @@ def _crossings(
     z = corners[facet, :, 2]
     height = z[:, 0] + second * (z[:, 1] - z[:, 0]) + third * (z[:, 2] - z[:, 0])
     return facet, column[inside], height
+
+
+# Tetrahedra that share the faces of the part.
 
 
 _INWARD = 1e-3

@@ -228,6 +228,9 @@ def _stiffest_cut(
     return kept if exchange is None else exchange(kept, candidates[best], near)
 
 
+# Stretches of other plans in the room between strands, in exchange for what carries less.
+
+
 _TIMES = 3
 """Exchanges at most."""
 
