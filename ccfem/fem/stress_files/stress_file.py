@@ -29,7 +29,6 @@ from ccfem.fem.stress_files.stress_arrays import (
 )
 from ccfem.geometry.facets import positions
 
-
 # Results of CalculiX (``.frd``).
 
 

@@ -30,7 +30,6 @@ from ccfem.machine.machine import Machine
 from ccfem.printing.support.overhang import hanging_facets, overhang
 from ccfem.slicing.layers.layer import plane_frame
 
-
 # Upright columns on a square grid.
 
 
