@@ -8,11 +8,12 @@ default makes layers like those that the authors published.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
 from ccfem.base.arrays import FloatArray
+from ccfem.base.checks import check_choices, check_fields
 from ccfem.base.errors import InputError
 from ccfem.fem.elasticity import PartStress
 from ccfem.machine.machine import Machine
@@ -136,22 +137,11 @@ class Spatial:
     def __post_init__(self) -> None:
         if self.thickness is not None and self.count is not None:
             raise InputError("spatial layers need one of thickness and count; got both: choose one")
-        for name, kind in (("form", JointForm), ("lines", Keep)):
-            if getattr(self, name) not in get_args(kind):
-                raise InputError(
-                    f"spatial.{name} must be one of {', '.join(get_args(kind))}; got "
-                    f"{getattr(self, name)!r}"
-                )
-        for name in ("thickness", "count", "smoothness", "length", "rings", "shortest_edge"):
-            value = getattr(self, name)
-            if value is not None and not 0.0 < value < np.inf:
-                raise InputError(f"spatial.{name} must be above 0; got {value}")
-        for name in (
-            *("stress_weight", "joint_weight", "hole_weight", "hole_reach"),
-            *("least_area", "flat_within"),
-        ):
-            if not 0.0 <= getattr(self, name) < np.inf:
-                raise InputError(f"spatial.{name} must be at least 0; got {getattr(self, name)}")
+        check_choices(self)
+        positive = ("thickness", "count", "smoothness", "length", "rings", "shortest_edge")
+        check_fields(self, *positive, above=0.0)
+        free = ("stress_weight", "joint_weight", "hole_weight", "hole_reach")
+        check_fields(self, *free, "least_area", "flat_within", at_least=0.0)
 
     def __call__(self, stress: PartStress, build: Vector, machine: Machine) -> tuple[Layer, ...]:
         """Cut a part into curved layers."""
