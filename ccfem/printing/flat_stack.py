@@ -44,8 +44,7 @@ def flat_stack(
         """Region on the bed of one in the plane of the layers."""
         turn = place.axes[:2] @ upright[:2].T
         return shapely.transform(
-            region,
-            lambda points: (points @ turn.T if place.spin else points) - place.origin[:2],
+            region, lambda points: (points @ turn.T if place.spin else points) - place.origin[:2]
         )
 
     same = strands.repeated(used)

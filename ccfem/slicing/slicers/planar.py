@@ -17,13 +17,7 @@ from ccfem.fem.elasticity import PartStress
 from ccfem.geometry.facets import border_edges, counter_clockwise
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import FlatLayer, Layer, Plane, plane_frame
-from ccfem.slicing.layers.level_cut import (
-    chain,
-    cut_at_zero,
-    on_edges,
-    patch_edges,
-    wall_edges,
-)
+from ccfem.slicing.layers.level_cut import chain, cut_at_zero, on_edges, patch_edges, wall_edges
 from ccfem.slicing.layers.slicer import Vector, check_heights
 
 _TOP = 1e-3
