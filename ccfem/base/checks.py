@@ -212,7 +212,7 @@ class KnownNames(dict[str, V]):
 
 
 def check_instance(kind: str, value: object) -> None:
-    """Refuse a class in place of an instance of it, and what is no `kind`, as "strategy"."""
+    """Refuse a class in place of an instance of a kind, as "strategy", and what is not callable."""
     if isinstance(value, type):
         raise InputError(
             f"a {kind} must be an instance; got the class {value.__name__}: write "
@@ -227,7 +227,7 @@ def check_instance(kind: str, value: object) -> None:
 def refuse_keywords(
     function: str, unknown: Iterable[str], known: Iterable[str], replaced: Mapping[str, str]
 ) -> None:
-    """Refuse keywords that a function does not have; `replaced` says what stands for some."""
+    """Refuse keywords that a function does not have; `replaced` names what stands for some."""
     for name in unknown:
         cure = f": give it as {replaced[name]}" if name in replaced else ""
         raise InputError(

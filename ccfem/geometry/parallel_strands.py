@@ -246,7 +246,7 @@ def _fill_rest(
 
 
 def lengthened(line: FloatArray, region: Region, near: float, length: float) -> FloatArray:
-    """Extend an open line (m, 2) straight, by a length, at ends near the border of a region, mm."""
+    """Extend an open line (m, 2) straight at ends no farther than `near` from the border, mm."""
     if is_closed(line):
         return line
     gap = shapely.distance(region.boundary, shapely.points(line[[0, -1]]))

@@ -172,7 +172,10 @@ def _places(points: FloatArray, section: Region) -> IntArray:
 def cut_at_section(
     starts: FloatArray, ends: FloatArray, section: Region, tolerance: float = TOLERANCE
 ) -> Pieces:
-    """Cut straight steps (s, 2), mm, at the boundary of a section, as far as `section_places`."""
+    """Cut straight steps (s, 2), mm, at the boundary of a section.
+
+    What counts as inside, and the tolerance, are as of `section_places`.
+    """
     grown = shapely.buffer(section, tolerance, quad_segs=2)
     boundary = shapely.boundary(grown)
     shapely.prepare(boundary)

@@ -111,7 +111,10 @@ class Design:
         return axes_about_z(self.angle[cKDTree(centres).query(points[:, : centres.shape[1]])[1]])
 
     def filled(self, volume_fraction: float | None = None) -> BoolArray:
-        """Densest cells, as an (m,) mask, that make up a share of the volume, or as the design."""
+        """Densest cells, as an (m,) mask, that make up a share of the volume.
+
+        By default that of the design.
+        """
         share = self.volume_fraction if volume_fraction is None else volume_fraction
         check_number("volume_fraction", share, above=0.0, at_most=1.0)
         order = np.argsort(-self.density, kind="stable")

@@ -83,7 +83,7 @@ TYPES = {
 
 
 def write_gcode(path: str | Path, plan: PrintPlan, machine: Machine, title: str = "") -> None:
-    """Write the G-code of a part with a title, whole or not at all; the plan is for the machine."""
+    """Write the G-code of a part, whole or not at all, with a title at the head of the file."""
     pieces = gcode_pieces(part_moves(plan, machine), plan, machine, title)
     with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
         file.writelines(pieces)
