@@ -10,7 +10,7 @@ import shapely
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.fem.elasticity import PartStress
 from ccfem.paths.toolpaths import Toolpaths
-from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer import Layer, curved_layers
 
 ALIKE = 0.01
 """Root mean square of the difference of alike stress, over that of the stress. Our choice, well
@@ -62,13 +62,9 @@ def on_layer(paths: Toolpaths, layer: Layer) -> Toolpaths:
 
 def _equal(one: Layer, other: Layer) -> bool:
     """Whether two flat layers have equal sections, and the same patches along them."""
-    if one.flat is None or other.flat is None:
+    if curved_layers((one, other)) or abs(one.thickness - other.thickness) > EQUAL:
         return False
-    if not np.array_equal(one.flat.frame, other.flat.frame):
-        return False
-    if abs(one.thickness - other.thickness) > EQUAL:
-        return False
-    if not equal_sections(one, other):
+    if not np.array_equal(one.plane.frame, other.plane.frame) or not equal_sections(one, other):
         return False
     a, b = _along_patches(one), _along_patches(other)
     return a.keys() == b.keys() and all(
