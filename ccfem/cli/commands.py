@@ -323,7 +323,7 @@ def faces(
     ] = Path("faces.png"),
 ) -> None:
     """List the smooth faces of a body with numbers to choose patches by, and draw them."""
-    from ccfem.cli.faces import list_faces
+    from ccfem.cli.check_part import list_faces
 
     list_faces(body, angle, scale, out)
 

@@ -190,7 +190,7 @@ def _write(optimised: "Optimised", files: Sequence[Path], case: str) -> None:
     from ccfem.body.files.formats import npz
     from ccfem.cases.part_writing import part_text
     from ccfem.comparison.plot.canvas import png
-    from ccfem.comparison.plot.design_picture import design_picture
+    from ccfem.comparison.plot.part_views import design_picture
 
     _, mesh, picture, history = files
     design, new = optimised.design, optimised.case

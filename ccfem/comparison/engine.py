@@ -22,8 +22,7 @@ from ccfem.base.progress import Progress, silent
 from ccfem.cases.case import Case
 from ccfem.cases.load_cases import weighted_cases
 from ccfem.comparison.bounds import bounded, bounds_of
-from ccfem.comparison.curve import Curve, one_length_suits
-from ccfem.comparison.curve_stages import along_curve
+from ccfem.comparison.curve import Curve, along_curve, one_length_suits
 from ccfem.comparison.effort import LONGEST_CURVE, Counts, curve_steps, stage_effort
 from ccfem.comparison.expected import Schedule, expected_steps
 from ccfem.comparison.plan_to_stiffness import plan_to_stiffness

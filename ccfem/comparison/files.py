@@ -146,8 +146,8 @@ def write_results(
         with spared(f"drawings ({suffix})", left_out):
             _write_drawings(comparison, folder, suffix)
     if comparison.broken:
-        from ccfem.comparison.plot.breaking_curves import breaking_picture
         from ccfem.comparison.plot.canvas import png
+        from ccfem.comparison.plot.curves import breaking_picture
 
         with spared("breaking.png", left_out):
             colours = palette(run.name for run in comparison.runs)

@@ -10,7 +10,7 @@ from ccfem.base.arrays import BoolArray, freeze
 from ccfem.base.errors import InputError
 from ccfem.comparison.front import on_front
 from ccfem.comparison.front_cases import WORST, PointCase, PointCases, stiffness_panels
-from ccfem.comparison.plot.amount_curves import AmountPoint, TradePoint, amount_curves, trade_curves
+from ccfem.comparison.plot.curves import AmountPoint, TradePoint, amount_curves, trade_curves
 from ccfem.paths.planning.equal_fibre import TOLERANCE
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.strategies.fibre_aware.upper_bound import UpperBound

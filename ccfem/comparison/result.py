@@ -92,7 +92,7 @@ def front_picture(runs: Sequence[Run], over: str) -> "Figure":
     InputError
         For an unknown index, and runs without a virtual test.
     """
-    from ccfem.comparison.plot.fronts import FrontPoint, front_figure
+    from ccfem.comparison.plot.curves import FrontPoint, front_figure
 
     cost = cost_of(over)
     values = [headline_values(run) for run in runs]

@@ -38,16 +38,14 @@ from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer, LayerStress, flat_layers, stress_on
 from ccfem.strategies.stress_tracing.band import band
 from ccfem.strategies.stress_tracing.frame import ARC_CHORD, frame
-from ccfem.strategies.stress_tracing.main_paths import main_paths
-from ccfem.strategies.stress_tracing.stems import with_shared_stems
+from ccfem.strategies.stress_tracing.main_paths import main_paths, with_shared_stems
 from ccfem.strategies.stress_tracing.stress_lines import (
     Criterion,
     misalignment,
     plane_stress_at,
     stress_lines,
 )
-from ccfem.strategies.stress_tracing.tails import tail_turns
-from ccfem.strategies.stress_tracing.tracks import tracks
+from ccfem.strategies.stress_tracing.tracks import tail_turns, tracks
 
 _SAMPLING = 0.5
 """Distance between the border samples for the medial axis, in fibre widths."""

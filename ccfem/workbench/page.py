@@ -9,7 +9,7 @@ import io
 import threading
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from ccfem.cases.inspection import Check
 from ccfem.cases.inspection.acting import Entry, Name, entries
 from ccfem.cases.inspection.patch_places import PatchPlace, patch_places
 from ccfem.cases.part_editing import valued
-from ccfem.comparison.plot.face_meshes import borders, face_meshes
 from ccfem.comparison.plot.symbols import (
     arrow_outside,
     bed_under,
@@ -30,15 +29,24 @@ from ccfem.comparison.plot.symbols import (
     turning,
 )
 from ccfem.workbench.bench import Bench, Said
-from ccfem.workbench.body_scene import boxes, snapped, stretched, upward
 from ccfem.workbench.compare_tab import CompareTab
-from ccfem.workbench.drawing import MATT, draw_arrows, draw_label, draw_lines, draw_mesh
-from ccfem.workbench.file_tab import FileTab
+from ccfem.workbench.drawing import (
+    MATT,
+    borders,
+    boxes,
+    draw_arrows,
+    draw_label,
+    draw_lines,
+    draw_mesh,
+    face_meshes,
+    snapped,
+    stretched,
+    upward,
+)
 from ccfem.workbench.guard import Guard, Served, escaped, limit_uploads
 from ccfem.workbench.loads_tab import LoadsTab
-from ccfem.workbench.newest import Newest
 from ccfem.workbench.print_tab import PrintTab
-from ccfem.workbench.tab import PART, VIEWS, Tabbed, lines_of
+from ccfem.workbench.tab import PART, VIEWS, FileTab, Tabbed, lines_of
 
 _FACE, _CHOSEN = (203, 210, 216), (245, 190, 65)
 _HELD, _LOADED, _BOTH = (120, 168, 214), (226, 142, 120), (170, 140, 190)
@@ -448,3 +456,49 @@ class Page(Tabbed):
         size = np.linalg.norm(now.amount or 0.0) * (-1.0 if presses else 1.0)
         vector = [round(float(x), 3) + 0.0 for x in size * along]
         self.edit(valued((*now.keys, now.key), vector))
+
+
+# Work on the newest of what is asked for, as a check while somebody types.
+
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+_QUIET = 0.25
+"""Seconds for which nothing new must come before the work begins."""
+
+
+class Newest(Generic[Item, Result]):
+    """Works on the newest item, once it has been quiet; others are passed over.
+
+    Parameters
+    ----------
+    work : callable
+        Takes an item.
+    done : callable
+        Takes an item and what came of it, unless a newer one has come meanwhile.
+    """
+
+    def __init__(
+        self, work: Callable[[Item], Result], done: Callable[[Item, Result], object]
+    ) -> None:
+        self._work, self._done, self._asked = work, done, 0
+        self._busy = threading.Lock()
+
+    def ask(self, item: Item) -> None:
+        """Ask for an item; what was asked before and not begun is dropped."""
+        self._asked += 1
+        timer = threading.Timer(_QUIET, self._run, (item, self._asked))
+        timer.daemon = True
+        timer.start()
+
+    def close(self) -> None:
+        """Begin nothing more."""
+        self._asked += 1
+
+    def _run(self, item: Item, number: int) -> None:
+        with self._busy:
+            if number == self._asked:
+                result = self._work(item)
+                if number == self._asked:
+                    self._done(item, result)

@@ -1,4 +1,4 @@
-"""What the tabs of the page share: how it does one thing after the other, its fields, its lists."""
+"""What the tabs of the page share, its fields and its lists; and the tab for the part file."""
 
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -7,8 +7,9 @@ from typing import Any
 from ccfem.base.errors import InputError, SolveError
 from ccfem.cases.inspection import Check
 from ccfem.cases.part_editing import Change
+from ccfem.cases.reading import named_cases
 from ccfem.workbench.bench import Bench, Said
-from ccfem.workbench.guard import escaped, send_again
+from ccfem.workbench.guard import Served, escaped, send_again
 
 PART, STRESS, MOVED, FIBRE, PRINT = VIEWS = ("Part", "Stress", "Deformed", "Fibre", "Print")
 """What the page shows in space: the part to be set up, or what the last run says of it."""
@@ -234,3 +235,43 @@ def lines_of(said: Said) -> str:
         for kind, line in said
     )
     return f"<ul>{items}</ul>" if items else ""
+
+
+class FileTab:
+    """Text of the part file, and what can be opened in its place."""
+
+    def __init__(self, page: Tabbed) -> None:
+        self.page, gui = page, page.server.gui
+        with gui.add_folder("Open"):
+            self.files = Choice(page, "In this folder", "choose", page.open)
+            cases = Choice(page, "Cases of ccfem", "choose", page.open)
+            cases.offer(sorted(named_cases()))
+            upload = gui.add_upload_button(
+                "Upload a body or a part file", hint="STEP, STL, mesh or TOML, up to 200 MB."
+            )
+            upload.on_upload(page.on(self._upload, value=True))
+        self._said = gui.add_html("")
+
+    def _upload(self, file: Any) -> None:
+        self.page.open(self.page.bench.upload(file.name, file.content))
+
+    def served(self) -> Served | None:
+        """Serve the part file, to be saved."""
+        bench = self.page.bench
+        if bench.opened is None:
+            return None
+        return Served(bench.text.encode(), "application/toml", f"{bench.name}.toml")
+
+    def show(self) -> None:
+        """Show the part file."""
+        bench = self.page.bench
+        self.files.offer(bench.offered())
+        if bench.opened is None:
+            self._said.content = ""
+            return
+        command = f"ccfem check {bench.part_argument()}"
+        self._said.content = (
+            f'<div class="ccfem"><p><a href="/files/part.toml" download>Download the part file</a>'
+            f"</p><p>In a terminal: <code>{escaped(command)}</code></p>"
+            f'<pre tabindex="0">{escaped(bench.text)}</pre></div>'
+        )

@@ -13,7 +13,7 @@ from ccfem.comparison.plot.symbols import (
     swung,
     turning,
 )
-from ccfem.workbench.body_scene import (
+from ccfem.workbench.drawing import (
     boxes,
     snapped,
     stretched,

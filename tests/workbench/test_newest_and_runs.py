@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ccfem.workbench.child_run import ChildRun, RunState
-from ccfem.workbench.newest import Newest
+from ccfem.workbench.page import Newest
 
 
 def test_only_the_newest_is_worked_on():
@@ -36,7 +36,7 @@ def test_only_the_newest_is_worked_on():
 
 
 def test_what_came_of_an_older_item_is_dropped(monkeypatch):
-    monkeypatch.setattr("ccfem.workbench.newest._QUIET", 0.0)
+    monkeypatch.setattr("ccfem.workbench.page._QUIET", 0.0)
     going, newer, done = threading.Event(), threading.Event(), []
 
     def work(item):

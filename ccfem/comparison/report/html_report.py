@@ -17,8 +17,8 @@ from ccfem.cases.inspection import Check, check
 from ccfem.comparison.bed_print import BedPrint
 from ccfem.comparison.citations import bibtex, cited, methods_of, sentence
 from ccfem.comparison.headline import TEST_COLUMNS
-from ccfem.comparison.plot.breaking_curves import breaking_picture
 from ccfem.comparison.plot.colours import palette
+from ccfem.comparison.plot.curves import breaking_picture
 from ccfem.comparison.plot.part_picture import coloured, drawn_arrows, load_arrows, support_marks
 from ccfem.comparison.plot.values import image
 from ccfem.comparison.report.charts import curve_charts, fronts, spreads

@@ -143,7 +143,7 @@ class StudyResult:
         ----------
         over : {"fibre_length", "print_time_nearest", "first_failure_load"}
         """
-        from ccfem.comparison.plot.fronts import FrontPoint, front_figure
+        from ccfem.comparison.plot.curves import FrontPoint, front_figure
 
         panels: dict[str, list[FrontPoint]] = {}
         frame, cost = self.frame, cost_of(over)

@@ -14,11 +14,10 @@ size.
 
 Strands carry tension only. One breaks where its force, averaged over a length, reaches its
 strength. It then carries nothing over that length. Where the bond of a strand to the matrix is
-given as a force, strands come loose from their ends on (`ccfem.judging.virtual_testing.
-strand_ends`).
+given as a force, strands come loose from their ends on (`virtual_testing.anchorage`).
 
 Layers part where the traction of the averaged stress on them reaches the strength of their bond
-(`ccfem.judging.virtual_testing.parting`), if the layers and that strength are known.
+(`failure_laws.interlayer`), if the layers and that strength are known.
 """
 
 from collections.abc import Sequence
@@ -38,12 +37,15 @@ from ccfem.fem.elasticity import Solver, StressField, cell_gradients
 from ccfem.fem.elasticity.recovery import cell_strain, times
 from ccfem.fem.elasticity.solvers import LARGEST_DIRECT, direct_backend
 from ccfem.fem.elasticity.zone import ZONE, distance_from_patches
+from ccfem.judging.virtual_testing.anchorage import Ends, StrandEnds
 from ccfem.judging.virtual_testing.equilibrium import Equilibrium, bar_stiffness, equilibrium
-from ccfem.judging.virtual_testing.failure_laws.interlayer import layer_normals
-from ccfem.judging.virtual_testing.parting import parted_stiffness, parting_factors
+from ccfem.judging.virtual_testing.failure_laws.interlayer import (
+    layer_normals,
+    parted_stiffness,
+    parting_factors,
+)
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import Limits, Strand
-from ccfem.judging.virtual_testing.strand_ends import Ends, StrandEnds
 from ccfem.judging.virtual_testing.strands import Strands, Windows, cut_strands
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths

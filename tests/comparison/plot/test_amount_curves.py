@@ -2,7 +2,7 @@
 
 import pytest
 
-from ccfem.comparison.plot.amount_curves import AmountPoint, TradePoint, amount_curves, trade_curves
+from ccfem.comparison.plot.curves import AmountPoint, TradePoint, amount_curves, trade_curves
 
 
 def legend(figure):

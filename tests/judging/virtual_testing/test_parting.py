@@ -10,7 +10,7 @@ from ccfem.body.mesh.box import box_mesh
 from ccfem.fem.elasticity.zone import BALL, ball_averages
 from ccfem.fem.materials import isotropic
 from ccfem.judging.virtual_testing.failure_laws import interlayer
-from ccfem.judging.virtual_testing.parting import parted_stiffness, parting_factors
+from ccfem.judging.virtual_testing.failure_laws.interlayer import parted_stiffness, parting_factors
 from ccfem.judging.virtual_testing.progressive_failure import breaking_load
 from ccfem.judging.virtual_testing.strand import Limits
 from ccfem.slicing.slicers import Planar

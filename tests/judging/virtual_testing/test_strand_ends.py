@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from ccfem.judging.virtual_testing.anchorage import StrandEnds
 from ccfem.judging.virtual_testing.progressive_failure import breaking_load
 from ccfem.judging.virtual_testing.strand import Strand
-from ccfem.judging.virtual_testing.strand_ends import StrandEnds
 from ccfem.judging.virtual_testing.strands import Strands
 
 from .test_progressive_failure import AREA, LENGTH, MODULUS, bar, strands

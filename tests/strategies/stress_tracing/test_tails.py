@@ -11,9 +11,8 @@ from ccfem.slicing.layers.layer import stress_on
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies.stress_tracing.band import band, extension
 from ccfem.strategies.stress_tracing.frame import FREE, Frame, Member
-from ccfem.strategies.stress_tracing.main_paths import MainPath
-from ccfem.strategies.stress_tracing.stems import with_shared_stems
-from ccfem.strategies.stress_tracing.tails import tail_turns
+from ccfem.strategies.stress_tracing.main_paths import MainPath, with_shared_stems
+from ccfem.strategies.stress_tracing.tracks import tail_turns
 from ccfem.strategies.svt import alike, apart
 
 
