@@ -14,6 +14,16 @@ from ccfem.base.errors import InputError
 from ccfem.base.toml import assignment
 
 
+def option(metavar: str, text: str, *names: str, **more: Any) -> Any:
+    """Option of a command that takes a value; named as its parameter is, unless names are given."""
+    return typer.Option(*names, metavar=metavar, help=text, **more)
+
+
+def argument(metavar: str, text: str) -> Any:
+    """Argument of a command."""
+    return typer.Argument(metavar=metavar, help=text)
+
+
 def path_of(text: str | Path) -> Path:
     """Path of an option; an empty text would be the current folder."""
     if not str(text).strip():

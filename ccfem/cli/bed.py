@@ -12,7 +12,7 @@ import typer
 
 from ccfem.base.errors import InputError
 from ccfem.cli import options
-from ccfem.cli.arguments import parameters_by_strategy
+from ccfem.cli.arguments import argument, option, parameters_by_strategy
 from ccfem.cli.machines import MachineName, SetMachine
 from ccfem.cli.part_choices import PlacedPart, SetPlastic
 
@@ -38,30 +38,18 @@ class _Part(NamedTuple):
 class PartsOptions:
     """Parts, and what is said of each of them."""
 
-    parts: Annotated[
-        list[str],
-        typer.Argument(metavar="CASE_OR_PART.toml ...", help="Parts; one may be named twice."),
-    ]
+    parts: Annotated[list[str], argument("CASE_OR_PART.toml ...", "Parts; one may be named twice.")]
     strategy: Annotated[
-        list[str] | None,
-        typer.Option(metavar="S", help=f"Strategy, {_EACH}; default stream_function."),
+        list[str] | None, option("S", f"Strategy, {_EACH}; default stream_function.")
     ] = None
-    layers: Annotated[
-        list[int] | None, typer.Option(metavar="N", help=f"Layers of fibre, {_EACH}.")
-    ] = None
+    layers: Annotated[list[int] | None, option("N", f"Layers of fibre, {_EACH}.")] = None
     copies: Annotated[
-        list[str] | None,
-        typer.Option(metavar="N|NXxNY", help=f"How many, as 4, or 2x3 by X and Y, {_EACH}."),
+        list[str] | None, option("N|NXxNY", f"How many, as 4, or 2x3 by X and Y, {_EACH}.")
     ] = None
-    turn: Annotated[
-        list[str] | None, typer.Option(metavar="AXIS=DEGREES", help=f"Turn, as z=37, {_EACH}.")
-    ] = None
+    turn: Annotated[list[str] | None, option("AXIS=DEGREES", f"Turn, as z=37, {_EACH}.")] = None
     centre: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="X,Y",
-            help="Middle of each part on the bed, mm; else they are laid out in rows.",
-        ),
+        option("X,Y", "Middle of each part on the bed, mm; else they are laid out in rows."),
     ] = None
 
     def counted(self) -> dict[_Part, str | None]:

@@ -14,7 +14,7 @@ import typer
 from ccfem.base.errors import InputError
 from ccfem.base.progress import progress_bar
 from ccfem.cli import options
-from ccfem.cli.arguments import parameters_by_strategy, path_of
+from ccfem.cli.arguments import argument, option, parameters_by_strategy, path_of
 from ccfem.cli.bed import bed
 from ccfem.cli.fibre_amounts import front
 from ccfem.cli.machines import machines
@@ -37,17 +37,17 @@ def support(
     slicing: options.Slicing = None,
     angle: Annotated[
         float | None,
-        typer.Option(
-            metavar="DEGREES",
-            help="Support what leans over by more than this from upright; default 45 below flat "
-            "layers, 0 (all that looks down) below curved ones.",
+        option(
+            "DEGREES",
+            "Support what leans over by more than this from upright; default 45 below flat layers, "
+            "0 (all that looks down) below curved ones.",
         ),
     ] = None,
     lift: Annotated[
         float | None,
-        typer.Option(
-            metavar="MM",
-            help="Height of the part above the bed; default 0, and ten layers or more below curved "
+        option(
+            "MM",
+            "Height of the part above the bed; default 0, and ten layers or more below curved "
             "layers, which become flat in it.",
         ),
     ] = None,
@@ -55,11 +55,10 @@ def support(
     backend: options.Backend = "auto",
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out",
-            metavar="PATHS.vtp|BODY.stl",
+        option(
+            "PATHS.vtp|BODY.stl",
+            "Also write their paths here, or the support as a body.",
             parser=path_of,
-            help="Also write their paths here, or the support as a body.",
         ),
     ] = None,
 ) -> None:
@@ -115,15 +114,13 @@ def support(
 
 def study(
     file: Annotated[
-        Path | None,
-        typer.Argument(metavar="FILE.toml", help="Study file; ccfem study --example prints one."),
+        Path | None, argument("FILE.toml", "Study file; ccfem study --example prints one.")
     ] = None,
     example: Annotated[
         bool, typer.Option("--example", help="Print a study file to start from, and end.")
     ] = False,
     workers: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="Processes; default as many as processors.", min=0),
+        int | None, option("N", "Processes; default as many as processors.", min=0)
     ] = None,
     scheduler: options.Scheduler = None,
     out: options.Out = None,
@@ -166,15 +163,9 @@ def _run(
 
 
 def reproduce(
-    paper: Annotated[
-        str | None, typer.Argument(metavar="PAPER", help="As wang_2021; none lists them.")
-    ] = None,
-    part: Annotated[
-        str | None, typer.Argument(metavar="PART", help="As table2 or figure8; none makes all.")
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Default results/PAPER.")
-    ] = None,
+    paper: Annotated[str | None, argument("PAPER", "As wang_2021; none lists them.")] = None,
+    part: Annotated[str | None, argument("PART", "As table2 or figure8; none makes all.")] = None,
+    out: Annotated[Path | None, option("FOLDER", "Default results/PAPER.")] = None,
 ) -> None:
     """Make the figures, tables and claims of a paper again, ours beside theirs."""
     from ccfem.base.progress import progress_bar
@@ -270,8 +261,7 @@ def cases() -> None:
 
 
 _Explained = Annotated[
-    str | None,
-    typer.Argument(metavar="NAME", help="Explain this one, and what its parameters mean."),
+    str | None, argument("NAME", "Explain this one, and what its parameters mean.")
 ]
 
 
@@ -302,25 +292,15 @@ app.command()(machines)
 @app.command()
 def faces(
     body: Annotated[
-        Path,
-        typer.Argument(
-            metavar="BODY",
-            help="Surface (.stl), CAD file (.step), mesh, part file or case.",
-        ),
+        Path, argument("BODY", "Surface (.stl), CAD file (.step), mesh, part file or case.")
     ],
     angle: Annotated[
-        float,
-        typer.Option(metavar="DEGREES", help="Angle at an edge from which it separates two faces."),
+        float, option("DEGREES", "Angle at an edge from which it separates two faces.")
     ] = 30.0,
-    scale: Annotated[
-        float, typer.Option(metavar="S", help="Factor that converts a file's coordinates to mm.")
-    ] = 1.0,
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out", metavar="PICTURE", parser=path_of, help="Picture (.png, .pdf, .svg)."
-        ),
-    ] = Path("faces.png"),
+    scale: Annotated[float, option("S", "Factor that converts a file's coordinates to mm.")] = 1.0,
+    out: Annotated[Path, option("PICTURE", "Picture (.png, .pdf, .svg).", parser=path_of)] = Path(
+        "faces.png"
+    ),
 ) -> None:
     """List the smooth faces of a body with numbers to choose patches by, and draw them."""
     from ccfem.cli.check_part import list_faces
@@ -334,12 +314,10 @@ def check(
     part: PlacedPart,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out",
-            metavar="PICTURE",
+        option(
+            "PICTURE",
+            "Picture (.png, .pdf, .svg), with a rotatable view beside it; default NAME-check.png.",
             parser=path_of,
-            help="Picture (.png, .pdf, .svg), with a rotatable view beside it; default "
-            "NAME-check.png.",
         ),
     ] = None,
 ) -> None:
@@ -459,29 +437,22 @@ def plan(
 @options.grouped
 def calibrate(
     given: PrintedPart,
-    unreinforced: Annotated[
-        Path, typer.Option(metavar="CURVE.csv", help="Test of the part printed without fibre.")
-    ],
+    unreinforced: Annotated[Path, option("CURVE.csv", "Test of the part printed without fibre.")],
     reinforced: Annotated[
-        Path | None,
-        typer.Option(metavar="CURVE.csv", help="Test of the part printed with fibre."),
+        Path | None, option("CURVE.csv", "Test of the part printed with fibre.")
     ] = None,
     strategy: Annotated[
-        str | None, typer.Option(metavar="S", help="Strategy that planned the reinforced part.")
+        str | None, option("S", "Strategy that planned the reinforced part.")
     ] = None,
     set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Parameter of it; repeatable."),
+        list[str] | None, option("NAME=VALUE", "Parameter of it; repeatable.", "--set")
     ] = None,
     layers: options.Layers = None,
     fibre_per_layer: options.Fibre = None,
     load_case: options.OneLoadCase = None,
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out", metavar="MATERIAL.toml", parser=path_of, help="File that is written."
-        ),
-    ] = Path("calibrated.toml"),
+    out: Annotated[Path, option("MATERIAL.toml", "File that is written.", parser=path_of)] = Path(
+        "calibrated.toml"
+    ),
 ) -> None:
     """Fit modulus, matrix strength and strand stiffness to force-displacement curves (CSV).
 

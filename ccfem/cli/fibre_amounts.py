@@ -6,10 +6,8 @@ from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from ccfem.cli import options
-from ccfem.cli.arguments import numbers_of, parameters_by_strategy
+from ccfem.cli.arguments import numbers_of, option, parameters_by_strategy
 from ccfem.cli.part_choices import PrintedPart
 
 if TYPE_CHECKING:
@@ -88,20 +86,18 @@ def front(
     set_: options.SetOfOne = None,
     layers: Annotated[
         str | None,
-        typer.Option(
-            metavar="N,N,..",
-            help="Numbers of fibre layers; default the part's own, and twice as many where a "
-            "strand has room in layers half as high.",
+        option(
+            "N,N,..",
+            "Numbers of fibre layers; default the part's own, and twice as many where a strand has "
+            "room in layers half as high.",
         ),
     ] = None,
-    points: Annotated[
-        int, typer.Option(metavar="N", help="Lengths of fibre, up to what fills most layers.")
-    ] = 5,
+    points: Annotated[int, option("N", "Lengths of fibre, up to what fills most layers.")] = 5,
     strength: Annotated[
         str | None,
-        typer.Option(
-            metavar="W,W,..",
-            help="Also plan for the load at first failure, which counts so much of 1 beside the "
+        option(
+            "W,W,..",
+            "Also plan for the load at first failure, which counts so much of 1 beside the "
             "stiffness, as 0,0.25,0.5; trade.png shows what one costs in the other.",
         ),
     ] = None,

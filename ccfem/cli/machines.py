@@ -6,10 +6,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from ccfem.base.errors import InputError
 from ccfem.base.toml import assignment
+from ccfem.cli.arguments import argument, option
 from ccfem.cli.docstring import attributes
 
 if TYPE_CHECKING:
@@ -17,20 +16,15 @@ if TYPE_CHECKING:
 
 MachineName = Annotated[
     str | None,
-    typer.Option(
-        "--machine",
-        metavar="NAME_OR_FILE",
-        help="Printer: one of ccfem machines, or a TOML file with [machine]; what it does not set "
-        "stays as the part has it.",
+    option(
+        "NAME_OR_FILE",
+        "Printer: one of ccfem machines, or a TOML file with [machine]; what it does not set stays "
+        "as the part has it.",
     ),
 ]
 SetMachine = Annotated[
     list[str] | None,
-    typer.Option(
-        "--set-machine",
-        metavar="KEY=VALUE",
-        help="Set a value of the machine, as process.start_speed=3; repeatable.",
-    ),
+    option("KEY=VALUE", "Set a value of the machine, as process.start_speed=3; repeatable."),
 ]
 
 _WIDTH = 100
@@ -72,23 +66,20 @@ def _table(text: str) -> dict[str, Any]:
 
 def machines(
     name: Annotated[
-        str | None,
-        typer.Argument(metavar="NAME_OR_FILE", help="Print all values of this one, to edit."),
+        str | None, argument("NAME_OR_FILE", "Print all values of this one, to edit.")
     ] = None,
     square: Annotated[
         Path | None,
-        typer.Option(
-            "--square",
-            metavar="FILE.gcode",
-            help="Write a square to print that calibrates it, and say what to measure on it.",
+        option(
+            "FILE.gcode",
+            "Write a square to print that calibrates it, and say what to measure on it.",
         ),
     ] = None,
     measured: Annotated[
         str | None,
-        typer.Option(
-            "--measured",
-            metavar="NAME=VALUE,..",
-            help="Print it with the values that the measured square tells, as "
+        option(
+            "NAME=VALUE,..",
+            "Print it with the values that the measured square tells, as "
             "front=5.2,back=4.9,left=5,right=5,start=15,end=14.6,mass=15.7.",
         ),
     ] = None,

@@ -12,7 +12,7 @@ import typer
 from ccfem.base.checks import check_number
 from ccfem.base.errors import InputError
 from ccfem.base.toml import assignment
-from ccfem.cli.arguments import names_of, numbers_of, path_of
+from ccfem.cli.arguments import names_of, numbers_of, option, path_of
 from ccfem.cli.options import grouped
 from ccfem.cli.part_choices import GivenPart
 
@@ -30,65 +30,55 @@ class OptimisationOptions:
     """How a part is optimised."""
 
     volume_fraction: Annotated[
-        float, typer.Option(metavar="F", help="Share of the volume that is left, above 0, below 1.")
+        float, option("F", "Share of the volume that is left, above 0, below 1.")
     ]
     method: Annotated[
         str,
-        typer.Option(
-            metavar="somp|simp",
-            help="Densities and the axis of a laminate, for plates; or densities alone.",
+        option(
+            "somp|simp", "Densities and the axis of a laminate, for plates; or densities alone."
         ),
     ] = "somp"
     element_size: Annotated[
-        float | None,
-        typer.Option(
-            metavar="MM", help="Element size of a plate; by default it has 4000 square cells."
-        ),
+        float | None, option("MM", "Element size of a plate; by default it has 4000 square cells.")
     ] = None
     radius: Annotated[
-        float | None,
-        typer.Option(metavar="MM", help="Radius of the filter; default two element sizes."),
+        float | None, option("MM", "Radius of the filter; default two element sizes.")
     ] = None
-    filter_: Annotated[
-        str, typer.Option("--filter", metavar="sensitivity|density", help="What is filtered.")
-    ] = "sensitivity"
+    filter_: Annotated[str, option("sensitivity|density", "What is filtered.", "--filter")] = (
+        "sensitivity"
+    )
     orientation: Annotated[
-        str,
-        typer.Option(
-            metavar="gradient|principal|fixed", help="How somp turns the axis of the laminate."
-        ),
+        str, option("gradient|principal|fixed", "How somp turns the axis of the laminate.")
     ] = "gradient"
     laminate: Annotated[
         str | None,
-        typer.Option(
-            metavar="E1,E2,NU12,G12",
-            help="Of somp, MPa; default the part's own material where it has an axis, else the "
-            "woven laminate of Wang et al. 2021.",
+        option(
+            "E1,E2,NU12,G12",
+            "Of somp, MPa; default the part's own material where it has an axis, else the woven "
+            "laminate of Wang et al. 2021.",
         ),
     ] = None
     weight: Annotated[
-        list[str] | None,
-        typer.Option(metavar="CASE=W", help="Weight of a load case, default 1; repeatable."),
+        list[str] | None, option("CASE=W", "Weight of a load case, default 1; repeatable.")
     ] = None
     keep: Annotated[
         str | None,
-        typer.Option(
-            metavar="A,B,..",
-            help="Patches around which the part stays solid; default loaded patches and supported "
+        option(
+            "A,B,..",
+            "Patches around which the part stays solid; default loaded patches and supported "
             "holes; '' for none.",
         ),
     ] = None
     solid: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="X,Y,R",
-            help="Disc to keep solid, or X,Y,X,Y a rectangle, X,Y,Z,X,Y,Z a box; repeatable.",
+        option(
+            "X,Y,R", "Disc to keep solid, or X,Y,X,Y a rectangle, X,Y,Z,X,Y,Z a box; repeatable."
         ),
     ] = None
-    void: Annotated[
-        list[str] | None, typer.Option(metavar="X,Y,R", help="The same, to keep empty; repeatable.")
-    ] = None
-    iterations: Annotated[int, typer.Option(metavar="N", help="Iterations at most.")] = 200
+    void: Annotated[list[str] | None, option("X,Y,R", "The same, to keep empty; repeatable.")] = (
+        None
+    )
+    iterations: Annotated[int, option("N", "Iterations at most.")] = 200
     in_space: Annotated[
         bool, typer.Option("--in-space", help="Optimise a flat part in 3D too (simp).")
     ] = False
@@ -126,11 +116,10 @@ def optimise(
     how: OptimisationOptions,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out",
-            metavar="PART.toml",
+        option(
+            "PART.toml",
+            "Part file; beside it mesh, picture and history. Default NAME-optimised.toml.",
             parser=path_of,
-            help="Part file; beside it mesh, picture and history. Default NAME-optimised.toml.",
         ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,

@@ -13,7 +13,14 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 from ccfem.base.errors import InputError
-from ccfem.cli.arguments import drawings_of, names_of, numbers_of, parameters_by_strategy, path_of
+from ccfem.cli.arguments import (
+    drawings_of,
+    names_of,
+    numbers_of,
+    option,
+    parameters_by_strategy,
+    path_of,
+)
 from ccfem.cli.run import Output, with_given_paths
 
 if TYPE_CHECKING:
@@ -58,37 +65,28 @@ def grouped(command: Callable[..., None]) -> Callable[..., None]:
 
 # Single options.
 
-Out = Annotated[
-    Path | None,
-    typer.Option("--out", metavar="DIR", parser=path_of, help="Folder for the results."),
-]
+Out = Annotated[Path | None, option("DIR", "Folder for the results.", parser=path_of)]
 Scheduler = Annotated[
     str | None,
-    typer.Option(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="Dask scheduler whose workers plan, evaluate and test instead, as tcp://host:8786.",
+    option(
+        "ADDRESS",
+        "Dask scheduler whose workers plan, evaluate and test instead, as tcp://host:8786.",
     ),
 ]
-Layers = Annotated[
-    int | None,
-    typer.Option("--layers", metavar="N", help="Fibre layers instead of the part's own."),
-]
+Layers = Annotated[int | None, option("N", "Fibre layers instead of the part's own.")]
 Slicing = Annotated[
     str | None,
-    typer.Option(
-        "--slicing",
-        metavar="METHOD[:NAME=VALUE,..]",
-        help="Slicer and its parameters instead of --layers, as planar:thickness=0.4; see ccfem "
+    option(
+        "METHOD[:NAME=VALUE,..]",
+        "Slicer and its parameters instead of --layers, as planar:thickness=0.4; see ccfem "
         "slicers.",
     ),
 ]
 Fibre = Annotated[
     float | None,
-    typer.Option(
-        "--fibre-per-layer",
-        metavar="MM",
-        help="Fibre length that each strategy is held to, mean over the layers. By default compare "
+    option(
+        "MM",
+        "Fibre length that each strategy is held to, mean over the layers. By default compare "
         "takes the shortest natural length of any of them; plan takes the natural length.",
     ),
 ]
@@ -125,33 +123,22 @@ Refine = Annotated[
 ]
 LoadCase = Annotated[
     str | None,
-    typer.Option(
-        "--load-case",
-        metavar="NAME",
-        help='Load case to plan for; default the first. "all" plans for all at once, by [weights].',
+    option(
+        "NAME",
+        'Load case to plan for; default the first. "all" plans for all at once, by [weights].',
     ),
 ]
-OneLoadCase = Annotated[
-    str | None,
-    typer.Option("--load-case", metavar="NAME", help="Load case to take; default the first."),
-]
+OneLoadCase = Annotated[str | None, option("NAME", "Load case to take; default the first.")]
 Backend = Annotated[
-    str,
-    typer.Option(
-        "--backend",
-        metavar="NAME",
-        help="Linear solver, such as superlu, amg or pypardiso; default by size.",
-    ),
+    str, option("NAME", "Linear solver, such as superlu, amg or pypardiso; default by size.")
 ]
 SetOfStrategies = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="STRATEGY.NAME=VALUE", help="Set a parameter; repeatable."),
+    list[str] | None, option("STRATEGY.NAME=VALUE", "Set a parameter; repeatable.", "--set")
 ]
 SetOfOne = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter; repeatable."),
+    list[str] | None, option("NAME=VALUE", "Set a parameter; repeatable.", "--set")
 ]
-Strategy = Annotated[str, typer.Option("--strategy", metavar="S", help="See ccfem strategies.")]
+Strategy = Annotated[str, option("S", "See ccfem strategies.")]
 
 
 # Groups.
@@ -164,11 +151,7 @@ class LayerOptions:
     layers: Layers = None
     heights: Annotated[
         str | None,
-        typer.Option(
-            "--heights",
-            metavar="MM,MM,..",
-            help="Heights of the layers along the build direction, instead of --layers.",
-        ),
+        option("MM,MM,..", "Heights of the layers along the build direction, instead of --layers."),
     ] = None
     slicing: Slicing = None
 
@@ -193,30 +176,25 @@ class StrategyOptions:
 
     strategies: Annotated[
         str | None,
-        typer.Option(
-            "--strategies",
-            metavar="A,B,..",
-            help="Strategies; default stream_function, isocurve, contour_zigzag and zigzag.",
+        option(
+            "A,B,..", "Strategies; default stream_function, isocurve, contour_zigzag and zigzag."
         ),
     ] = None
     set_: SetOfStrategies = None
     paths: Annotated[
         str | None,
-        typer.Option(
-            "--paths",
-            metavar="FILE,..",
-            help="Paths of other programs, judged beside the strategies: waypoints, CSV with "
+        option(
+            "FILE,..",
+            "Paths of other programs, judged beside the strategies: waypoints, CSV with "
             "x,y,z,path,layer, or a folder of strands on curved layers (.obj, .txt, a file a "
             "layer).",
         ),
     ] = None
     paths_frame: Annotated[
         str | None,
-        typer.Option(
-            "--paths-frame",
-            metavar="mesh|tool",
-            help="Frame of their coordinates; default mesh for CSV, the printer's tool for "
-            "waypoints.",
+        option(
+            "mesh|tool",
+            "Frame of their coordinates; default mesh for CSV, the printer's tool for waypoints.",
         ),
     ] = None
 
@@ -241,22 +219,16 @@ class AmountOptions:
 
     slicings: Annotated[
         str | None,
-        typer.Option(
-            "--slicings",
-            metavar="A,B,..",
-            help="Compare over several slicings at equal fibre in all, as "
-            "planar:z,planar:x,spatial; flat layers are as thick as the part's own unless they say "
-            "otherwise.",
+        option(
+            "A,B,..",
+            "Compare over several slicings at equal fibre in all, as planar:z,planar:x,spatial; "
+            "flat layers are as thick as the part's own unless they say otherwise.",
         ),
     ] = None
     fibre_per_layer: Fibre = None
     fibre: Annotated[
         float | None,
-        typer.Option(
-            "--fibre",
-            metavar="MM",
-            help="Fibre length in all layers together, instead of --fibre-per-layer.",
-        ),
+        option("MM", "Fibre length in all layers together, instead of --fibre-per-layer."),
     ] = None
     natural: Annotated[
         bool, typer.Option("--natural", help="Let each strategy lay its own amount of fibre.")
@@ -279,10 +251,9 @@ class PlanAmountOptions:
     fibre_per_layer: Fibre = None
     stiffness: Annotated[
         str | None,
-        typer.Option(
-            "--stiffness",
-            metavar="RATIO",
-            help="Lay the least fibre that makes the part so stiff: as 2.5, over the part without "
+        option(
+            "RATIO",
+            "Lay the least fibre that makes the part so stiff: as 2.5, over the part without "
             "fibre, or as 1200N/mm. With all load cases every one of them, as a ratio.",
         ),
     ] = None
@@ -296,11 +267,7 @@ class SolveOptions:
     refine: Refine = False
     calibration: Annotated[
         Path | None,
-        typer.Option(
-            "--calibration",
-            metavar="MATERIAL.toml",
-            help="Material of ccfem calibrate, instead of the part's own.",
-        ),
+        option("MATERIAL.toml", "Material of ccfem calibrate, instead of the part's own."),
     ] = None
     backend: Backend = "auto"
     breaking_load: Annotated[
@@ -342,36 +309,23 @@ class StressOptions:
 
     stress: Annotated[
         Path | None,
-        typer.Option(
-            "--stress",
-            metavar="FILE",
-            help="Plan and evaluate on the stress of another program on the same mesh: .vtu, .vtk "
-            "or .xdmf with an array of tensors, .frd of CalculiX, or .csv by element or node.",
+        option(
+            "FILE",
+            "Plan and evaluate on the stress of another program on the same mesh: .vtu, .vtk or "
+            ".xdmf with an array of tensors, .frd of CalculiX, or .csv by element or node.",
         ),
     ] = None
     stress_unit: Annotated[
-        str | None,
-        typer.Option(
-            "--stress-unit", metavar="UNIT", help="MPa, Pa, .., where the file does not say it."
-        ),
+        str | None, option("UNIT", "MPa, Pa, .., where the file does not say it.")
     ] = None
-    stress_array: Annotated[
-        str | None,
-        typer.Option("--stress-array", metavar="NAME", help="Array of a .vtu, .vtk or .xdmf file."),
-    ] = None
+    stress_array: Annotated[str | None, option("NAME", "Array of a .vtu, .vtk or .xdmf file.")] = (
+        None
+    )
     stress_step: Annotated[
-        int | None,
-        typer.Option(
-            "--stress-step", metavar="NUMBER", help="Step of a .frd or .xdmf file that has several."
-        ),
+        int | None, option("NUMBER", "Step of a .frd or .xdmf file that has several.")
     ] = None
     stress_components: Annotated[
-        str | None,
-        typer.Option(
-            "--stress-components",
-            metavar="xx,yy,...",
-            help="Order of six components without names.",
-        ),
+        str | None, option("xx,yy,...", "Order of six components without names.")
     ] = None
 
     def foreign(self, refine: bool) -> "ForeignStress | None":
@@ -405,19 +359,14 @@ class PrintOptions:
     ] = False
     pause: Annotated[
         list[str] | None,
-        typer.Option(
-            "--pause",
-            metavar="LAYER|MMmm",
-            help="Halt before a layer, as 12, or when a height is printed, as 3.4mm; repeatable.",
+        option(
+            "LAYER|MMmm",
+            "Halt before a layer, as 12, or when a height is printed, as 3.4mm; repeatable.",
         ),
     ] = None
     from_layer: Annotated[
         int,
-        typer.Option(
-            "--from-layer",
-            metavar="N",
-            help="Begin the file at this layer, on what is printed below it; the lowest is 0.",
-        ),
+        option("N", "Begin the file at this layer, on what is printed below it; the lowest is 0."),
     ] = 0
     cell: Annotated[
         bool,
@@ -453,11 +402,9 @@ class ResultOptions:
     ] = False
     drawings: Annotated[
         str | None,
-        typer.Option(
-            "--drawings",
-            metavar="svg,dxf",
-            help="Also draw every flat layer of every strategy to scale, in mm: border, fibre, "
-            "links.",
+        option(
+            "svg,dxf",
+            "Also draw every flat layer of every strategy to scale, in mm: border, fibre, links.",
         ),
     ] = None
     details: Annotated[

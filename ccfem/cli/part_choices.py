@@ -6,11 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from ccfem.base.errors import InputError
 from ccfem.base.toml import assignment
-from ccfem.cli.arguments import numbers_of
+from ccfem.cli.arguments import argument, numbers_of, option
 from ccfem.cli.machines import MachineName, SetMachine, machine_choice
 
 if TYPE_CHECKING:
@@ -20,10 +18,9 @@ if TYPE_CHECKING:
 
 SetPlastic = Annotated[
     list[str] | None,
-    typer.Option(
-        "--set-plastic",
-        metavar="KEY=VALUE,..",
-        help="Walls, skins, infill and seam, by keys of [plastic] in a part file: "
+    option(
+        "KEY=VALUE,..",
+        "Walls, skins, infill and seam, by keys of [plastic] in a part file: "
         "infill=gyroid,density=0.2,walls=2,skins=3,fibre_skins=1,seam=behind; repeatable.",
     ),
 ]
@@ -35,18 +32,13 @@ class GivenPart:
 
     case: Annotated[
         str,
-        typer.Argument(
-            metavar="CASE_OR_PART.toml",
-            help="Name of a case, a part file, or a deck with its analysis (.inp).",
+        argument(
+            "CASE_OR_PART.toml", "Name of a case, a part file, or a deck with its analysis (.inp)."
         ),
     ]
     set_case: Annotated[
         list[str] | None,
-        typer.Option(
-            "--set-case",
-            metavar="NAME=VALUE",
-            help="Set a parameter of the case, as element_size=3; repeatable.",
-        ),
+        option("NAME=VALUE", "Set a parameter of the case, as element_size=3; repeatable."),
     ] = None
 
     def change(self) -> "Callable[[Case], Case]":
@@ -88,11 +80,10 @@ class PrintedPart(GivenPart):
     set_machine: SetMachine = None
     set_fibre: Annotated[
         list[str] | None,
-        typer.Option(
-            "--set-fibre",
-            metavar="KEY=VALUE",
-            help="Which layers get fibre, by a key of [fibre] in a part file: layers=3:20:2, "
-            "from=0.4, to=9.6, every=2, between=1, covered=true; repeatable.",
+        option(
+            "KEY=VALUE",
+            "Which layers get fibre, by a key of [fibre] in a part file: layers=3:20:2, from=0.4, "
+            "to=9.6, every=2, between=1, covered=true; repeatable.",
         ),
     ] = None
     set_plastic: SetPlastic = None
@@ -116,11 +107,10 @@ class TurnedPart(PrintedPart):
 
     turn: Annotated[
         list[str] | None,
-        typer.Option(
-            "--turn",
-            metavar="AXIS=DEGREES",
-            help="Turn the part on the bed, as z=37; x and y change the build direction; "
-            "repeatable, one after the other.",
+        option(
+            "AXIS=DEGREES",
+            "Turn the part on the bed, as z=37; x and y change the build direction; repeatable, "
+            "one after the other.",
         ),
     ] = None
 
@@ -140,18 +130,10 @@ class PlacedPart(TurnedPart):
     """A part, or several copies of it, at a place on the bed."""
 
     centre: Annotated[
-        str | None,
-        typer.Option(
-            "--centre", metavar="X,Y", help="Middle of the part, or of all copies, on the bed, mm."
-        ),
+        str | None, option("X,Y", "Middle of the part, or of all copies, on the bed, mm.")
     ] = None
     copies: Annotated[
-        str | None,
-        typer.Option(
-            "--copies",
-            metavar="N|NXxNY",
-            help="Print several in one file, as 4, or 2x3 by X and Y.",
-        ),
+        str | None, option("N|NXxNY", "Print several in one file, as 4, or 2x3 by X and Y.")
     ] = None
 
     @property

@@ -8,29 +8,24 @@ import typer
 from typer.core import TyperCommand
 
 from ccfem.base.errors import InputError
-from ccfem.cli.arguments import path_of
+from ccfem.cli.arguments import argument, option, path_of
 from ccfem.cli.options import Backend, Refine, grouped
 from ccfem.cli.part_choices import GivenPart
 
-_Out = Annotated[
-    Path | None,
-    typer.Option("--out", metavar="PART.toml", parser=path_of, help="File that is written."),
-]
+_Out = Annotated[Path | None, option("PART.toml", "File that is written.", parser=path_of)]
 _Force = Annotated[bool, typer.Option("--force", help="Replace a file that is there.")]
 
 
 def _open(
     what: Annotated[
         str | None,
-        typer.Argument(
-            metavar="BODY_OR_PART_OR_CASE",
-            help="Body (.step, .stl, mesh), part file (.toml) or case; by default one is chosen on "
-            "the page.",
+        argument(
+            "BODY_OR_PART_OR_CASE",
+            "Body (.step, .stl, mesh), part file (.toml) or case; by default one is chosen on the "
+            "page.",
         ),
     ] = None,
-    port: Annotated[
-        int, typer.Option(metavar="N", help="Port on this machine; default any that is free.")
-    ] = 0,
+    port: Annotated[int, option("N", "Port on this machine; default any that is free.")] = 0,
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Show the page in the browser.")
     ] = True,
@@ -46,9 +41,7 @@ def _open(
 
 
 def _new(
-    body: Annotated[
-        Path, typer.Argument(metavar="BODY", help="Surface (.stl), CAD file (.step) or mesh.")
-    ],
+    body: Annotated[Path, argument("BODY", "Surface (.stl), CAD file (.step) or mesh.")],
     out: _Out = None,
     force: _Force = False,
 ) -> None:
@@ -62,9 +55,7 @@ def _new(
 
 
 def _example(
-    name: Annotated[
-        str | None, typer.Argument(metavar="NAME", help="Write this one; without it, list them.")
-    ] = None,
+    name: Annotated[str | None, argument("NAME", "Write this one; without it, list them.")] = None,
     out: _Out = None,
     force: _Force = False,
 ) -> None:
@@ -85,9 +76,7 @@ def _example(
 def _cite(
     whats: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="FOLDER_OR_METHOD", help="Folders of results, or strategies and slicers."
-        ),
+        argument("FOLDER_OR_METHOD", "Folders of results, or strategies and slicers."),
     ] = None,
 ) -> None:
     """Print BibTeX of ccfem, and of the papers whose methods a result used."""
@@ -108,22 +97,16 @@ def _cite(
 def _mesh(
     body: Annotated[
         Path,
-        typer.Argument(
-            metavar="BODY",
-            help="Surface ({surfaces}), CAD file ({cad_files}), or folder of curved layers of a "
-            "solid (.obj).",
+        argument(
+            "BODY",
+            "Surface ({surfaces}), CAD file ({cad_files}), or folder of curved layers of a solid "
+            "(.obj).",
         ),
     ],
-    size: Annotated[float, typer.Option("--size", metavar="MM", help="Edge length of the cells.")],
-    out: Annotated[
-        Path, typer.Option("-o", "--out", metavar="MESH", parser=path_of, help="Mesh ({meshes}).")
-    ],
-    scale: Annotated[
-        float, typer.Option(metavar="S", help="Factor that converts a file's coordinates to mm.")
-    ] = 1.0,
-    mesher: Annotated[
-        str, typer.Option(metavar="auto|gmsh|ftetwild", help="What meshes a surface.")
-    ] = "auto",
+    size: Annotated[float, option("MM", "Edge length of the cells.")],
+    out: Annotated[Path, option("MESH", "Mesh ({meshes}).", "-o", "--out", parser=path_of)],
+    scale: Annotated[float, option("S", "Factor that converts a file's coordinates to mm.")] = 1.0,
+    mesher: Annotated[str, option("auto|gmsh|ftetwild", "What meshes a surface.")] = "auto",
 ) -> None:
     """Mesh a surface or CAD file, faces as patches (face_1, or their names), or curved layers."""
     from ccfem.base.whole import check_writable
@@ -155,18 +138,14 @@ def _mesh(
 def _solve(
     given: GivenPart,
     out: Annotated[
-        Path,
-        typer.Option(
-            "-o", "--out", metavar="RESULT.vtu", parser=path_of, help="File that is written."
-        ),
+        Path, option("RESULT.vtu", "File that is written.", "-o", "--out", parser=path_of)
     ],
     load_case: Annotated[
         str | None,
-        typer.Option(
-            "--load-case",
-            metavar="NAME",
-            help="Only this one; default all, the name of each behind that of the file where "
-            "there are several.",
+        option(
+            "NAME",
+            "Only this one; default all, the name of each behind that of the file where there are "
+            "several.",
         ),
     ] = None,
     backend: Backend = "auto",
