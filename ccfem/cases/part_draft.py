@@ -22,15 +22,9 @@ def _tables(value: object) -> dict[int, Mapping[str, Any]]:
 
 @dataclass(frozen=True)
 class PartDraft:
-    """What a part file says. What is of another kind than it should be counts as not there.
+    """What a part file says. What is of another kind than it should be counts as not there."""
 
-    Attributes
-    ----------
-    content : mapping
-        As it stands in the file.
-    """
-
-    content: Mapping[str, Any]
+    content: Mapping[str, Any]  # as it stands in the file
 
     @property
     def patches(self) -> Mapping[str, Any]:

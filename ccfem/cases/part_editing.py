@@ -34,21 +34,11 @@ _HEAVY = re.compile(r">\s*([^<>]+?):/")
 
 @dataclass(frozen=True)
 class History:
-    """Texts of a part file, one after the other, and which of them is shown.
+    """Texts of a part file, one after the other, and which of them is shown."""
 
-    Attributes
-    ----------
-    texts : tuple of str
-        At least one.
-    place : int
-        Of the text that is shown.
-    field : str
-        Field whose value was changed last: to change it again is the same step.
-    """
-
-    texts: tuple[str, ...]
-    place: int = 0
-    field: str = ""
+    texts: tuple[str, ...]  # at least one
+    place: int = 0  # of the text that is shown
+    field: str = ""  # field whose value was changed last: to change it again is the same step
 
     @property
     def text(self) -> str:

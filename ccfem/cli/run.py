@@ -38,32 +38,18 @@ def complain(*messages: str) -> int:
 
 @dataclass(frozen=True)
 class Output:
-    """Where the results of a command go, and what is drawn of them.
+    """Where the results of a command go, and what is drawn of them."""
 
-    Attributes
-    ----------
-    out : Path, optional
-        Folder; default ``results/`` and the name of the case with `suffix`.
-    force : bool
-        Replace files with names of results that ccfem did not write, too; a plan that cannot be
-        printed ends with exit code 0.
-    pictures : bool
-        Also draw PNG files of what the report shows.
-    drawings : tuple of {"svg", "dxf"}
-        Also draw every flat layer of every strategy to scale.
-    details : bool
-        Print every index and remark.
-    cell : bool
-        Also write the moves of a print for a cell of robots.
-    """
-
-    out: Path | None = None
+    out: Path | None = None  # folder; default ``results/`` and the name of the case with `suffix`
+    # Replace files with names of results that ccfem did not write, too; a plan that cannot be
+    # printed ends with exit code 0.
     force: bool = False
-    pictures: bool = False
+    pictures: bool = False  # also draw PNG files of what the report shows
+    # Also draw, as "svg" or "dxf", every flat layer of every strategy to scale.
     drawings: tuple[str, ...] = ()
     suffix: str = ""
-    details: bool = False
-    cell: bool = False
+    details: bool = False  # print every index and remark
+    cell: bool = False  # also write the moves of a print for a cell of robots
 
     def folder(self, case: "Case") -> Path:
         """Folder for the results of a case."""

@@ -64,29 +64,16 @@ _PLANNED = {
 
 @dataclass(frozen=True)
 class Counts:
-    """What the work on a part grows with.
+    """What the work on a part grows with."""
 
-    Attributes
-    ----------
-    unknowns, solved : float
-        Before supports, on linear cells and on those that the part is solved on.
-    triangles : float
-        In which its layers with fibre cut the cells.
-    room : float, mm
-        Length of strands that would cover these layers once.
-    volume : float, mm^3
-    some_room : float, mm
-        `room` of the layers that are planned: of more than 60, about four of those that cut the
-        same cells in equal sections, since their stress is alike (`alike_layers`).
-    run : float
-        One.
-    """
-
+    # Before supports, on linear cells and on those that the part is solved on.
     unknowns: float
     solved: float
-    triangles: float
-    room: float
-    volume: float
+    triangles: float  # in which its layers with fibre cut the cells
+    room: float  # mm: length of strands that would cover these layers once
+    volume: float  # mm^3
+    # mm: `room` of the layers that are planned: of more than 60, about four of those that cut the
+    # same cells in equal sections, since their stress is alike (`alike_layers`)
     some_room: float
     run: float = 1.0
 

@@ -99,24 +99,14 @@ _LEAST = 1.0 / 16.0
 
 @dataclass(frozen=True)
 class Solved:
-    """A case with its stress: what all slicings share.
-
-    Attributes
-    ----------
-    cases : WeightedCases
-        The load cases that paths are planned for: one, or several with their weights.
-    given : GivenStress, optional
-        Stress of another program to plan and evaluate on.
-    tests : Tests, optional
-        None if nothing is tested.
-    every_layer, longest_test, course, limits_only
-        As of `Request`, the last one as of `Part`.
-    """
+    """A case with its stress: what all slicings share."""
 
     case: Case
+    # The load cases that paths are planned for: one, or several with their weights.
     cases: WeightedCases
-    given: GivenStress | None = None
-    tests: Tests | None = None
+    given: GivenStress | None = None  # stress of another program to plan and evaluate on
+    tests: Tests | None = None  # None if nothing is tested
+    # As of `Request`, the last one as of `Part`.
     every_layer: bool = False
     longest_test: float = float("inf")
     course: Course = WITHOUT_HALT
@@ -315,20 +305,13 @@ def answer(
 
 @dataclass(frozen=True)
 class _Early:
-    """Judges runs, also while others are being planned: then with what bounds them.
-
-    Attributes
-    ----------
-    bounds : dict of length, mm, to UpperBound
-        What is bounded already.
-    seconds : dict of stage to float
-        That this took.
-    """
+    """Judges runs, also while others are being planned: then with what bounds them."""
 
     request: Request
     basis: Solved
+    # by length, mm: what is bounded already
     bounds: dict[float, UpperBound] = field(default_factory=dict)
-    seconds: dict[str, float] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)  # by stage: that this took
 
     @property
     def judged(self) -> Callable[[Run, Part], Run]:

@@ -22,22 +22,14 @@ _UNKNOWN = 0.9
 
 @dataclass
 class Schedule:
-    """Tells progress what is done next, and the share of all expected time that is behind it.
-
-    Attributes
-    ----------
-    steps : dict of words to float, s
-        First words of each step that is expected, and its time. What else is done counts nothing.
-    behind : float, s
-        Expected time of what is done already.
-    begun : set of words
-        Steps of which the first words were said.
-    """
+    """Tells progress what is done next, and the share of all expected time that is behind it."""
 
     progress: Progress
+    # by words, s: first words of each step that is expected, and its time. What else is done counts
+    # nothing.
     steps: dict[str, float]
-    behind: float
-    begun: set[str] = field(default_factory=set)
+    behind: float  # s: expected time of what is done already
+    begun: set[str] = field(default_factory=set)  # steps of which the first words were said
 
     def __call__(self, what: str) -> None:
         """Say what is done next: what was said before is done."""

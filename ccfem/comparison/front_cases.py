@@ -19,19 +19,12 @@ Curves = dict[str, list[tuple[float, float]]]
 
 @dataclass(frozen=True)
 class PointCase:
-    """Stiffness and first failure of one plan in its only load case: as `PointCases` of several.
+    """Stiffness and first failure of one plan in its only load case: as `PointCases` of several."""
 
-    Attributes
-    ----------
-    ratio, bound : float
-        Stiffness over that of the part without fibre, and what no paths of this length exceed.
-    failure : float, N
-        Load at first failure; NaN where that is not known.
-    """
-
+    # Stiffness over that of the part without fibre, and what no paths of this length exceed.
     ratio: float
     bound: float
-    failure: float
+    failure: float  # N: load at first failure; NaN where that is not known
 
     drawn: ClassVar[tuple[float, str]] = (1e-3, "first failure, kN")
     """Factor and title of the failure in pictures."""
@@ -62,23 +55,14 @@ class PointCase:
 
 @dataclass(frozen=True)
 class PointCases:
-    """Stiffness and first failure of one plan in every load case.
-
-    Attributes
-    ----------
-    names : tuple of str
-    ratios : (n,) array
-        Stiffness over that of the part without fibre, fibres in tension only.
-    factors : (n,) array
-        Load at first failure over the load of the case; NaN where that is not known.
-    bound : UpperBound
-        What no paths of this length exceed.
-    """
+    """Stiffness and first failure of one plan in every load case."""
 
     names: tuple[str, ...]
+    # (n,): stiffness over that of the part without fibre, fibres in tension only
     ratios: FloatArray
+    # (n,): load at first failure over the load of the case; NaN where that is not known
     factors: FloatArray
-    bound: UpperBound
+    bound: UpperBound  # what no paths of this length exceed
 
     drawn: ClassVar[tuple[float, str]] = (1.0, "first failure, times the load")
 

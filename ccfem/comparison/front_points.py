@@ -28,49 +28,28 @@ def _layers(count: int) -> str:
 
 @dataclass(frozen=True)
 class FrontPoint:
-    """One plan.
+    """One plan."""
 
-    Attributes
-    ----------
-    layers : int
-        Number of layers that the part is cut into.
-    asked : float, mm
-        Length per layer that the strategy was asked for: asked again, it lays the same.
-    length : float, mm
-        Of fibre in all layers.
-    ratio : float
-        Stiffness over that of the part without fibre, fibres in tension only; of several load
-        cases of the one that is farthest below its bound.
-    failure : float, N
-        Load at which something fails first; NaN where that is not known. Of several load cases
-        that of the one which fails at the least multiple of its load.
-    fails_in : str
-        "matrix", "fibre" or "interlayer"; empty where that is not known.
-    bound : float
-        Ratio that no paths of this length exceed, on the largest number of layers of the front; of
-        several load cases in that case alone.
-    why_not : str
-        What keeps the paths from being printed as they are; empty where they can be.
-    strength : float, default 0
-        How much the load at first failure counted when it was planned.
-    cases : PointCases, optional
-        What it does in every load case, where it is planned for several.
-    with_fibre : int, optional
-        Number of layers that get fibre; default all.
-    """
-
-    layers: int
+    layers: int  # number of layers that the part is cut into
+    # mm: length per layer that the strategy was asked for: asked again, it lays the same
     asked: float
-    length: float
+    length: float  # mm: of fibre in all layers
+    # Stiffness over that of the part without fibre, fibres in tension only; of several load cases
+    # of the one that is farthest below its bound.
     ratio: float
+    # N: load at which something fails first; NaN where that is not known. Of several load cases
+    # that of the one which fails at the least multiple of its load.
     failure: float
-    fails_in: str
+    fails_in: str  # "matrix", "fibre" or "interlayer"; empty where that is not known
+    # Ratio that no paths of this length exceed, on the largest number of layers of the front; of
+    # several load cases in that case alone.
     bound: float
-    why_not: str
+    why_not: str  # what keeps the paths from being printed as they are; empty where they can be
     toolpaths: Toolpaths
-    strength: float = 0.0
+    strength: float = 0.0  # how much the load at first failure counted when it was planned
+    # What it does in every load case, where it is planned for several.
     cases: PointCases | None = None
-    with_fibre: int | None = None
+    with_fibre: int | None = None  # number of layers that get fibre; default all
 
     @property
     def _stack(self) -> int:

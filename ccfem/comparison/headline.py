@@ -112,24 +112,12 @@ TEST_COLUMNS = (
 
 @dataclass(frozen=True)
 class Headline:
-    """One column of the headline table.
+    """One column of the headline table."""
 
-    Attributes
-    ----------
-    column : str
-        Name of the index.
-    title : str
-        What tables print above it.
-    better : str
-        "high", "low", or "" where neither is better.
-    pattern : str
-        How a value is printed, for `str.format`.
-    """
-
-    column: str
-    title: str
-    better: str
-    pattern: str
+    column: str  # name of the index
+    title: str  # what tables print above it
+    better: str  # "high", "low", or "" where neither is better
+    pattern: str  # how a value is printed, for `str.format`
 
 
 HEADLINE = (

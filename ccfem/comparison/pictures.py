@@ -36,35 +36,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Pictures:
-    """PNG files of a comparison.
+    """PNG files of a comparison."""
 
-    Attributes
-    ----------
-    paths : dict of (strategy, layer index) to bytes
-    forces : dict of strategy to bytes
-        Force in the fibres of the middle layer, where there was a virtual test.
-    tension : bytes
-        Tension in the middle layer.
-    overview : bytes
-        All strategies side by side on the middle layer.
-    part : bytes
-        The part with its patches, loads and supports.
-    part_page : str
-        Page on which it turns, HTML.
-    middle : int
-        Index of the layer that stands for all: the middle one of those with fibre.
-    curve : bytes
-        Stiffness over the length of fibre; empty without a curve.
-    """
-
-    paths: dict[tuple[str, int], bytes]
+    paths: dict[tuple[str, int], bytes]  # by (strategy, layer index)
+    # by strategy: force in the fibres of the middle layer, where there was a virtual test
     forces: dict[str, bytes]
-    tension: bytes
-    overview: bytes
-    part: bytes
-    part_page: str
-    middle: int
-    curve: bytes = b""
+    tension: bytes  # tension in the middle layer
+    overview: bytes  # all strategies side by side on the middle layer
+    part: bytes  # the part with its patches, loads and supports
+    part_page: str  # page on which it turns, HTML
+    middle: int  # index of the layer that stands for all: the middle one of those with fibre
+    curve: bytes = b""  # stiffness over the length of fibre; empty without a curve
 
 
 def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictures:

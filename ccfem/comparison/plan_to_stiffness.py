@@ -56,27 +56,16 @@ smallest as long as only too little or only enough is known."""
 
 @dataclass(frozen=True)
 class LeastFibre:
-    """The least fibre that was found to reach a stiffness.
+    """The least fibre that was found to reach a stiffness."""
 
-    Attributes
-    ----------
-    planned : Planned
-        The plan that reaches it, with its length per layer.
-    asked : float, mm
-        Length per layer that this plan was asked for: asked again, the strategy lays the same.
-    ratio : float
-        Its stiffness over that of the part without fibre, fibres in tension only; of several load
-        cases the least.
-    ratios : (n,) array
-        The same in each load case.
-    tried : tuple of (float, float)
-        Length per layer, mm, and stiffness ratio of every plan, in the order of the search.
-    """
-
-    planned: Planned
+    planned: Planned  # the plan that reaches it, with its length per layer
+    # mm: length per layer that this plan was asked for: asked again, the strategy lays the same
     asked: float
+    # Its stiffness over that of the part without fibre, fibres in tension only; of several load
+    # cases the least.
     ratio: float
-    ratios: FloatArray
+    ratios: FloatArray  # (n,): the same in each load case
+    # Length per layer, mm, and stiffness ratio of every plan, in the order of the search.
     tried: tuple[tuple[float, float], ...]
 
     __repr__ = in_brief

@@ -72,53 +72,31 @@ themselves: the error of the stiffness is of its square, that of a force in a st
 
 @dataclass(frozen=True)
 class Part:
-    """A part cut into layers, with all that its runs share.
+    """A part cut into layers, with all that its runs share."""
 
-    Attributes
-    ----------
-    stress : PartStress
-        That paths are planned and evaluated on; of several load cases that of the heaviest.
-    layers : tuple of Layer
-    cases : WeightedCases
-        The load cases that paths are planned for and tested under: one, or several.
-    build : tuple of 3 floats, optional
-    layout : BedLayout
-        Turn, place and copies on the bed.
-    course : Course
-        Where a print begins and halts.
-    support : SupportLayers or bool
-        Printed below curved layers; of flat ones, whether it is printed below what they would lay
-        in air.
-    every_layer : bool
-        Whether all indices are taken on every layer, and every layer is planned.
-    limits_only : bool
-        Whether indices that no limit of the machine bounds are taken on one layer: nobody asks for
-        them.
-    longest_test : float, mm
-        Length of fibre above which a run is not tested virtually.
-    remarks : tuple of str
-        Of the slicer, one line each.
-    plastic : Plastic
-        Walls, skins, infill and seam of its print.
-    scatter : Scatter
-        How far prints of it differ.
-    """
-
+    # That paths are planned and evaluated on; of several load cases that of the heaviest.
     stress: PartStress
     layers: tuple[Layer, ...]
     machine: Machine
+    # The load cases that paths are planned for and tested under: one, or several.
     cases: WeightedCases
     strand: Strand | None = None
     build: tuple[float, float, float] | None = None
+    # Printed below curved layers; of flat ones, whether it is printed below what they would lay in
+    # air.
     support: SupportLayers | bool = False
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()  # of the slicer, one line each
+    # Whether all indices are taken on every layer, and every layer is planned.
     every_layer: bool = False
+    # Whether indices that no limit of the machine bounds are taken on one layer: nobody asks for
+    # them.
     limits_only: bool = False
+    # mm: length of fibre above which a run is not tested virtually
     longest_test: float = float("inf")
-    layout: BedLayout = AS_IT_STANDS
-    course: Course = WITHOUT_HALT
-    plastic: Plastic = SOLID
-    scatter: Scatter = DEFAULT_SCATTER
+    layout: BedLayout = AS_IT_STANDS  # turn, place and copies on the bed
+    course: Course = WITHOUT_HALT  # where a print begins and halts
+    plastic: Plastic = SOLID  # walls, skins, infill and seam of its print
+    scatter: Scatter = DEFAULT_SCATTER  # how far prints of it differ
 
     @property
     def flat_layers(self) -> tuple[Layer, ...]:
@@ -482,20 +460,13 @@ def with_print(run: Run, part: Part) -> Run:
 
 @dataclass(frozen=True)
 class Tests:
-    """Data for the virtual tests of a part, made once, with one factorisation for each model.
-
-    Attributes
-    ----------
-    models : sequence of (Specimen, float)
-        The part under its supports, and under alternative ones if there are any, each with the peak
-        of the averaged von Mises stress without fibre, MPa.
-    refused : str
-        Why the part cannot be tested; else empty.
-    """
+    """Data for the virtual tests of a part, made once, with one factorisation for each model."""
 
     strand: Strand
+    # The part under its supports, and under alternative ones if there are any, each with the peak
+    # of the averaged von Mises stress without fibre, MPa.
     models: Sequence[tuple[Specimen, float]] = ()
-    refused: str = ""
+    refused: str = ""  # why the part cannot be tested; else empty
 
     @classmethod
     def of(

@@ -28,25 +28,17 @@ _TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class TestedCases:
-    """Virtual tests of one strategy's paths under several load cases.
+    """Virtual tests of one strategy's paths under several load cases."""
 
-    Attributes
-    ----------
-    tension, partial, bonded : CasesTest
-        Fibres that carry no compression, a fifth of it, and all of it.
-    failure : CasesFailure or None
-        Of the tests in tension; None where a strength is unknown.
-    joints : tuple of tuples of PinnedJoint
-        Holes that pins press on in each case, the weakest first; empty where a strength is unknown.
-    bound : UpperBound, optional
-        What no paths of the compared length can exceed; None without a bound.
-    """
-
+    # Fibres that carry no compression, a fifth of it, and all of it.
     tension: CasesTest
     partial: CasesTest
     bonded: CasesTest
+    # Of the tests in tension; None where a strength is unknown.
     failure: CasesFailure | None
+    # Holes that pins press on in each case, the weakest first; empty where a strength is unknown.
     joints: tuple[tuple[PinnedJoint, ...], ...] = ()
+    # What no paths of the compared length can exceed; None without a bound.
     bound: UpperBound | None = None
 
     __repr__ = in_brief

@@ -53,24 +53,12 @@ Said = tuple[tuple[str, str], ...]
 
 @dataclass(frozen=True)
 class Opened:
-    """What was opened.
+    """What was opened."""
 
-    Attributes
-    ----------
-    stem : str
-        Name of the part file, without ``.toml``.
-    home : Path
-        Folder that paths in the text start from.
-    file : Path, optional
-        The part file that was opened; none for a body.
-    text : str
-        The part file as it was opened.
-    """
-
-    stem: str
-    home: Path
-    file: Path | None
-    text: str
+    stem: str  # name of the part file, without ``.toml``
+    home: Path  # folder that paths in the text start from
+    file: Path | None  # the part file that was opened; None for a body
+    text: str  # the part file as it was opened
 
 
 class Bench:

@@ -25,27 +25,13 @@ _KEPT = 40
 
 @dataclass(frozen=True)
 class RunState:
-    """Where a run stands.
+    """Where a run stands."""
 
-    Attributes
-    ----------
-    share : float
-        Of the work that is done.
-    step : str
-        What it is doing, and how long it will still take.
-    lines : tuple of str
-        The last that it said.
-    code : int, optional
-        Exit code, when it has ended.
-    stopped : str
-        Why it was stopped; empty where it was not.
-    """
-
-    share: float = 0.0
-    step: str = "starting"
-    lines: tuple[str, ...] = ()
-    code: int | None = None
-    stopped: str = ""
+    share: float = 0.0  # of the work that is done
+    step: str = "starting"  # what it is doing, and how long it will still take
+    lines: tuple[str, ...] = ()  # the last that it said
+    code: int | None = None  # exit code, when it has ended
+    stopped: str = ""  # why it was stopped; empty where it was not
 
     @property
     def running(self) -> bool:

@@ -58,18 +58,11 @@ class Served:
 
 @dataclass
 class Guard:
-    """Lets a request pass, answers it, or refuses it.
+    """Lets a request pass, answers it, or refuses it."""
 
-    Attributes
-    ----------
-    serve : callable
-        Returns the file of a name below ``/files/``; None where there is none.
-    token : str
-        What the link holds.
-    """
-
+    # Returns the file of a name below ``/files/``; None where there is none.
     serve: Callable[[str], Served | None] = lambda name: None
-    token: str = field(default_factory=lambda: secrets.token_urlsafe(24))
+    token: str = field(default_factory=lambda: secrets.token_urlsafe(24))  # what the link holds
 
     def link(self, port: int) -> str:
         """Link that opens the page."""

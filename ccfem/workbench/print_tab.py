@@ -28,38 +28,21 @@ _SPARSE = ("density", "skins", "fibre_skins")
 
 @dataclass(frozen=True)
 class Row:
-    """A row of the panel for a value of the part file.
+    """A row of the panel for a value of the part file."""
 
-    Attributes
-    ----------
-    keys : tuple of str
-        Where the value stands: a key, or a table and its key.
-    label : str
-    default
-        What is so where it does not stand there; its type is that of the field.
-    options : tuple of str
-        What can be chosen.
-    step, least : float
-        Of a number.
-    hint : str
-    read : callable
-        From the part file's value to that of the field; None where the field cannot show it.
-    write : callable
-        From the field's value to that of the part file.
-    always : bool
-        Whether the row is there where the part file has no such value.
-    """
-
-    keys: tuple[str, ...]
+    keys: tuple[str, ...]  # where the value stands: a key, or a table and its key
     label: str
-    default: Any
-    options: tuple[str, ...] = ()
+    default: Any  # what is so where it does not stand there; its type is that of the field
+    options: tuple[str, ...] = ()  # what can be chosen
+    # Of a number.
     step: float = 1.0
     least: float | None = 0.0
     hint: str = ""
+    # From the part file's value to that of the field; None where the field cannot show it.
     read: Callable[[Any], Any] | None = None
+    # From the field's value to that of the part file.
     write: Callable[[Any], Any] = lambda value: value
-    always: bool = True
+    always: bool = True  # whether the row is there where the part file has no such value
 
     def add(self, gui: Any) -> Any:
         """Add the row to the panel; returns the handle of viser."""

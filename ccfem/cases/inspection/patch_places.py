@@ -15,18 +15,10 @@ from ccfem.cases.part_tables import rules_of
 
 @dataclass(frozen=True)
 class PatchPlace:
-    """Where a patch lies.
+    """Where a patch lies."""
 
-    Attributes
-    ----------
-    corners : (k, 3, 3) array, mm
-        Of its triangles.
-    numbers : tuple of int
-        Faces that it is made of; empty where it is none.
-    """
-
-    corners: FloatArray
-    numbers: tuple[int, ...] = ()
+    corners: FloatArray  # (k, 3, 3), mm: of its triangles
+    numbers: tuple[int, ...] = ()  # faces that it is made of; empty where it is none
 
     @property
     def centre(self) -> FloatArray:

@@ -14,21 +14,11 @@ if TYPE_CHECKING:
 
 
 class StiffnessPoint(NamedTuple):
-    """One point of a curve.
+    """One point of a curve."""
 
-    Attributes
-    ----------
-    length : float, mm per layer
-        Of fibre.
-    ratio : float
-        Stiffness over that of the part without fibre.
-    printable : bool
-        Whether the paths can be printed as planned: others are drawn hollow.
-    """
-
-    length: float
-    ratio: float
-    printable: bool
+    length: float  # mm per layer: of fibre
+    ratio: float  # stiffness over that of the part without fibre
+    printable: bool  # whether the paths can be printed as planned: others are drawn hollow
 
 
 def stiffness_curves(
@@ -112,26 +102,14 @@ def _legend_at_foot(figure: "Figure", marks: Sequence[Any], columns: int, size: 
 
 
 class FrontPoint(NamedTuple):
-    """One run.
+    """One run."""
 
-    Attributes
-    ----------
-    name : str
-        That of its strategy: it has a colour.
-    on_front : bool
-        Whether no other run dominates it: such points are joined.
-    printable : bool
-        Others are drawn hollow.
-    label : str
-        Written beside the point, where it is on the front.
-    """
-
-    name: str
+    name: str  # that of its strategy: it has a colour
     x: float
     y: float
-    on_front: bool
-    printable: bool = True
-    label: str = ""
+    on_front: bool  # whether no other run dominates it: such points are joined
+    printable: bool = True  # others are drawn hollow
+    label: str = ""  # written beside the point, where it is on the front
 
 
 def front_figure(panels: Mapping[str, Sequence[FrontPoint]], across: str, up: str) -> "Figure":
@@ -218,43 +196,22 @@ _APART = 0.04
 
 
 class AmountPoint(NamedTuple):
-    """One plan.
+    """One plan."""
 
-    Attributes
-    ----------
-    length : float, m
-        Of fibre in all.
-    value : float
-        NaN where it is not known.
-    on_front : bool
-        Whether no other one with as little fibre is better: drawn large.
-    printable : bool
-        Others are drawn hollow.
-    """
-
-    length: float
-    value: float
-    on_front: bool
-    printable: bool
+    length: float  # m: of fibre in all
+    value: float  # NaN where it is not known
+    on_front: bool  # whether no other one with as little fibre is better: drawn large
+    printable: bool  # others are drawn hollow
 
 
 class TradePoint(NamedTuple):
-    """One of several plans with as much fibre.
+    """One of several plans with as much fibre."""
 
-    Attributes
-    ----------
-    stiffness, failure : float
-        NaN where it is not known.
-    strength : float
-        How much strength counted: written beside it.
-    printable : bool
-        Others are drawn hollow.
-    """
-
+    # NaN where it is not known
     stiffness: float
     failure: float
-    strength: float
-    printable: bool
+    strength: float  # how much strength counted: written beside it
+    printable: bool  # others are drawn hollow
 
 
 def amount_curves(

@@ -29,23 +29,12 @@ _A_ROW = 4
 
 @dataclass(frozen=True)
 class Coloured:
-    """Straight pieces of fibre with a value each, to colour the paths by.
+    """Straight pieces of fibre with a value each, to colour the paths by."""
 
-    Attributes
-    ----------
-    segments : (s, 2, 2) array, mm
-        Both ends of each piece in the plane of the layer.
-    values : (s,) array
-    label : str
-        Unit, and quantity if wanted, for the colour bar.
-    limits : tuple of 2 floats
-        Values at the ends of the colour scale.
-    """
-
-    segments: FloatArray
-    values: FloatArray
-    label: str
-    limits: tuple[float, float]
+    segments: FloatArray  # (s, 2, 2), mm: both ends of each piece in the plane of the layer
+    values: FloatArray  # (s,)
+    label: str  # unit, and quantity if wanted, for the colour bar
+    limits: tuple[float, float]  # values at the ends of the colour scale
 
 
 def force_on_paths(

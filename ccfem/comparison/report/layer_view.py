@@ -30,31 +30,17 @@ _REACH = 0.05
 
 @dataclass(frozen=True)
 class DrawnPaths:
-    """Paths of one run, thinned out.
+    """Paths of one run, thinned out."""
 
-    Attributes
-    ----------
-    points : (P, 3) array, mm
-    offsets : (K + 1,) int array
-        Path k holds ``points[offsets[k]:offsets[k + 1]]``.
-    layer : (K,) int array
-        Index of the layer of each path.
-    link : (P,) bool array
-        Whether the piece from each point to the next one is a link.
-    force : (P,) array, N
-        Axial force in the piece from each point to the next one; NaN where it is not known.
-    broken : (K,) bool array
-        Whether the path breaks a rule for strands (`StrandVerdict`).
-    curvature : (P,) array, 1/mm
-        At the middle of that piece, as `ccfem.judging.evaluation.indices.curvature` samples it.
-    """
-
-    points: FloatArray
-    offsets: IntArray
-    layer: IntArray
-    link: BoolArray
+    points: FloatArray  # (P, 3), mm
+    offsets: IntArray  # (K + 1,): path k holds ``points[offsets[k]:offsets[k + 1]]``
+    layer: IntArray  # (K,): index of the layer of each path
+    link: BoolArray  # (P,): whether the piece from each point to the next one is a link
+    # (P,), N: axial force in the piece from each point to the next one; NaN where it is not known
     force: FloatArray
-    broken: BoolArray
+    broken: BoolArray  # (K,): whether the path breaks a rule for strands (`StrandVerdict`)
+    # (P,), 1/mm: at the middle of that piece, as `ccfem.judging.evaluation.indices.curvature`
+    # samples it
     curvature: FloatArray
 
 

@@ -23,18 +23,11 @@ _STEPS = 65535
 
 @dataclass(frozen=True)
 class Rounded:
-    """Coordinates kept to a step, and finer or coarser by 16 bits for each.
+    """Coordinates kept to a step, and finer or coarser by 16 bits for each."""
 
-    Attributes
-    ----------
-    values : (n, d) array
-        Finite.
-    step : float
-        What they are rounded to, where 65,535 steps reach from the lowest to the highest; else the
-        smallest step with which they do.
-    """
-
-    values: FloatArray
+    values: FloatArray  # (n, d): finite
+    # What they are rounded to, where 65,535 steps reach from the lowest to the highest; else the
+    # smallest step with which they do.
     step: float
 
 

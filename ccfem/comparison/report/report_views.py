@@ -30,20 +30,12 @@ _NOT_KNOWN = 255
 
 @dataclass(frozen=True)
 class Pieces:
-    """Straight pieces of fibre of one strategy on one layer.
+    """Straight pieces of fibre of one strategy on one layer."""
 
-    Attributes
-    ----------
-    ends : (s, 2, 3) array, mm
-    share : (s,) array in [0, 1]
-        Force in each over `RunResults.most_force`; 0 where it is not known.
-    link : (s,) bool array
-        Whether a piece only joins strands.
-    """
-
-    ends: FloatArray
+    ends: FloatArray  # (s, 2, 3), mm
+    # (s,) in [0, 1]: force in each over `RunResults.most_force`; 0 where it is not known
     share: FloatArray
-    link: BoolArray
+    link: BoolArray  # (s,): whether a piece only joins strands
 
     @property
     def colours(self) -> FloatArray:
@@ -53,22 +45,12 @@ class Pieces:
 
 @dataclass(frozen=True)
 class Surface:
-    """Surface of the part, coloured by a value at its points.
+    """Surface of the part, coloured by a value at its points."""
 
-    Attributes
-    ----------
-    points : (n, 3) array, mm
-    triangles : (t, 3) int array
-    share : (n,) array in [0, 1]
-        Of the largest value.
-    said : str
-        What is drawn, and the largest value.
-    """
-
-    points: FloatArray
-    triangles: IntArray
-    share: FloatArray
-    said: str
+    points: FloatArray  # (n, 3), mm
+    triangles: IntArray  # (t, 3)
+    share: FloatArray  # (n,) in [0, 1]: of the largest value
+    said: str  # what is drawn, and the largest value
 
     @property
     def colours(self) -> FloatArray:
@@ -78,20 +60,11 @@ class Surface:
 
 @dataclass(frozen=True)
 class PrintLayer:
-    """Lines of a layer of the whole print, in straight pieces.
+    """Lines of a layer of the whole print, in straight pieces."""
 
-    Attributes
-    ----------
-    said : str
-        Which layer it is, and up to where.
-    ends : (s, 2, 3) array, mm
-    kind : (s,) int array
-        Place in `ccfem.comparison.report.print_view.KINDS`.
-    """
-
-    said: str
-    ends: FloatArray
-    kind: IntArray
+    said: str  # which layer it is, and up to where
+    ends: FloatArray  # (s, 2, 3), mm
+    kind: IntArray  # (s,): place in `ccfem.comparison.report.print_view.KINDS`
 
     @property
     def colours(self) -> FloatArray:
@@ -101,19 +74,12 @@ class PrintLayer:
 
 @dataclass(frozen=True)
 class RunResults:
-    """Results in a folder: what ``results.json`` records, and what ``report.html`` draws.
-
-    Attributes
-    ----------
-    folder : Path
-    record : dict
-    views : dict
-        What `ccfem.comparison.report.html_report.report_html` packs: the ``table``, the ``part``
-        with displacement and stress, ``layers`` with paths, the ``print``; empty where it has none.
-    """
+    """Results in a folder: what ``results.json`` records, and what ``report.html`` draws."""
 
     folder: Path
     record: dict[str, Any]
+    # What `ccfem.comparison.report.html_report.report_html` packs: the ``table``, the ``part`` with
+    # displacement and stress, ``layers`` with paths, the ``print``; empty where it has none.
     views: dict[str, Any]
 
     @property

@@ -22,16 +22,9 @@ from ccfem.strategies import create
 
 
 class Variant(NamedTuple):
-    """A name with parameters.
+    """A name with parameters."""
 
-    Attributes
-    ----------
-    name : str
-        Of a case, part file, slicer or strategy.
-    parameters : dict
-    """
-
-    name: str
+    name: str  # of a case, part file, slicer or strategy
     parameters: dict[str, Any]
 
 
@@ -128,12 +121,7 @@ def _nested(values: Mapping[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Part:
-    """A part with the load cases that a study runs on it: solved once.
-
-    Attributes
-    ----------
-    load_cases : tuple of str
-    """
+    """A part with the load cases that a study runs on it: solved once."""
 
     case: Case
     load_cases: tuple[str, ...]
@@ -160,27 +148,18 @@ class Outcome(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class Job:
-    """One run.
+    """One run."""
 
-    Attributes
-    ----------
-    key : str
-        Hash of everything that it depends on: mesh, problem, machine, slicing, strategy, length of
-        fibre, virtual test and version.
-    part : int
-        Number of its part.
-    fibre_per_layer : float, mm, or None
-    labels : mapping of column to value
-        What it is called in tables: part, load_case, slicing, strategy, and the parameters that
-        were given.
-    """
-
+    # Hash of everything that it depends on: mesh, problem, machine, slicing, strategy, length of
+    # fibre, virtual test and version.
     key: str
-    part: int
+    part: int  # number of its part
     load_case: str
     slicer: Slicer
     strategy: Strategy
-    fibre_per_layer: float | None
+    fibre_per_layer: float | None  # mm
+    # by column: what it is called in tables: part, load_case, slicing, strategy, and the parameters
+    # that were given
     labels: Mapping[str, Any]
 
     @property
@@ -193,20 +172,11 @@ class Job:
 
 @dataclass(frozen=True)
 class Jobs:
-    """All runs of a study.
-
-    Attributes
-    ----------
-    parts : tuple of Part
-    jobs : tuple of Job
-        Each once.
-    repeated : int
-        Runs that were named more than once.
-    """
+    """All runs of a study."""
 
     parts: tuple[Part, ...]
-    jobs: tuple[Job, ...]
-    repeated: int
+    jobs: tuple[Job, ...]  # each once
+    repeated: int  # runs that were named more than once
 
 
 def jobs_of(study: Study, progress: Progress = silent) -> Jobs:
