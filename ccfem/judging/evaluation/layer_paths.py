@@ -27,24 +27,15 @@ Samples = TypeVar("Samples")
 
 @dataclass(frozen=True)
 class PlanePaths:
-    """Fibre paths of one layer in its plane coordinates.
-
-    Attributes
-    ----------
-    points : (P, 2) array, mm
-        Without repeated neighbouring points.
-    offsets : (K + 1,) int array
-        Path k holds ``points[offsets[k]:offsets[k + 1]]``, at least two points.
-    closed : (K,) bool array
-    link : (P,) bool array, optional
-        Whether the step from each point to the next one of its path is a link, as in `Toolpaths`.
-        Default: none is.
-    """
+    """Fibre paths of one layer in its plane coordinates."""
 
     layer: Layer
-    points: FloatArray
+    points: FloatArray  # (P, 2), mm: without repeated neighbouring points
+    # (K + 1,): path k holds ``points[offsets[k]:offsets[k + 1]]``, at least two points
     offsets: IntArray
-    closed: BoolArray
+    closed: BoolArray  # (K,)
+    # (P,): whether the step from each point to the next one of its path is a link, as in
+    # `Toolpaths`. Default: none is.
     link: BoolArray = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
@@ -213,20 +204,11 @@ COARSE = 2.0
 
 @dataclass(frozen=True)
 class Printed:
-    """Points of all layers, those of the first ones first.
+    """Points of all layers, those of the first ones first."""
 
-    Attributes
-    ----------
-    points : (n, 3) array, mm
-    index : (n,) int array
-        Of the layer.
-    build : (3,) array
-        Unit vector.
-    """
-
-    points: FloatArray
-    index: FloatArray
-    build: FloatArray
+    points: FloatArray  # (n, 3), mm
+    index: FloatArray  # (n,): of the layer
+    build: FloatArray  # (3,): unit vector
 
 
 def printed(layers: Sequence[Layer], build: Sequence[float] | None = None) -> Printed | None:
@@ -261,62 +243,32 @@ def printed(layers: Sequence[Layer], build: Sequence[float] | None = None) -> Pr
 
 @dataclass(frozen=True)
 class LayerPaths:
-    """Paths of one layer, with what they lie on.
+    """Paths of one layer, with what they lie on."""
 
-    Attributes
-    ----------
-    toolpaths : Toolpaths
-        Every path of the layer, of all kinds, in the order of printing.
-    fibre : Toolpaths
-        Those of fibre.
-    inside : Toolpaths
-        Fibre without its links; of a curved layer all of it.
-    plane : PlanePaths
-        The fibre in the plane of a flat layer, or in the chart of a curved one.
-    layer_stress : LayerStress
-        On the flat layer, or on the chart.
-    below : shapely (Multi)Polygon, optional
-        What is under a flat layer, empty where nothing is; None where all of it lies on something.
-    late : int
-        Paths that are printed after paths of a higher layer.
-    stack : Printed, optional
-        All layers as they are printed, where they are curved.
-    build : (3,) array
-        Unit vector of the build direction.
-    """
-
-    toolpaths: Toolpaths
-    fibre: Toolpaths
-    inside: Toolpaths
-    plane: PlanePaths
+    toolpaths: Toolpaths  # every path of the layer, of all kinds, in the order of printing
+    fibre: Toolpaths  # those of fibre
+    inside: Toolpaths  # fibre without its links; of a curved layer all of it
+    plane: PlanePaths  # the fibre in the plane of a flat layer, or in the chart of a curved one
     layer: Layer
-    layer_stress: LayerStress
+    layer_stress: LayerStress  # on the flat layer, or on the chart
     stress: PartStress
     machine: Machine
+    # Shapely (Multi)Polygon: what is under a flat layer, empty where nothing is; None where all of
+    # it lies on something.
     below: Region | None
-    late: int
-    stack: Printed | None
-    build: FloatArray
+    late: int  # paths that are printed after paths of a higher layer
+    stack: Printed | None  # all layers as they are printed, where they are curved
+    build: FloatArray  # (3,): unit vector of the build direction
 
 
 @dataclass(frozen=True)
 class Basis:
-    """What indices refer to.
-
-    Attributes
-    ----------
-    material : Material
-        Of a part that is full of strands.
-    sampled : float, default 1
-        Share of the layers' area on which samples were taken.
-    filled : float, default 1
-        Share of the part's volume that is filled.
-    """
+    """What indices refer to."""
 
     machine: Machine
-    material: Material
-    sampled: float = 1.0
-    filled: float = 1.0
+    material: Material  # of a part that is full of strands
+    sampled: float = 1.0  # share of the layers' area on which samples were taken
+    filled: float = 1.0  # share of the part's volume that is filled
 
 
 # What an index is: name, unit, formula and range, for tables and their glossaries.

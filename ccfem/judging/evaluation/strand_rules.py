@@ -34,24 +34,14 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class BrokenRule:
-    """A rule, and the strands that break it.
+    """A rule, and the strands that break it."""
 
-    Attributes
-    ----------
-    rule : {"folds", "held", "outside"}
-    strands : (k,) int array
-        Numbers of the fibre paths, the worst first.
-    places : (k, 3) array, mm
-        Where each breaks it: at its middle fold, at the fold near its start or cut, and where most
-        of its width is outside.
-    words : str
-        One line: how many, by how much, and where the worst is.
-    """
-
-    rule: str
-    strands: IntArray
+    rule: str  # {"folds", "held", "outside"}
+    strands: IntArray  # (k,): numbers of the fibre paths, the worst first
+    # (k, 3), mm: where each breaks it: at its middle fold, at the fold near its start or cut, and
+    # where most of its width is outside
     places: FloatArray
-    words: str
+    words: str  # one line: how many, by how much, and where the worst is
 
     __repr__ = in_brief
 
@@ -61,19 +51,11 @@ class BrokenRule:
 
 @dataclass(frozen=True)
 class StrandVerdict:
-    """What the rules say of all strands.
-
-    Attributes
-    ----------
-    remark : str
-        What folds that are no reason to refuse the plan cost; empty without any.
-    parts : StrandParts, optional
-        Of the strands, as the virtual test takes them too.
-    """
+    """What the rules say of all strands."""
 
     broken: tuple[BrokenRule, ...] = ()
-    remark: str = ""
-    parts: StrandParts | None = None
+    remark: str = ""  # what folds that are no reason to refuse the plan cost; empty without any
+    parts: StrandParts | None = None  # of the strands, as the virtual test takes them too
 
     __repr__ = in_brief
 

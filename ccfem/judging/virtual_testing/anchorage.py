@@ -29,18 +29,10 @@ PETG, 18.6 with a standard deviation of 1.2, pulled out from 1 to 50 mm; from 4.
 
 @dataclass(frozen=True)
 class Anchorage:
-    """Strands, and how much force a length of them takes up from the matrix.
+    """Strands, and how much force a length of them takes up from the matrix."""
 
-    Attributes
-    ----------
-    strands : Strands
-        Where their `share` is 0 they end.
-    flow : float, N/mm
-        Largest force a length that the bond passes on.
-    """
-
-    strands: Strands
-    flow: float
+    strands: Strands  # where their `share` is 0 they end
+    flow: float  # N/mm: largest force a length that the bond passes on
 
     @classmethod
     def of(cls, strands: Strands, machine: Machine) -> "Anchorage":
@@ -131,17 +123,11 @@ class Ends(NamedTuple):
 
 @dataclass(frozen=True)
 class StrandEnds:
-    """Ends of the strands of a part, and the force that they pass on.
+    """Ends of the strands of a part, and the force that they pass on."""
 
-    Attributes
-    ----------
-    strands : Strands
-        Pieces whose `share` is 0, as in folds, are no part of a strand.
-    length : float, mm
-        Length from the end over which a force is averaged, and comes loose. Of shorter strands all.
-    """
-
-    strands: Strands
+    strands: Strands  # pieces whose `share` is 0, as in folds, are no part of a strand
+    # mm: length from the end over which a force is averaged, and comes loose. Of shorter strands
+    # all.
     length: float = AVERAGING_LENGTH
 
     def at(self, pull: FloatArray, intact: FloatArray) -> Ends:

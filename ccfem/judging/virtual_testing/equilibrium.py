@@ -71,22 +71,12 @@ def _add_bars(
 
 @dataclass(frozen=True)
 class Bars:
-    """Pieces of fibre as axial bars, ready to be applied to displacements.
+    """Pieces of fibre as axial bars, ready to be applied to displacements."""
 
-    Attributes
-    ----------
-    nodes : (s, q) int array
-        Nodes of the cell of each piece.
-    slope : (s, q) array, 1/mm
-        Slopes of its shape functions along the piece.
-    tangent : (s, 3) array
-    length : (s,) array, mm
-    """
-
-    nodes: IntArray
-    slope: FloatArray
-    tangent: FloatArray
-    length: FloatArray
+    nodes: IntArray  # (s, q): nodes of the cell of each piece
+    slope: FloatArray  # (s, q), 1/mm: slopes of its shape functions along the piece
+    tangent: FloatArray  # (s, 3)
+    length: FloatArray  # (s,), mm
 
     def __post_init__(self) -> None:
         freeze(self, nodes=np.int32, slope=float, tangent=float, length=float)
@@ -189,19 +179,11 @@ def _slopes(strands: Strands, mesh: TetMesh) -> FloatArray:
 
 @dataclass(frozen=True)
 class Reinforced:
-    """Stiffness of a part and its fibres; ``@`` gives the forces of a displacement.
+    """Stiffness of a part and its fibres; ``@`` gives the forces of a displacement."""
 
-    Attributes
-    ----------
-    part : bsr_array (3n, 3n), N/mm
-        Without fibres.
-    stiffness : (s,) array, N
-        EA of each piece of fibre that carries; zero of the others.
-    """
-
-    part: sp.bsr_array
+    part: sp.bsr_array  # (3n, 3n), N/mm: without fibres
     bars: Bars
-    stiffness: FloatArray
+    stiffness: FloatArray  # (s,), N: EA of each piece of fibre that carries; zero of the others
 
     def __matmul__(self, displacement: FloatArray) -> FloatArray:
         """Return the forces (3n,), N, of a displacement (3n,), mm."""
@@ -212,15 +194,9 @@ class Reinforced:
 
 @dataclass(frozen=True)
 class Reduced:
-    """The same stiffness on the components that the supports leave free.
+    """The same stiffness on the components that the supports leave free."""
 
-    Attributes
-    ----------
-    part : bsr_array (3k, 3k), N/mm
-        Reduced matrix of the part without fibres.
-    """
-
-    part: sp.bsr_array
+    part: sp.bsr_array  # (3k, 3k), N/mm: reduced matrix of the part without fibres
     whole: Reinforced
     held: Held
 
@@ -255,32 +231,15 @@ _PROGRESS_BY_ENERGY = 0.2
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """Displacement of the part with its fibres.
+    """Displacement of the part with its fibres."""
 
-    Attributes
-    ----------
-    displacement : (n, 3) array, mm
-    matrix : Reinforced
-        Stiffness of part and carrying fibres.
-    strain : (s,) array
-        Along each piece of fibre.
-    carried : (s,) array in [0, 1]
-        Share of its stiffness that each piece lends.
-    updates : int
-        Solves until the set of carrying fibres and the displacement were converged.
-    iterations : int
-        Of conjugate gradients, over all updates.
-    residual : float
-        ``|f - K(u) u| / |f|``, with the carrying set of u itself.
-    """
-
-    displacement: FloatArray
-    matrix: Reinforced
-    strain: FloatArray
-    carried: FloatArray
-    updates: int
-    iterations: int
-    residual: float
+    displacement: FloatArray  # (n, 3), mm
+    matrix: Reinforced  # stiffness of part and carrying fibres
+    strain: FloatArray  # (s,): along each piece of fibre
+    carried: FloatArray  # (s,) in [0, 1]: share of its stiffness that each piece lends
+    updates: int  # solves until the set of carrying fibres and the displacement were converged
+    iterations: int  # of conjugate gradients, over all updates
+    residual: float  # ``|f - K(u) u| / |f|``, with the carrying set of u itself
 
     def __post_init__(self) -> None:
         freeze(self, displacement=float, strain=float, carried=float)

@@ -47,21 +47,11 @@ _ENGINEERING = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 
 @dataclass(frozen=True)
 class Peak:
-    """One index.
+    """One index."""
 
-    Attributes
-    ----------
-    index : float
-        Its peak: 1 at failure.
-    norm : float
-        Its p-norm, in a scale of its own.
-    by_displacement : (n, 3) array, 1/mm
-        Derivative of the logarithm of the norm.
-    """
-
-    index: float
-    norm: float
-    by_displacement: FloatArray
+    index: float  # its peak: 1 at failure
+    norm: float  # its p-norm, in a scale of its own
+    by_displacement: FloatArray  # (n, 3), 1/mm: derivative of the logarithm of the norm
 
     __repr__ = in_brief
 
@@ -154,14 +144,9 @@ def _slopes(index: Callable[[FloatArray], Any], stress: FloatArray) -> FloatArra
 
 @dataclass(frozen=True)
 class MatrixPeaks:
-    """The cells of a part in which the matrix is judged, for any number of displacements.
+    """The cells of a part in which the matrix is judged, for any number of displacements."""
 
-    Attributes
-    ----------
-    part : StressField
-        Without fibre: its problem says what holds and loads the part, and the material.
-    """
-
+    # Without fibre: its problem says what holds and loads the part, and the material.
     part: StressField
 
     __repr__ = in_brief

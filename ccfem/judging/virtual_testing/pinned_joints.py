@@ -60,33 +60,21 @@ _GAP = 0.05
 
 @dataclass(frozen=True)
 class PinnedJoint:
-    """A hole across which a pin presses, and when the matrix round it gives way.
+    """A hole across which a pin presses, and when the matrix round it gives way."""
 
-    Attributes
-    ----------
-    patch : str
-        Of a load or a support on its wall.
-    centre : (3,) array, mm
-        On the axis, in the middle of the wall.
-    force : (3,) array, N
-        Of the pin on the part, across the axis, under the load of the test.
-    diameter, thickness : float, mm
-        Of the hole; length of its loaded wall along the axis.
-    net_area, shear_area : float, mm^2
-        Of the material beside the hole across the force, and of both planes of shear-out.
-    loads : mapping of mode to float, N
-        Load of the part at which each mode happens. Infinite for the net section where it is
-        pressed; none of a mode without material that could part. That of strands in the net
-        section is there where they hold anything.
-    """
-
-    patch: str
-    centre: FloatArray
+    patch: str  # of a load or a support on its wall
+    centre: FloatArray  # (3,), mm: on the axis, in the middle of the wall
+    # (3,), N: of the pin on the part, across the axis, under the load of the test
     force: FloatArray
+    # mm: of the hole; length of its loaded wall along the axis
     diameter: float
     thickness: float
+    # mm^2: of the material beside the hole across the force, and of both planes of shear-out
     net_area: float
     shear_area: float
+    # by mode, N: load of the part at which each mode happens. Infinite for the net section where it
+    # is pressed; none of a mode without material that could part. That of strands in the net
+    # section is there where they hold anything.
     loads: Mapping[str, float]
 
     def __post_init__(self) -> None:

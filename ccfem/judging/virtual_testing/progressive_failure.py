@@ -117,24 +117,13 @@ def _largest_principal(stress: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Damage:
-    """What is left of a part.
+    """What is left of a part."""
 
-    Attributes
-    ----------
-    events : (m,) int array
-        Of each cell.
-    ductility : (m,) array
-        Of cells that have cracked; 1 in others.
-    intact : (s,) array in [0, 1]
-        Share of each piece of fibre that has not broken or come loose.
-    parted : (m,) bool array
-        Cells whose layers have parted.
-    """
-
-    events: IntArray
-    ductility: FloatArray
+    events: IntArray  # (m,): of each cell
+    ductility: FloatArray  # (m,): of cells that have cracked; 1 in others
+    # (s,) in [0, 1]: share of each piece of fibre that has not broken or come loose
     intact: FloatArray
-    parted: BoolArray
+    parted: BoolArray  # (m,): cells whose layers have parted
 
     def __post_init__(self) -> None:
         freeze(self, events=int, ductility=float, intact=float, parted=bool)

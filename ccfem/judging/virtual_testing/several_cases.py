@@ -20,15 +20,9 @@ from ccfem.slicing.layers import Layer
 
 @dataclass(frozen=True)
 class CasesTest:
-    """Virtual tests of one set of paths, one for each load case.
+    """Virtual tests of one set of paths, one for each load case."""
 
-    Attributes
-    ----------
-    tests : tuple of VirtualTest
-        In the order of the cases.
-    """
-
-    tests: tuple[VirtualTest, ...]
+    tests: tuple[VirtualTest, ...]  # in the order of the cases
 
     __repr__ = in_brief
 
@@ -45,21 +39,11 @@ class CasesTest:
 
 @dataclass(frozen=True)
 class CasesFailure:
-    """First failure of a part that is loaded by one of several cases at a time.
+    """First failure of a part that is loaded by one of several cases at a time."""
 
-    Attributes
-    ----------
-    each : tuple of FirstFailure
-        First failure under each case.
-    factors : tuple of float
-        Load at first failure over the load of the case.
-    case : str
-        The one that fails at the least factor.
-    """
-
-    each: tuple[FirstFailure, ...]
-    factors: tuple[float, ...]
-    case: str
+    each: tuple[FirstFailure, ...]  # first failure under each case
+    factors: tuple[float, ...]  # load at first failure over the load of the case
+    case: str  # the one that fails at the least factor
 
     __repr__ = in_brief
 

@@ -78,27 +78,15 @@ def width_inside(
 
 
 class StrandParts(NamedTuple):
-    """Parts of the fibre paths, and what of each carries.
+    """Parts of the fibre paths, and what of each carries."""
 
-    Attributes
-    ----------
-    beads : Beads
-        The parts, in the order of ``toolpaths.of_kind(FIBRE)``.
-    link : (s,) bool array
-        Parts of links.
-    inside : (s,) array in [0, 1]
-        Share of the width that lies in the section of the layer; 1 where no layers are given.
-    folds : Folds
-        Of the fibre paths.
-    folded : (s,) bool array
-        Parts whose middle lies in a fold.
-    """
-
-    beads: Beads
-    link: BoolArray
+    beads: Beads  # the parts, in the order of ``toolpaths.of_kind(FIBRE)``
+    link: BoolArray  # (s,): parts of links
+    # (s,) in [0, 1]: share of the width that lies in the section of the layer; 1 where no layers
+    # are given
     inside: FloatArray
-    folds: Folds
-    folded: BoolArray
+    folds: Folds  # of the fibre paths
+    folded: BoolArray  # (s,): parts whose middle lies in a fold
 
     def carrying(self, crosses: bool) -> FloatArray:
         """Share (s,) of each part that carries, also where strands cross if they do so by design.

@@ -224,15 +224,10 @@ class Windows:
 
     Values that are constant in each piece have their largest mean over such a length in one of
     them. Lengths are counted in fibre that carries (`Strands.share`). Shorter paths count whole.
-
-    Attributes
-    ----------
-    strands : Strands
-    length : float, mm
     """
 
     strands: Strands
-    length: float = AVERAGING_LENGTH
+    length: float = AVERAGING_LENGTH  # mm
 
     __repr__ = in_brief
 
@@ -299,22 +294,15 @@ _SLIVER = 1e-12
 
 
 class CutSteps(NamedTuple):
-    """Pieces of steps, each in one cell, in the order of the steps.
+    """Pieces of steps, each in one cell, in the order of the steps."""
 
-    Attributes
-    ----------
-    step, cell : (s,) int arrays
-        Step that each piece belongs to, and cell that holds the piece.
-    begin, end : (s,) arrays in [0, 1]
-        Shares of the step at the ends of the piece.
-    share : (s,) array
-        1 over the number of cells that hold the piece; it is listed once for each of them.
-    """
-
+    # (s,): step that each piece belongs to, and cell that holds the piece
     step: IntArray
     cell: IntArray
+    # (s,) in [0, 1]: shares of the step at the ends of the piece
     begin: FloatArray
     end: FloatArray
+    # (s,): 1 over the number of cells that hold the piece; it is listed once for each of them
     share: FloatArray
 
 

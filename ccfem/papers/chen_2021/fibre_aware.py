@@ -96,25 +96,15 @@ def bound(load: str = "pull", count: int = LAYERS_TABLE_2, mode: str = "tension"
 
 @dataclass(frozen=True)
 class Tested:
-    """Virtual tests of one design.
+    """Virtual tests of one design."""
 
-    Attributes
-    ----------
-    length : float, mm
-    tension, bonded : float
-        Stiffness ratio under the pull.
-    bearing : float
-        Stiffness ratio under the bearing load, fibres in tension only.
-    failure : float, kN
-        Load at first failure under the pull.
-    """
-
-    length: float
+    length: float  # mm
     paths: int
+    # Stiffness ratio under the pull.
     tension: float
     bonded: float
-    bearing: float
-    failure: float
+    bearing: float  # stiffness ratio under the bearing load, fibres in tension only
+    failure: float  # kN: load at first failure under the pull
 
 
 def tested(paths: Toolpaths) -> Tested:

@@ -29,55 +29,30 @@ _LITERAL = Isocurve.literal()
 
 @dataclass(frozen=True)
 class VectorField:
-    """The vectors of section 4.1 on the tetrahedra, before and after each step.
+    """The vectors of section 4.1 on the tetrahedra, before and after each step."""
 
-    Attributes
-    ----------
-    raw : (m, 3) array
-        Unit vectors with the signs that a decomposition happens to give: drawn at random.
-    oriented : (m, 3) array
-        Along the minimum spanning tree.
-    tension : Tension
-        Oriented, and undefined where the filter of Eq. 2 finds vectors incompatible.
-    unfiltered : Tension
-        The raw vectors, none taken away.
-    seconds : (2,) tuple
-        Of the orientation and of the filter.
-    """
-
+    # (m, 3): unit vectors with the signs that a decomposition happens to give: drawn at random
     raw: FloatArray
-    oriented: FloatArray
+    oriented: FloatArray  # (m, 3): along the minimum spanning tree
+    # Oriented, and undefined where the filter of Eq. 2 finds vectors incompatible.
     tension: Tension
-    unfiltered: Tension
-    seconds: tuple[float, float]
+    unfiltered: Tension  # the raw vectors, none taken away
+    seconds: tuple[float, float]  # of the orientation and of the filter
 
 
 @dataclass(frozen=True)
 class LayerStages:
-    """What each stage of one layer gives.
-
-    Attributes
-    ----------
-    directed : Directed
-        The filled and smoothed vectors.
-    values : (n,) array
-        The scalar field s.
-    rings : list of (k, 2) arrays
-        Curves round the chosen holes.
-    led : list of (k, 2) arrays
-        Isocurves, cut back and led into the last of those curves.
-    seconds : (4,) tuple
-        Of `STAGES`.
-    """
+    """What each stage of one layer gives."""
 
     layer: Layer
-    directed: Directed
-    values: FloatArray
+    directed: Directed  # the filled and smoothed vectors
+    values: FloatArray  # (n,): the scalar field s
     curves: Isocontours
-    rings: list[FloatArray]
+    rings: list[FloatArray]  # (k, 2) each: curves round the chosen holes
+    # (k, 2) each: isocurves, cut back and led into the last of those curves
     led: list[FloatArray]
     paths: Toolpaths
-    seconds: tuple[float, ...]
+    seconds: tuple[float, ...]  # of `STAGES`
 
 
 def vector_field(stress: PartStress) -> VectorField:

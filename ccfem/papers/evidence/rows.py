@@ -33,47 +33,28 @@ _MEASURED = {
 
 @dataclass(frozen=True)
 class Row:
-    """One measured value of a paper.
+    """One measured value of a paper."""
 
-    Attributes
-    ----------
-    part, specimen : str
-        What was tested, and which print of it.
-    over, over_part : str
-        Print that it is divided by, of that part; "" where the value is absolute.
-    kind : str
-        `STIFFNESS`, `BREAKING`, `SLOPE`, `LOAD` or `ORDER`; "" where nothing can be predicted.
-    measured : float
-        NaN where the text gives the order alone, or a sentence (`quantity`).
-    paper, source, published : str
-        Where it stands, and what else is published.
-    tests : int
-        Specimens of each print.
-    ours : bool
-        Whether a plan of ccfem stands for paths that were not published.
-    scale : str
-        Part whose print without fibre gives the matrix of an absolute value, and whose solid gives
-        the strength of a strand.
-    counted : bool
-        Whether medians and orders count it.
-    why : str
-        Why it is not predicted.
-    """
-
+    # What was tested, and which print of it.
     part: str
     specimen: str
+    # Print that it is divided by, of that part; "" where the value is absolute.
     over: str
     over_part: str
+    # `STIFFNESS`, `BREAKING`, `SLOPE`, `LOAD` or `ORDER`; "" where nothing can be predicted
     kind: str
-    measured: float
+    measured: float  # NaN where the text gives the order alone, or a sentence (`quantity`)
+    # Where it stands, and what else is published.
     paper: str
     source: str
     published: str
-    tests: int
-    ours: bool = False
+    tests: int  # specimens of each print
+    ours: bool = False  # whether a plan of ccfem stands for paths that were not published
+    # Part whose print without fibre gives the matrix of an absolute value, and whose solid gives
+    # the strength of a strand.
     scale: str = ""
-    counted: bool = True
-    why: str = ""
+    counted: bool = True  # whether medians and orders count it
+    why: str = ""  # why it is not predicted
     remark: str = ""
     text: str = ""
 
@@ -190,24 +171,16 @@ def measured_of(part: str, specimen: str, kind: str) -> float:
 
 @dataclass(frozen=True)
 class PartResult:
-    """A part under its load, as predicted.
+    """A part under its load, as predicted."""
 
-    Attributes
-    ----------
-    readings : tuple of mapping of print to float
-        Stiffness of each print, N/mm, in a matrix of one modulus. The first is the prediction; the
-        others span its interval.
-    by_rho : mapping of print to mapping of float to float
-        Ratio to the stiffness without fibre at some rho, mm^2.
-    matrix_index : float
-        Peak of the averaged von Mises stress without fibre, MPa a N of load.
-    strand_force : mapping of print to float
-        Highest force in a strand, averaged over 5 mm, N a N of load.
-    """
-
+    # by print, N/mm: stiffness in a matrix of one modulus.
+    # The first is the prediction; the others span its interval.
     readings: tuple[Mapping[str, float], ...]
+    # by print: ratio to the stiffness without fibre at some rho, mm^2
     by_rho: Mapping[str, Mapping[float, float]] | None = None
+    # Peak of the averaged von Mises stress without fibre, MPa a N of load.
     matrix_index: float = np.nan
+    # by print: highest force in a strand, averaged over 5 mm, N a N of load
     strand_force: Mapping[str, float] | None = None
 
 
@@ -381,24 +354,14 @@ def order(row: Row, prediction: Prediction) -> str:
 
 @dataclass(frozen=True)
 class Summary:
-    """Errors of all rows that count, in % of the measured value.
+    """Errors of all rows that count, in % of the measured value."""
 
-    Attributes
-    ----------
-    errors : mapping of kind to tuple of floats
-        By kind; those with paths of ours under the kind and ", ours too".
-    orders : mapping of verdict to tuple of Row
-        Pairs of designs whose order is "right", "wrong" or a "tie".
-    left_out : mapping of kind to tuple of floats
-        Errors with rho fitted to the other solids.
-    stiffness : tuple of floats
-        Errors of ratios of breaking loads by the stiffness alone.
-    """
-
+    # By kind; those with paths of ours under the kind and ", ours too"
     errors: Mapping[str, tuple[float, ...]]
+    # by verdict: pairs of designs whose order is "right", "wrong" or a "tie"
     orders: Mapping[str, tuple[Row, ...]]
-    left_out: Mapping[str, tuple[float, ...]]
-    stiffness: tuple[float, ...]
+    left_out: Mapping[str, tuple[float, ...]]  # by kind: errors with rho fitted to the other solids
+    stiffness: tuple[float, ...]  # errors of ratios of breaking loads by the stiffness alone
 
     def median(self, kind: str) -> float:
         """Median of the sizes of the errors of a kind, %; NaN without any."""

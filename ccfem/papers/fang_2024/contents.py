@@ -353,17 +353,10 @@ PAPER_LOADS = {"planar z": ("head", 0.87), "planar y": ("head", 0.87), "planar x
 
 
 class Opening(NamedTuple):
-    """Load, kN, at which the bond fails in each judged cell of one slicing.
+    """Load, kN, at which the bond fails in each judged cell of one slicing."""
 
-    Attributes
-    ----------
-    middle : (m, 3) array, mm
-    load : (m,) array
-        Infinite where nothing opens or slides.
-    """
-
-    middle: FloatArray
-    load: FloatArray
+    middle: FloatArray  # (m, 3), mm
+    load: FloatArray  # (m,): infinite where nothing opens or slides
 
     def at(self, place: str) -> float:
         """Load that opens a place first, kN."""

@@ -39,17 +39,11 @@ _NEAR = 0.75
 
 @dataclass(frozen=True)
 class FibreMap:
-    """Fibre of one layer in the cells of a plate.
+    """Fibre of one layer in the cells of a plate."""
 
-    Attributes
-    ----------
-    angle : (m,) array, radians
-        From axis x to the fibre; a line, so its half turn means nothing.
-    path : (m,) int array
-        Path that lies in the cell; -1 where none passes within 0.75 bead widths of its centre.
-    """
-
+    # (m,), radians: from axis x to the fibre; a line, so its half turn means nothing
     angle: FloatArray
+    # (m,): path that lies in the cell; -1 where none passes within 0.75 bead widths of its centre
     path: IntArray
 
     def __post_init__(self) -> None:
@@ -141,16 +135,10 @@ class Sensitivity:
 
     Equation 2 of the paper prints the reciprocal; its figures and the range 0 to 1
     stated in table 2 are those of this form.
-
-    Attributes
-    ----------
-    angles : (k,) array, degrees
-        Rising, from 0 to 90.
-    energies : (k,) array, N mm
-        Strain energy S with the fibre of every cell turned by that angle.
     """
 
-    angles: FloatArray
+    angles: FloatArray  # (k,), degrees: rising, from 0 to 90
+    # (k,), N mm: strain energy S with the fibre of every cell turned by that angle
     energies: FloatArray
 
     def __post_init__(self) -> None:
@@ -202,15 +190,10 @@ def reduced_stiffness(material: Material) -> FloatArray:
 
 @dataclass(frozen=True)
 class LaidPlate:
-    """Solution of a plate with fibre in given directions.
-
-    Attributes
-    ----------
-    components : (L, m, 3) array, MPa
-        s11, s22, s12 at the centre of each cell in the axes of each layer.
-    """
+    """Solution of a plate with fibre in given directions."""
 
     field: PlaneField
+    # (L, m, 3), MPa: s11, s22, s12 at the centre of each cell in the axes of each layer
     components: FloatArray
 
     def __post_init__(self) -> None:
@@ -304,24 +287,13 @@ def turned_energies(
 
 @dataclass(frozen=True)
 class Benchmark:
-    """The plate with its fibre along the principal direction everywhere, without paths.
+    """The plate with its fibre along the principal direction everywhere, without paths."""
 
-    Attributes
-    ----------
-    direction : (m,) array, radians
-        Of the stress of the largest size, with an isotropic material.
-    defined : (m,) bool array
-        Where there is such a direction (`strongest`).
-    laid : LaidPlate
-        With the fibre along `direction`.
-    curve : Sensitivity
-        Strain energies with the fibre turned from it.
-    """
-
+    # (m,), radians: of the stress of the largest size, with an isotropic material
     direction: FloatArray
-    defined: BoolArray
-    laid: LaidPlate
-    curve: Sensitivity
+    defined: BoolArray  # (m,): where there is such a direction (`strongest`)
+    laid: LaidPlate  # with the fibre along `direction`
+    curve: Sensitivity  # strain energies with the fibre turned from it
 
     def agreement(self, maps: Sequence[FibreMap]) -> float:
         """Mean agreement of the fibre with `direction` over cells and layers, in [0, 1]."""

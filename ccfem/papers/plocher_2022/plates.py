@@ -37,30 +37,19 @@ _ON_SIDE = 1e-9
 
 @dataclass(frozen=True)
 class Plate:
-    """A plate in plane stress, 1 mm thick.
-
-    Attributes
-    ----------
-    polygon : shapely Polygon, mm
-        The section; its box starts at the origin.
-    mask : (H, W) bool array
-        Row 0 is the top; a pixel is solid where its centre lies in the section.
-    bead : float, mm
-        Side of a pixel, and bead width.
-    points : mapping of patch name to (x, y), mm
-        Patches of the one node nearest to a point.
-    peaks : tuple of (x, y), mm
-        Places of point loads and point supports, where stress has no bound.
-    """
+    """A plate in plane stress, 1 mm thick."""
 
     name: str
     title: str
-    polygon: Any
+    polygon: Any  # shapely Polygon, mm: the section; its box starts at the origin
+    # (H, W): row 0 is the top; a pixel is solid where its centre lies in the section
     mask: BoolArray
-    bead: float
+    bead: float  # mm: side of a pixel, and bead width
     supports: tuple[Support, ...]
     load: tuple[SurfaceLoad, ...]
+    # by patch name, (x, y), mm: patches of the one node nearest to a point
     points: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    # mm: places of point loads and point supports, where stress has no bound
     peaks: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
@@ -265,33 +254,18 @@ _SUPPORT_IN = 2
 
 @dataclass(frozen=True)
 class BendingBeam:
-    """An optimised beam, mirror symmetric to the last pixel.
+    """An optimised beam, mirror symmetric to the last pixel."""
 
-    Attributes
-    ----------
-    mask : (60, 204) bool array
-        Pixels of the part, row 0 on top.
-    density : (60, 204) array in [0, 1]
-        Optimised density, interpolated to the pixels.
-    polygon : shapely Polygon, mm
-        Smooth outline of the same part; the origin is the lower left corner of the image.
-    size : float, mm
-        Side of a pixel.
-    supports : (2, 2) array, mm
-        Points at the bottom.
-    loads : (3, 2) array, mm
-        Points at the top: the middle one carries 1 N, its neighbours 0.5 N each.
-    design : Design
-        On the coarse raster.
-    """
-
-    mask: BoolArray
-    density: FloatArray
+    mask: BoolArray  # (60, 204): pixels of the part, row 0 on top
+    density: FloatArray  # (60, 204) in [0, 1]: optimised density, interpolated to the pixels
+    # Shapely Polygon, mm: smooth outline of the same part; the origin is the lower left corner of
+    # the image.
     polygon: Any
-    size: float
-    supports: FloatArray
+    size: float  # mm: side of a pixel
+    supports: FloatArray  # (2, 2), mm: points at the bottom
+    # (3, 2), mm: points at the top: the middle one carries 1 N, its neighbours 0.5 N each
     loads: FloatArray
-    design: Design
+    design: Design  # on the coarse raster
 
     def __post_init__(self) -> None:
         freeze(self, mask=bool, density=float, supports=float, loads=float)

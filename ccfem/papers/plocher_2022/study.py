@@ -67,24 +67,15 @@ RASTER: dict[str, tuple[str, dict[str, Any]]] = {
 
 @dataclass(frozen=True)
 class PatternStudy:
-    """One pattern on one plate.
+    """One pattern on one plate."""
 
-    Attributes
-    ----------
-    toolpaths : Toolpaths
-        Of two layers for the grids, which turn from one to the next, of one for the others.
-    laid : mapping of "C", "S", "mixed" to LaidPlate
-    values : mapping of index to float
-    raster : tuple of RasterPlan
-        A layer each; none of a pattern of polylines.
-    """
-
+    # Of two layers for the grids, which turn from one to the next, of one for the others.
     toolpaths: Toolpaths
     paths: tuple[PlanePaths, ...]
     maps: tuple[plane_study.FibreMap, ...]
-    laid: Mapping[str, plane_study.LaidPlate]
-    values: Mapping[str, float]
-    raster: tuple[RasterPlan, ...] = ()
+    laid: Mapping[str, plane_study.LaidPlate]  # by "C", "S", "mixed"
+    values: Mapping[str, float]  # by index
+    raster: tuple[RasterPlan, ...] = ()  # A layer each; none of a pattern of polylines
 
 
 @dataclass(frozen=True)

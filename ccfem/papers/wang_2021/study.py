@@ -63,37 +63,26 @@ LEAST = 0.5
 
 @dataclass(frozen=True)
 class PatternStudy:
-    """One pattern on one part.
-
-    Attributes
-    ----------
-    total : mapping of index to float
-        From `evaluate`.
-    rates : mapping of reading to (18,) array
-        Matching rates at 5, 10, ..., 90 degrees; "strands" is "path" without links.
-    places, curvature : (s, 2) array, mm, and (s,) array, 1/mm
-        Resampled in steps of half a millimetre; outside the part too.
-    curvature_in_part : (s,) array, 1/mm
-    native, native_in_part : (v,) arrays, 1/mm
-        At the vertices as planned.
-    stiffness : mapping of "tension" and "bonded" to float
-        Of the part with its fibre over that without, in the virtual test, with strands so stiff
-        that all patterns have the same volume of fibre in the part; empty for full plates.
-    seconds : float
-        Of planning.
-    """
+    """One pattern on one part."""
 
     toolpaths: Toolpaths
     paths: PlanePaths
-    total: Mapping[str, float]
+    total: Mapping[str, float]  # by index: from `evaluate`
+    # by reading: matching rates at 5, 10, ..., 90 degrees; "strands" is "path" without links
     rates: Mapping[str, FloatArray]
+    # (s, 2), mm, and (s,) array, 1/mm: resampled in steps of half a millimetre; outside the part
+    # too
     places: FloatArray
     curvature: FloatArray
-    curvature_in_part: FloatArray
+    curvature_in_part: FloatArray  # (s,), 1/mm
+    # (v,), 1/mm: at the vertices as planned
     native: FloatArray
     native_in_part: FloatArray
+    # by "tension" and "bonded": of the part with its fibre over that without, in the virtual test,
+    # with strands so stiff that all patterns have the same volume of fibre in the part; empty for
+    # full plates
     stiffness: Mapping[str, float]
-    seconds: float
+    seconds: float  # of planning
 
     def rate(self, angle: float, reading: str = "path") -> float:
         """Return the matching rate, %, within an angle that is a multiple of 5 degrees."""
@@ -102,39 +91,25 @@ class PatternStudy:
 
 @dataclass(frozen=True)
 class PartStudy:
-    """All patterns on the optimised or on the full plate.
-
-    Attributes
-    ----------
-    machine : Machine
-        That of the case, with no shortest path.
-    patterns : mapping of name to PatternStudy
-    """
+    """All patterns on the optimised or on the full plate."""
 
     case: Case
-    machine: Machine
+    machine: Machine  # that of the case, with no shortest path
     field: StressField
     layer: Layer
     stress: LayerStress
-    patterns: Mapping[str, PatternStudy]
+    patterns: Mapping[str, PatternStudy]  # by name
 
 
 @dataclass(frozen=True)
 class PlateStudy:
-    """One plate.
-
-    Attributes
-    ----------
-    design : Design, optional
-        Of an optimisation in this run.
-    off_stored : float
-        Area by which its outline differs from the stored one, over the area; NaN without it.
-    """
+    """One plate."""
 
     plate: DesignPlate
     optimised: PartStudy
     original: PartStudy
-    design: Design | None
+    design: Design | None  # of an optimisation in this run
+    # Area by which its outline differs from the stored one, over the area; NaN without it.
     off_stored: float
     seconds: float
 

@@ -41,33 +41,17 @@ its tracks are clipped afterwards."""
 
 @dataclass(frozen=True)
 class Band:
-    """Middle line of a main path with half the vector from its right to its left side.
+    """Middle line of a main path with half the vector from its right to its left side."""
 
-    Attributes
-    ----------
-    middle, half : (n, 2) arrays, mm
-        In nearly equal steps.
-    core : slice
-        Points that are not extended.
-    within : slice
-        Points up to the middle of the joints that it ends in.
-    width : (k,) array, mm
-        Distance of the rails along the core, before smoothing.
-    free : (n,) array
-        From 0 where rails guide the band to 1 where it is bridged or extended.
-    closed : bool
-        Whether the last point leads to the first.
-    joined : 2 bools
-        Whether it starts, and whether it ends, in a joint.
-    """
-
+    # (n, 2), mm: in nearly equal steps
     middle: FloatArray
     half: FloatArray
-    core: slice
-    within: slice
-    width: FloatArray
-    free: FloatArray
-    closed: bool = False
+    core: slice  # points that are not extended
+    within: slice  # points up to the middle of the joints that it ends in
+    width: FloatArray  # (k,), mm: distance of the rails along the core, before smoothing
+    free: FloatArray  # (n,): from 0 where rails guide the band to 1 where it is bridged or extended
+    closed: bool = False  # whether the last point leads to the first
+    # Whether it starts, and whether it ends, in a joint.
     joined: tuple[bool, bool] = (True, True)
 
     def __post_init__(self) -> None:

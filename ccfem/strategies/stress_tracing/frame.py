@@ -26,25 +26,15 @@ where they are equally wide and cross at 60 degrees."""
 
 @dataclass(frozen=True)
 class Member:
-    """A curve of the medial axis with the border points beside it (rails).
+    """A curve of the medial axis with the border points beside it (rails)."""
 
-    Attributes
-    ----------
-    points : (m, 2) array, mm
-        Along the axis.
-    left, right : (m, 2) arrays, mm
-        Points of the border nearest to each point, on both sides of the walking direction.
-    ends : tuple of 2 ints
-        Joints at both ends, `FREE` where there is none; a closed member has `FREE` twice.
-    closed : bool
-        Whether the member is a ring.
-    """
-
-    points: FloatArray
+    points: FloatArray  # (m, 2), mm: along the axis
+    # (m, 2), mm: points of the border nearest to each point, on both sides of the walking direction
     left: FloatArray
     right: FloatArray
+    # Joints at both ends, `FREE` where there is none; a closed member has `FREE` twice.
     ends: tuple[int, int]
-    closed: bool = False
+    closed: bool = False  # whether the member is a ring
 
     def __post_init__(self) -> None:
         freeze(self, points=float, left=float, right=float)
@@ -64,21 +54,12 @@ class Member:
 
 @dataclass(frozen=True)
 class Frame:
-    """Members and joints of a section.
+    """Members and joints of a section."""
 
-    Attributes
-    ----------
-    members : tuple of Member
-        The longest first. Empty for sections whose axis is a point: discs, squares.
-    joints : (k, 2) array, mm
-        Middle of each joint.
-    radius : (k,) array, mm
-        Of the disc round the middle that holds the joint.
-    """
-
+    # The longest first. Empty for sections whose axis is a point: discs, squares.
     members: tuple[Member, ...]
-    joints: FloatArray
-    radius: FloatArray
+    joints: FloatArray  # (k, 2), mm: middle of each joint
+    radius: FloatArray  # (k,), mm: of the disc round the middle that holds the joint
 
     def __post_init__(self) -> None:
         freeze(self, joints=float, radius=float)

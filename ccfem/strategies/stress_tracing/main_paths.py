@@ -30,18 +30,10 @@ _OTHER_SIGN = 1.5
 
 @dataclass(frozen=True)
 class MainPath:
-    """A chain of members that one family of tracks runs through.
+    """A chain of members that one family of tracks runs through."""
 
-    Attributes
-    ----------
-    members : tuple of Member
-        In walking order and direction.
-    closed : bool
-        Whether the last one leads into the first.
-    """
-
-    members: tuple[Member, ...]
-    closed: bool = False
+    members: tuple[Member, ...]  # in walking order and direction
+    closed: bool = False  # whether the last one leads into the first
 
 
 class _End(NamedTuple):

@@ -12,20 +12,11 @@ from ccfem.slicing.layers.layer import LayerStress
 
 @dataclass(frozen=True)
 class StressLines:
-    """Principal stress of largest absolute value at k places.
+    """Principal stress of largest absolute value at k places."""
 
-    Attributes
-    ----------
-    direction : (k, 2) array
-        Unit vectors of lines, whose sign is arbitrary.
-    value : (k,) array, MPa
-        Positive in tension.
-    defined : (k,) bool array
-        False where both principal stresses have the same absolute value (`tensor`).
-    """
-
-    direction: FloatArray
-    value: FloatArray
+    direction: FloatArray  # (k, 2): unit vectors of lines, whose sign is arbitrary
+    value: FloatArray  # (k,), MPa: positive in tension
+    # (k,): False where both principal stresses have the same absolute value (`tensor`)
     defined: BoolArray
 
 
@@ -67,21 +58,11 @@ amplification k and eta, are 1."""
 
 @dataclass(frozen=True)
 class Criterion:
-    """Criterion for a good step of a load path.
+    """Criterion for a good step of a load path."""
 
-    Attributes
-    ----------
-    turn : float, degrees
-        Limit of the angle alpha between one step and the next.
-    misalignment : float, degrees
-        Limit of the angle beta between a step and the stress.
-    distance : float, mm
-        Limit of the length d of a step.
-    """
-
-    turn: float = 75.0
-    misalignment: float = 60.0
-    distance: float = 3.0
+    turn: float = 75.0  # degrees: limit of the angle alpha between one step and the next
+    misalignment: float = 60.0  # degrees: limit of the angle beta between a step and the stress
+    distance: float = 3.0  # mm: limit of the length d of a step
 
     def __call__(self, turn: ArrayLike, misalignment: ArrayLike, distance: ArrayLike) -> FloatArray:
         """Smoothness of steps, the smaller the better: equation 5, the product over all properties.

@@ -93,17 +93,10 @@ def _split(points: FloatArray, triangles: IntArray, middle: IntArray) -> IntArra
 
 @dataclass(frozen=True)
 class Cells:
-    """Triangles of a layer in its plane, with the operators that field and pattern need.
+    """Triangles of a layer in its plane, with the operators that field and pattern need."""
 
-    Attributes
-    ----------
-    points : (n, 2) array, mm
-    triangles : (t, 3) int array
-        Counter-clockwise, or without area.
-    """
-
-    points: FloatArray
-    triangles: IntArray
+    points: FloatArray  # (n, 2), mm
+    triangles: IntArray  # (t, 3): counter-clockwise, or without area
 
     def __post_init__(self) -> None:
         freeze(self, points=float, triangles=int)
@@ -204,22 +197,13 @@ def line_field(
 
 @dataclass(frozen=True)
 class Pattern:
-    """Phases of a stripe pattern, by the edges along which they grow.
-
-    Attributes
-    ----------
-    phase : (n,) array, radians
-        At the points, each seen with the sign of its own direction.
-    growth : (e,) array, radians
-        Of the phase along each edge, seen with the sign at its first end.
-    same : (e,) array
-        1 where the directions at both ends have the same sign, otherwise -1.
-    """
+    """Phases of a stripe pattern, by the edges along which they grow."""
 
     cells: Cells
-    phase: FloatArray
+    phase: FloatArray  # (n,), radians: at the points, each seen with the sign of its own direction
+    # (e,), radians: of the phase along each edge, seen with the sign at its first end
     growth: FloatArray
-    same: FloatArray
+    same: FloatArray  # (e,): 1 where the directions at both ends have the same sign, otherwise -1
 
 
 def stripe_pattern(

@@ -14,24 +14,13 @@ from ccfem.strategies.winding_curves.triangle_mesh import TriangleMesh
 
 @dataclass(frozen=True)
 class Piece:
-    """A connected piece of a layer, with the borders of its joints.
-
-    Attributes
-    ----------
-    mesh : TriangleMesh
-        Points of the layer keep their numbers.
-    loops : tuple of int arrays
-        Points of the border of each joint's hole.
-    outer : tuple of int arrays
-        All other loops of its border.
-    curves : tuple of int arrays
-        Points of each curve that joins holes; none before it is `joined`.
-    """
+    """A connected piece of a layer, with the borders of its joints."""
 
     layer: Layer
-    mesh: TriangleMesh
-    loops: tuple[IntArray, ...]
-    outer: tuple[IntArray, ...]
+    mesh: TriangleMesh  # points of the layer keep their numbers
+    loops: tuple[IntArray, ...]  # points of the border of each joint's hole
+    outer: tuple[IntArray, ...]  # all other loops of its border
+    # Points of each curve that joins holes; none before it is `joined`.
     curves: tuple[IntArray, ...] = ()
 
     @property

@@ -9,39 +9,22 @@ from ccfem.base.arrays import FloatArray, IntArray
 
 @dataclass(frozen=True)
 class TriangleMesh:
-    """Triangles of one piece of a layer.
+    """Triangles of one piece of a layer."""
 
-    Attributes
-    ----------
-    points : (n, 3) array, mm
-    triangles : (t, 3) int array
-    source : (t,) int array
-        Triangle of the layer that each lies on.
-    """
-
-    points: FloatArray
-    triangles: IntArray
-    source: IntArray
+    points: FloatArray  # (n, 3), mm
+    triangles: IntArray  # (t, 3)
+    source: IntArray  # (t,): triangle of the layer that each lies on
 
 
 @dataclass(frozen=True)
 class EdgePath:
-    """A curve over triangles, straight in each: from a point of the mesh across its edges.
+    """A curve over triangles, straight in each: from a point of the mesh across its edges."""
 
-    Attributes
-    ----------
-    start, end : int
-        Points of the mesh.
-    edges : (k, 2) int array
-        Edges crossed, in order.
-    share : (k,) array in (0, 1)
-        Position of the crossing: the share of the second end.
-    """
-
+    # Points of the mesh.
     start: int
     end: int
-    edges: IntArray
-    share: FloatArray
+    edges: IntArray  # (k, 2): edges crossed, in order
+    share: FloatArray  # (k,) in (0, 1): position of the crossing: the share of the second end
 
     def points(self, mesh: TriangleMesh) -> FloatArray:
         """Return the points of the curve, (k + 2, 3), mm."""

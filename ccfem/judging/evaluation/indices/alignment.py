@@ -92,24 +92,14 @@ _ROUNDING = 1e-3
 
 @dataclass(frozen=True)
 class AlignmentSamples(LayerSamples):
-    """Samples along the fibre inside the part, (s,) each.
+    """Samples along the fibre inside the part, (s,) each."""
 
-    Attributes
-    ----------
-    length : mm
-    angle : radians in [0, pi/2]
-        NaN where both principal values are equal.
-    largest, smallest : MPa
-        In-plane principal values, S1 the larger.
-    along : MPa
-        t.S.t.
-    """
-
-    length: FloatArray
-    angle: FloatArray
+    length: FloatArray  # mm
+    angle: FloatArray  # radians in [0, pi/2]: NaN where both principal values are equal
+    # MPa: in-plane principal values, S1 the larger
     largest: FloatArray
     smallest: FloatArray
-    along: FloatArray
+    along: FloatArray  # MPa: t.S.t
 
 
 def sample_alignment(paths: PlanePaths, stress: LayerStress, step: float) -> AlignmentSamples:

@@ -91,22 +91,12 @@ _SHIFT = (0.381966, 0.276393)
 
 @dataclass(frozen=True)
 class CoverageSamples:
-    """Samples of equal area inside the section, and whole areas of a layer.
+    """Samples of equal area inside the section, and whole areas of a layer."""
 
-    Attributes
-    ----------
-    tension : (s,) array, MPa
-        S1+.
-    covered : (s,) bool array
-    laid : (1,) array, mm^2
-        Length of the fibre times its width.
-    area, gap : (1,) arrays, mm^2
-        Of the section, and of its places that are too narrow for a strand.
-    """
-
-    tension: FloatArray
-    covered: BoolArray
-    laid: FloatArray
+    tension: FloatArray  # (s,), MPa: s1+
+    covered: BoolArray  # (s,)
+    laid: FloatArray  # (1,), mm^2: length of the fibre times its width
+    # (1,), mm^2: of the section, and of its places that are too narrow for a strand
     area: FloatArray
     gap: FloatArray
 

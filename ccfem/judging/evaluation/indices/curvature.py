@@ -68,24 +68,13 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class CurvatureSamples(LayerSamples):
-    """Curvature along the fibre of a layer.
+    """Curvature along the fibre of a layer."""
 
-    Attributes
-    ----------
-    curvature : (s,) array, 1/mm
-        At points equally far apart.
-    native : (n,) array, 1/mm
-        At the vertices of the simplified paths.
-    turns : (v,) array, radians
-        Turning angles at the vertices as planned, those above 45 degrees.
-    length : (1,) array, mm
-        Of the fibre.
-    """
-
-    curvature: FloatArray
-    native: FloatArray
+    curvature: FloatArray  # (s,), 1/mm: at points equally far apart
+    native: FloatArray  # (n,), 1/mm: at the vertices of the simplified paths
+    # (v,), radians: turning angles at the vertices as planned, those above 45 degrees
     turns: FloatArray
-    length: FloatArray
+    length: FloatArray  # (1,), mm: of the fibre
 
 
 def sample_curvature(paths: PlanePaths, step: float) -> CurvatureSamples:

@@ -56,18 +56,11 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class HeadSamples(LayerSamples):
-    """Samples of the fibre of a layer.
+    """Samples of the fibre of a layer."""
 
-    Attributes
-    ----------
-    length : (s,) array, mm
-    tilt : (s,) array, degrees
-    hits : (s,) bool array
-    """
-
-    length: FloatArray
-    tilt: FloatArray
-    hits: BoolArray
+    length: FloatArray  # (s,), mm
+    tilt: FloatArray  # (s,), degrees
+    hits: BoolArray  # (s,)
 
 
 def sample_head(

@@ -81,21 +81,11 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class MatchingSamples:
-    """Angles between fibre and stress.
+    """Angles between fibre and stress."""
 
-    Attributes
-    ----------
-    angle : (s,) array, degrees
-        In [0, 90]; infinite for a stress that meets no fibre.
-    weight : (s,) array
-        Length of fibre, mm, or area, mm^2, that a sample stands for.
-    size : (s,) array, MPa
-        Larger absolute principal value in the plane.
-    """
-
-    angle: FloatArray
-    weight: FloatArray
-    size: FloatArray
+    angle: FloatArray  # (s,), degrees: in [0, 90]; infinite for a stress that meets no fibre
+    weight: FloatArray  # (s,): length of fibre, mm, or area, mm^2, that a sample stands for
+    size: FloatArray  # (s,), MPa: larger absolute principal value in the plane
 
 
 def matching_rate(

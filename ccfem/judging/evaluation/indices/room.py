@@ -96,42 +96,26 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class RoomSamples:
-    """What the strands of a layer have of room, part by part, and unsupported runs.
+    """What the strands of a layer have of room, part by part, and unsupported runs."""
 
-    Attributes
-    ----------
-    length : (1,) array, mm
-        Of the fibre.
-    on, across, outside : (1,) arrays, mm
-        Length that lies on other fibre of its direction, across other fibre, and, by the width of
-        the strand, outside the section.
-    stack, stack_length : (a,) arrays, 1 and mm
-        Numbers of strands above each other, and the length with each.
-    fraction, fraction_length : (b,) arrays, 1 and mm
-        Fibre volume fractions, and the length with each.
-    free : (f,) array, mm
-        Lengths of the runs that lie on nothing.
-    overlap : (1,) array, mm^2
-        Area of all bands less that of their union.
-    fibre, volume : (1,) arrays, mm^3
-        Of the fibre in the section, and of the part that the layer stands for.
-    late : (1,) array
-        Number of paths printed after one of a higher layer.
-    """
-
-    length: FloatArray
+    length: FloatArray  # (1,), mm: of the fibre
+    # (1,), mm: length that lies on other fibre of its direction, across other fibre, and, by the
+    # width of the strand, outside the section
     on: FloatArray
     across: FloatArray
     outside: FloatArray
+    # (a,), 1 and mm: numbers of strands above each other, and the length with each
     stack: FloatArray
     stack_length: FloatArray
+    # (b,), 1 and mm: fibre volume fractions, and the length with each
     fraction: FloatArray
     fraction_length: FloatArray
-    free: FloatArray
-    overlap: FloatArray
+    free: FloatArray  # (f,), mm: lengths of the runs that lie on nothing
+    overlap: FloatArray  # (1,), mm^2: area of all bands less that of their union
+    # (1,), mm^3: of the fibre in the section, and of the part that the layer stands for
     fibre: FloatArray
     volume: FloatArray
-    late: FloatArray
+    late: FloatArray  # (1,): number of paths printed after one of a higher layer
 
     with_length: ClassVar[dict[str, str]] = {"stack": "stack_length", "fraction": "fraction_length"}
 

@@ -38,16 +38,10 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class SkinSamples(LayerSamples):
-    """Samples of the fibre of a layer.
+    """Samples of the fibre of a layer."""
 
-    Attributes
-    ----------
-    length : (s,) array, mm
-    stands_out : (s,) bool array
-    """
-
-    length: FloatArray
-    stands_out: BoolArray
+    length: FloatArray  # (s,), mm
+    stands_out: BoolArray  # (s,)
 
 
 def sample_skin(fibre: Toolpaths, layer: Layer, mesh: TetMesh, machine: Machine) -> SkinSamples:

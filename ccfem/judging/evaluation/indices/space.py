@@ -84,26 +84,19 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class SpaceSamples(LayerSamples):
-    """Samples of a layer.
+    """Samples of a layer."""
 
-    Attributes
-    ----------
-    length, angle, size : (s,) arrays
-        Length, mm, of the fibre at each sample, its angle to the strongest stress, degrees, nan
-        where there is none, and that stress's size, MPa.
-    curvature : (c,) array, 1/mm
-    strand, linked : (k,) arrays
-        Length of each strand, mm, and number of patches near it.
-    area, across, tension : (t,) arrays
-        Of each triangle: mm^2, normal stress and largest principal stress, MPa, 0 where negative.
-    """
-
+    # (s,): length, mm, of the fibre at each sample, its angle to the strongest stress, degrees, nan
+    # where there is none, and that stress's size, MPa
     length: FloatArray
     angle: FloatArray
     size: FloatArray
-    curvature: FloatArray
+    curvature: FloatArray  # (c,), 1/mm
+    # (k,): length of each strand, mm, and number of patches near it
     strand: FloatArray
     linked: FloatArray
+    # (t,): of each triangle: mm^2, normal stress and largest principal stress, MPa, 0 where
+    # negative
     area: FloatArray
     across: FloatArray
     tension: FloatArray

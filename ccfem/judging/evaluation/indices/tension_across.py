@@ -69,29 +69,15 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class TensionSamples(LayerSamples):
-    """Samples of a layer.
+    """Samples of a layer."""
 
-    Attributes
-    ----------
-    tensor : (t, 3, 3) array
-        Of the triangles where there is tension: stress times area, N.
-    tension : (t,) array, N
-        Largest principal value.
-    flat : (t,) array, N
-        Tension along the build direction; 0 where that is in compression.
-    gap : (t,) array, N
-        Difference of the two lesser principal values, at most `tension`.
-    least : (t, 3) array
-        Unit vector along the least principal stress.
-    angle, angle_flat : (t,) arrays, degrees
-        From `least` to the normal of the layer, and from `least` to the build direction.
-    """
-
-    tensor: FloatArray
-    tension: FloatArray
-    flat: FloatArray
-    gap: FloatArray
-    least: FloatArray
+    tensor: FloatArray  # (t, 3, 3): of the triangles where there is tension: stress times area, N
+    tension: FloatArray  # (t,), N: largest principal value
+    flat: FloatArray  # (t,), N: tension along the build direction; 0 where that is in compression
+    gap: FloatArray  # (t,), N: difference of the two lesser principal values, at most `tension`
+    least: FloatArray  # (t, 3): unit vector along the least principal stress
+    # (t,), degrees: from `least` to the normal of the layer, and from `least` to the build
+    # direction
     angle: FloatArray
     angle_flat: FloatArray
 
