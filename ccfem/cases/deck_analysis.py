@@ -168,13 +168,7 @@ class _Conversion:
     def chosen(
         self, wanted: str | None, path: Path
     ) -> dict[str, tuple[tuple[AnySupport, ...], tuple[load_kinds.Load, ...]]]:
-        """Supports and loads of the static steps that do something, or of the one that is named.
-
-        Raises
-        ------
-        InputError
-            When there is none.
-        """
+        """Supports and loads of the static steps that do something, or of the one that is named."""
         steps = [step for step in self.steps.ended if step.static]
         names = [step.name for step in self.steps.ended]
         if wanted is not None:

@@ -166,13 +166,7 @@ class DeckConstraints:
         return references, nodes[in_cell[nodes]]
 
     def degrees(self, letters: str, offset: int) -> str:
-        """Degrees of freedom of a reference node whose first one has a number.
-
-        Raises
-        ------
-        InputError
-            For one that there is not.
-        """
+        """Degrees of freedom of a reference node whose first one has a number."""
         places = [offset + DEGREES.index(letter) for letter in letters]
         if max(places) >= len(DEGREES):
             raise InputError(f"a ROT NODE has degrees of freedom 1 to 3: {TAKE_OUT}")

@@ -209,13 +209,7 @@ def optimise(
 
 
 def find_design(case: Case, asked: Optimisation, progress: Progress = silent) -> Optimised:
-    """Carry out an optimisation: `optimise` with what is asked of it as a value.
-
-    Raises
-    ------
-    InputError, SolveError
-        As `optimise`.
-    """
+    """Carry out an optimisation: `optimise` with what is asked of it as a value."""
     problem = case.problem
     plate = None if asked.in_space else flat_part(problem.mesh)
     _check_case(case, asked, plate)

@@ -60,24 +60,12 @@ class History:
 
 
 def content_of(text: str) -> dict[str, Any]:
-    """Content of a part file.
-
-    Raises
-    ------
-    InputError
-        Where the text is not TOML.
-    """
+    """Content of a part file."""
     return toml_of(text, "the part file")
 
 
 def draft_of(text: str) -> PartDraft:
-    """Return what a part file says, as far as it reads.
-
-    Raises
-    ------
-    InputError
-        Where the text is not TOML.
-    """
+    """Return what a part file says, as far as it reads."""
     return PartDraft(content_of(text))
 
 
@@ -213,10 +201,6 @@ def check_files(text: str, home: Path, allowed: Sequence[Path]) -> None:
         Folder that its paths are relative to.
     allowed : sequence of Path
         The first is where the part is run: the folder of layers is relative to that.
-
-    Raises
-    ------
-    InputError
     """
     draft = draft_of(text)
     for name in draft.files.values():
@@ -240,13 +224,7 @@ def check_body(path: Path, allowed: Sequence[Path]) -> None:
 
 
 def check_inside(path: Path, allowed: Sequence[Path]) -> Path:
-    """Return a path with its links followed where it lies in one of the folders.
-
-    Raises
-    ------
-    InputError
-        Where it does not.
-    """
+    """Return a path with its links followed where it lies in one of the folders."""
     try:
         real = path.resolve()
     except (OSError, ValueError, RuntimeError):
@@ -275,11 +253,6 @@ def patch_of(text: str, listing: BodyFaces, numbers: Collection[int]) -> tuple[s
     """Text with a patch for faces, and its name: one that is there already, or a new one.
 
     The name says what the faces are, not what is done to them.
-
-    Raises
-    ------
-    InputError
-        Where no face is chosen.
     """
     if not numbers:
         raise InputError("no face is chosen: click one, or choose it from the list")

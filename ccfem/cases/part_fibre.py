@@ -107,13 +107,7 @@ def patches_of_fibre(places: fibre_places.FibrePlaces | None) -> tuple[str, ...]
 
 
 def fibre_table(places: fibre_places.FibrePlaces | None) -> dict[str, Any]:
-    """Table [fibre] that reads as some places; empty without any.
-
-    Raises
-    ------
-    InputError
-        For the inside of a surface, whose file is not known.
-    """
+    """Table [fibre] that reads as some places; empty without any."""
     if places is None:
         return {}
     keys = {name: key for key, name in _KEYS.items()}

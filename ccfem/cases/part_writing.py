@@ -32,11 +32,6 @@ def part_text(case: Case, mesh: str, comment: str = "") -> str:
         Name of the file that its mesh, with the patches, is written to.
     comment : str
         Lines at its head.
-
-    Raises
-    ------
-    InputError
-        For what a part file cannot say.
     """
     problem = case.problem
     if problem.regions or problem.axes is not None or problem.density is not None:
@@ -122,13 +117,7 @@ def _changed(value: Any, default: Any) -> dict[str, Any]:
 
 
 def _material(material: Material) -> dict[str, Any]:
-    """Table of a material with one axis, or none.
-
-    Raises
-    ------
-    InputError
-        For any other.
-    """
+    """Table of a material with one axis, or none."""
     compliance = np.linalg.inv(material.stiffness)
     (e1, e2, e3), (_, g13, g12) = (
         1.0 / np.diag(compliance)[rows] for rows in ([0, 1, 2], [3, 4, 5])

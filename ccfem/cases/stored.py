@@ -49,13 +49,7 @@ def stored_outline(name: str, volume_fraction: float) -> shapely.Polygon | None:
 
 
 def _stored_file(name: str, key: str, value: float) -> Path | None:
-    """File of an entry of the manifest that has this value; None where there is none.
-
-    Raises
-    ------
-    InputError
-        When the file is not the one that the manifest names.
-    """
+    """File of an entry of the manifest that has this value; None where there is none."""
     entry = manifest().get(name)
     if entry is None or entry[key] != value:
         return None

@@ -33,14 +33,7 @@ _WIDTH = 100
 def machine_choice(
     name: str | None, texts: Sequence[str] | None
 ) -> "Callable[[Machine], Machine] | None":
-    """Turn the two options into what they make of a case's machine; None where neither is given.
-
-    Raises
-    ------
-    InputError
-        For an unknown machine, a file that is none, and a text that is no assignment; what comes
-        back raises it for unknown keys and values of a wrong type.
-    """
+    """Turn the two options into what they make of a case's machine; None where neither is given."""
     if name is None and not texts:
         return None
     from ccfem.machine.named_machines import machine_table, updated

@@ -42,13 +42,7 @@ class GivenPart:
     ] = None
 
     def change(self) -> "Callable[[Case], Case]":
-        """Return what makes the part that is asked for of the part that was read.
-
-        Raises
-        ------
-        InputError
-            For what is wrong of the options themselves.
-        """
+        """Return what makes the part that is asked for of the part that was read."""
         return lambda case: case
 
     def read(self, refine: bool = False) -> "Case":
@@ -146,13 +140,7 @@ class PlacedPart(TurnedPart):
 def fibre_choice(
     texts: Sequence[str] | None,
 ) -> "Callable[[FibrePlaces | None], FibrePlaces] | None":
-    """Turn ``--set-fibre`` into what it makes of a part's choice; None where it is not given.
-
-    Raises
-    ------
-    InputError
-        For a text that is no assignment, an unknown key and a value that it does not take.
-    """
+    """Turn ``--set-fibre`` into what it makes of a part's choice; None where it is not given."""
     if not texts:
         return None
     from ccfem.cases.part_fibre import fibre_of
@@ -167,13 +155,7 @@ def fibre_choice(
 
 
 def plastic_choice(texts: Sequence[str] | None) -> "Callable[[Plastic], Plastic] | None":
-    """Turn ``--set-plastic`` into what it makes of a part's plastic; None where it is not given.
-
-    Raises
-    ------
-    InputError
-        As `fibre_choice`.
-    """
+    """Turn ``--set-plastic`` into what it makes of a part's plastic; None where it is not given."""
     if not texts:
         return None
     from ccfem.cases.part_tables import plastic_of

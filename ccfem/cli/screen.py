@@ -66,13 +66,7 @@ def print_members(kind: str) -> None:
 
 
 def print_member(kind: str, name: str) -> None:
-    """Print what one strategy or slicer does, and what each of its parameters means.
-
-    Raises
-    ------
-    InputError
-        For an unknown name.
-    """
+    """Print what one strategy or slicer does, and what each of its parameters means."""
     known = _members(kind)
     check_known(kind, name, sorted(known))
     member, by_class = known[name], {class_.__name__: class_ for class_ in known.values()}

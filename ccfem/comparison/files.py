@@ -595,11 +595,6 @@ def write_trims(path: str | Path, plan: PrintPlan) -> None:
     """Write where the knife comes behind a print: places at which strands cross the part's border.
 
     ``layer, x, y, z``, on the bed of the printer, mm.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be written.
     """
     with whole_file(path) as temporary, temporary.open("w", encoding="ascii") as file:
         file.write("layer,x,y,z\n")

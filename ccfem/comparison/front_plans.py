@@ -105,11 +105,6 @@ def front_of(
         As of `fibre_front`.
     known : Solved, optional
         The case with its stress, if it is solved already.
-
-    Raises
-    ------
-    InputError
-        As `fibre_front`.
     """
     ((name, strategy),) = request.strategies.items()
     spread, kinds = Spread(points), _kinds(name, strategy, strengths)

@@ -186,11 +186,6 @@ def counts_to_try(case: Case, stress: PartStress) -> tuple[int, ...]:
 
     All layers count, those without fibre too. A layer has to be as high as a strand is
     (`Machine.strand_height`).
-
-    Raises
-    ------
-    InputError
-        For curved layers.
     """
     layers = case.slicing(stress, case.build, case.machine)
     if curved_layers(layers):

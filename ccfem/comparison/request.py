@@ -120,13 +120,7 @@ class Stiffness:
 
     @classmethod
     def parsed(cls, text: str) -> "Stiffness":
-        """Read a ratio as ``2.5``, or ``1200N/mm``.
-
-        Raises
-        ------
-        InputError
-            For any other text.
-        """
+        """Read a ratio as ``2.5``, or ``1200N/mm``."""
         stripped = text.strip()
         try:
             return cls(float(stripped.removesuffix(_UNIT)), stripped.endswith(_UNIT))
@@ -368,11 +362,6 @@ class Request:
             As in `ccfem.compare`.
         **more
             As the attributes of the class.
-
-        Raises
-        ------
-        InputError
-            As the class, and for short forms that mean nothing.
         """
         case = read(case)
         if not isinstance(strategies, Mapping):

@@ -232,13 +232,7 @@ class Comparison:
 
     @property
     def layers(self) -> tuple[Layer, ...]:
-        """Layers of the part.
-
-        Raises
-        ------
-        InputError
-            Where several slicings are compared.
-        """
+        """Layers of the part."""
         if len(self.stacks) > 1:
             raise InputError(
                 f"a comparison over slicings has layers for each: {', '.join(self.stacks)}; take "

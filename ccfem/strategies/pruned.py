@@ -124,13 +124,7 @@ class Pruned(ByCoverage):
     def for_part(
         self, stress: PartStress, layers: Sequence[Layer], machine: Machine
     ) -> LayerPlanner:
-        """Plan and prune all layers of the part.
-
-        Raises
-        ------
-        InputError
-            Whatever the base strategy raises.
-        """
+        """Plan and prune all layers of the part."""
         wanted = self.natural_length(layers, machine)
         return self.to_lengths(stress, layers, machine, (wanted,))[0][1]
 
@@ -145,11 +139,6 @@ class Pruned(ByCoverage):
 
         Each layer is planned for one load case, and tests under all cases say what goes. Lengths
         that need more than the largest coverage are reduced to that coverage.
-
-        Raises
-        ------
-        InputError
-            Whatever the base strategy raises.
         """
         check_moves(self.moves, layers)
         full, strand = full_length(layers, machine), Strand(self.rho)

@@ -211,11 +211,6 @@ class StreamFunction(ByCoverage):
         paths of the design are too short in total, it is repeated with proportionally more fibre.
         Much shorter lengths get a design of their own: a design cut far below its length would end
         strands where they carry load.
-
-        Raises
-        ------
-        InputError
-            As `for_part`, where no layer has a tensile direction in any case.
         """
         least = 1.0 if len(cases) == 1 else _CASES_OVERFILL
         common = _Common(self, cases, tuple(layers), machine)

@@ -110,13 +110,7 @@ class Bench:
         return [path.relative_to(self.folder).as_posix() for path in bodies[:_LISTED]]
 
     def open(self, what: str | os.PathLike[str]) -> None:
-        """Open a body, a part file, or a case by name.
-
-        Raises
-        ------
-        InputError
-            For what cannot be read, or lies elsewhere; what was on the bench stays.
-        """
+        """Open a body, a part file, or a case by name."""
         name = os.fspath(what)
         if not Path(name).suffix and not {"/", "\\"} & set(name):
             check_known("case", name, named_cases(), "or name a file")
@@ -187,13 +181,7 @@ class Bench:
     # Editing.
 
     def edit(self, change: Change | str, field: str = "") -> None:
-        """Change the part file, or put a text in its place, and save it in ``results``.
-
-        Raises
-        ------
-        InputError
-            Where that cannot be; then nothing is changed.
-        """
+        """Change the part file, or put a text in its place, and save it in ``results``."""
         text = change if isinstance(change, str) else edited(self.text, change)
         self._show(self.history.after(text, field))
 
@@ -232,13 +220,7 @@ class Bench:
         )
 
     def make(self, folder: Path) -> None:
-        """Make a folder, ``results`` or one in it.
-
-        Raises
-        ------
-        InputError
-            Where it lies elsewhere, as by a link, or something is in its place.
-        """
+        """Make a folder, ``results`` or one in it."""
         check_inside(self.results, [self.folder])
         check_inside(folder, [self.results])
         try:
@@ -290,13 +272,7 @@ class Bench:
         return str(self.content.get("name") or self.part_file().stem)
 
     def other_part(self, name: str) -> str:
-        """Name of a part file that is printed beside this one, from the folder.
-
-        Raises
-        ------
-        InputError
-            Where it cannot be read, or lies elsewhere.
-        """
+        """Name of a part file that is printed beside this one, from the folder."""
         path = check_inside(self.folder / name, [self.folder])
         check_files(text_of(path, "part file"), path.parent, [self.folder])
         return self._argument(path)

@@ -53,13 +53,7 @@ class LoadsTab:
         self._rows: dict[Name, tuple[Any, Field | None, Any]] = {}
 
     def entry(self, name: Name) -> Entry:
-        """Support or load of a name, wherever it stands by now.
-
-        Raises
-        ------
-        InputError
-            Where it is there no more.
-        """
+        """Support or load of a name, wherever it stands by now."""
         entry = entries(self.page.bench.draft).get(name)
         if entry is None:
             raise InputError(f"{name[0]} is not in the part any more: add it again")

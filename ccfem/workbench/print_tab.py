@@ -72,13 +72,7 @@ class Row:
         return float(value) if whole or isinstance(self.default, float) else None
 
     def written(self, value: Any) -> Any:
-        """Value of the part file for that of the field.
-
-        Raises
-        ------
-        InputError
-            For a part of a whole number.
-        """
+        """Value of the part file for that of the field."""
         if type(self.default) is not int:
             return self.write(value)
         if not float(value).is_integer():

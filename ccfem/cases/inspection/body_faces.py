@@ -32,11 +32,6 @@ def faces(
         Feature angle: edges of at least this angle separate two faces.
     scale : float, default 1
         Factor that converts the coordinates of a file to mm.
-
-    Raises
-    ------
-    InputError
-        For a body that cannot be read.
     """
     if isinstance(body, Case):
         return numbered_faces(body.problem.mesh, angle) if body.body is None else body.body

@@ -144,13 +144,7 @@ class LoadRow:
 
 
 def load_row(problem: Problem, case: str, load: Load, held: Held | None) -> LoadRow:
-    """Describe a load.
-
-    Raises
-    ------
-    InputError
-        For a load that its patch cannot take.
-    """
+    """Describe a load."""
     what = in_words(load)
     if isinstance(load, Displacement | Temperature):
         nothing = np.full(3, np.nan)
@@ -410,13 +404,7 @@ def _about_fibre(case: Case, layers: Sequence[Layer]) -> tuple[str, ...]:
 
 
 def _about_plastic(case: Case) -> tuple[str, ...]:
-    """Say how much of the part is plastic, and its mass; nothing of one that is solid by default.
-
-    Raises
-    ------
-    InputError
-        As `Case.printed_problem`.
-    """
+    """Say how much of the part is plastic, and its mass; nothing of one solid by default."""
     if case.plastic == SOLID:
         return ()
     plastic, printed = case.plastic, case.printed_problem()

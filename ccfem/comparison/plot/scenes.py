@@ -98,13 +98,7 @@ def _has_screen() -> bool:
 
 @singledispatch
 def add(value: Any, plotter: Any, **options: Any) -> None:
-    """Add a value to a scene.
-
-    Raises
-    ------
-    InputError
-        For a value that is nothing in space.
-    """
+    """Add a value to a scene."""
     raise InputError(f"a {type(value).__name__} is nothing in space: use plot() or print it")
 
 

@@ -42,13 +42,7 @@ _PATCHES = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#8c7a00", "#d9a58c", "#
 
 @singledispatch
 def figure(value: Any, **options: Any) -> "Figure":
-    """Draw a value in the plane.
-
-    Raises
-    ------
-    InputError
-        For a value that has no picture.
-    """
+    """Draw a value in the plane."""
     raise InputError(f"a {type(value).__name__} has no picture: print it")
 
 

@@ -215,13 +215,7 @@ def _in_space(points: FloatArray, space: Any) -> FloatArray:
 
 
 def read_results(folder: Path) -> RunResults:
-    """Read the results of a comparison, a plan, or a print of several parts.
-
-    Raises
-    ------
-    InputError
-        Where the folder holds none.
-    """
+    """Read the results of a comparison, a plan, or a print of several parts."""
     try:
         names = [name for name in ("results.json", "bed.json") if (folder / name).exists()]
         record = json.loads((folder / (names or ["results.json"])[0]).read_text(encoding="utf-8"))
@@ -234,13 +228,7 @@ def read_results(folder: Path) -> RunResults:
 
 
 def read_solution(file: Path, part_file: str = "") -> RunResults:
-    """Read what ``ccfem solve`` has written of one load case.
-
-    Raises
-    ------
-    InputError
-        Where the file holds no such thing.
-    """
+    """Read what ``ccfem solve`` has written of one load case."""
     import pyvista
 
     try:

@@ -236,11 +236,6 @@ def on_cluster(
         Task of each part that jobs need, from `part_bytes`.
     address : str
         Of the scheduler, as ``tcp://host:8786``.
-
-    Raises
-    ------
-    InputError
-        As of `ccfem.base.cluster.connected`.
     """
     with connected(address) as client:
         from distributed import as_completed
@@ -280,13 +275,7 @@ class Store:
         self._folder, self._force = folder, force
 
     def __getitem__(self, key: str) -> Outcome | None:
-        """Outcome of a run; None where it is not there.
-
-        Raises
-        ------
-        InputError
-            Where something else has its place.
-        """
+        """Outcome of a run; None where it is not there."""
         name = f"{key}.json"
         if self._folder.entry(_RUNS) is None:
             return None

@@ -87,11 +87,6 @@ def check_stretched(strains: Sequence[FloatArray]) -> None:
     ----------
     strains : sequence of (s,) array
         Along the fibre, of each load case.
-
-    Raises
-    ------
-    InputError
-        Where it is not.
     """
     if not any(strain.max(initial=0.0) > 0.0 for strain in strains):
         raise InputError(

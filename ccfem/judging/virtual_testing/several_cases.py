@@ -54,13 +54,7 @@ class CasesFailure:
 
 
 def specimens(cases: WeightedCases, backend: str = "auto") -> tuple[Specimen, ...]:
-    """Specimens of several load cases; those of one problem share one factorisation.
-
-    Raises
-    ------
-    InputError
-        As `Specimen.of`.
-    """
+    """Specimens of several load cases; those of one problem share one factorisation."""
     leaders: dict[int, Specimen] = {}
     parts = []
     for field in cases.fields:
@@ -92,13 +86,6 @@ def virtual_tests(
         As in `virtual_test`.
     known : sequence of (n, 3) arrays, mm, optional
         For each case a displacement near its solution, to start from.
-
-    Raises
-    ------
-    InputError
-        As `virtual_test`.
-    SolveError
-        When a solve misses its tolerance.
     """
     specimens_of_cases = specimens(parts) if isinstance(parts, WeightedCases) else tuple(parts)
     if isinstance(fibres, Toolpaths):

@@ -78,11 +78,6 @@ class Specimen:
         ----------
         other : StressField
             Without fibres, of the same mesh, material and supports.
-
-        Raises
-        ------
-        InputError
-            As `of`.
         """
         known = other.__dict__.setdefault("specimens", {})
         other.__dict__.pop(EQUATIONS, None)

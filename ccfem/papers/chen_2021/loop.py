@@ -33,13 +33,7 @@ HOLES = {
 
 
 def authors_folder() -> Path:
-    """Folder of the authors' data.
-
-    Raises
-    ------
-    InputError
-        When the environment variable is unset or names no folder.
-    """
+    """Folder of the authors' data."""
     folder = os.environ.get(FOLDER, "")
     if not folder or not Path(folder).is_dir():
         raise InputError(

@@ -115,11 +115,6 @@ def oriented_stiffness(fourth: FloatArray, fibre: Material) -> FloatArray:
     Returns
     -------
     (..., 6, 6) array, MPa
-
-    Raises
-    ------
-    InputError
-        When the material is not transversely isotropic about axis 1.
     """
     c = fibre.stiffness
     transverse, along = c[3, 3], c[4, 4]

@@ -63,11 +63,6 @@ def fibre_map(paths: PlanePaths, centres: FloatArray, bead: float) -> FibreMap:
     centres : (m, 2) array, mm
         Of square cells one bead wide.
     bead : float, mm
-
-    Raises
-    ------
-    ValueError
-        When there is no path.
     """
     if not len(paths):
         raise ValueError("a fibre map needs at least one path")
