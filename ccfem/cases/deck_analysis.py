@@ -49,7 +49,6 @@ class DeckAnalysis:
     ----------
     mesh : TetMesh
         In mm, as it stands in the deck, with patches of its sets, supports and loads.
-    materials : CellMaterials
     supports, case_supports, loads
         As in `ccfem.fem.elasticity.problem.Problem`; a load case a static step.
     remarks : tuple of str

@@ -117,10 +117,8 @@ class DeckConstraints:
     ----------
     border : (b, 3) int array
         Facets of the outside.
-    systems : list of LocalSystem
     system_of : (n,) int array
         System of the components of each node; -1 for those of the space.
-    couplings : list of Coupling
     reference : dict of int to (int, int)
         Coupling of each reference node, and the number of its first degree of freedom: 0, or 3 of a
         node whose displacements stand for rotations.

@@ -99,7 +99,6 @@ class DesignPlate:
         That a force presses on, down.
     volume_fraction : float in (0, 1]
         Share of the plate that the design fills.
-    holes : tuple of Hole
     force : float, N
     mirror : str, default ""
         "x" or "y" where the plate and its load are symmetric along that axis: its part is then

@@ -127,7 +127,6 @@ def with_given_paths(
 
     Parameters
     ----------
-    strategies : dict of name to Strategy
     frame : {"mesh", "tool"}, optional
         What the coordinates of the files are in.
     """

@@ -36,13 +36,10 @@ class BedPrint:
     ----------
     comparisons : mapping of str to Comparison
         Of each part by its name, with its only run.
-    machine : Machine
     print_plan : PrintPlan
         Of all parts.
-    moves : Moves
     print_totals : PrintTotals
         Of all, with the share of each part.
-    name : str
     """
 
     comparisons: Mapping[str, Comparison]
@@ -124,7 +121,6 @@ def print_together(
         Of one strategy and one slicing each; the machine is the same but for the height of layers.
     course : Course
         Where the file begins and halts.
-    progress : callable, optional
 
     Raises
     ------

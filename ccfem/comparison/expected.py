@@ -48,7 +48,6 @@ def expected_steps(request: Request, known: Mapping[str, Counts], cases: int) ->
 
     Parameters
     ----------
-    known : mapping of slicing to Counts
     cases : int
         Load cases that are planned for.
     """

@@ -65,7 +65,6 @@ def save(
         In an existing folder only files that ccfem wrote, and nobody has changed, are replaced.
     force : bool, default False
         Also replace files of the same names that others wrote or changed.
-    progress : callable, optional
     cell : bool, default False
         As in `write_results`.
 
@@ -116,7 +115,6 @@ def write_results(
         What was typed; the report tells how to repeat it.
     seconds : mapping of stage to float, optional
         Stages outside the comparison.
-    progress : callable, optional
     pictures : bool, default False
         Also draw what the report shows as PNG files: every layer of every strategy, forces,
         tension, all side by side, the part and the curve; and ``part.html``, which turns the part.

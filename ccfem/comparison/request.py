@@ -50,7 +50,6 @@ class ForeignStress:
 
     Attributes
     ----------
-    path : path
     unit : str, optional
         Unit of the stress, if the file does not state it.
     array : str, optional
@@ -446,7 +445,6 @@ def named_strategies(
     strategies : sequence of str or Strategy
         A strategy object keeps its parameters and gets the name of its module; a second one of the
         same name gets a number.
-    parameters : mapping of strategy name to parameters, optional
 
     Raises
     ------

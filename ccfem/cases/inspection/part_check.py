@@ -176,8 +176,6 @@ class Check(Shown):
     ----------
     facts : tuple of str
         Size, cells, quality, pieces, and the cost of a solve.
-    patches : tuple of PatchRow
-    loads : tuple of LoadRow
     warnings : tuple of str
         Things that may be unintended, each with its cure.
     fibre : tuple of Layer

@@ -160,7 +160,6 @@ def breaking_picture(broken: Mapping[str, BreakingLoad], colours: Mapping[str, s
 
     Parameters
     ----------
-    broken : mapping of name to BreakingLoad
     colours : mapping of name to colour
         Of all names but the part without fibre, which is drawn in ink.
     """

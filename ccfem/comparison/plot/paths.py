@@ -249,7 +249,6 @@ def layer_pictures(
     ----------
     layer, stress, width, limit
         As in `layer_picture`.
-    paths : mapping of strategy name to Toolpaths
     captions, colours : mappings of strategy name to str
         Lines with key numbers, and marks.
     """
@@ -288,7 +287,6 @@ def compare_layer(
     ----------
     layer, stress, width, limit
         As in `layer_picture`.
-    paths : mapping of strategy name to Toolpaths
     captions : mapping of strategy name to str, optional
         Lines with key numbers.
     """

@@ -120,7 +120,6 @@ def spreads(
     ----------
     runs : sequence of Run
         That did not fail.
-    colours : mapping of run name to colour
     radius : float, mm
         Tightest that the machine allows; 0 for none.
     """

@@ -300,7 +300,6 @@ def breaking_views(broken: Mapping[str, BreakingLoad], centres: FloatArray) -> l
 
     Parameters
     ----------
-    broken : mapping of name to BreakingLoad
     centres : (m, 3) array, mm
         Of the cells of the part.
 

@@ -180,7 +180,6 @@ def layer_views(stacks: Mapping[str, Comparison], colours: Mapping[str, str]) ->
     ----------
     stacks : mapping of name to Comparison
         Of each slicing; of one alone, its name is empty.
-    colours : mapping of strategy name to colour
 
     Returns
     -------

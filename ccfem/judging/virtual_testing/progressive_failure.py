@@ -505,7 +505,6 @@ class BreakingLoad:
 
     Attributes
     ----------
-    curve : BreakingCurve
     low, high : BreakingCurve, optional
         With weaker strands in a matrix that softens faster, and the other way round. They end
         sooner after their highest load.

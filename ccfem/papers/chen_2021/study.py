@@ -231,7 +231,6 @@ def run_study(
     ----------
     element_size : float, mm, optional
         Of all parts, which then are ccfem's own; for a quick look, without `lifting_eye`.
-    layers : int, default 12
     step : float, mm, default 1
         Of the large displacement.
     """

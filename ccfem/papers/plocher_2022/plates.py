@@ -86,10 +86,6 @@ class Plate:
 
         The section is extruded and sliced; the stress is that of `isotropic_field`, carried from
         the pixels to the nodes, so that a plate is planned and evaluated as any other part.
-
-        Parameters
-        ----------
-        layers : int, default 2
         """
         mesh = self._with_patches(extrude(self.polygon, _THICKNESS, _EDGE * self.bead, 1))
         plane = self.isotropic_field
@@ -304,7 +300,6 @@ def three_point_bending(size: float = 0.8, volume_fraction: float = 0.6) -> Bend
     ----------
     size : float, mm, default 0.8
         Side of a pixel; the beam is 204 x 60 pixels. The published size is not known.
-    volume_fraction : float, default 0.6
     """
     problem = three_point_bending_problem(_TIMES * size)
     method = Simp(
