@@ -93,8 +93,8 @@ def bed(
     from ccfem.cli.first_run import compiling_beside
     from ccfem.cli.run import elapsed, plan_code
     from ccfem.cli.screen import print_bed
-    from ccfem.comparison.bed_files import BED_FILES, write_bed
     from ccfem.comparison.bed_print import needs_support, print_together
+    from ccfem.comparison.files import BED_FILES, write_bed
 
     where = out or Path("results") / "bed"
 

@@ -24,7 +24,6 @@ from ccfem.cli.part_commands import add_part_commands
 from ccfem.cli.run import plan_code, run
 
 if TYPE_CHECKING:
-    from ccfem.cases.case import Case
     from ccfem.comparison.request import Request
 
 # What ``ccfem support`` does: the layers below a part, summed up, and their paths as a file.
@@ -459,25 +458,47 @@ def calibrate(
     The paths of the reinforced part are planned again as they were printed: give the strategy, its
     parameters and the amount of fibre of that print.
     """
-    from ccfem.cli.fitting import fit_material
+    from ccfem.base.whole import check_writable
+    from ccfem.comparison.engine import answer
     from ccfem.comparison.request import Request, named_strategies
+    from ccfem.fem.elasticity.plausibility import about_problem
+    from ccfem.judging.virtual_testing.calibration import calibrate as fitted, read_curve
 
     parameters = parameters_by_strategy(set_ or (), strategy) if strategy is not None else {}
-
-    def ask(part: "Case") -> "Request":
-        chosen = named_strategies(part, (strategy,) if strategy is not None else (), parameters)
-        return Request.of(
+    curves = [curve.resolve() for curve in (unreinforced, reinforced) if curve is not None]
+    if out.resolve() in curves:
+        raise InputError(f"--out {out} is the curve of a test: name another file for the material")
+    check_writable(out)
+    without = read_curve(unreinforced)
+    with_fibre = None if reinforced is None else read_curve(reinforced)
+    if (reinforced is None) != (strategy is None):
+        raise InputError("--reinforced and --strategy belong together; got only one of them")
+    part, paths = given.read(), None
+    if strategy is not None:
+        request = Request.of(
             part,
-            chosen,
+            named_strategies(part, (strategy,), parameters),
             layers,
             fibre_per_layer=fibre_per_layer,
             natural=fibre_per_layer is None,
             strand=None,
             load_case=load_case,
         )
-
-    planned = None if strategy is None else ask
-    fit_material(given.read, unreinforced, reinforced, planned, load_case, out)
+        (planned,) = answer(request).runs
+        if not len(planned.toolpaths):
+            raise InputError(f"{planned.name} could not plan the part: {planned.failure}")
+        paths = planned.toolpaths
+    for line in (*part.findings, *about_problem(part.problem)):
+        print(f"warning: {line}")
+    problem = part.printed_problem()
+    calibration = fitted(problem, without, with_fibre, paths, load_case, out.stem)
+    calibration.write(out)
+    rho = "" if calibration.rho is None else f", rho {calibration.rho:.3g} mm^2"
+    print(
+        f"{out}: modulus {calibration.modulus:.4g} MPa, "
+        f"matrix strength {calibration.tensile_strength:.3g} MPa"
+        f"{rho}; use it with --calibration {out}"
+    )
 
 
 app.command()(bed)

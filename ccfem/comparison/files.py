@@ -21,6 +21,7 @@ from ccfem.base.parallel import in_processes
 from ccfem.base.progress import Progress, silent
 from ccfem.base.result_folder import whole_folder
 from ccfem.base.whole import whole_file
+from ccfem.comparison.bed_print import BedPrint
 from ccfem.comparison.headline import TEST_COLUMNS, headline_values, print_values
 from ccfem.comparison.plot.colours import palette
 from ccfem.comparison.result import Comparison
@@ -37,7 +38,6 @@ from ccfem.slicing.layers.layer import curved_layers
 if TYPE_CHECKING:
     from ccfem.comparison.pictures import Pictures
     from ccfem.comparison.report.html_report import Record
-
 
 RESULT_FILES = (
     *("results.csv", "results.json", "report.html", "paths.vtp", "curve.csv", "curve.png"),
@@ -598,3 +598,63 @@ def write_trims(path: str | Path, plan: PrintPlan) -> None:
         file.write("layer,x,y,z\n")
         for layer, x, y in plan.trims.tolist():
             file.write(f"{layer:.0f},{x:.3f},{y:.3f},{plan.top[int(layer)]:.3f}\n")
+
+
+# Files of parts that are printed together: one G-code, one table, one report.
+
+
+BED_FILES = ("bed.gcode", "bed_cell.csv", "bed_trim.csv", "bed.json", "parts.csv", "report.html")
+"""All files that parts printed together write."""
+
+
+def write_bed(bed: BedPrint, folder: Path, command: str = "", cell: bool = False) -> None:
+    """Write ``bed.gcode``, ``parts.csv``, ``bed.json`` and ``report.html``.
+
+    Parameters
+    ----------
+    folder : Path
+        An existing folder, as of `ccfem.comparison.files.write_results`.
+    command : str
+        What was typed.
+    cell : bool, default False
+        Also write the moves for a cell of robots, ``bed_cell.csv``.
+    """
+    from ccfem.comparison.report.html_report import bed_html
+
+    title = ", ".join(f"{name}, {run.strategy_name}" for name, run in bed.runs.items())
+    write_printed(folder / "bed.gcode", bed, bed.machine, title, bed.doubts)
+    for write in files_of_print(folder, "bed", bed, cell):
+        write()
+    write_table(_bed_rows(bed), folder / "parts.csv")
+    about, left_out = _bed_record(bed, command), list[str]()
+    with spared("report.html", left_out):
+        page = bed_html(bed, cast("Record", about), left_out)
+        (folder / "report.html").write_text(page, encoding="utf-8")
+    text = json.dumps(about | {"left_out": left_out}, indent=1, ensure_ascii=False, allow_nan=False)
+    (folder / "bed.json").write_text(text + "\n", encoding="utf-8")
+
+
+def _bed_rows(bed: BedPrint) -> list[dict[str, Any]]:
+    """Totals of each part, with its share of the print, as of all of its kind on the bed."""
+    shares = {part.name: part for part in bed.print_totals.parts}
+    rows = []
+    for name, comparison in bed.comparisons.items():
+        share = dataclasses.asdict(shares[name])
+        printed = {f"print_{key}": value for key, value in share.items() if key != "name"}
+        rows.append({"part": name, **printed, **results_rows(comparison)[-1]})
+    return rows
+
+
+def _bed_record(bed: BedPrint, command: str) -> dict[str, Any]:
+    """Say what it takes to judge and repeat a print, ready for JSON."""
+    about = {
+        "ccfem": version("ccfem"),
+        "command": command,
+        "made": datetime.now(UTC).isoformat(timespec="seconds"),
+        "versions": versions(),
+        "machine": dataclasses.asdict(bed.machine),
+        "standing": [dataclasses.asdict(spot) for spot in bed.print_plan.standing],
+        "print": print_record(bed),
+        "parts": {name: run_record(run) for name, run in bed.runs.items()},
+    }
+    return cast("dict[str, Any]", plain_record(about))
