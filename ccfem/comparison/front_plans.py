@@ -21,10 +21,10 @@ from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.stages import Tests
 from ccfem.fem.elasticity.stress_field import StressField, WeightedCases
+from ccfem.judging.virtual_testing.failure_laws.matrix import matrix_peak
 from ccfem.judging.virtual_testing.several_cases import specimens
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import Strand
-from ccfem.judging.virtual_testing.strength import matrix_peak
 from ccfem.paths.planning.strategy import Strategy
 from ccfem.slicing.slicers.planar import Planar
 

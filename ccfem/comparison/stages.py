@@ -17,6 +17,7 @@ from ccfem.fem.elasticity.stress_field import PartStress, StressField, WeightedC
 from ccfem.judging.evaluation import evaluate
 from ccfem.judging.evaluation.strand_rules import StrandVerdict, strand_verdict, why_not
 from ccfem.judging.virtual_testing.anchorage import Anchorage
+from ccfem.judging.virtual_testing.failure_laws.matrix import matrix_peak
 from ccfem.judging.virtual_testing.pinned_joints import pinned_joints, pins_not_judged
 from ccfem.judging.virtual_testing.progressive_failure import breaking_load
 from ccfem.judging.virtual_testing.scatter import DEFAULT_SCATTER, Scatter, ratio_scatter
@@ -24,7 +25,7 @@ from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.stiffness_test import virtual_bracket
 from ccfem.judging.virtual_testing.strand import Limits, Strand
 from ccfem.judging.virtual_testing.strands import Strands, carrying_strands
-from ccfem.judging.virtual_testing.strength import first_failure, matrix_peak
+from ccfem.judging.virtual_testing.strength import first_failure
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.alike import alike_layers
 from ccfem.paths.planning.equal_fibre import (

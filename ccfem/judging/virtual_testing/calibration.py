@@ -23,11 +23,11 @@ from ccfem.base.whole import existing_file, text_of, whole_file
 from ccfem.fem.elasticity import Problem, StressField, solve
 from ccfem.fem.materials import Material, isotropic
 from ccfem.judging.virtual_testing.equilibrium import TENSION
+from ccfem.judging.virtual_testing.failure_laws.matrix import matrix_peak
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.judging.virtual_testing.strands import cut_strands
-from ccfem.judging.virtual_testing.strength import matrix_peak
 from ccfem.paths.toolpaths import Toolpaths
 
 # Force-displacement curves of physical tests.

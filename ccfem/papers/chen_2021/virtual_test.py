@@ -20,6 +20,7 @@ from ccfem.fem.elasticity import Problem, StressField, solve
 from ccfem.fem.elasticity.problem import Bearing
 from ccfem.fem.materials import Material, named_material
 from ccfem.judging.virtual_testing.equilibrium import bar_stiffness
+from ccfem.judging.virtual_testing.failure_laws.matrix import matrix_peak
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.stiffness_test import (
     FIRST,
@@ -31,7 +32,7 @@ from ccfem.judging.virtual_testing.stiffness_test import (
 )
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.judging.virtual_testing.strands import Strands, cut_strands
-from ccfem.judging.virtual_testing.strength import first_failure, matrix_peak
+from ccfem.judging.virtual_testing.strength import first_failure
 from ccfem.papers.chen_2021.authors import PATHS
 from ccfem.papers.chen_2021.loop import LAYERS_TABLE_2, authors_folder, authors_loop
 from ccfem.paths.toolpaths import Toolpaths

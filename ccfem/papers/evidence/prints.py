@@ -29,10 +29,11 @@ from ccfem.fem.elasticity import StressField, solve
 from ccfem.fem.elasticity.problem import Force, Problem, Support
 from ccfem.fem.materials import isotropic
 from ccfem.judging.virtual_testing.equilibrium import IN_COMPRESSION, PARTIAL
+from ccfem.judging.virtual_testing.failure_laws.fibre import fibre_peak
+from ccfem.judging.virtual_testing.failure_laws.matrix import matrix_peak
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strands import cut_strands
-from ccfem.judging.virtual_testing.strength import fibre_peak, matrix_peak
 from ccfem.machine import Machine
 from ccfem.papers.chen_2021.authors import PATHS
 from ccfem.papers.chen_2021.loop import FOLDER as CHEN, LAYERS_TABLE_2, authors_folder, authors_loop
