@@ -1,10 +1,10 @@
 """The command line, called in the test's own process."""
 
-import sys
+from functools import partial
 
 import pytest
+from command_line import run_command
 
-from ccfem.cli.main import main
 from ccfem.comparison import effort
 
 
@@ -21,12 +21,4 @@ def ccfem(monkeypatch, capsys, tmp_path, pace):
     """Call the command line in a folder of its own: exit code, stdout, stderr."""
     monkeypatch.setattr(effort, "pace", lambda: pace)
 
-    def call(*arguments):
-        monkeypatch.chdir(tmp_path)
-        monkeypatch.setattr(sys, "argv", ["ccfem", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        said = capsys.readouterr()
-        return ended.value.code, said.out, said.err
-
-    return call
+    return partial(run_command, monkeypatch, capsys, tmp_path)

@@ -11,6 +11,7 @@ from typing import get_type_hints
 import numpy as np
 import pytest
 import pyvista
+from command_line import run_command, without_progress
 
 from ccfem import __version__
 from ccfem.base.errors import InputError
@@ -19,7 +20,6 @@ from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.box import box_mesh
 from ccfem.body.meshing import cad
 from ccfem.cli.arguments import parameters_by_strategy
-from ccfem.cli.main import main
 from ccfem.comparison.plot.part_views import draw_part
 from ccfem.printing.export.waypoints import read_waypoints
 from ccfem.strategies import named
@@ -91,14 +91,8 @@ def ccfem(monkeypatch, capsys, folder):
     """Call the command line in the folder: exit code, lines of stdout, lines of stderr."""
 
     def call(*arguments):
-        monkeypatch.chdir(folder)
-        monkeypatch.setattr(sys, "argv", ["ccfem", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        said = capsys.readouterr()
-        steps = re.compile(r"ccfem: \d+ s, \d+ %.*: .*")  # progress without a terminal
-        lines = [line for line in said.err.splitlines(True) if not steps.match(line)]
-        return ended.value.code, said.out, "".join(lines)
+        code, out, err = run_command(monkeypatch, capsys, folder, *arguments)
+        return code, out, without_progress(err)
 
     return call
 

@@ -1,16 +1,14 @@
 """``ccfem optimise``: from a part file to the part file of what is left."""
 
-import sys
-
 import numpy as np
 import pytest
 import shapely
+from command_line import run_command
 
 from ccfem.base.errors import InputError
 from ccfem.body.files import write_mesh
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cases.part_file import read_part
-from ccfem.cli.main import main
 from ccfem.fem.topopt.flat_part import flat_part
 
 _PART = """
@@ -44,12 +42,7 @@ def plate(monkeypatch, capsys, tmp_path):
     def call(*arguments, vector="[60.0, 0.0, 0.0]", more=""):
         write_mesh(box_mesh((40.0, 16.0, 2.0), (10, 4, 1)), tmp_path / "plate.npz")
         (tmp_path / "plate.toml").write_text(_PART.format(vector=vector, more=more))
-        monkeypatch.chdir(tmp_path)
-        monkeypatch.setattr(sys, "argv", ["ccfem", "optimise", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        said = capsys.readouterr()
-        return ended.value.code, said.out, said.err
+        return run_command(monkeypatch, capsys, tmp_path, "optimise", *arguments)
 
     return call
 

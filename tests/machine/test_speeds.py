@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import strip_part
 
 from ccfem.base.errors import InputError
 from ccfem.base.toml import from_table
@@ -185,29 +186,7 @@ def test_tables_that_make_no_sense(given, message):
         SpeedTable(**given)
 
 
-PART = """
-material = "pla"
-[planform]
-outline = [[0, 0], [60, 0], [60, 20], [0, 20]]
-height = 4.0
-edge_length = 5.0
-[patches.foot]
-rule = "plane"
-normal = "x"
-offset = "min"
-[patches.tip]
-rule = "plane"
-normal = "x"
-offset = "max"
-[[supports]]
-patch = "foot"
-[[loads.pull]]
-kind = "force"
-patch = "tip"
-vector = [10, 0, 0]
-[machine]
-cutter_distance = 30.0
-"""
+PART = f"{strip_part.PART}[machine]\ncutter_distance = 30.0\n"
 
 
 def test_a_part_file_sets_the_table(tmp_path):

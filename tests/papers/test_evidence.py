@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 import pytest
+from flat_paths import flat_paths
 
 from ccfem.body.mesh.box import box_mesh
 from ccfem.cli.commands import reproduce
@@ -49,7 +50,6 @@ from ccfem.papers.evidence.rows import (
     strand_strength,
     summary,
 )
-from ccfem.paths.toolpaths import Toolpaths
 
 
 def row_of(part, specimen, over, kind):
@@ -284,10 +284,7 @@ def test_the_command_prints_the_table_in_short(tmp_path, monkeypatch, capsys):
 def test_strands_along_a_block_lend_what_they_carry_in_compression():
     """What the cuboid of figure 2 rests on, to what the cells of a small block spread."""
     lines = [[[0.0, y, z], [8.0, y, z]] for y in (0.5, 1.5, 2.5) for z in (0.5, 1.5)]
-    points = np.array(lines).reshape(-1, 3)
-    none = np.zeros(6, dtype=int)
-    up = np.broadcast_to([0.0, 0.0, 1.0], points.shape)
-    strands = Toolpaths(points, up, 2 * np.arange(7), none, none, none.astype(bool))
+    strands = flat_paths(lines)
     ratios = {}
     for sign in (1.0, -1.0):
         problem = Problem(

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from flat_paths import flat_paths
 
 from ccfem.base.errors import InputError
 from ccfem.base.tensor import rotate_stiffness, to_voigt
@@ -16,7 +17,6 @@ from ccfem.papers.chen_2021.virtual_test import (
     oriented_ratio,
     oriented_stiffness,
 )
-from ccfem.paths.toolpaths import Toolpaths
 
 CARBON = transversely_isotropic(73200.0, 4100.0, 0.33, 2200.0)
 PLA = isotropic(3000.0, 0.35)
@@ -65,12 +65,7 @@ def pulled():
     supports = (Support("x_min", "x"), Support("y_min", "y"), Support("z_min", "z"))
     problem = Problem(mesh, PLA, supports, {"pull": (Force("x_max", (100.0, 0.0, 0.0)),)})
     at = np.arange(0.1, 2.0, 0.2)
-    lines = np.array([[[0.0, y, z], [8.0, y, z]] for y in at for z in at])
-    none = np.zeros(len(lines), dtype=int)
-    points = lines.reshape(-1, 3)
-    normals = np.broadcast_to([0.0, 0.0, 1.0], points.shape)
-    offsets = np.arange(len(lines) + 1) * 2
-    paths = Toolpaths(points, normals, offsets, none, none, none.astype(bool))
+    paths = flat_paths([[[0.0, y, z], [8.0, y, z]] for y in at for z in at])
     return problem, cut_strands(paths, mesh)
 
 

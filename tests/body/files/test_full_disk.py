@@ -8,6 +8,7 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from flat_paths import flat_paths
 
 from ccfem.base.errors import InputError
 from ccfem.body.files import read_surface, write_mesh
@@ -16,7 +17,6 @@ from ccfem.body.mesh import box_mesh
 from ccfem.comparison.plot.canvas import new_figure, save
 from ccfem.fem.elasticity import Force, Problem, Support, solve
 from ccfem.fem.materials import isotropic
-from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.printing.export.vtk import write_paths, write_result
 
 MESH = box_mesh((20.0, 10.0, 5.0), (16, 8, 4))
@@ -40,9 +40,7 @@ def result(path):
 
 
 def paths(path):
-    points = np.random.default_rng(0).random((500, 3))
-    normals = np.broadcast_to([0.0, 0.0, 1.0], points.shape)
-    write_paths(Toolpaths(points, normals, [0, 500], [0], [FIBRE], [False]), path)
+    write_paths(flat_paths([np.random.default_rng(0).random((500, 3))]), path)
 
 
 def picture(path):

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from flat_paths import flat_paths
 from scipy.optimize import nnls
 
 from ccfem.base.errors import InputError
@@ -26,7 +27,6 @@ from ccfem.fem.topopt import Simp
 from ccfem.judging.virtual_testing.equilibrium import BONDED, TENSION, equilibrium
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strands import cut_strands
-from ccfem.paths.toolpaths import Toolpaths
 
 SIZE = (16.0, 4.0, 3.0)
 GUIDES = (Support("x_min", "x"), Support("y_min", "y"))
@@ -190,12 +190,9 @@ def test_contact_and_fibres_are_settled_together(mode):
     spring = Spring("x_max", (0.0, 0.0, 1.0))
     problem = block(1, 0.4, spring, divisions=(12, 2, 2))
     rows = [[[0.5, y, z], [15.5, y, z]] for y in (0.7, 3.1) for z in (0.3, 2.6)]
-    points = np.array(rows).reshape(-1, 3)
-    none = np.zeros(len(rows), dtype=int)
-    up = np.broadcast_to([0.0, 0.0, 1.0], points.shape)
-    paths = Toolpaths(points, up, 2 * np.arange(len(rows) + 1), none, none, none.astype(bool))
     specimen = Specimen.of(solve(problem)["case"])
-    found = equilibrium(specimen, cut_strands(paths, problem.mesh), 400.0, mode)
+    strands = cut_strands(flat_paths(rows), problem.mesh)
+    found = equilibrium(specimen, strands, 400.0, mode)
     exact = programme(found.matrix, specimen.system.held, specimen.forces)
     assert np.abs(found.displacement - exact).max() < 1e-5 * np.abs(exact).max()
     assert (found.strain[found.carried > 0.0] > 0.0).all() or mode == BONDED

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from flat_paths import flat_paths
 
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
@@ -17,7 +18,6 @@ from ccfem.judging.virtual_testing.calibration import (
     read_curve,
 )
 from ccfem.judging.virtual_testing.strand import Strand
-from ccfem.paths.toolpaths import Toolpaths
 
 LENGTH, AREA, COUNT = 12.0, 64.0, 4
 
@@ -35,11 +35,7 @@ def pulled():
 
 
 def fibres():
-    lines = np.array([[[0.0, y, z], [LENGTH, y, z]] for y in (2.5, 5.5) for z in (2.5, 5.5)])
-    none = np.zeros(len(lines), dtype=int)
-    points = lines.reshape(-1, 3)
-    normals = np.broadcast_to([0.0, 0.0, 1.0], points.shape)
-    return Toolpaths(points, normals, np.arange(5) * 2, none, none, none.astype(bool))
+    return flat_paths([[[0.0, y, z], [LENGTH, y, z]] for y in (2.5, 5.5) for z in (2.5, 5.5)])
 
 
 def curve(stiffness, peak, name="test", slack=0.2):

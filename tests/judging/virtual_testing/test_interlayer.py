@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from flat_paths import flat_paths
 
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
@@ -14,7 +15,6 @@ from ccfem.judging.virtual_testing.failure_laws.interlayer import interlayer, la
 from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.judging.virtual_testing.strength import first_failure
-from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.slicers import Planar
 
 SIGMA = 5.0
@@ -53,10 +53,7 @@ def tilted(mesh, angle):
 
 def with_fibre(field):
     """Tested with fibre so thin that it does nothing."""
-    point = np.array([[1.0, 2.0, 2.0], [19.0, 2.0, 2.0]])
-    none = np.zeros(1, dtype=int)
-    up = np.broadcast_to([0.0, 0.0, 1.0], point.shape)
-    paths = Toolpaths(point, up, np.array([0, 2]), none, none, none.astype(bool))
+    paths = flat_paths([[[1.0, 2.0, 2.0], [19.0, 2.0, 2.0]]])
     return virtual_test(paths, field, Strand(rho=1e-9), span=())
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
+from flat_paths import flat_paths
 
 from ccfem.body.mesh.box import box_mesh
 from ccfem.body.mesh.patches import Box, Cylinder, Plane, patches_from_rules
@@ -188,10 +189,7 @@ def test_a_remark_on_the_part_without_fibre_names_the_weakest_pin():
 
 def fibre(*lines):
     """Straight strands in the middle of the height, from and to places of the plane."""
-    points = np.array([[(*end, THICKNESS / 2) for end in line] for line in lines]).reshape(-1, 3)
-    none = np.zeros(len(lines), dtype=int)
-    normals = np.broadcast_to([0.0, 0.0, 1.0], points.shape)
-    return Toolpaths(points, normals, 2 * np.arange(len(lines) + 1), none, none, none.astype(bool))
+    return flat_paths([[(*end, THICKNESS / 2) for end in line] for line in lines])
 
 
 @pytest.fixture(scope="module")

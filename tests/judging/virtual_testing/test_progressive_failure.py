@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from flat_paths import flat_paths
 
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
@@ -17,7 +18,6 @@ from ccfem.judging.virtual_testing.progressive_failure import (
 )
 from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strand import Strand
-from ccfem.paths.toolpaths import Toolpaths
 
 LENGTH, AREA, MODULUS = 20.0, 16.0, 2000.0
 
@@ -39,11 +39,7 @@ def bar(cells=2, matrix=30.0, weak=1.0, poisson=0.0, pull=None):
 
 
 def strands(*places):
-    points = np.array([[[0.0, *place], [LENGTH, *place]] for place in places]).reshape(-1, 3)
-    none = np.zeros(len(places), dtype=int)
-    normals = np.broadcast_to([0.0, 0.0, 1.0], points.shape)
-    offsets = 2 * np.arange(len(places) + 1)
-    return Toolpaths(points, normals, offsets, none, none, none.astype(bool))
+    return flat_paths([[[0.0, *place], [LENGTH, *place]] for place in places])
 
 
 @pytest.mark.parametrize("cells", [2, 4])

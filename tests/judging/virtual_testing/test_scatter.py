@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from flat_paths import flat_paths
 
 from ccfem.base.errors import InputError
 from ccfem.body.mesh.box import box_mesh
@@ -16,7 +17,6 @@ from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strand import Strand
 from ccfem.judging.virtual_testing.strands import cut_strands
-from ccfem.paths.toolpaths import Toolpaths
 
 MODULUS, RHO = 2000.0, 4.0
 
@@ -36,13 +36,7 @@ def cantilever(modulus=MODULUS, bed=False, order=1):
 def strands(mesh, aside=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), factor=None):
     """Six strands along the beam, at places that may differ, and their stiffness too."""
     ys = np.linspace(1.3, 10.9, 6) + aside
-    lines = [np.array([[0.2, y, 1.7], [39.9, y, 1.7]]) for y in ys]
-    none = np.zeros(len(lines), dtype=int)
-    points = np.concatenate(lines)
-    up = np.broadcast_to([0.0, 0.0, 1.0], points.shape)
-    offsets = 2 * np.arange(len(lines) + 1)
-    paths = Toolpaths(points, up, offsets, none, none, none.astype(bool))
-    cut = cut_strands(paths, mesh)
+    cut = cut_strands(flat_paths([[[0.2, y, 1.7], [39.9, y, 1.7]] for y in ys]), mesh)
     return cut if factor is None else replace(cut, share=cut.share * factor[cut.path])
 
 

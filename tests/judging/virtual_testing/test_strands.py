@@ -5,12 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from flat_paths import flat_paths
 from hypothesis import given, settings, strategies as st
 
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import TetMesh
 from ccfem.judging.virtual_testing.strands import cut_strands
-from ccfem.paths.toolpaths import FIBRE, MATRIX, Toolpaths
+from ccfem.paths.toolpaths import MATRIX, Toolpaths
 
 
 def kuhn(shape=(3, 2, 2), size=(3.0, 2.0, 2.0), jitter=0.0):
@@ -30,20 +31,6 @@ def kuhn(shape=(3, 2, 2), size=(3.0, 2.0, 2.0), jitter=0.0):
     inner = np.all((points > 1e-9) & (points < np.array(size) - 1e-9), axis=1)
     move = np.random.default_rng(3).uniform(-jitter, jitter, points.shape)
     return TetMesh(points + move * inner[:, None], np.array(cells))
-
-
-def toolpaths(*lines, kind=FIBRE):
-    """Toolpaths of (n, 3) polylines."""
-    points = np.concatenate(lines)
-    none = np.zeros(len(lines), dtype=int)
-    return Toolpaths(
-        points,
-        np.broadcast_to([0.0, 0.0, 1.0], points.shape),
-        np.concatenate([[0], np.cumsum([len(line) for line in lines])]),
-        none,
-        none + kind,
-        none.astype(bool),
-    )
 
 
 MESH = kuhn(shape=(4, 3, 3), size=(4.0, 3.0, 3.0), jitter=0.15)
@@ -72,7 +59,7 @@ def test_length_is_conserved_wherever_the_path_runs(line, tilt):
     length = np.linalg.norm(np.diff(line, axis=0), axis=1).sum()
     if length < 1e-6:
         return
-    strands = cut_strands(toolpaths(line), MESH)
+    strands = cut_strands(flat_paths([line]), MESH)
     assert strands.total == pytest.approx(length, rel=1e-9)
     assert strands.outside <= 1e-9 * length
     assert (strands.length > 0.0).all()
@@ -100,7 +87,7 @@ def test_pieces_are_those_of_clipping_each_cell():
     generator = np.random.default_rng(0)
     for _ in range(10):
         a, b = generator.uniform(0.0, 3.0, (2, 3))
-        strands = cut_strands(toolpaths(np.array([a, b])), MESH)
+        strands = cut_strands(flat_paths([np.array([a, b])]), MESH)
         found = np.bincount(strands.cell, strands.length, len(MESH.cells))
         np.testing.assert_allclose(found, clipped(MESH, a, b), atol=1e-12)
 
@@ -115,7 +102,7 @@ def test_pieces_of_long_lines_are_those_of_clipping_each_step(reach):
         ahead = np.clip(ahead, [0.1, 0.12, 0.17], [3.9, 2.92, 2.81])
         near = corners[np.linalg.norm(corners.mean(axis=1) - ahead, axis=1).argmin()]
         line.append(generator.dirichlet(3.0 * np.ones(3)) @ near if k % 2 else ahead)
-    strands = cut_strands(toolpaths(np.array(line)), MESH)
+    strands = cut_strands(flat_paths([np.array(line)]), MESH)
     found = np.bincount(strands.cell, strands.length, len(MESH.cells))
     wanted = sum(clipped(MESH, a, b) for a, b in itertools.pairwise(line))
     np.testing.assert_allclose(found, wanted, atol=1e-9)
@@ -128,7 +115,7 @@ def test_a_piece_on_a_face_is_shared_by_both_cells():
     inner = next(k for k in range(len(key)) if (key == key[k]).all(axis=1).sum() == 2)
     a, b, c = face[inner]
     middle = (a + b + c) / 3
-    strands = cut_strands(toolpaths(np.array([middle, 0.5 * (middle + a)])), MESH)
+    strands = cut_strands(flat_paths([np.array([middle, 0.5 * (middle + a)])]), MESH)
     assert len(strands) == 2
     assert strands.length[0] == pytest.approx(strands.length[1])
     owners = np.flatnonzero((key == key[inner]).all(axis=1)) // 4
@@ -138,13 +125,13 @@ def test_a_piece_on_a_face_is_shared_by_both_cells():
 def test_a_piece_on_the_boundary_is_kept_whole():
     mesh = kuhn()
     line = np.array([[0.1, 0.0, 0.3], [2.9, 0.0, 0.3], [2.9, 0.0, 1.9]])
-    assert cut_strands(toolpaths(line), mesh).total == pytest.approx(2.8 + 1.6, rel=1e-12)
+    assert cut_strands(flat_paths([line]), mesh).total == pytest.approx(2.8 + 1.6, rel=1e-12)
 
 
 def test_arc_length_path_and_tangent_follow_the_paths():
     first = np.array([[0.2, 0.3, 0.4], [3.7, 0.5, 0.6], [3.5, 2.7, 2.2]])
     second = np.array([[0.1, 2.0, 2.0], [3.0, 2.1, 0.3]])
-    strands = cut_strands(toolpaths(first, second), MESH)
+    strands = cut_strands(flat_paths([first, second]), MESH)
     assert set(strands.path) == {0, 1}
     for path, line in enumerate((first, second)):
         mine = strands.path == path
@@ -164,32 +151,32 @@ def test_arc_length_path_and_tangent_follow_the_paths():
 
 def test_the_part_outside_is_reported_and_above_one_percent_refused():
     line = np.array([[0.5, 1.0, 1.1], [3.01, 1.0, 1.1]])
-    strands = cut_strands(toolpaths(line), kuhn())
+    strands = cut_strands(flat_paths([line]), kuhn())
     assert strands.outside == pytest.approx(0.01)
     assert strands.total == pytest.approx(2.5)
     with pytest.raises(InputError, match=r"0.2 mm of 2.7 mm lie outside"):
-        cut_strands(toolpaths(np.array([[0.5, 1.0, 1.1], [3.2, 1.0, 1.1]])), kuhn())
+        cut_strands(flat_paths([np.array([[0.5, 1.0, 1.1], [3.2, 1.0, 1.1]])]), kuhn())
     with pytest.raises(InputError, match=r"1 mm of 1 mm lie outside \(100 %, .*same frame"):
-        cut_strands(toolpaths(np.array([[0.5, 1.0, 50.0], [0.5, 2.0, 50.0]])), kuhn())
+        cut_strands(flat_paths([np.array([[0.5, 1.0, 50.0], [0.5, 2.0, 50.0]])]), kuhn())
 
 
 def test_links_carry_where_they_are_in_the_mesh_and_may_leave_it():
     # 2 mm to the face, out and back over 3 mm that are links, and 1.5 mm on.
     line = np.array([[1, 0.4, 1.1], [3, 0.4, 1.1], [4, 0.4, 1.1], [4, 1.4, 1.1], [1.5, 1.4, 1.1]])
-    paths = toolpaths(line)
+    paths = flat_paths([line])
     marked = replace(paths, link=np.array([False, True, True, True, False]))
     strands = cut_strands(marked, kuhn())
     assert strands.total == pytest.approx(2.0 + 1.5)
     assert strands.outside == 0.0
     # Arc length runs on over the link, so places along the path are those of the toolpaths.
     assert strands.arc[strands.middle[:, 1] > 1.0].min() > 2.0 + 3.0
-    bare = cut_strands(toolpaths(line[:2], np.array([[3.0, 1.4, 1.1], [1.5, 1.4, 1.1]])), kuhn())
+    bare = cut_strands(flat_paths([line[:2], np.array([[3.0, 1.4, 1.1], [1.5, 1.4, 1.1]])]), kuhn())
     assert np.sort(strands.cell).tolist() == np.sort(bare.cell).tolist()
     assert np.sort(strands.length) == pytest.approx(np.sort(bare.length))
     # What is no link must stay inside.
     with pytest.raises(InputError, match=r"2 mm of 5.5 mm lie outside"):
         cut_strands(replace(paths, link=np.array([False, False, True, False, False])), kuhn())
-    beyond = toolpaths(line[2:4])
+    beyond = flat_paths([line[2:4]])
     with pytest.raises(InputError, match=r"1 mm of links outside"):
         cut_strands(replace(beyond, link=np.array([True, False])), kuhn())
 
@@ -199,7 +186,7 @@ def test_a_gap_in_the_part_is_outside():
     middle = mesh.points[mesh.corners].mean(axis=1)[:, 0]
     split = TetMesh(mesh.points, mesh.cells[(middle < 1.0) | (middle > 2.0)])
     line = np.array([[0.2, 0.4, 0.7], [2.9, 0.4, 0.7]])
-    strands = cut_strands(toolpaths(line), split, most_outside=0.5)
+    strands = cut_strands(flat_paths([line]), split, most_outside=0.5)
     assert strands.outside == pytest.approx(1.0)
 
 
@@ -211,7 +198,7 @@ def test_a_small_part_far_from_another_needs_no_large_grid():
         np.concatenate([near.cells, near.cells + len(near.points)]),
     )
     line = np.array([[0.001, 0.01, 0.011], [0.029, 0.012, 0.011]])
-    strands = cut_strands(toolpaths(line, line + 500.0), mesh)
+    strands = cut_strands(flat_paths([line, line + 500.0]), mesh)
     assert strands.total == pytest.approx(2 * np.hypot(0.028, 0.002), rel=1e-9)
 
 
@@ -219,8 +206,8 @@ def test_a_small_part_far_from_another_needs_no_large_grid():
     "paths",
     [
         Toolpaths.empty(),
-        toolpaths(np.array([[1.0, 1.0, 1.0], [2.0, 1.0, 1.0]]), kind=MATRIX),
-        toolpaths(np.array([[1.0, 1.0, 1.0], [1.0, 1.0, 1.0]])),
+        flat_paths([np.array([[1.0, 1.0, 1.0], [2.0, 1.0, 1.0]])], kind=MATRIX),
+        flat_paths([np.array([[1.0, 1.0, 1.0], [1.0, 1.0, 1.0]])]),
     ],
 )
 def test_no_fibre_is_refused(paths):

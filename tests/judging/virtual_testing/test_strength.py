@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from flat_paths import flat_paths
 
 from ccfem.base.errors import InputError
 from ccfem.base.tensor import von_mises
@@ -18,7 +19,6 @@ from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strand import Failure, Strand
 from ccfem.judging.virtual_testing.strands import Strands, Windows
 from ccfem.judging.virtual_testing.strength import fibre_peak, first_failure, matrix_peak
-from ccfem.paths.toolpaths import Toolpaths
 
 SIZE = (20.0, 4.0, 4.0)
 
@@ -38,20 +38,7 @@ def clamped(load, strength=30.0):
     return dataclasses.replace(problem(load, strength), supports=(Support("x_min"),))
 
 
-def fibres(*lines):
-    points = np.concatenate(lines).astype(float)
-    none = np.zeros(len(lines), dtype=int)
-    return Toolpaths(
-        points,
-        np.broadcast_to([0.0, 0.0, 1.0], points.shape),
-        np.arange(len(lines) + 1) * 2,
-        none,
-        none,
-        none.astype(bool),
-    )
-
-
-LINES = fibres(*[np.array([[1.0, y, z], [19.0, y, z]]) for y in (1.0, 3.0) for z in (1.0, 3.0)])
+LINES = flat_paths([np.array([[1.0, y, z], [19.0, y, z]]) for y in (1.0, 3.0) for z in (1.0, 3.0)])
 BEND = (Force("x_max", (0.0, 0.0, 10.0)),)
 
 
@@ -147,7 +134,7 @@ def test_mean_counts_the_fibre_that_carries():
 
 def test_force_of_the_fibre_depends_little_on_the_cells():
     """Beam theory: a strand at a height z carries EA M z / (E I), most where 5 mm are nearest."""
-    line = fibres(np.array([[0.5, 2.0, 0.4], [19.5, 2.0, 0.4]]))
+    line = flat_paths([np.array([[0.5, 2.0, 0.4], [19.5, 2.0, 0.4]])])
     highest = []
     for divisions in ((15, 3, 3), (30, 6, 6)):
         mesh = box_mesh(SIZE, divisions)

@@ -6,6 +6,7 @@ import pickle
 
 import numpy as np
 import pytest
+from flat_paths import flat_paths
 from hypothesis import given, settings, strategies as st
 
 from ccfem.base.errors import InputError, SolveError
@@ -41,20 +42,6 @@ from ccfem.paths.toolpaths import Toolpaths
 
 SIZE = (8.0, 3.0, 2.0)
 MODULUS = 2000.0
-
-
-def toolpaths(*lines):
-    """Toolpaths of (n, 3) polylines."""
-    points = np.concatenate(lines).astype(float)
-    none = np.zeros(len(lines), dtype=int)
-    return Toolpaths(
-        points,
-        np.broadcast_to([0.0, 0.0, 1.0], points.shape),
-        np.concatenate([[0], np.cumsum([len(line) for line in lines])]),
-        none,
-        none,
-        none.astype(bool),
-    )
 
 
 def bar(load, poisson=0.0, divisions=(4, 3, 2)):
@@ -106,7 +93,7 @@ def test_bar_with_straight_fibres_is_a_rod_in_a_matrix(mode, order):
     if order == 2:
         problem = dataclasses.replace(problem, mesh=problem.mesh.quadratic())
     strand = Strand(rho=900.0 / MODULUS)
-    test = virtual_test(toolpaths(*grid_lines()), solve(problem)["load"], strand, mode)
+    test = virtual_test(flat_paths(grid_lines()), solve(problem)["load"], strand, mode)
     area = SIZE[1] * SIZE[2]
     matrix, fibre = MODULUS * area / SIZE[0], 6 * 900.0 / SIZE[0]
     assert test.unreinforced_stiffness == pytest.approx(matrix, rel=1e-10)
@@ -125,12 +112,12 @@ def test_combination_is_tested_as_a_load_case():
         loads={"pull": aside, "move": (Displacement("x_max", (0.005, 0.0, 0.0)),)},
         combinations={"both": {"move": 2.0}},
     )
-    test = virtual_test(toolpaths(*grid_lines()), solve(problem)["both"], Strand(900.0 / MODULUS))
+    test = virtual_test(flat_paths(grid_lines()), solve(problem)["both"], Strand(900.0 / MODULUS))
     matrix, fibre = MODULUS * SIZE[1] * SIZE[2] / SIZE[0], 6 * 900.0 / SIZE[0]
     assert test.unreinforced_stiffness == pytest.approx(matrix, rel=1e-10)
     assert test.stiffness == pytest.approx(matrix + fibre, rel=1e-10)
     free = dataclasses.replace(bar(half), combinations={"twice": {"load": 2.0}})
-    test = virtual_test(toolpaths(*grid_lines()), solve(free)["twice"], Strand(900.0 / MODULUS))
+    test = virtual_test(flat_paths(grid_lines()), solve(free)["twice"], Strand(900.0 / MODULUS))
     assert test.force == pytest.approx(300.0)
     assert test.unreinforced_stiffness == pytest.approx(matrix, rel=1e-10)
 
@@ -147,7 +134,7 @@ def test_bar_pulled_by_forces_is_a_rod_in_a_matrix_free_to_narrow(mode):
     )
     lines = [np.array([[0.0, y, z], [SIZE[0], y, z]]) for y, z in ends]
     field = solve(bar(loads, poisson=0.3))["load"]
-    test = virtual_test(toolpaths(*lines), field, Strand(rho=axial / MODULUS), mode)
+    test = virtual_test(flat_paths(lines), field, Strand(rho=axial / MODULUS), mode)
     force = pull + 3 * axial * strain
     assert test.force == pytest.approx(force, rel=1e-10)
     assert test.stiffness == pytest.approx(force / (strain * SIZE[0]), rel=1e-10)
@@ -165,7 +152,7 @@ def test_energy_balances(mode, order):
     if order == 2:
         problem = dataclasses.replace(problem, mesh=problem.mesh.quadratic())
     before = solve(problem)["load"]
-    test = virtual_test(toolpaths(*random_lines()), before, mode=mode)
+    test = virtual_test(flat_paths(random_lines()), before, mode=mode)
     specimen = Specimen.of(before)
     u = test.solution.displacement
     work = 0.5 * np.vdot(specimen.forces, u)
@@ -195,8 +182,8 @@ def test_order_direction_and_subdivision_do_not_count(random, mode):
         else changed
     )
     specimen = Specimen.of(solve(clamped())["load"])
-    one = virtual_test(toolpaths(*lines), specimen, mode=mode, span=())
-    two = virtual_test(toolpaths(*changed), specimen, mode=mode, span=())
+    one = virtual_test(flat_paths(lines), specimen, mode=mode, span=())
+    two = virtual_test(flat_paths(changed), specimen, mode=mode, span=())
     assert two.stiffness == pytest.approx(one.stiffness, rel=1e-9)
     assert two.fibre_energy == pytest.approx(one.fibre_energy, rel=1e-7)
     assert one.ratio > 1.05
@@ -204,7 +191,7 @@ def test_order_direction_and_subdivision_do_not_count(random, mode):
 
 def test_fibres_in_compression_carry_nothing_in_tension_mode():
     squeezed = solve(stretched(length=-0.01))["load"]
-    bracket = virtual_bracket(toolpaths(*grid_lines()), squeezed)
+    bracket = virtual_bracket(flat_paths(grid_lines()), squeezed)
     assert bracket.tension.ratio == pytest.approx(1.0, rel=1e-12)
     assert not bracket.tension.axial_force.any()
     assert bracket.partial.ratio == pytest.approx(1.0 + 0.2 * 6 * 4.0 / 6.0, rel=1e-10)
@@ -213,13 +200,13 @@ def test_fibres_in_compression_carry_nothing_in_tension_mode():
     )
     assert bracket.bonded.ratio == pytest.approx(1.0 + 6 * 4.0 / 6.0, rel=1e-10)
     assert (bracket.bonded.axial_force < 0.0).all()
-    pushed = virtual_test(toolpaths(*grid_lines()), solve(bar(PUSH, 0.3))["load"])
+    pushed = virtual_test(flat_paths(grid_lines()), solve(bar(PUSH, 0.3))["load"])
     assert pushed.ratio == pytest.approx(1.0, rel=1e-9)
 
 
 def test_tension_only_minimises_the_energy():
     specimen = Specimen.of(solve(clamped())["load"])
-    strands = cut_strands(toolpaths(*random_lines(20)), specimen.unreinforced.mesh)
+    strands = cut_strands(flat_paths(random_lines(20)), specimen.unreinforced.mesh)
     found = equilibrium(specimen, strands, 4.0 * MODULUS, TENSION)
     assert found.carried.any()
     assert not found.carried.all()
@@ -242,7 +229,7 @@ def test_tension_only_minimises_the_energy():
 
 
 def test_tension_only_is_homogeneous_and_between_none_and_bonded():
-    lines = toolpaths(*random_lines(20))
+    lines = flat_paths(random_lines(20))
     field = solve(clamped())["load"]
     bracket = virtual_bracket(lines, field)
     assert 1.0 < bracket.tension.ratio < bracket.bonded.ratio
@@ -255,7 +242,7 @@ def test_tension_only_is_homogeneous_and_between_none_and_bonded():
 
 
 def test_ratio_depends_on_rho_alone_and_grows_with_it():
-    lines = toolpaths(*random_lines())
+    lines = flat_paths(random_lines())
     soft, stiff = clamped(), dataclasses.replace(clamped(), material=isotropic(5 * MODULUS, 0.3))
     one = virtual_test(lines, solve(soft)["load"], Strand(rho=3.0), span=(2.0, 3.0, 6.0))
     two = virtual_test(lines, solve(stiff)["load"], Strand(rho=3.0), span=())
@@ -268,7 +255,7 @@ def test_ratio_depends_on_rho_alone_and_grows_with_it():
 
 def test_the_solver_does_not_count():
     field = solve(clamped())["load"]
-    lines = toolpaths(*random_lines())
+    lines = flat_paths(random_lines())
     direct = virtual_test(lines, Specimen.of(field, "superlu"), span=())
     iterative = virtual_test(lines, Specimen.of(field, "amg"), span=())
     assert iterative.stiffness == pytest.approx(direct.stiffness, rel=1e-7)
@@ -280,7 +267,7 @@ def test_on_quadratic_cells_the_energy_of_the_error_bounds_that_of_the_stiffness
     """Held against a factorisation of the part, and solves to rounding."""
     mesh = box_mesh(SIZE, (12, 4, 3)).quadratic()
     part = solve(dataclasses.replace(clamped(), mesh=mesh), "two-level")["load"]
-    strands = cut_strands(toolpaths(*random_lines()), mesh)
+    strands = cut_strands(flat_paths(random_lines()), mesh)
     exact = virtual_bracket(strands, Specimen.of(part, "superlu"), span=(), tolerance=1e-10)
     near = virtual_bracket(strands, part, span=(), energy=1e-3)
     full = virtual_bracket(strands, part, span=())
@@ -296,7 +283,7 @@ def test_rough_steps_settle_on_the_fibres_that_carry():
     problem = dataclasses.replace(clamped((Force("x_max", (0.0, 0.0, 1.0)),)), mesh=mesh)
     part = solve(problem, "two-level")["load"]
     places = np.random.default_rng(3).uniform(0.03, 0.97, (120, 2)) * (4.0, 1.0)
-    lines = toolpaths(*(np.array([[0.0, *place], [60.0, *place]]) for place in places))
+    lines = flat_paths(np.array([[0.0, *place], [60.0, *place]]) for place in places)
     strands, stiff = cut_strands(lines, mesh), Strand(rho=100.0)
     exact = virtual_test(strands, Specimen.of(part, "superlu"), stiff, span=())
     rough = virtual_test(strands, part, stiff, span=(), energy=1e-3)
@@ -307,7 +294,7 @@ def test_a_rough_solution_is_taken_only_if_its_reactions_balance_the_loads():
     """The resultant of the reactions is that of the load, within what is allowed: 1e-4."""
     mesh = box_mesh(SIZE, (12, 4, 3)).quadratic()
     part = solve(dataclasses.replace(clamped(), mesh=mesh), "two-level")["load"]
-    strands = cut_strands(toolpaths(*random_lines()), mesh)
+    strands = cut_strands(flat_paths(random_lines()), mesh)
     test = virtual_test(strands, part, span=(), energy=0.5)
     assert test.solution.record.residual > 1e-8
     np.testing.assert_allclose(test.solution.reactions.sum(axis=0), [0.0, 0.0, -20.0], atol=2e-3)
@@ -315,7 +302,7 @@ def test_a_rough_solution_is_taken_only_if_its_reactions_balance_the_loads():
 
 def test_the_load_need_not_be_the_one_that_paths_were_planned_for():
     problem = dataclasses.replace(clamped(), loads={"bend": BEND, "pull": PULL})
-    lines, both = toolpaths(*random_lines()), solve(problem)
+    lines, both = flat_paths(random_lines()), solve(problem)
     alone = virtual_test(lines, solve(clamped(PULL))["load"], span=())
     assert virtual_test(lines, both["pull"], span=()).stiffness == pytest.approx(
         alone.stiffness, rel=1e-8
@@ -325,13 +312,13 @@ def test_the_load_need_not_be_the_one_that_paths_were_planned_for():
 
 def test_neither_is_stiffer_where_the_tests_disagree():
     field = solve(clamped())["load"]
-    low = toolpaths(np.array([[0, 1.5, 0.1], [8, 1.5, 0.1]]))
-    high = toolpaths(*[np.array([[0, y, 1.9], [8, y, 1.9]]) for y in np.linspace(0.2, 2.8, 9)])
+    low = flat_paths([np.array([[0, 1.5, 0.1], [8, 1.5, 0.1]])])
+    high = flat_paths([np.array([[0, y, 1.9], [8, y, 1.9]]) for y in np.linspace(0.2, 2.8, 9)])
     below, above = (virtual_bracket(lines, field, span=()) for lines in (low, high))
     assert below.tension.ratio > above.tension.ratio
     assert below.partial.ratio < above.partial.ratio
     assert stiffer(below, above) == UNDECIDED
-    more = virtual_bracket(toolpaths(*low, *high), field)
+    more = virtual_bracket(flat_paths([*low, *high]), field)
     assert stiffer(more, below) == FIRST
     assert stiffer(below, more) == SECOND
     assert stiffer(below, below) == SAME
@@ -362,7 +349,7 @@ def test_impossible_strands_are_refused(values, message):
 
 def test_bad_input_is_refused():
     field = solve(clamped())["load"]
-    lines = toolpaths(*random_lines(2))
+    lines = flat_paths(random_lines(2))
     with pytest.raises(InputError, match="needs fibre"):
         virtual_test(Toolpaths.empty(), field)
     with pytest.raises(InputError, match="lie outside"):
@@ -399,7 +386,7 @@ WIDE = Machine(fibre_width=1.0, fibre_height=0.1, filament_area=0.05)
 def test_fibre_beyond_the_room_counts_nothing(lines, room, mode):
     """A bar stretched evenly: each strand that has room adds EA / L, by the rule of mixtures."""
     paths = [np.array([[0.0, y, z], [SIZE[0], y, z]]) for y, z in lines]
-    laid = dataclasses.replace(toolpaths(*paths), layer=np.array([int(100 * z) for _, z in lines]))
+    laid = dataclasses.replace(flat_paths(paths), layer=np.array([int(100 * z) for _, z in lines]))
     field = solve(stretched())["load"]
     area = SIZE[1] * SIZE[2]
     with_room = virtual_test(laid, field, Strand(rho=2.0), mode, span=(), machine=WIDE)
@@ -420,14 +407,14 @@ def test_strands_across_each_other_count_as_laid():
     lines = [np.array([[0.0, 1.5, 1.0], [8.0, 1.5, 1.0]])]
     lines += [np.array([[x, 0.0, 1.0], [x, 3.0, 1.0]]) for x in (2.0, 4.0, 6.0)]
     field = solve(clamped(PULL))["load"]
-    strands = cut_strands(toolpaths(*lines), field.mesh, machine=WIDE)
+    strands = cut_strands(flat_paths(lines), field.mesh, machine=WIDE)
     np.testing.assert_array_equal(strands.share, 1.0)
 
 
 def test_a_set_that_does_not_settle_is_an_error(monkeypatch):
     monkeypatch.setattr(equilibrium_module, "_UPDATES", 1)
     with pytest.raises(SolveError, match=r"relative residual .* after 1 updates"):
-        virtual_test(toolpaths(*random_lines()), solve(clamped())["load"], mode=BONDED)
+        virtual_test(flat_paths(random_lines()), solve(clamped())["load"], mode=BONDED)
 
 
 def test_a_test_takes_over_the_equations_of_the_solve():
@@ -441,7 +428,7 @@ def test_a_test_takes_over_the_equations_of_the_solve():
     assert field.record.backend == "two-level"
     assert taken.solver is solver
     np.testing.assert_array_equal(taken.matrix.data, made.assemble().data)
-    strands = toolpaths(np.array([[1.0, 3.0, 3.0], [23.0, 9.0, 3.0]]))
+    strands = flat_paths([np.array([[1.0, 3.0, 3.0], [23.0, 9.0, 3.0]])])
     ratios = [virtual_test(strands, kind, mode=BONDED).ratio for kind in (plain, field)]
     assert ratios[0] == pytest.approx(ratios[1], rel=1e-9)
     assert "equations" not in vars(field)
@@ -449,7 +436,7 @@ def test_a_test_takes_over_the_equations_of_the_solve():
 
 def test_strands_on_two_meshes_in_turn():
     field = solve(clamped())["load"]
-    strands = cut_strands(toolpaths(*random_lines()), field.mesh)
+    strands = cut_strands(flat_paths(random_lines()), field.mesh)
     finer = dataclasses.replace(field.mesh, points=2.0 * field.mesh.points)
     slopes = [bars(strands, mesh).slope.copy() for mesh in (field.mesh, finer, field.mesh)]
     np.testing.assert_allclose(slopes[1], 0.5 * slopes[0], rtol=1e-12)

@@ -2,17 +2,13 @@
 
 import numpy as np
 import pytest
+from flat_paths import flat_paths
 
 from ccfem.paths.planning.equal_fibre import cut_to_length
-from ccfem.paths.toolpaths import Toolpaths
 
 
 def lines(*lengths):
-    points = np.concatenate([[[0.0, k, 0.0], [size, k, 0.0]] for k, size in enumerate(lengths)])
-    count = len(lengths)
-    none = np.zeros(count, dtype=int)
-    flat = np.broadcast_to([0.0, 0.0, 1.0], points.shape)
-    return Toolpaths(points, flat, 2 * np.arange(count + 1), none, none, none.astype(bool))
+    return flat_paths([[[0.0, k, 0.0], [size, k, 0.0]] for k, size in enumerate(lengths)])
 
 
 @pytest.mark.parametrize(
@@ -47,9 +43,7 @@ def test_a_ring_is_opened_and_keeps_its_way():
     angle = np.linspace(0.0, 2.0 * np.pi, 401)
     ring = 20.0 * np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
     ring[-1] = ring[0]
-    flat = np.broadcast_to([0.0, 0.0, 1.0], ring.shape)
-    none = np.zeros(1, dtype=int)
-    paths = Toolpaths(ring, flat, np.array([0, 401]), none, none, np.array([True]))
+    paths = flat_paths([ring], closed=True)
     found = cut_to_length(paths, 100.0, 42.0)
     assert found.lengths == pytest.approx([100.0])
     assert not found.closed.any()
@@ -64,11 +58,7 @@ def test_a_ring_is_opened_and_keeps_its_way():
 def test_no_path_ends_in_a_link(length, left):
     """One strand of 100 mm, of which a link takes the way from 60 to 80 mm."""
     points = np.array([[x, 0.0, 0.0] for x in (0.0, 30.0, 60.0, 70.0, 80.0, 100.0)])
-    none = np.zeros(1, dtype=int)
-    link = np.array([False, False, True, True, False, False])
-    flat = np.broadcast_to([0.0, 0.0, 1.0], points.shape)
-    offsets = np.array([0, len(points)])
-    paths = Toolpaths(points, flat, offsets, none, none, none.astype(bool), link)
+    paths = flat_paths([points], link=np.array([False, False, True, True, False, False]))
     found = cut_to_length(paths, length, 42.0)
     assert found.lengths == pytest.approx([left])
     assert not found.link[-1]

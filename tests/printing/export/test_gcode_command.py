@@ -2,12 +2,11 @@
 
 import json
 import re
-import sys
 
 import numpy as np
 import pytest
+from command_line import run_command, without_progress
 
-from ccfem.cli.main import main
 from ccfem.printing.export.waypoints import read_waypoints
 
 PART = """
@@ -43,16 +42,10 @@ def ccfem(monkeypatch, capsys, tmp_path):
     """Call the command line in a folder of its own: exit code, stderr, files in results."""
 
     def call(part, *arguments):
-        monkeypatch.chdir(tmp_path)
         (tmp_path / "part.toml").write_text(part)
         words = ["plan", "part.toml", "--strategy", "zigzag", "--no-virtual-test", *arguments]
-        monkeypatch.setattr(sys, "argv", ["ccfem", *words])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        folder = tmp_path / "results" / "part-zigzag"
-        # Without the lines of progress.
-        err = re.sub(r"(?m)^ccfem: \d+ s, \d+ %.*\n", "", capsys.readouterr().err)
-        return ended.value.code, err, folder
+        code, _, err = run_command(monkeypatch, capsys, tmp_path, *words)
+        return code, without_progress(err), tmp_path / "results" / "part-zigzag"
 
     return call
 

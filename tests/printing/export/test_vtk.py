@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from flat_paths import flat_paths
 
 from ccfem.base.errors import InputError
 from ccfem.paths.toolpaths import FIBRE, MATRIX, Toolpaths
@@ -40,15 +41,7 @@ def test_pyvista_reads_the_paths_back(tmp_path):
 def test_what_repeats_is_packed(tmp_path):
     count = 20_000
     points = np.column_stack([np.arange(count) % 100, np.zeros((count, 2))]).astype(float)
-    paths = Toolpaths(
-        points=points,
-        normals=np.broadcast_to([0.0, 0.0, 1.0], points.shape),
-        offsets=[0, count],
-        layer=[0],
-        kind=[FIBRE],
-        closed=[False],
-    )
-    write_paths(paths, tmp_path / "a.vtp")
+    write_paths(flat_paths([points]), tmp_path / "a.vtp")
     np.testing.assert_array_equal(pyvista.read(tmp_path / "a.vtp").points, points)
     # Three coordinates and three of the normal, 8 bytes each.
     assert (tmp_path / "a.vtp").stat().st_size < 0.1 * 48 * count
