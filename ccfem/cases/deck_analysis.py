@@ -43,24 +43,15 @@ _SAME = 1e-9
 
 @dataclass(frozen=True)
 class DeckAnalysis:
-    """A deck as values of a part.
+    """A deck as values of a part."""
 
-    Attributes
-    ----------
-    mesh : TetMesh
-        In mm, as it stands in the deck, with patches of its sets, supports and loads.
-    supports, case_supports, loads
-        As in `ccfem.fem.elasticity.problem.Problem`; a load case a static step.
-    remarks : tuple of str
-        What was left out, with its line.
-    """
-
-    mesh: TetMesh
+    mesh: TetMesh  # in mm, as it stands in the deck, with patches of its sets, supports and loads
     materials: CellMaterials
+    # As in `ccfem.fem.elasticity.problem.Problem`; a load case a static step.
     supports: tuple[AnySupport, ...]
     case_supports: Mapping[str, tuple[AnySupport, ...]]
     loads: Mapping[str, tuple[load_kinds.Load, ...]]
-    remarks: tuple[str, ...]
+    remarks: tuple[str, ...]  # what was left out, with its line
 
     def on_cells(self, mesh: TetMesh) -> tuple[Material, tuple[Region, ...], FloatArray | None]:
         """Material, regions and axes of the cells of its mesh, mended or made quadratic."""

@@ -48,16 +48,10 @@ _SYSTEMS: dict[str, Literal["rectangular", "cylindrical"]] = {
 
 @dataclass(frozen=True)
 class LocalSystem:
-    """Axes of a *TRANSFORM: see `ccfem.fem.elasticity.support_kinds.LocalSupport`.
-
-    Attributes
-    ----------
-    points : (2, 3) array
-        In the unit of the deck.
-    """
+    """Axes of a *TRANSFORM: see `ccfem.fem.elasticity.support_kinds.LocalSupport`."""
 
     system: Literal["rectangular", "cylindrical"]
-    points: FloatArray
+    points: FloatArray  # (2, 3): in the unit of the deck
 
     def at(self, places: FloatArray) -> FloatArray:
         """Axes (k, 3, 3) as columns at places (k, 3)."""
@@ -66,23 +60,13 @@ class LocalSystem:
 
 @dataclass(frozen=True)
 class Coupling:
-    """Faces (k, 3) that hang on a reference node.
-
-    Attributes
-    ----------
-    place : (3,) array
-        Of the reference node, in the unit of the deck.
-    rigid : bool
-        Whether they move with it as a rigid body; else it passes loads on alone.
-    components : str, default "xyz"
-        In which they move with it.
-    """
+    """Faces (k, 3) that hang on a reference node."""
 
     title: str
     facets: IntArray
-    place: FloatArray
-    rigid: bool
-    components: str = "xyz"
+    place: FloatArray  # (3,): of the reference node, in the unit of the deck
+    rigid: bool  # whether they move with it as a rigid body; else it passes loads on alone
+    components: str = "xyz"  # in which they move with it
 
     def held(self, at: Mapping[str, float]) -> dict[str, float] | None:
         """Displacement of its faces by component where its node is held; None for "xyz".
@@ -285,33 +269,21 @@ class DeckConstraints:
 
 @dataclass(frozen=True)
 class Tie:
-    """Two surfaces of a *TIE, whose meshes do not match, by their facets (k, 3).
-
-    Attributes
-    ----------
-    within : float, optional
-        Distance up to which nodes are tied, in the unit of the deck.
-    """
+    """Two surfaces of a *TIE, whose meshes do not match, by their facets (k, 3)."""
 
     titles: tuple[str, str]
     slave: IntArray
     master: IntArray
-    within: float | None
+    within: float | None  # distance up to which nodes are tied, in the unit of the deck
 
 
 @dataclass
 class TiedModel:
-    """A model whose tied surfaces share their nodes where their meshes match.
-
-    Attributes
-    ----------
-    ties : list of Tie
-        The other ones.
-    """
+    """A model whose tied surfaces share their nodes where their meshes match."""
 
     model: Model
     cells: SplitCells
-    ties: list[Tie]
+    ties: list[Tie]  # the other ones
     mistakes: list[str]
     remarks: list[str]
 

@@ -276,21 +276,11 @@ def _orientation(block: Block) -> _Axes:
 
 @dataclass(frozen=True)
 class CellMaterials:
-    """Materials of the cells of a deck.
+    """Materials of the cells of a deck."""
 
-    Attributes
-    ----------
-    materials : tuple of Material
-        That of the most cells first.
-    number : (m,) int array
-        Material of each cell.
-    axes : (m, 3, 3) array, optional
-        Axes of the material of each cell, where they matter.
-    """
-
-    materials: tuple[Material, ...]
-    number: IntArray
-    axes: FloatArray | None
+    materials: tuple[Material, ...]  # that of the most cells first
+    number: IntArray  # (m,): material of each cell
+    axes: FloatArray | None  # (m, 3, 3): axes of the material of each cell, where they matter
 
     def with_expansion(self) -> "CellMaterials":
         """Materials of which those without expansion have none by heat, as in a deck."""

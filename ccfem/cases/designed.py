@@ -62,19 +62,13 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Hole:
-    """A round hole.
+    """A round hole."""
 
-    Attributes
-    ----------
-    x, y, radius : float, mm
-    rim : float, mm
-        Width of the ring about it that the optimisation keeps solid.
-    """
-
+    # mm
     x: float
     y: float
     radius: float
-    rim: float = 0.0
+    rim: float = 0.0  # mm: width of the ring about it that the optimisation keeps solid
 
     def disc(self, more: float = 0.0) -> Any:
         """Area of the hole, wider by `more`, mm: a shapely Polygon."""

@@ -104,18 +104,10 @@ class InAll:
 
 @dataclass(frozen=True)
 class Stiffness:
-    """The least fibre that makes the part as stiff as this.
+    """The least fibre that makes the part as stiff as this."""
 
-    Attributes
-    ----------
-    value : float
-        Stiffness over that of the part without fibre, or N/mm.
-    absolute : bool, default False
-        Whether it is N/mm.
-    """
-
-    value: float
-    absolute: bool = False
+    value: float  # stiffness over that of the part without fibre, or N/mm
+    absolute: bool = False  # whether it is N/mm
 
     @classmethod
     def parsed(cls, text: str) -> "Stiffness":
@@ -131,15 +123,9 @@ class Stiffness:
 
 @dataclass(frozen=True)
 class Spread:
-    """Several lengths of fibre by one factor, from a sixteenth of what fills the most layers up.
+    """Several lengths of fibre by one factor, from a sixteenth of what fills the most layers up."""
 
-    Attributes
-    ----------
-    points : int, default 5
-        Lengths, at least 2.
-    """
-
-    points: int = 5
+    points: int = 5  # lengths, at least 2
 
     def __post_init__(self) -> None:
         check_number("points", self.points, at_least=2)
@@ -164,18 +150,11 @@ Wanted = float | InAll | None
 
 @dataclass(frozen=True)
 class Slicing:
-    """A way to cut the part.
+    """A way to cut the part."""
 
-    Attributes
-    ----------
-    slicer : Slicer or None
-        None for the part's own.
-    as_thick : bool, default False
-        Whether flat layers are as thick as those of the part's own slicing are in the mean: one
-        printer lays them all.
-    """
-
-    slicer: Slicer | None = None
+    slicer: Slicer | None = None  # None for the part's own
+    # Whether flat layers are as thick as those of the part's own slicing are in the mean: one
+    # printer lays them all.
     as_thick: bool = False
 
 

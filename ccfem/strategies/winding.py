@@ -299,24 +299,13 @@ class _Wound(NamedTuple):
 
 @dataclass(frozen=True)
 class _Planner:
-    """The strategy once it has seen the whole part.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Patches of the joints.
-    direction : (m, 3) array
-        Direction of the strongest stress of each cell.
-    weight : (m,) array
-    least : int
-        Joints that a piece must hold.
-    """
+    """The strategy once it has seen the whole part."""
 
     strategy: Winding
-    names: tuple[str, ...]
-    direction: FloatArray
-    weight: FloatArray
-    least: int
+    names: tuple[str, ...]  # patches of the joints
+    direction: FloatArray  # (m, 3): direction of the strongest stress of each cell
+    weight: FloatArray  # (m,)
+    least: int  # joints that a piece must hold
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         lines: list[FloatArray] = []

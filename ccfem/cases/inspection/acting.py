@@ -33,18 +33,10 @@ Name = tuple[str, type, int]
 
 @dataclass(frozen=True)
 class Entry:
-    """A load or a support of the part file.
+    """A load or a support of the part file."""
 
-    Attributes
-    ----------
-    keys : tuple
-        Where it stands: ("supports", 0) or ("loads", name, 0).
-    table : mapping
-        What it says.
-    """
-
-    keys: Keys
-    table: Mapping[str, Any]
+    keys: Keys  # where it stands: ("supports", 0) or ("loads", name, 0)
+    table: Mapping[str, Any]  # what it says
 
     @property
     def holds(self) -> bool:
