@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from facet_sets import facets_as_set
 
 from ccfem.base.errors import InputError
 from ccfem.body.files import read_mesh
@@ -17,10 +18,6 @@ MESHED = f"*Node\n{NODES}\n*Element, type=C3D4, elset=Eall\n{CELLS}\n"
 LEFT = ", ".join(map(str, np.flatnonzero(MESH.points[:, 0] == 0.0) + 1))
 PART = f"*Part, name=P\n{MESHED}"
 ONE = "*End Part\n*Assembly, name=A\n*Instance, name=P-1, part=P\n*End Instance\n"
-
-
-def facets_as_set(facets):
-    return {frozenset(f) for f in np.asarray(facets).tolist()}
 
 
 def reading(tmp_path, text, **files):

@@ -5,6 +5,7 @@ import meshio
 import numpy as np
 import pytest
 import pyvista
+from facet_sets import facets_as_set
 from hypothesis import given, settings, strategies as st
 
 from benchmarks.fuzz.mutants import bdf, medit, unv
@@ -15,10 +16,6 @@ from ccfem.body.mesh.patches import Plane, match_boundary
 from ccfem.geometry.facets import are_among
 
 MIDDLE = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]]
-
-
-def facets_as_set(facets):
-    return {frozenset(f) for f in np.asarray(facets).tolist()}
 
 
 def same(found: TetMesh, mesh: TetMesh, exact=True):

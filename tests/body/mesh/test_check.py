@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from facet_sets import facets_as_set
 from hypothesis import given, settings, strategies as st
 
 from ccfem.base.errors import InputError
@@ -9,10 +10,6 @@ from ccfem.body.mesh.check import check_mesh
 
 INSIDE_OUT = {1: [1, 0, 2, 3], 2: [1, 0, 2, 3, 4, 6, 5, 8, 7, 9]}
 """Corners 0 and 1 swapped, with the mid-side nodes of edges 01, 12, 02, 03, 13, 23 that follow."""
-
-
-def facets_as_set(facets):
-    return {frozenset(f) for f in np.asarray(facets).tolist()}
 
 
 def midsides_are_right(mesh):
