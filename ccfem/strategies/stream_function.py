@@ -265,7 +265,9 @@ class StreamFunction(ByCoverage):
             fields, solutions = designed.fields.ravel(), designed.objective.solution
             weight, most = self.strength, self.evaluations
             strong = design_for_strength(problem, fields, solutions, weight, most)
-            tried = _with_first(candidates(strong), tried)
+            # Of each length: the first design for strength, and all designs for stiffness.
+            pairs = zip(candidates(strong), tried, strict=True)
+            tried = [[first, *stiff] for (first, *_), stiff in pairs]
         how = Cutting(_ROUNDS, self.strength, self.moves, TIGHT_SHARES[self.turns])
         # Fields are designed on linear cells; moves gain less than those may be off.
         last = replace(goal, parts=specimens(cases)) if self.moves else None
@@ -421,16 +423,6 @@ class _Common:
         """First step of all designs that take two."""
         problem, _, start = self.strategy._posed(self)
         return first_step(problem, start, self.strategy.evaluations)
-
-
-def _with_first(
-    strong: Sequence[Sequence[Toolpaths]], stiff: Sequence[Sequence[Toolpaths]]
-) -> list[list[Toolpaths]]:
-    """Candidates for each length: the first design for strength, and all designs for stiffness.
-
-    Each sequence holds the candidates for one length.
-    """
-    return [[one[0], *others] for one, others in zip(strong, stiff, strict=True)]
 
 
 def _check_tension(stresses: Sequence[StressField], layers: Sequence[Layer]) -> None:

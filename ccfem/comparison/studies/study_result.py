@@ -191,15 +191,11 @@ def with_fronts(table: "pd.DataFrame") -> "pd.DataFrame":
         if GAIN not in marked or cost not in marked:
             continue
         printable = marked[marked["printable"].astype(bool)]
-        for _, group in printable.groupby(["part", "load_case", *_geometry(marked)], dropna=False):
+        shape = [column for column in marked.columns if column.startswith("part.")]
+        for _, group in printable.groupby(["part", "load_case", *shape], dropna=False):
             chosen = on_front(group[cost].to_numpy(), group[GAIN].to_numpy(), better)
             marked.loc[group.index[chosen], name] = True
     return marked
-
-
-def _geometry(table: "pd.DataFrame") -> list[str]:
-    """Columns that tell parts of one name apart."""
-    return [name for name in table.columns if name.startswith("part.")]
 
 
 # The table of a study in HTML.

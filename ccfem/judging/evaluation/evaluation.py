@@ -258,7 +258,7 @@ def _origins(
     for name, kind in kinds.items():
         first: dict[int, int] = {}
         for k, group in enumerate(source.tolist()):
-            if whole[k] or not _on_some(kind):
+            if whole[k] or not getattr(kind, "ON_SOME_LAYERS", False):
                 by_paths = getattr(kind, "BY_PATHS", False)
                 origin[k][name] = first.setdefault(group, k) if by_paths else k
     return origin
@@ -287,11 +287,6 @@ def _passes(layers: int) -> list[dict[str, ModuleType]]:
     large = [{name: kind} for name, kind in kinds.items() if getattr(kind, "LARGE", False)]
     rest = {name: kind for name, kind in kinds.items() if not getattr(kind, "LARGE", False)}
     return [*large, rest]
-
-
-def _on_some(kind: ModuleType) -> bool:
-    """Whether some of many layers are enough for an index."""
-    return bool(getattr(kind, "ON_SOME_LAYERS", False))
 
 
 def _check_layers(toolpaths: Toolpaths, layers: Sequence[Layer]) -> None:

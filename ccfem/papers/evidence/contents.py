@@ -429,15 +429,11 @@ def write_all(folder: Path, progress: Progress = silent) -> None:
     write_report(folder, introduction(study), sections, names)
 
 
-def _run(progress: Progress) -> Study:
-    return Study(parts_tested(progress))
-
-
 CONTENTS = Contents(
     title="Predicted beside measured: every published test of a printed part",
     seconds=200.0,
     whole=write_all,
-    run=_run,
+    run=lambda progress: Study(parts_tested(progress)),
     tables={
         "pairs": lambda study: pairs_table(study()),
         "absent": lambda study: absent_table(),

@@ -415,10 +415,6 @@ def _loads(
     return {**loads, "B, pressed": failure_loads(chains["B"], pressed)}
 
 
-def _strength(chains: Mapping[str, Chain]) -> str:
-    return strength_table(_loads(chains, on_pressing_supports(chains["B"])))
-
-
 CONTENTS = Contents(
     title="Kipping and Schueppstuhl 2023, layers square to the least stress",
     seconds=600.0,
@@ -428,7 +424,9 @@ CONTENTS = Contents(
         "table1": lambda study: table_1(study()),
         "table2": lambda study: table_2(study()),
         "support": lambda study: support_table(study()),
-        "strength": lambda study: _strength(study()),
+        "strength": lambda study: strength_table(
+            _loads(study(), on_pressing_supports(study()["B"]))
+        ),
         "fiso": lambda study: shapes_table()[0],
     },
 )
