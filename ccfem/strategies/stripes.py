@@ -256,23 +256,12 @@ def _long_chains(
 
 @dataclass(frozen=True)
 class _Strand:
-    """A strand, and the tension along it.
+    """A strand, and the tension along it."""
 
-    Attributes
-    ----------
-    line : (k, 2) array, mm
-    link : (k,) bool array
-        Whether the step from each point is a link.
-    along : (k,) array, mm
-        Arc length at its points.
-    carried : (k,) array, N/mm
-        Integral of ``t . S t`` up to each point.
-    """
-
-    line: FloatArray
-    link: BoolArray
-    along: FloatArray
-    carried: FloatArray
+    line: FloatArray  # (k, 2), mm
+    link: BoolArray  # (k,): whether the step from each point is a link
+    along: FloatArray  # (k,), mm: arc length at its points
+    carried: FloatArray  # (k,), N/mm: integral of ``t . S t`` up to each point.
 
 
 def _carrying(joined: Joined, layer: Layer, plane: FloatArray) -> list[_Strand]:
