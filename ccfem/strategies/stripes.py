@@ -261,7 +261,7 @@ class _Strand:
     line: FloatArray  # (k, 2), mm
     link: BoolArray  # (k,): whether the step from each point is a link
     along: FloatArray  # (k,), mm: arc length at its points
-    carried: FloatArray  # (k,), N/mm: integral of ``t . S t`` up to each point.
+    carried: FloatArray  # (k,), N/mm: integral of ``t . S t`` up to each point
 
 
 def _carrying(joined: Joined, layer: Layer, plane: FloatArray) -> list[_Strand]:
