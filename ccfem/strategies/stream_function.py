@@ -192,7 +192,7 @@ class StreamFunction(ByCoverage):
         cases = WeightedCases.of(solved(stress, "stream_function"))
         length = self.natural_length(layers, machine)
         common = _Common(self, cases, tuple(layers), machine)
-        return WholePart(self._cut_to_lengths(common, (length,))[0])
+        return WholePart(self._cut_to_lengths(common, (length,))[0][0])
 
     def for_cases(
         self,
@@ -208,7 +208,8 @@ class StreamFunction(ByCoverage):
 
         The design is for the largest of the lengths, mm per layer, and cut to lengths near that
         one. Lengths that need more than the largest coverage are reduced to that coverage. If the
-        paths of the design are too short in total, it is repeated with proportionally more fibre.
+        paths of the design are too short in total, it is repeated with proportionally more fibre,
+        unless plans that cost little lay more than twice as much as they do.
         Much shorter lengths get a design of their own: a design cut far below its length would end
         strands where they carry load.
         """
@@ -230,10 +231,11 @@ class StreamFunction(ByCoverage):
 
     def _cut_to_lengths(
         self, common: "_Common", lengths: Sequence[float], whole: bool = False
-    ) -> list[Toolpaths]:
+    ) -> tuple[list[Toolpaths], float]:
         """Design for this coverage, and cut by tests of all cases to lengths, mm per layer.
 
-        With `whole`, plans that lay the length go before stiffer ones that do not.
+        With `whole`, plans that lay the length go before stiffer ones that do not. Returned with
+        the plans is the length, mm in all, of the longest paths that are drawn of the design.
         """
         cases, layers, machine = common.cases, common.layers, common.machine
         check_moves(self.moves, layers)
@@ -277,7 +279,7 @@ class StreamFunction(ByCoverage):
             enough = [paths for paths in offered if float(paths.lengths.sum()) >= _WHOLE * length]
             offered = enough if whole and enough else offered
             plans.append(prune_and_move(offered, layers, goal, length, machine, strand, how, last))
-        return plans
+        return plans, max(float(paths.lengths.sum()) for some in tried for paths in some)
 
     def extraction(
         self,
@@ -453,6 +455,9 @@ _NEAR = 0.95
 _MORE = 1.03
 """Factor on the length asked for in the repeated design, on top of the proportional increase."""
 
+_AT_MOST = 2.0
+"""Fibre of the repeated design over that of the first, at most."""
+
 
 class _Strategy(Protocol):
     """A strategy that designs fields for a coverage, and for more fibre by its overfill."""
@@ -474,7 +479,7 @@ def designed_to_lengths(
     layers: Sequence[Layer],
     machine: Machine,
     lengths: Sequence[float],
-    cut: Callable[[Designed, Sequence[float], bool], list[Toolpaths]],
+    cut: Callable[[Designed, Sequence[float], bool], tuple[list[Toolpaths], float]],
     again: bool = True,
 ) -> list[tuple[Designed, LayerPlanner]]:
     """Design for the largest length, and again for much shorter ones.
@@ -486,9 +491,12 @@ def designed_to_lengths(
         stiffest plan is taken, however much it lays.
     cut : callable
         Designs for the coverage of a strategy and cuts the paths to each of the lengths, given
-        whether plans that lay a length go before stiffer ones that do not.
+        whether plans that lay a length go before stiffer ones that do not. Returns the plans, and
+        the length, mm in all, that the design itself draws.
     again : bool, default True
         Whether to design for more fibre where the paths are too short, and to take the longer ones.
+        Not where other plans are so much longer that the design, which draws about in proportion to
+        its fibre, could not be.
 
     Returns
     -------
@@ -502,14 +510,15 @@ def designed_to_lengths(
     def designed(near: Sequence[float]) -> list[tuple[Designed, LayerPlanner]]:
         longest = max(near)
         asked = replace(strategy, coverage=longest / full)
-        plans = cut(asked, near, False)
+        plans, drawn = cut(asked, near, False)
         longest_plan = max(float(paths.lengths.sum()) for paths in plans) / len(layers)
         # At the largest coverage the stiffest plan counts, however much of that it lays.
         short_of = longest < most and 0.0 < longest_plan < _ENOUGH * longest
-        if again and short_of and strategy.overfill * asked.coverage < DENSEST:
-            overfill = min(_MORE * longest / longest_plan, 2.0) * strategy.overfill
+        in_reach = longest_plan * len(layers) < _AT_MOST * drawn
+        if again and short_of and in_reach and strategy.overfill * asked.coverage < DENSEST:
+            overfill = min(_MORE * longest / longest_plan, _AT_MOST) * strategy.overfill
             more = replace(asked, overfill=overfill)
-            longer = cut(more, near, True)
+            longer, _ = cut(more, near, True)
             if max(float(paths.lengths.sum()) for paths in longer) > longest_plan * len(layers):
                 asked, plans = more, longer
         whole = asked.overfill * asked.coverage

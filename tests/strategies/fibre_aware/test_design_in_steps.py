@@ -87,18 +87,26 @@ def test_designs_for_several_lengths_share_their_first_step(lever, monkeypatch):
         np.testing.assert_array_equal(paths[2].points, paths[3].points)
 
 
-def test_only_lengths_within_the_largest_coverage_are_designed_for_again(lever):
+@pytest.mark.parametrize(
+    ("coverage", "drawn", "designs"),
+    [
+        (0.6, 50.0, [False, True]),
+        (0.6, 26.0, [False, True]),
+        # Twice of it is less than the 50 mm that another plan lays.
+        (0.6, 24.0, [False]),
+        # More than that would lay strands side by side, and soften the part.
+        (0.9, 50.0, [False]),
+    ],
+)
+def test_what_a_longer_design_could_reach_is_designed_for_again(lever, coverage, drawn, designs):
     _, layers = lever
     short = Toolpaths.from_plane([np.array([[0.0, 0.0], [50.0, 0.0]])], layers[0])
     asked = []
 
     def cut(strategy, lengths, whole):
         asked.append(whole)
-        return len(lengths) * [short]
+        return len(lengths) * [short], drawn
 
-    full = full_length(layers, MACHINE)
-    stream_function.designed_to_lengths(StreamFunction(), layers, MACHINE, [0.6 * full], cut)
-    assert asked == [False, True]
-    asked.clear()
-    stream_function.designed_to_lengths(StreamFunction(), layers, MACHINE, [0.9 * full], cut)
-    assert asked == [False]  # more than that would lay them side by side, and soften the part
+    length = coverage * full_length(layers, MACHINE)
+    stream_function.designed_to_lengths(StreamFunction(), layers, MACHINE, [length], cut)
+    assert asked == designs
