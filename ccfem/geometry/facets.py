@@ -92,6 +92,12 @@ def unique_edges(ends: IntArray) -> tuple[IntArray, IntArray]:
     return edges, edge
 
 
+def edges_left(edges: IntArray, number: IntArray) -> IntArray:
+    """Edges (k, 2) of which both ends stay, by the new numbers (n,) of points; -1 for none."""
+    left = number[edges]
+    return np.asarray(left[(left >= 0).all(axis=1)])
+
+
 def border_edges(triangles: IntArray, n: int) -> IntArray:
     """Directed edges (e, 2) that only one triangle has, with the material on their left.
 

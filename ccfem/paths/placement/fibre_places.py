@@ -15,7 +15,7 @@ from ccfem.body.files.surface import Surface
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.face_rules import check_box
 from ccfem.body.mesh.patches import Vector, unit_vector
-from ccfem.geometry.facets import border_edges, counter_clockwise
+from ccfem.geometry.facets import border_edges, counter_clockwise, edges_left
 from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer, Plane
@@ -486,6 +486,8 @@ def cut_layer(layer: Layer, region: Region, mesh: TetMesh) -> Layer | None:
     kept = kept.reshape(-1, 3)
     owner = np.zeros(len(used), dtype=np.int64)
     owner[kept] = parent[:, None]
+    place_of = np.full(len(points), -1)
+    place_of[used] = np.arange(len(used))
     place = np.concatenate([layer.points, plane.to_space(points[len(layer.points) :])])[used]
     nodes, weights = _in_cells(place, layer.cell[owner], mesh)
     border = border_edges(kept, len(used))
@@ -498,6 +500,7 @@ def cut_layer(layer: Layer, region: Region, mesh: TetMesh) -> Layer | None:
         weights=weights,
         loops=chain(border),
         patches=_patches(layer, place, border),
+        walls=tuple((wall, edges_left(edges, place_of)) for wall, edges in layer.walls),
         local_thickness=np.full(len(used), layer.thickness),
     )
 

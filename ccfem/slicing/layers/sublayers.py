@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ccfem.base.arrays import BoolArray, FloatArray, IntArray
+from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.body.mesh import TetMesh
-from ccfem.geometry.facets import border_edges
+from ccfem.geometry.facets import border_edges, edges_left
 from ccfem.slicing.layers.layer import Layer
 from ccfem.slicing.layers.level_cut import chain
 from ccfem.slicing.layers.level_surfaces import LevelSurfaces, level_surfaces, thickness_at_nodes
@@ -115,11 +115,6 @@ def _restricted(layer: Layer, wanted: BoolArray, least_area: float) -> Layer | N
     border = border_edges(triangles, len(used))
     place = np.full(len(layer.points), -1)
     place[used] = np.arange(len(used))
-
-    def left(edges: IntArray) -> IntArray:
-        kept = place[edges]
-        return np.asarray(kept[(kept >= 0).all(axis=1)])
-
     return replace(
         layer,
         points=layer.points[used],
@@ -128,7 +123,7 @@ def _restricted(layer: Layer, wanted: BoolArray, least_area: float) -> Layer | N
         nodes=layer.nodes[used],
         weights=layer.weights[used],
         loops=chain(border),
-        patches={name: left(edges) for name, edges in layer.patches.items()},
-        walls=tuple((wall, left(edges)) for wall, edges in layer.walls),
+        patches={name: edges_left(edges, place) for name, edges in layer.patches.items()},
+        walls=tuple((wall, edges_left(edges, place)) for wall, edges in layer.walls),
         local_thickness=layer.local_thickness[used],
     )

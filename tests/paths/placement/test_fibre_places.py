@@ -10,6 +10,7 @@ from ccfem.base.errors import InputError
 from ccfem.body.files import write_mesh
 from ccfem.body.files.surface import Surface
 from ccfem.body.mesh import box_mesh
+from ccfem.body.meshing import extrude
 from ccfem.cases.case import Case
 from ccfem.cases.inspection import check
 from ccfem.cases.part_file import read_part
@@ -97,6 +98,19 @@ def test_regions_have_the_areas_of_their_sections(name):
         assert layer.areas.min() > 0.0
         np.testing.assert_allclose(layer.interpolate(MESH.points), layer.points, atol=1e-5)
         assert (layer.normals[:, 2] > 0.999).all()
+
+
+@pytest.mark.parametrize("mode", ["only", "exclude"])
+def test_regions_of_a_part_with_a_round_hole_have_no_notches(mode):
+    """A hole of 12 mm in 40 x 40 mm, of which 28 x 27 mm about the hole are chosen."""
+    hole = shapely.Point(20.0, 18.0).buffer(6.0, quad_segs=32)
+    mesh = extrude(shapely.box(0, 0, 40, 40).difference(hole), 4.0, 3.0)
+    places = FibrePlaces(regions=(FibreRegion(InBox((5, 4, 0), (33, 31, 4)), mode),))
+    area = {"only": 28.0 * 27.0 - 36.0 * np.pi, "exclude": 1600.0 - 28.0 * 27.0}[mode]
+    for layer in places.on(Planar(count=6).cut(mesh), mesh, MACHINE):
+        # Walls are kept to within .005 mm of 38 mm round the hole.
+        assert layer.plane.polygon.area == pytest.approx(area, abs=0.2)
+        assert layer.areas.sum() == pytest.approx(layer.plane.polygon.area, abs=1e-4)
 
 
 def test_near_a_face_lie_the_layers_that_are_near_it():
