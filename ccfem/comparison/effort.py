@@ -10,7 +10,7 @@ import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from hashlib import sha256
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +21,8 @@ from ccfem.body.mesh.tet_mesh import TetMesh
 from ccfem.cases.case import Case
 from ccfem.comparison.request import LONGEST_TEST, MOST_LAYERS, STRATEGIES
 from ccfem.fem.elasticity.solve_cost import solve_costs
-from ccfem.geometry.shapes import corners_only
 from ccfem.machine.machine import Machine
+from ccfem.paths.planning.alike import BORDERS, equal_sections
 from ccfem.slicing.layers.layer import Layer, curved_layers
 
 COEFFICIENTS = Path(__file__).with_suffix(".toml")
@@ -84,7 +84,7 @@ class Counts:
         triangles = float(sum(len(layer.triangles) for layer in layers))
         room = float(sum(layer.areas.sum() for layer in layers)) / machine.fibre_width
         solved = 3.0 * len(mesh.points)
-        some = room * _planned_layers(layers) / max(len(layers), 1)
+        some = room * _planned_layers(mesh, layers) / max(len(layers), 1)
         return cls(unknowns, solved, triangles, room, float(mesh.volumes.sum()), some)
 
 
@@ -92,16 +92,19 @@ _OF_EQUAL = 4
 """Layers that are planned of those that cut the same cells: 22 of 238 on five layers of cells."""
 
 
-def _planned_layers(layers: Sequence[Layer]) -> int:
+def _planned_layers(mesh: TetMesh, layers: Sequence[Layer]) -> int:
     """Count about how many layers are planned, where those that are alike are not."""
     count = len(layers)
     if count <= MOST_LAYERS or curved_layers(layers):
         return count
-    # Those that cut the same cells mostly share the array that says so; regions have their own.
-    arrays = {id(layer.cell): layer.cell for layer in layers}
-    cells = {key: sha256(np.unique(array).tobytes()).digest() for key, array in arrays.items()}
-    unequal = {(corners_only(layer.plane.polygon), cells[id(layer.cell)]) for layer in layers}
-    return min(_OF_EQUAL * len(unequal), count)
+    # Layers cut the same cells where no node lies between them: regions a part of these.
+    nodes = mesh.points[np.unique(mesh.corners)] @ layers[0].plane.frame[2]
+    between = np.searchsorted(np.unique(nodes), [layer.plane.height for layer in layers])
+    runs = 1 + sum(
+        low != high or not equal_sections(*pair, BORDERS)
+        for pair, (low, high) in zip(pairwise(layers), pairwise(between), strict=True)
+    )
+    return min(_OF_EQUAL * runs, count)
 
 
 def counts(case: Case, layers: Sequence[Layer]) -> tuple[Counts, ...]:

@@ -19,6 +19,10 @@ below the error that a solution estimates on the meshes of shipped cases (17 % o
 EQUAL = 1e-6
 """Distance, mm, up to which two sections are equal: paths drawn on one are those of the other."""
 
+BORDERS = 1e-3
+"""Distance, mm, up to which those of layers that are alike may differ: what is too small for a
+triangle is left out at the borders of regions."""
+
 _PATCH = 0.01
 """Share by which the length of a patch along equal sections may differ: chords of round walls."""
 
@@ -64,7 +68,8 @@ def _equal(one: Layer, other: Layer) -> bool:
     """Whether two flat layers have equal sections, and the same patches along them."""
     if curved_layers((one, other)) or abs(one.thickness - other.thickness) > EQUAL:
         return False
-    if not np.array_equal(one.plane.frame, other.plane.frame) or not equal_sections(one, other):
+    same = equal_sections(one, other, BORDERS)
+    if not np.array_equal(one.plane.frame, other.plane.frame) or not same:
         return False
     a, b = _along_patches(one), _along_patches(other)
     return a.keys() == b.keys() and all(

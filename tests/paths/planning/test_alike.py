@@ -2,12 +2,15 @@
 
 import numpy as np
 import pytest
+import shapely
+import shapely.affinity
 
 from ccfem.body.mesh import box_mesh
 from ccfem.fem.elasticity import GivenStress
 from ccfem.machine import Machine
+from ccfem.paths.placement.fibre_places import cut_layer
 from ccfem.paths.planning import plan
-from ccfem.paths.planning.alike import ALIKE, alike_layers
+from ccfem.paths.planning.alike import ALIKE, alike_layers, equal_sections
 from ccfem.slicing.slicers import Planar
 from ccfem.strategies import create
 
@@ -52,6 +55,14 @@ def test_layers_that_are_alike_take_the_paths_of_one_at_their_own_height():
         # The stress is uniform: planned by itself, each layer gets as much fibre.
         own = every.on_layer(layer.index).lengths.sum()
         assert once.on_layer(layer.index).lengths.sum() == pytest.approx(own, rel=1e-6)
+
+
+def test_regions_with_a_slanted_border_are_alike():
+    """Their borders cross other cells at every height, and leave out specks there."""
+    region = shapely.affinity.rotate(shapely.box(5.0, 4.0, 31.0, 12.0), 23.0)
+    parts = [cut_layer(layer, region, MESH) for layer in Planar(count=100).cut(MESH)[:20]]
+    assert not all(equal_sections(parts[0], part) for part in parts)
+    assert set(alike_layers(parts, pulled(0.0)).tolist()) == {10}
 
 
 def test_strategies_that_turn_from_layer_to_layer_plan_every_layer():
