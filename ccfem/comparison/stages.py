@@ -12,7 +12,7 @@ from ccfem.base.errors import InputError, SolveError
 from ccfem.base.parallel import give_back, has_room_beside, in_processes
 from ccfem.comparison.request import MOST_LAYERS
 from ccfem.comparison.runs import Run, Tested
-from ccfem.comparison.tested_cases import in_all_cases
+from ccfem.comparison.tested_cases import ENERGY, RESIDUAL, in_all_cases
 from ccfem.fem.elasticity.stress_field import PartStress, StressField, WeightedCases
 from ccfem.judging.evaluation import evaluate
 from ccfem.judging.evaluation.strand_rules import StrandVerdict, strand_verdict, why_not
@@ -62,13 +62,6 @@ own amount."""
 
 _AHEAD = 4
 """Runs that are judged while others are being planned: it takes about as long."""
-
-_TOLERANCE = 1e-6
-"""Relative residual of the virtual tests: the error of the stiffness is of its square."""
-
-_ENERGY = 1e-3
-"""Error in energy norm of those on quadratic cells for one load case, far below what cells leave by
-themselves: the error of the stiffness is of its square, that of a force in a strand of its size."""
 
 
 @dataclass(frozen=True)
@@ -519,7 +512,7 @@ def _test(
     strands: Strands, specimen: Specimen, before: float, strand: Strand, part: Part
 ) -> Tested:
     """Test strands in every mode, and find what fails first."""
-    bracket = virtual_bracket(strands, specimen, strand, (), tolerance=_TOLERANCE, energy=_ENERGY)
+    bracket = virtual_bracket(strands, specimen, strand, (), tolerance=RESIDUAL, energy=ENERGY)
     test = bracket.tension
     scatter = ratio_scatter(test, part.scatter, part.build or (0.0, 0.0, 1.0))
     try:

@@ -73,6 +73,7 @@ def virtual_tests(
     machine: Machine | None = None,
     known: Sequence[FloatArray] | None = None,
     tolerance: float = 1e-8,
+    energy: float = 0.0,
 ) -> CasesTest:
     """Test a part with its fibres under several load cases, each with the fibres that it stretches.
 
@@ -82,7 +83,7 @@ def virtual_tests(
     ----------
     parts : WeightedCases, or sequence of Specimen
         The part without fibres under each case.
-    strand, mode, machine, tolerance
+    strand, mode, machine, tolerance, energy
         As in `virtual_test`.
     known : sequence of (n, 3) arrays, mm, optional
         For each case a displacement near its solution, to start from.
@@ -93,7 +94,7 @@ def virtual_tests(
     near = [()] * len(specimens_of_cases) if known is None else [(one,) for one in known]
     return CasesTest(
         tuple(
-            virtual_test(fibres, one, strand, mode, (), known=start, tolerance=tolerance)
+            virtual_test(fibres, one, strand, mode, (), None, start, tolerance, energy)
             for one, start in zip(specimens_of_cases, near, strict=True)
         )
     )

@@ -59,6 +59,22 @@ def test_a_case_is_tested_as_alone_also_with_other_supports(plate):
     np.testing.assert_allclose(found.ratios, alone, rtol=1e-9)
 
 
+def test_on_quadratic_cells_every_case_is_accurate_to_the_square_of_its_energy(plate):
+    """Held against a factorisation of the part, and solves to rounding."""
+    problem, _, paths = plate
+    loads = {
+        "along_x": problem.loads["along_x"],
+        "bend": (Force("x_max", (0.0, 3.0, -1.0)),),
+    }
+    problem = replace(problem, mesh=problem.mesh.quadratic(), loads=loads)
+    cases = WeightedCases.of(solve(problem, "two-level"))
+    exact = virtual_tests(paths, specimens(cases, "superlu"), tolerance=1e-10)
+    full, near = (virtual_tests(paths, cases, energy=energy) for energy in (0.0, 1e-3))
+    np.testing.assert_allclose(near.ratios, exact.ratios, rtol=1e-6)
+    iterations = [[test.solution.record.iterations for test in some.tests] for some in (near, full)]
+    assert sum(iterations[0]) < 0.7 * sum(iterations[1])
+
+
 @pytest.mark.parametrize(("strength", "case"), [(86.0, "along_x"), (400.0, "along_y")])
 def test_part_fails_in_the_case_of_the_least_multiple(plate, strength, case):
     # Along x 5 MPa / R in the matrix and 4 mm^2 of that in a strand; along y 2 of 35 MPa.
