@@ -1,11 +1,12 @@
 """How true the remaining time is that a run tells.
 
-    python -m benchmarks.speed.time_left [loop] [plate ...]
+    python -m benchmarks.speed.time_left [loop] [bracket] [front] [plate] [layers]
 
-Runs ``ccfem compare loop`` and ``ccfem plan --gcode`` of a plate of 400 x 300 mm with 16 layers on
-one processor, and prints for each line of progress the time that is left by its share of the work,
-that which was left, and their ratio. All are processor time, so that other load does not count. The
-last line is the largest factor between them after the first tenth of the run.
+Runs commands on one processor, and prints for each line of progress the time that is left by its
+share of the work, that which was left, and their ratio: ``ccfem compare`` of two cases, ``front``
+of one, and ``plan --gcode`` of plates of 400 x 300 mm with 16 layers and of 200 x 150 mm with 72.
+All are processor time, so that other load does not count. The last line is the largest factor
+between them after the first tenth of the run.
 """
 
 import math
@@ -23,9 +24,18 @@ _LINE = re.compile(r"ccfem: \d+ s, (\d+) %(?:, about .* left)?: (.*)")
 _WORTH = 2.0
 """Seconds left from which a line counts: shares are told in whole hundredths."""
 
+PLATES = {"plate": (400.0, 300.0, 16), "layers": (200.0, 150.0, 72)}
+"""Sides, mm, and layers."""
+
+_LAYERED = ["--strategy", "isocurve", "--gcode", "--layers"]
+
 RUNS = {
     "loop": ["compare", "loop"],
-    "plate": ["plan", "{folder}/plate.toml", "--strategy", "isocurve", "--gcode", "--layers", "16"],
+    "bracket": ["compare", "bracket"],
+    "front": ["front", "loop"],
+} | {
+    name: ["plan", f"{{folder}}/{name}.toml", *_LAYERED, str(layers)]
+    for name, (_, _, layers) in PLATES.items()
 }
 
 
@@ -63,10 +73,11 @@ def watch(words: list[str], folder: Path) -> None:
 
 
 def main() -> None:
-    """Watch the runs that are named, by default both."""
+    """Watch the runs that are named, by default all."""
     for name in sys.argv[1:] or RUNS:
         with tempfile.TemporaryDirectory() as folder:
-            (Path(folder) / "plate.toml").write_text(plate(400.0, 300.0, 16))
+            for part, about in PLATES.items():
+                (Path(folder) / f"{part}.toml").write_text(plate(*about))
             watch(RUNS[name], Path(folder))
 
 

@@ -32,7 +32,7 @@ FILLED = 0.45
 """Share of the room that plans fill by default."""
 
 TERMS: dict[str, tuple[str, ...]] = {
-    "start": ("run", "unknowns"),
+    "start": ("run", "unknowns", "triangles"),
     "solve": ("solved", "triangles"),
     "plan stream_function": ("unknowns", "room"),
     "plan zigzag": ("triangles", "room"),
@@ -43,7 +43,7 @@ TERMS: dict[str, tuple[str, ...]] = {
     "bound": ("unknowns", "triangles"),
     "write": ("run", "room"),
     "write a print": ("run", "volume"),
-    "report": ("run", "triangles"),
+    "report": ("run", "unknowns", "triangles"),
     "memory of compare": ("run", "solved", "triangles", "room"),
     "memory of plan": ("run", "solved", "triangles", "room"),
     "memory of untested": ("run", "solved", "room", "some_room"),
@@ -127,6 +127,11 @@ def stage_effort(stage: str, known: Counts, coefficients: Coefficients | None = 
     """CPU seconds of a stage on a part, or gigabytes of memory."""
     given = measured() if coefficients is None else coefficients
     return float(np.dot([getattr(known, term) for term in TERMS[stage]], given[stage]))
+
+
+def cutting_effort(known: Counts) -> float:
+    """CPU seconds of cutting the layers: what of the start grows with their triangles."""
+    return known.triangles * float(measured()["start"][TERMS["start"].index("triangles")])
 
 
 def planning_stage(strategy: str) -> str:

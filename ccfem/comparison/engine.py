@@ -23,8 +23,8 @@ from ccfem.cases.case import Case
 from ccfem.cases.load_cases import weighted_cases
 from ccfem.comparison.bounds import bounded, bounds_of
 from ccfem.comparison.curve import Curve, along_curve, one_length_suits
-from ccfem.comparison.effort import LONGEST_CURVE, Counts, curve_steps, stage_effort
-from ccfem.comparison.expected import Schedule, expected_steps
+from ccfem.comparison.effort import LONGEST_CURVE, Counts, curve_steps
+from ccfem.comparison.expected import Schedule, before_planning, expected_steps
 from ccfem.comparison.plan_to_stiffness import plan_to_stiffness
 from ccfem.comparison.request import (
     DEFAULT_STRAND,
@@ -267,7 +267,7 @@ def answer(
         name: Counts.of(part.stress.mesh, part.layers, part.machine) for name, part in parts.items()
     }
     steps = expected_steps(request, known_of, len(basis.cases))
-    before = stage_effort("solve", next(iter(known_of.values()))) if known is None else 0.0
+    before = before_planning(next(iter(known_of.values()))) if known is None else 0.0
     tell = Schedule(progress, steps, before)
     early = _Early(request, basis)
     parts, runs, wanted = _planned(request, basis, parts, tell, early)

@@ -7,17 +7,19 @@ from ccfem.base.progress import Progress
 from ccfem.comparison.effort import (
     FILLED,
     Counts,
+    cutting_effort,
     judging_stages,
     planning_stage,
     stage_effort,
 )
-from ccfem.comparison.request import Request
+from ccfem.comparison.request import Request, Spread
 
 _BREAKING = 10.0
 """Time of a breaking load over that of judging: a guess, so that the bar moves on."""
 
-_UNKNOWN = 0.9
-"""Share of a run that is behind when its results are written, where its layers are not known."""
+_UNKNOWN = (0.9, 0.98)
+"""Shares of a run that are behind when its results and its report are written, where its layers are
+not known."""
 
 
 @dataclass
@@ -52,6 +54,7 @@ def expected_steps(request: Request, known: Mapping[str, Counts], cases: int) ->
         Load cases that are planned for.
     """
     steps: dict[str, float] = {}
+    plans = cases * (request.amount.points if isinstance(request.amount, Spread) else 1)
     for slicing, part in known.items():
         tested = request.strand is not None and FILLED * part.room <= request.longest_test
         judging = sum(
@@ -59,23 +62,29 @@ def expected_steps(request: Request, known: Mapping[str, Counts], cases: int) ->
         )
         for name in request.strategies:
             run = request.on_slicing(name, slicing)
-            steps[f"planning {run}"] = cases * stage_effort(planning_stage(name), part)
-            steps[f"judging {run}"] = cases * judging
+            steps[f"planning {run}"] = plans * stage_effort(planning_stage(name), part)
+            steps[f"judging {run}"] = plans * judging
             if request.breaking_load:
                 steps[f"breaking {run}"] = _BREAKING * judging
         if request.bound and tested and not slicing:
-            steps["bounding"] = cases * stage_effort("bound", part)
+            steps["bounding"] = plans * stage_effort("bound", part)
     return steps
 
 
-def share_before_writing(request: Request) -> float:
-    """Share of a run that is behind when its results are written, where that is known before."""
+def before_planning(part: Counts) -> float:
+    """Seconds of cutting and solving a part."""
+    return cutting_effort(part) + stage_effort("solve", part)
+
+
+def shares_before_writing(request: Request) -> tuple[float, float]:
+    """Shares of a run that are behind when its results, and when its report, are written."""
     layers = () if request.named else request.case.known_layers(request.only_slicer)
     if not layers:
         return _UNKNOWN
     part = Counts.of(request.case.problem.mesh, layers, request.case.machine)
     steps = expected_steps(request, {"": part}, 1)
-    before = stage_effort("solve", part) + sum(steps.values())
     written = "write a print" if request.print_plans else "write"
-    after = stage_effort(written, part) + stage_effort("report", part)
-    return before / (before + after)
+    results = before_planning(part) + sum(steps.values())
+    report = results + stage_effort(written, part)
+    whole = report + stage_effort("report", part)
+    return results / whole, report / whole

@@ -50,6 +50,10 @@ RESULT_FILES = (
 """Patterns of all files that comparisons, over slicings too, write (`whole_folder`)."""
 
 
+BEFORE_REPORT = 0.8
+"""Share of writing that is told when the report begins."""
+
+
 def save(
     comparison: Comparison,
     folder: str | os.PathLike[str],
@@ -152,9 +156,10 @@ def write_results(
             picture = png(breaking_picture(comparison.broken, colours))
             (folder / "breaking.png").write_bytes(picture)
     if pictures:
-        _draw(comparison, folder, lambda what, share: progress(what, 0.2 + 0.6 * share), left_out)
+        drawn = BEFORE_REPORT - 0.2
+        _draw(comparison, folder, lambda what, share: progress(what, 0.2 + drawn * share), left_out)
         spent["pictures"] = time.perf_counter() - start
-    progress("writing the report", 0.8)
+    progress("writing the report", BEFORE_REPORT)
     about = record(comparison, command, spent)
     about["left_out"] = left_out
     _write_report(comparison, about, folder, part_file)

@@ -2,6 +2,7 @@
 
 import math
 import tomllib
+from dataclasses import replace
 
 import pytest
 import shapely
@@ -16,10 +17,12 @@ from ccfem.comparison.effort import (
     about_effort,
     counts,
     curve_steps,
+    cutting_effort,
     stage_effort,
     stages,
 )
-from ccfem.comparison.expected import Schedule
+from ccfem.comparison.expected import Schedule, expected_steps, shares_before_writing
+from ccfem.comparison.request import Request, Spread
 from ccfem.fem.elasticity import Force, Problem, Support
 from ccfem.fem.materials import isotropic
 from ccfem.machine import Machine
@@ -88,6 +91,27 @@ def test_progress_is_the_share_of_the_time_that_is_behind():
     tell("planning the least and the most of a")
     tell("planning a along the curve")
     assert [share for _, share in told[4:]] == pytest.approx([10.0 / 44.0, 14.0 / 44.0])
+
+
+def test_every_length_of_a_front_is_a_plan():
+    request = Request.of("bar", ["stream_function"])
+    known = {"": counts(request.case, request.case.known_layers())[0]}
+    one = expected_steps(request, known, 1)
+    front = expected_steps(replace(request, amount=Spread(4)), known, 1)
+    assert front == pytest.approx({step: 4.0 * spent for step, spent in one.items()})
+
+
+def test_what_is_left_when_the_report_begins_is_the_report():
+    request = Request.of("bar", ["isocurve"])
+    results, report = shares_before_writing(request)
+    known = counts(request.case, request.case.known_layers())[0]
+    write, draw = (stage_effort(stage, known) for stage in ("write", "report"))
+    assert (report - results) / (1.0 - results) == pytest.approx(write / (write + draw))
+    whole = draw / (1.0 - report)
+    every = cutting_effort(known) + sum(
+        stage_effort(stage, known) for stage in stages(["isocurve"], False)[1:]
+    )
+    assert whole == pytest.approx(every)
 
 
 def test_layers_that_cut_the_same_cells_count_once_in_regions_too():
