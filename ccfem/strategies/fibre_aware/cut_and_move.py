@@ -65,8 +65,8 @@ class _Cut(Protocol):
         """Cut, given the weight of the strength, the number of tests and the others."""
 
 
-_Exchange = Callable[[Toolpaths, Toolpaths, Sequence[FloatArray]], Toolpaths]
-"""Makes a plan better, given what it was cut from and its displacements."""
+_Exchange = Callable[[Toolpaths, Toolpaths, Judged], Toolpaths]
+"""Makes a plan better, given what it was cut from and its test."""
 
 
 @dataclass(frozen=True)
@@ -127,11 +127,11 @@ def prune_and_move(
 
     judges = judges_of(goal, _ROUGH)
 
-    def exchange(kept: Toolpaths, source: Toolpaths, near: Sequence[FloatArray]) -> Toolpaths:
+    def exchange(kept: Toolpaths, source: Toolpaths, tested: Judged) -> Toolpaths:
         if len(goal.parts) > 1 or fibre_length(source) < _MUCH * length:
             return kept
         cut_again = partial(cut, share=0.0)
-        return exchanged(kept, candidates, goal.mesh, machine, judges[0], cut_again, near)
+        return exchanged(kept, candidates, goal.mesh, machine, judges[0], cut_again, tested)
 
     kept = best_cut(candidates, cut, judges[0], how.strength, how.rounds, exchange)
     if not how.moves:
@@ -212,20 +212,15 @@ def _stiffest_cut(
         return first
     least = judge(first)
 
-    def contender(paths: Toolpaths) -> tuple[Toolpaths, float, tuple[FloatArray, ...]]:
+    def contender(paths: Toolpaths) -> tuple[Toolpaths, Judged | None]:
         kept = cut(paths, 0.0, rounds, least)
-        if not len(kept):
-            return kept, -np.inf, ()
-        tested = judge(kept)
-        return kept, tested.value, tested.displacements
+        return kept, judge(kept) if len(kept) else None
 
-    tried = [
-        (first, least.value, least.displacements),
-        *in_processes(contender, candidates[1:], shared=[candidates]),
-    ]
-    best = int(np.argmax([value for _, value, _ in tried]))
-    kept, _, near = tried[best]
-    return kept if exchange is None else exchange(kept, candidates[best], near)
+    tried = [(first, least), *in_processes(contender, candidates[1:], shared=[candidates])]
+    best = int(np.argmax([-np.inf if tested is None else tested.value for _, tested in tried]))
+    kept, tested = tried[best]
+    assert tested is not None
+    return kept if exchange is None else exchange(kept, candidates[best], tested)
 
 
 # Stretches of other plans in the room between strands, in exchange for what carries less.
@@ -261,7 +256,7 @@ def exchanged(
     machine: Machine,
     judge: Judge,
     cut: Callable[..., Toolpaths],
-    near: Sequence[FloatArray] | None = None,
+    tested: Judged | None = None,
 ) -> Toolpaths:
     """Add stretches of other plans to a plan where there is room, and cut all to the length again.
 
@@ -273,8 +268,8 @@ def exchanged(
         Plans that are not cut to the length, on the same layers.
     cut : callable
         Cuts toolpaths to the length wanted, by a number of `tests`.
-    near : sequence of (n, 3) arrays, mm, optional
-        Displacements of the part with alike paths under each load case, which save time.
+    tested : Judged, optional
+        The test of the given paths, where it is known.
 
     Returns
     -------
@@ -282,7 +277,7 @@ def exchanged(
         The given ones where nothing as long is stiffer by more than a thousandth.
     """
     least = machine.shortest_strand
-    length, known = fibre_length(paths), judge(paths, near)
+    length, known = fibre_length(paths), judge(paths) if tested is None else tested
     pieces = [(plan, *_pieces(plan, mesh)) for plan in plans if len(plan)]
     for _ in range(_TIMES):
         price, taken = _price(paths, known, mesh), _Taken(machine.fibre_width, [paths])
@@ -295,11 +290,11 @@ def exchanged(
         if len(taken.plans) == 1:
             return paths
         other = cut(Toolpaths.concatenate(taken.plans), tests=_TESTS)
-        tested = judge(other, known.displacements)
-        better = tested.value > (1.0 + _GAIN) * known.value
+        fresh_test = judge(other, known.displacements)
+        better = fresh_test.value > (1.0 + _GAIN) * known.value
         if not better or fibre_length(other) < (1.0 - 0.5 * TOLERANCE) * length:
             return paths
-        paths, known = other, tested
+        paths, known = other, fresh_test
     return paths
 
 

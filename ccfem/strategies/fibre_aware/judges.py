@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -229,8 +230,8 @@ def stiffness_judge(
         strands = _carrying(toolpaths, goal, machine, layers)
         tested = equilibria(goal, strands, strand, near, tolerance)
         counts = goal.counts(tested.ratios) / tested.work
-        worths = _stiff_worths(counts, tested.displacements)
-        return Judged(goal.merit(tested.ratios), tested.displacements, lambda: worths)
+        worths = partial(_stiff_worths, counts, tested.displacements)
+        return Judged(goal.merit(tested.ratios), tested.displacements, worths)
 
     return judge
 
