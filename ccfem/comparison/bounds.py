@@ -5,6 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
+import numpy as np
+
 from ccfem.base.parallel import in_processes
 from ccfem.comparison.ranking import off_length
 from ccfem.comparison.request import Request, Spread, Wanted
@@ -55,20 +57,33 @@ def bounds_of(
         lengths = _lengths_to_bound(fibre, _SAME_CASES_BOUND if several else _SAME_BOUND)
     of = " in all load cases" if several else ""
     bounds = {length: known[length] for length in lengths if length in known}
-    lengths = [length for length in lengths if length not in known]
-    with timed(seconds, "bound"):
-        about = (part.machine, strand)
-        # Those between the runs are there for the curve alone.
-        gaps = [None if length in fibre or several else LOOSE for length in lengths]
+
+    def bound(taken: Sequence[float], near: Sequence[Sequence[UpperBound]]) -> None:
+        """Bound lengths, from the densities found for those beside each if there are some."""
         results = in_processes(
-            lambda length, gap: upper_bound(cases, part.layers, length, *about, gap=gap),
-            lengths,
-            gaps,
+            lambda length, beside: upper_bound(
+                *(cases, part.layers, length, part.machine, strand),
+                # What lies between the runs is there for the curve alone.
+                gap=LOOSE if beside and not several else None,
+                start=np.sum([one.density for one in beside], axis=0) if beside else None,
+            ),
+            taken,
+            near,
         )
-        for length in lengths:
+        for length in taken:
             tell(f"bounding what any paths of {1e-3 * length:.3g} m could reach{of}")
             bounds[length] = next(results)
-    return bounds
+
+    with timed(seconds, "bound"):
+        left = [length for length in lengths if length not in bounds]
+        bound(left, [()] * len(left))
+        if several_lengths:
+            beside = {
+                0.5 * (shorter + longer): [bounds[one] for one in (shorter, longer) if one]
+                for shorter, longer in itertools.pairwise([0.0, *sorted(lengths)])
+            }
+            bound(list(beside), list(beside.values()))
+    return {length: bounds[length] for length in sorted(bounds)}
 
 
 def presses(cases: WeightedCases) -> bool:
@@ -78,16 +93,12 @@ def presses(cases: WeightedCases) -> bool:
 
 
 def _lengths_to_bound(lengths: Sequence[float], alike: float) -> list[float]:
-    """Lengths to be bounded, mm: of every run, and between them for the curve.
-
-    Lengths within the factor `alike` share a bound, that of the largest.
-    """
+    """Lengths of runs to be bounded, mm; those within the factor `alike` share the largest."""
     taken: list[float] = []
     for length in sorted(lengths, reverse=True):
         if not taken or alike * length < taken[-1]:
             taken.append(length)
-    between = [0.5 * (longer + shorter) for longer, shorter in itertools.pairwise([*taken, 0.0])]
-    return sorted([*taken, *between])
+    return sorted(taken)
 
 
 def bounded(run: Run, bounds: Mapping[float, UpperBound], wanted: Wanted) -> Run:

@@ -24,6 +24,7 @@ from ccfem.strategies.fibre_aware.smeared import SmearedPart, SmearedSolution, s
 from ccfem.strategies.fibre_aware.upper_bound import (
     LARGEST_GAP,
     LEAST,
+    LOOSE,
     SUM,
     WORST,
     DensityAscent,
@@ -66,6 +67,20 @@ def test_no_paths_exceed_the_bound(bent_beam, mode):
         reached = virtual_test(paths, stress, mode=mode, span=()).ratio
         assert 1.0 < reached <= found.ratio
         assert 0.0 < found.share(reached) <= 1.0
+
+
+def test_a_mean_of_densities_is_near_the_best_of_the_mean_length(bent_beam):
+    # The least compliance is convex in the length, and the compliance in the densities.
+    stress, layers = bent_beam
+    ends = [upper_bound(stress, layers, length, MACHINE, gap=0.002) for length in (400.0, 800.0)]
+    mean = 0.5 * (ends[0].density + ends[1].density)
+    found = upper_bound(stress, layers, 600.0, MACHINE, gap=LOOSE, start=mean)
+    assert 1.0 / found.reached <= np.mean([1.0 / end.reached for end in ends]) * (1.0 + 1e-5)
+    assert 1.0 / found.ratio <= np.mean([1.0 / end.reached for end in ends])
+    assert found.duality_gap <= LOOSE
+    even = upper_bound(stress, layers, 600.0, MACHINE, gap=LOOSE)
+    assert found.iterations < even.iterations
+    assert even.ratio / (1.0 + LOOSE) <= found.reached <= even.ratio
 
 
 @pytest.mark.parametrize("heights", [(0.5, 1.5, 2.5, 3.2), (1.0, 2.0, 3.0), (0.7, 2.0)])
