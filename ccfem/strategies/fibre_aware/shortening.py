@@ -62,6 +62,8 @@ def shorten(
     room = length - sum(profile.step * float(chosen[profile.path].sum()) for profile in along)
     for factor in _LOWER_PRICES if price > 0.0 else ():
         for profile in along:
+            if profile.step > room:  # not even one piece fits
+                continue
             before = chosen[profile.path]
             longer = profile.kept(factor * price, minimum, cut_cost)[0]
             if profile.step * (longer.sum() - before.sum()) > room:
