@@ -112,10 +112,15 @@ class Spacing:
             off, wanted = _outside(
                 points, near, self.border, self.inward, self.inset, lines.normals
             )
-            rows = np.repeat(np.arange(len(missing)), 3)
-            apart = sp.csr_array((value.ravel(), (rows, column.ravel())), (len(missing), count))
-            matrix = self.roughness + _STIFF * (apart.T @ apart + sp.diags_array(off * off))
-            right = _STIFF * (apart.T @ missing + off * wanted)
+            # What comes in from the border is a row of its own, below those of pairs.
+            out = np.flatnonzero(off)
+            sizes = np.repeat([3, 1], [len(missing), len(out)])
+            starts = np.concatenate([[0], np.cumsum(sizes)])
+            entries = np.concatenate([value.ravel(), off[out]])
+            columns = np.concatenate([column.ravel(), out])
+            apart = sp.csr_array((entries, columns, starts), shape=(len(sizes), count))
+            matrix = self.roughness + _STIFF * (apart.T @ apart)
+            right = _STIFF * (apart.T @ np.concatenate([missing, wanted[out]]))
             if self.radius:
                 column, value, over = _too_bent(points, lines.normals, lines.path, self.radius)
                 rows = np.repeat(np.arange(len(over)), 3)
