@@ -34,8 +34,8 @@ _DIRECT_UNKNOWNS = 25_000
 """Largest system that is factorised: solves are then as fast as with multigrid, and rotate with the
 part to the last digits."""
 
-_PACKED = np.array([0, 1, 2, 4, 5, 8])
-"""Places of the upper triangle among the entries of a symmetric 3 x 3 matrix."""
+UPPER = np.array([0, 0, 0, 1, 1, 2]), np.array([0, 1, 2, 1, 2, 2])
+"""Rows and columns of the upper triangle of a symmetric 3 x 3 matrix, in their order."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,8 @@ class SmearedSolution:
 
 
 Fibre = Callable[[FloatArray], FloatArray]
-"""Stiffness (m, 3, 3), MPa, of the fibre in each cell at strains (m, 3) in the plane."""
+"""Stiffness, MPa, of the fibre in each cell at strains (m, 3) in the plane: symmetric (m, 3, 3), or
+the upper triangles of that (m, 6), in the order of `UPPER`."""
 
 
 @dataclass(frozen=True)
@@ -226,10 +227,11 @@ class SmearedPart:
         return np.asarray(self._gathered @ of_cells.reshape(-1, 3))
 
     def pack(self, stiffness: FloatArray) -> FloatArray:
-        """Upper triangles (m, 6) of stiffnesses (m, 3, 3), times the volumes of the cells."""
-        packed = stiffness.reshape(-1, 9).take(_PACKED, axis=1)
-        packed *= self.mesh.volumes[:, None]
-        return packed
+        """Upper triangles (m, 6) of stiffnesses as of `Fibre`, times the volumes of the cells."""
+        rows, columns = UPPER
+        whole = stiffness.ndim == 3
+        upper = stiffness.reshape(-1, 9).take(3 * rows + columns, axis=1) if whole else stiffness
+        return upper * self.mesh.volumes[:, None]
 
     def solve(
         self, fibre: Fibre, start: SmearedSolution | None = None, tolerance: float = 1e-5
@@ -243,7 +245,7 @@ class SmearedPart:
         Parameters
         ----------
         fibre : callable
-            Stiffness (m, 3, 3), MPa, at strains (m, 3).
+            Stiffness at strains (m, 3).
         start : SmearedSolution, optional
             Where to start; default the part without fibre.
         tolerance : float
@@ -285,7 +287,7 @@ class SmearedPart:
     def respond(
         self, stiffness: FloatArray, forces: FloatArray, tolerance: float = 1e-3
     ) -> FloatArray:
-        """Strains (m, 3) under forces (n, 3), N, of the part with fibre of a stiffness (m, 3, 3).
+        """Strains (m, 3) under forces (n, 3), N, of the part with fibre of a stiffness.
 
         This is the adjoint solve, with supports at rest, to a relative residual `tolerance`.
         """

@@ -18,7 +18,7 @@ import scipy.sparse as sp
 from ccfem.base.arrays import FloatArray, IntArray, freeze
 from ccfem.strategies.fibre_aware.border_levels import BorderLevels
 from ccfem.strategies.fibre_aware.field_descent import designed_fields
-from ccfem.strategies.fibre_aware.smeared import SmearedPart, SmearedSolution
+from ccfem.strategies.fibre_aware.smeared import UPPER, SmearedPart, SmearedSolution
 from ccfem.strategies.fibre_aware.spline_grid import SplineGrid
 from ccfem.strategies.fibre_aware.upper_bound import LEAST, SUM, WORST
 
@@ -146,20 +146,20 @@ class SmearedFibre:
         Its size, rounded off at zero.
     along : (m, 3) array
         Maps strains 11, 22 and 12 in the plane to the strain along the fibre, times ``|g|^2``.
-    outer : (m, 3, 3) array, MPa
-        Stiffness of the fibre.
+    upper : (m, 6) array, MPa
+        Stiffness of the fibre: the upper triangle.
     """
 
     gx: FloatArray
     gy: FloatArray
     size: FloatArray
     along: FloatArray
-    outer: FloatArray
+    upper: FloatArray
 
     def stiffness(self, strain: FloatArray) -> FloatArray:
-        """Stiffness (m, 3, 3), MPa, at strains (m, 3): next to none for fibre in compression."""
+        """Stiffness (m, 6), MPa, at strains (m, 3): next to none for fibre in compression."""
         stretched = np.einsum("ci,ci->c", self.along, strain) > 0.0
-        return np.where(stretched, 1.0, SLACK)[:, None, None] * self.outer
+        return np.where(stretched, 1.0, SLACK)[:, None] * self.upper
 
 
 @dataclass(frozen=True)
@@ -332,9 +332,9 @@ class StreamModel:
         size = np.sqrt(gx * gx + gy * gy + _SMALLEST**2)
         along = np.stack([gy * gy, gx * gx, -gx * gy], axis=1)
         strength = self.axial_stiffness * self.capacity / size**3
-        return SmearedFibre(
-            gx, gy, size, along, strength[:, None, None] * along[:, :, None] * along[:, None, :]
-        )
+        rows, columns = UPPER
+        upper = (strength[:, None] * along).take(rows, axis=1) * along.take(columns, axis=1)
+        return SmearedFibre(gx, gy, size, along, upper)
 
     def pull(self, smeared: SmearedFibre, solution: SmearedSolution) -> Pull:
         """Return the derivatives (m,) of -log(stiffness) by the components of g."""
@@ -449,7 +449,7 @@ class StreamProblem:
         )
 
     def stiffness(self, smeared: Sequence[SmearedFibre], strain: FloatArray) -> FloatArray:
-        """Stiffness (m, 3, 3), MPa, of the fibre of all fields at strains (m, 3)."""
+        """Stiffness (m, 6), MPa, of the fibre of all fields at strains (m, 3)."""
         stiffness = self.shares[0] * smeared[0].stiffness(strain)
         for share, fibre in zip(self.shares[1:], smeared[1:], strict=True):
             stiffness += share * fibre.stiffness(strain)
