@@ -1,13 +1,22 @@
 """Toolpaths: the polylines that every strategy returns and every index is computed from."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from ccfem.base.arrays import BoolArray, FloatArray, IntArray, RowBuffer, freeze, shared_rows
+from ccfem.base.arrays import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    RowBuffer,
+    freeze,
+    read_only,
+    shared_rows,
+)
 from ccfem.base.display import Shown
 from ccfem.base.row_blocks import RowBlocks
 from ccfem.geometry.polylines import extent, step_lengths
@@ -184,6 +193,10 @@ class Toolpaths(Shown):
         joined = {name: column.rows() for name, column in columns.items()}
         return cls(offsets=np.cumsum(np.concatenate(sizes)), **joined)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Send only the fields to other processes, not what is stored beside them."""
+        return {column.name: getattr(self, column.name) for column in fields(self)}
+
     def __len__(self) -> int:
         return len(self.layer)
 
@@ -243,11 +256,11 @@ class Toolpaths(Shown):
         """Only the paths of one kind (FIBRE, MATRIX, SUPPORT or TRAVEL)."""
         return self.select(self.kind == kind)
 
-    @property
+    @cached_property
     def lengths(self) -> FloatArray:
         """Length of each path, (K,), mm."""
         if not len(self):
-            return np.zeros(0)
+            return read_only(np.zeros(0))
         # Some paths at a time: those of a large print fill memory.
         edges = np.searchsorted(self.offsets, np.arange(0, len(self.points), _TOGETHER))
         total = np.zeros(len(self))
@@ -257,4 +270,4 @@ class Toolpaths(Shown):
             step_lengths(self.points[ends[0] : ends[-1]], steps[1:])
             steps[ends[:-1] - ends[0]] = 0.0
             total[first:last] = np.add.reduceat(steps, ends[:-1] - ends[0])
-        return total
+        return read_only(total)

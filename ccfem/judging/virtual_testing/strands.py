@@ -80,6 +80,25 @@ class Strands:
         return float(self.length.sum())
 
 
+_STORED = 2**18
+"""Pieces of fibre up to which paths store them: some 200 bytes each, with what bars need."""
+
+
+def whole_strands(toolpaths: Toolpaths, mesh: TetMesh) -> Strands:
+    """Cut fibre paths of which all counts in full, as `cut_strands` does.
+
+    The paths store what was cut for the last mesh, if that is not much: plans are tested against
+    one another again and again.
+    """
+    known: tuple[TetMesh, Strands] | None = toolpaths.__dict__.get("strands")
+    if known is not None and known[0] is mesh:
+        return known[1]
+    strands = cut_strands(toolpaths, mesh)
+    if len(strands) <= _STORED:
+        toolpaths.__dict__["strands"] = mesh, strands
+    return strands
+
+
 def cut_strands(
     toolpaths: Toolpaths,
     mesh: TetMesh,

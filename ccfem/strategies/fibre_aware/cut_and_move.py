@@ -21,6 +21,7 @@ from ccfem.body.mesh import TetMesh
 from ccfem.geometry.polylines import along_line, points_along, resample
 from ccfem.judging.virtual_testing import Specimen, Strand, Strands, cut_strands
 from ccfem.judging.virtual_testing.equilibrium import Bars, bars
+from ccfem.judging.virtual_testing.strands import whole_strands
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.equal_fibre import TOLERANCE
 from ccfem.paths.planning.layer_plans import plan_layers
@@ -299,7 +300,7 @@ def exchanged(
 
 
 def _pieces(paths: Toolpaths, mesh: TetMesh) -> tuple[Strands, Bars]:
-    strands = cut_strands(paths, mesh)
+    strands = whole_strands(paths, mesh)
     return strands, bars(strands, mesh)
 
 
@@ -316,8 +317,8 @@ def _worth(known: Judged, pieces: Bars) -> FloatArray:
 
 def _price(paths: Toolpaths, known: Judged, mesh: TetMesh) -> float:
     """Worth per mm above the share `_CHEAPEST` of the fibre."""
-    strands, pieces = _pieces(paths, mesh)
-    worth = _worth(known, pieces)
+    strands = cut_strands(paths, mesh)
+    worth = _worth(known, bars(strands, mesh))
     order = np.argsort(worth, kind="stable")
     before = np.cumsum(strands.length[order])
     return float(worth[order][np.searchsorted(before, _CHEAPEST * before[-1])])

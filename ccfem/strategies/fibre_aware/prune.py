@@ -15,7 +15,8 @@ import numpy as np
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.checks import check_number
 from ccfem.fem.elasticity import StressField
-from ccfem.judging.virtual_testing import Specimen, Strand, Strands, cut_strands
+from ccfem.judging.virtual_testing import Specimen, Strand, Strands
+from ccfem.judging.virtual_testing.strands import whole_strands
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.strategies.fibre_aware.judges import Goal, Judged, equilibria, most_merit
@@ -110,7 +111,7 @@ def prune(
 
     strands = None
     if least is not None:
-        strands = cut_strands(toolpaths, goal.mesh)
+        strands = whole_strands(toolpaths, goal.mesh)
         if beaten(strands, least.displacements):
             return Toolpaths.empty()
     if length_now <= length and (tight >= 1.0 or tight_share(toolpaths, machine) <= tight):
@@ -119,7 +120,7 @@ def prune(
     worth = Worth.of(goal.parts, strand, strength) if strength else None
     for k in range(rounds):
         if k or strands is None:
-            strands = cut_strands(toolpaths, goal.mesh)
+            strands = whole_strands(toolpaths, goal.mesh)
         tested = equilibria(goal, strands, strand, known, _TOLERANCE)
         known, counts = tested.displacements, goal.counts(tested.ratios)
         if beaten(strands, known):

@@ -1,6 +1,7 @@
 """Strands: nothing lost, nothing counted twice, wherever the path runs."""
 
 import itertools
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,8 @@ from hypothesis import given, settings, strategies as st
 
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import TetMesh
-from ccfem.judging.virtual_testing.strands import cut_strands
+from ccfem.judging.virtual_testing import strands as strands_of
+from ccfem.judging.virtual_testing.strands import cut_strands, whole_strands
 from ccfem.paths.toolpaths import MATRIX, Toolpaths
 
 
@@ -213,3 +215,18 @@ def test_a_small_part_far_from_another_needs_no_large_grid():
 def test_no_fibre_is_refused(paths):
     with pytest.raises(InputError, match="needs fibre"):
         cut_strands(paths, kuhn())
+
+
+def test_whole_strands_are_stored_for_the_last_mesh_and_stay_here(monkeypatch):
+    line = np.array([[0.1, 0.2, 0.3], [3.9, 2.8, 2.6]])
+    paths, other = toolpaths(line), kuhn(shape=(2, 2, 2), size=(4.0, 3.0, 3.0))
+    first = whole_strands(paths, MESH)
+    np.testing.assert_array_equal(first.length, cut_strands(paths, MESH).length)
+    assert first.length.sum() == pytest.approx(np.linalg.norm(line[1] - line[0]))
+    assert whole_strands(paths, MESH) is first
+    assert len(whole_strands(paths, other)) != len(first)
+    assert paths.lengths is paths.lengths
+    assert not vars(pickle.loads(pickle.dumps(paths))).keys() & {"strands", "lengths"}
+    # Many pieces are not kept in memory.
+    monkeypatch.setattr(strands_of, "_STORED", len(first) - 1)
+    assert whole_strands(paths, MESH) is not whole_strands(paths, MESH)
