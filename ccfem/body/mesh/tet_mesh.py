@@ -35,12 +35,15 @@ from ccfem.geometry.facets import (
     signed_volumes,
     unique_edges,
 )
+from ccfem.geometry.locate import Simplices, locate
 
 # What meshes in space and in the plane share: nodes, cells, their facets, and named patches.
 
 
 _MANY = 12
 """Names of patches that a message lists."""
+_FEW = 2**17
+"""Cells up to which what they are searched by is stored."""
 _NONE: Mapping[str, FloatArray] = MappingProxyType({})
 
 
@@ -281,6 +284,19 @@ class TetMesh(CellMesh, Shown):
     def facets(self) -> IntArray:
         """Corner nodes of the faces of all cells, (4 m, 3), outward."""
         return self.corners[:, _FACES].reshape(-1, 3)
+
+    @cached_property
+    def _simplices(self) -> Simplices:
+        return Simplices.of(self.points, self.corners)
+
+    def locate(self, queries: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Cell that holds each point (q, 3), as `ccfem.geometry.locate.locate`, its sides straight.
+
+        What it is searched by is stored where cells are few: some 300 bytes each.
+        """
+        if len(self.cells) > _FEW:
+            return locate(self.points, self.corners, queries)
+        return self._simplices.locate(queries)
 
     @cached_property
     def partners(self) -> IntArray:

@@ -10,7 +10,6 @@ from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity.recovery import nodal_stress
 from ccfem.fem.elasticity.stress_field import StressField
 from ccfem.fem.elasticity.supports import soft_supports, spring_forces
-from ccfem.geometry.locate import Simplices
 from ccfem.judging.virtual_testing.equilibrium import IN_COMPRESSION, bars
 from ccfem.judging.virtual_testing.stiffness_test import VirtualTest
 from ccfem.judging.virtual_testing.strands import Strands
@@ -168,13 +167,15 @@ def _change_aside(
     size = np.linalg.norm(across, axis=1, keepdims=True)
     across *= distance / np.where(size > 0.0, size, 1.0)
     nodal = nodal_stress(mesh, displacement, _TENSOR)
-    cells, reached = Simplices.of(mesh.points, mesh.corners), []
-    for way in (1.0, -1.0):
-        cell, weights = cells.locate(strands.middle + way * across)
-        at = np.where(cell >= 0, cell, strands.cell)
-        weights[cell < 0] = 0.25
-        tensor = np.einsum("sa,saij->sij", weights, nodal[mesh.corners[at]])
+    places = np.concatenate([strands.middle + across, strands.middle - across])
+    cell, weights = mesh.locate(places)
+    held = cell >= 0
+    weights[~held] = 0.25
+    reached = []
+    for way in (slice(len(strands)), slice(len(strands), None)):
+        at = np.where(held[way], cell[way], strands.cell)
+        tensor = np.einsum("sa,saij->sij", weights[way], nodal[mesh.corners[at]])
         along = np.einsum("sij,si,sj->s", tensor, strands.tangent, strands.tangent)
-        reached.append((along, cell >= 0))
+        reached.append((along, held[way]))
     (ahead, inside), (behind, also) = reached
     return np.where(inside & also, 0.5 * (ahead - behind), 0.0)

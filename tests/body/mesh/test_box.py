@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from ccfem.base.errors import InputError
+from ccfem.body.mesh import tet_mesh
 from ccfem.body.mesh.box import box_mesh
 
 divisions = st.tuples(*[st.integers(1, 4)] * 3)
@@ -59,3 +60,17 @@ def test_alternating_bricks_are_their_own_mirror_image(axis):
 def test_empty_boxes_are_refused(size, count, message):
     with pytest.raises(InputError, match=message):
         box_mesh(size, count)
+
+
+@pytest.mark.parametrize("few", [0, 10**6])
+def test_points_of_a_box_are_located_in_cells_that_hold_them(few, monkeypatch):
+    monkeypatch.setattr(tet_mesh, "_FEW", few)
+    mesh = box_mesh((3.0, 2.0, 1.0), (3, 2, 2))
+    points = np.random.default_rng(5).uniform(-0.5, 1.5, (200, 3)) * (3.0, 2.0, 1.0)
+    inside = ((points >= 0.0) & (points <= (3.0, 2.0, 1.0))).all(axis=1)
+    cell, weights = mesh.locate(points)
+    np.testing.assert_array_equal(cell >= 0, inside)
+    corners = mesh.points[mesh.corners[cell[inside]]]
+    np.testing.assert_allclose(
+        np.einsum("qa,qad->qd", weights[inside], corners), points[inside], atol=1e-12
+    )

@@ -219,7 +219,7 @@ def test_no_fibre_is_refused(paths):
 
 def test_whole_strands_are_stored_for_the_last_mesh_and_stay_here(monkeypatch):
     line = np.array([[0.1, 0.2, 0.3], [3.9, 2.8, 2.6]])
-    paths, other = toolpaths(line), kuhn(shape=(2, 2, 2), size=(4.0, 3.0, 3.0))
+    paths, other = flat_paths([line]), kuhn(shape=(2, 2, 2), size=(4.0, 3.0, 3.0))
     first = whole_strands(paths, MESH)
     np.testing.assert_array_equal(first.length, cut_strands(paths, MESH).length)
     assert first.length.sum() == pytest.approx(np.linalg.norm(line[1] - line[0]))

@@ -6,7 +6,6 @@ import numpy as np
 
 from ccfem.base.arrays import BoolArray, FloatArray
 from ccfem.body.mesh import TetMesh
-from ccfem.geometry.locate import locate
 from ccfem.geometry.polylines import merge_repeated, sample_midpoints
 from ccfem.geometry.shapes import INSIDE, section_places
 from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, LayerSamples
@@ -63,7 +62,7 @@ def sample_skin(fibre: Toolpaths, layer: Layer, mesh: TetMesh, machine: Machine)
     normal, beside = _over(layer, middle)
     reach = (0.5 - _TOLERANCE) * machine.strand_height * normal
     beyond = np.concatenate([middle - reach, middle + reach])
-    cell, _ = locate(mesh.points, mesh.corners, beyond)
+    cell, _ = mesh.locate(beyond)
     out = (cell < 0).reshape(2, -1).any(axis=0)
     return SkinSamples(length, out & ~beside)
 
