@@ -39,13 +39,13 @@ def bar_stiffness(
     ----------
     volumes : (m,) array, mm^3
         Of the cells.
-    share : (s,) array in [0, 1], optional
-        How much of its stiffness each piece lends; default 1.
+    share : (s,) array, optional
+        How much of its stiffness each piece lends, in [0, 1], or its stiffness EA, N; default 1.
 
     Returns
     -------
     (m, 6, 6) array, 1/mm^2
-        Multiply by EA, N, for MPa.
+        Multiply by EA, N, for MPa, unless it is given.
     """
     weight = strands.length / volumes[strands.cell]
     result = np.zeros((len(volumes), 6, 6))
@@ -225,6 +225,9 @@ _SETTLING = 1e-4
 _PROGRESS = 1e-2
 """Factor by which each update reduces the residual while the set of carrying fibres may change."""
 
+_FAR = 20.0
+"""Residual over its goal from which on a preconditioner that knows the fibre pays (measured)."""
+
 _PROGRESS_BY_ENERGY = 0.2
 """The same where the energy of the error is judged, in all modes."""
 
@@ -259,6 +262,7 @@ def equilibrium(
     known: Sequence[FloatArray] = (),
     tolerance: float = 1e-8,
     energy: float = 0.0,
+    prepare: bool = False,
 ) -> Equilibrium:
     """Find the displacement of a part with fibres.
 
@@ -282,6 +286,9 @@ def equilibrium(
     energy : float, default 0
         On quadratic cells, largest error in energy norm, over the displacement, that is accepted
         too, by an estimate: the stiffness is then accurate to its square.
+    prepare : bool, default False
+        On large meshes of linear cells, solves far from their goal then get a preconditioner that
+        knows the fibre. They take a third of the iterations, and set it up in the time of twenty.
 
     Raises
     ------
@@ -307,8 +314,13 @@ def equilibrium(
         strain, carried = _state(pieces, u, mode)
         matrix = Reinforced(specimen.matrix, pieces, carried * full)
     part, x = _reduced(specimen, held), held.restrict(u)
+    prepare = prepare and specimen.solver.backend == "amg"
     for update in range(most):
         reduced, rest, residual = _imbalance(part, matrix, held, x, forces)
+        if prepare and residual > _FAR * tolerance:
+            fibre = np.maximum(carried, IN_COMPRESSION[PARTIAL]) * strands.share
+            specimen = _knowing_fibre(specimen, strands, axial_stiffness * fibre)
+            prepare = False
         if residual <= max(tolerance, _SETTLING if held.presses is not None else 0.0):
             # Near enough to say which supports still press; with others the balance is another.
             internal = (matrix @ u.reshape(-1)).reshape(u.shape)
@@ -344,6 +356,12 @@ def equilibrium(
         f"virtual test: relative residual {residual:.1e} after {most} updates of the fibres "
         f"that carry tension, above the tolerance {tolerance:.1e}"
     )
+
+
+def _knowing_fibre(specimen: Specimen, strands: Strands, stiffness: FloatArray) -> Specimen:
+    """Return the part with a preconditioner of it with fibre of a stiffness EA (s,), N."""
+    volumes = specimen.system.problem.mesh.volumes
+    return specimen.for_fibre(bar_stiffness(strands, volumes, stiffness))
 
 
 def _knowing(

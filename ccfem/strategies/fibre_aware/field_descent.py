@@ -21,6 +21,9 @@ _AT_BORDERS = 0.4
 _MEMORY = 20
 """Steps that L-BFGS remembers."""
 
+_PREPARED = 16
+"""Evaluations after which the solves are prepared for the fibre of the field then."""
+
 _REACH = 1.0
 """Radius of the filter, in squares of the grid."""
 
@@ -79,6 +82,7 @@ class _Evaluated(Protocol):
     def laplacian(self) -> Any: ...
 
     def evaluate(self, field: FloatArray, start: Any, tolerance: float) -> Any: ...
+    def prepared(self, field: FloatArray, solutions: Any) -> "_Evaluated": ...
 
 
 def improved(
@@ -98,12 +102,15 @@ def improved(
         metric = FieldMetric.of(smoother @ smoother)
     tried: list[tuple[FloatArray, Any]] = []
     ratios: list[Any] = []
+    near = [problem]
 
     def objective(x: FloatArray) -> tuple[float, FloatArray]:
         field = metric.field(x)
         # The last solution is near to this one; the best one is to be returned.
         last = tried[-1][1].solution if tried else solution
-        objective_at = problem.evaluate(field, last, TOLERANCE)
+        if len(ratios) == _PREPARED:
+            near[0] = problem.prepared(field, last)
+        objective_at = near[0].evaluate(field, last, TOLERANCE)
         ratios.append(objective_at.ratio)
         if len(tried) == 2:
             tried.pop() if tried[0][1].value <= tried[1][1].value else tried.pop(0)
@@ -122,6 +129,7 @@ class _Posed(Protocol):
     @property
     def laplacian(self) -> Any: ...
     def evaluate(self, field: FloatArray, start: Any = None, tolerance: float = 1e-5) -> Any: ...
+    def prepared(self, field: FloatArray, solutions: Any = None) -> "_Posed": ...
     def curvature(self, field: FloatArray, solution: Any) -> Any: ...
     def levels(self, field: FloatArray, solution: Any) -> BorderLevels: ...
 
@@ -136,6 +144,9 @@ class _AtBorders:
     @property
     def laplacian(self) -> Any:
         return self.problem.laplacian
+
+    def prepared(self, field: FloatArray, solutions: Any) -> "_AtBorders":
+        return replace(self, problem=self.problem.prepared(field, solutions))
 
     def evaluate(self, field: FloatArray, start: Any, tolerance: float) -> Any:
         objective = self.problem.evaluate(field, start, tolerance)
@@ -163,6 +174,7 @@ def designed_fields(
         As in `improved`; the objective is given without the cost of levels.
     """
     last = int(_AT_BORDERS * evaluations)
+    problem = problem.prepared(start)
     before = problem.evaluate(start, tolerance=TOLERANCE)
     metric = FieldMetric.of(problem.curvature(start, before.solution))
     designed = improved(problem, start, evaluations - last, metric, before.solution)
@@ -182,6 +194,7 @@ def drawn_to_borders(
     """
     levels = problem.levels(field, solution)
     lifted = levels.lifted(field)
+    problem = problem.prepared(lifted, solution)
     metric = FieldMetric.of(problem.curvature(lifted, solution) + levels.curvature())
     posed = _AtBorders(problem, levels)
     field, drawn, ratios = improved(posed, lifted, evaluations, metric, solution)

@@ -135,7 +135,9 @@ def equilibria(
     with_strands, ratios, works = [], [], []
     for k, part in enumerate(goal.parts):
         near = () if known is None else (known[k],)
-        with_fibre = equilibrium(part, strands, axial, known=near, tolerance=tolerance)
+        with_fibre = equilibrium(
+            part, strands, axial, known=near, tolerance=tolerance, prepare=True
+        )
         stiffness = part.stiffness(with_fibre.displacement, 0.5 * with_fibre.work)
         bare = part.unreinforced
         ratio = stiffness / part.stiffness(bare.displacement, bare.strain_energy)

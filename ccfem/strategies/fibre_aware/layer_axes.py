@@ -17,11 +17,15 @@ import numpy as np
 import scipy.sparse as sp
 
 from ccfem.base.arrays import FloatArray, IntArray, freeze
+from ccfem.base.tensor import bond_matrix
 from ccfem.geometry.locate import nearest_on_triangles
 from ccfem.slicing.layers.layer import Layer, curved_layers
 from ccfem.strategies.fibre_aware.spline_grid import SplineGrid
 
 _NEAREST = "_nearest_layers"
+
+_ALONG = [0, 1, 5]
+"""Places of stresses 11, 22 and 12 among those of Voigt."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +80,11 @@ class LayerAxes:
         """Vectors (m, 3) of components (m, 2) along the layers, one for each cell."""
         axes = np.broadcast_to(self.frames, (len(vectors), 3, 3))[:, :2]
         return np.asarray(np.einsum("ki,kid->kd", vectors, axes))
+
+    def stiffness_in_space(self, stiffness: FloatArray) -> FloatArray:
+        """Stiffness (m, 6, 6), MPa, of one along the layers, (m, 3, 3) for 11, 22 and 12."""
+        turn = bond_matrix(np.swapaxes(self.frames, -1, -2))[..., _ALONG]
+        return np.asarray(turn @ stiffness @ np.swapaxes(turn, -1, -2))
 
     def slopes(
         self, grid: SplineGrid, places: FloatArray, cells: IntArray | None = None

@@ -233,6 +233,18 @@ class SmearedPart:
         upper = stiffness.reshape(-1, 9).take(3 * rows + columns, axis=1) if whole else stiffness
         return upper * self.mesh.volumes[:, None]
 
+    def with_fibre(self, fibre: Fibre, strain: FloatArray) -> "SmearedPart":
+        """Return the part with a preconditioner that knows some fibre at strains (m, 3).
+
+        Solves with such fibre then take a third of the iterations. One that is factorised stays as
+        it is.
+        """
+        specimen = self.specimen
+        if specimen.solver.backend != "amg":
+            return self
+        added = self.axes.stiffness_in_space(fibre(strain))
+        return replace(self, specimen=specimen.for_fibre(added))
+
     def solve(
         self, fibre: Fibre, start: SmearedSolution | None = None, tolerance: float = 1e-5
     ) -> SmearedSolution:

@@ -468,6 +468,26 @@ class StreamProblem:
             for part, begin in zip(self.parts, starts, strict=True)
         )
 
+    def prepared(
+        self, field: FloatArray, solutions: Sequence[SmearedSolution] | None = None
+    ) -> "StreamProblem":
+        """Return the problem with parts that are prepared for the fibre of fields near to these.
+
+        Parameters
+        ----------
+        field : (n * c,) array
+        solutions : sequence of SmearedSolution, optional
+            Of each case, as near to that of the fields as is known; default without fibre.
+        """
+        if solutions is None:
+            solutions = [part.unreinforced for part in self.parts]
+        smeared = self.smeared(field)
+        parts = tuple(
+            part.with_fibre(lambda strain: self.stiffness(smeared, strain), solution.strain)
+            for part, solution in zip(self.parts, solutions, strict=True)
+        )
+        return replace(self, parts=parts)
+
     def ratios(self, solutions: Sequence[SmearedSolution]) -> FloatArray:
         """Stiffness (n,) of each case over that of the part without fibre."""
         ratios = [

@@ -6,6 +6,7 @@ any of several, one at a time. At every evaluation an adjoint solve for each cas
 gradient.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -107,6 +108,12 @@ class StrengthProblem:
     def laplacian(self) -> Any:
         """Graph Laplacian of all fields."""
         return self.problem.laplacian
+
+    def prepared(
+        self, field: FloatArray, solutions: Sequence[SmearedSolution] | None = None
+    ) -> "StrengthProblem":
+        """Return the problem prepared for fields near to these, as `StreamProblem.prepared`."""
+        return replace(self, problem=self.problem.prepared(field, solutions))
 
     def evaluate(
         self,

@@ -51,7 +51,7 @@ from ccfem.machine.machine import Machine
 from ccfem.slicing.layers.layer import Layer
 from ccfem.strategies.fibre_aware.heights import room_for_fibre
 from ccfem.strategies.fibre_aware.layer_axes import frames_in_cells
-from ccfem.strategies.fibre_aware.smeared import SmearedPart, SmearedSolution, smeared_cases
+from ccfem.strategies.fibre_aware.smeared import Fibre, SmearedPart, SmearedSolution, smeared_cases
 
 WORST, SUM, LEAST = OBJECTIVES = ("worst", "sum", "least")
 """What is minimised: the largest of ``bound_i / ratio_i``, their weighted mean, or the largest of
@@ -72,6 +72,9 @@ _MEASURED = 7
 _ANGLES = 24
 _CERTIFIED_ANGLES = 360
 _CELL_ITERATIONS = 1_500_000
+
+_PREPARED = 0, 3
+"""Iterations before which solves are prepared for the density then: it changes less and less."""
 
 _FULL_STEPS = 10
 """Iterations after which the steps of the factors shrink."""
@@ -263,6 +266,8 @@ def _searched(
     best, attained = ascent.density, np.inf
     mean = solutions
     for k in range(iterations):
+        if k in _PREPARED:
+            smeared = smeared.prepared(ascent.density, solutions)
         solutions = smeared.solve(ascent.density, solutions)
         # Later displacements count more: the k-th in proportion to k.
         mean = [_between(*pair, 2.0 / (k + 2.0)) for pair in zip(mean, solutions, strict=True)]
@@ -332,6 +337,16 @@ class _Smeared:
         self, density: FloatArray, starts: Sequence[SmearedSolution]
     ) -> list[SmearedSolution]:
         """Displacements with a density of fibre (m, k), of each case, from those of the last."""
+        pairs, fibre = zip(self.parts, starts, strict=True), self._fibre(density)
+        return [part.solve(fibre, start, 1e-3) for part, start in pairs]
+
+    def prepared(self, density: FloatArray, solutions: Sequence[SmearedSolution]) -> "_Smeared":
+        """Return the same parts, prepared for solves with densities (m, k) near to this one."""
+        pairs, fibre = zip(self.parts, solutions, strict=True), self._fibre(density)
+        return replace(self, parts=[part.with_fibre(fibre, one.strain) for part, one in pairs])
+
+    def _fibre(self, density: FloatArray) -> Fibre:
+        """Stiffness of a density of fibre (m, k)."""
         along = directions(density.shape[1])[1]
         outer = (along[:, :, None] * along[:, None, :]).reshape(-1, 9)
 
@@ -342,8 +357,7 @@ class _Smeared:
                 carried = np.where(strain @ along.T > 0.0, density, 0.0)
             return self.axial_stiffness * (carried @ outer).reshape(-1, 3, 3)
 
-        pairs = zip(self.parts, starts, strict=True)
-        return [part.solve(fibre, start, 1e-3) for part, start in pairs]
+        return fibre
 
     def terms(self, solutions: Sequence[SmearedSolution]) -> FloatArray:
         """Terms of the objective (n,): the measure of each case over its stiffness ratio."""
