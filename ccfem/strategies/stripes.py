@@ -39,6 +39,7 @@ from ccfem.strategies.stripe_pattern.pattern import (
     stripe_pattern,
 )
 from ccfem.strategies.stripe_pattern.strand_packing import (
+    PUSHES,
     corners,
     even_points,
     evened,
@@ -65,6 +66,8 @@ _CHARTED = 1.03
 _FOLDING = 0.36, 1.024
 """Factors, where strands may fold, on the lengths of smoothing, and on the pitch: with none of them
 left out, nothing gives way."""
+_FITTING = 12
+"""Rounds of pushes in which strands of another layer move to where there is room."""
 _HALVINGS = 40
 
 
@@ -172,6 +175,18 @@ class Stripes:
                 best = strands
         return best
 
+    def taken_over(
+        self, paths: Toolpaths, source: Layer, layer: Layer, machine: Machine
+    ) -> Toolpaths:
+        """Strands of a flat layer on another of about its section, moved to where that has room.
+
+        Without folds; in a twentieth of the time of strands of its own.
+        """
+        width = machine.fibre_width
+        lines = even_points([source.plane.project(path) for path in paths], width)
+        joined = _settled(lines, layer, machine, rounds=_FITTING)
+        return Toolpaths.from_plane(joined.lines, layer, link=joined.link)
+
 
 @dataclass(frozen=True)
 class _Planner:
@@ -215,13 +230,7 @@ def _packed(
     lines = stepped_over(lines, section, width, least)
     lines = even_points(joined_ends(lines, width), width)
     # What stays too short makes room for the others.
-    lines = _long_chains(lines, width, _NEARLY * least, folds)
-    lines = evened(lines, section, width)
-    lines = keep_off_border(lines, section, _END * width)
-    lines = trim_to_clearance(even_points(lines, width), _TRIM * width, _PIECE * width)
-    lines = _long_chains(lines, width, least, folds)
-    joined = join(lines, corners(lines, width, least) if folds else [])
-    joined = _printable(joined, section, machine, least, folds)
+    joined = _settled(_long_chains(lines, width, _NEARLY * least, folds), layer, machine, folds)
     # Where no strand turns any more, straight ones may still fit.
     for radius in (0.0, 0.0) if folds else (machine.minimum_radius, 0.0):
         rest = strands_in_rest(joined.lines, section, width, least, radius)
@@ -230,6 +239,23 @@ def _packed(
         joined = with_detours(joined, rest.rings, width) if folds else joined
         joined = _printable(joined, section, machine, least, folds)
     return joined
+
+
+def _settled(
+    lines: list[FloatArray],
+    layer: Layer,
+    machine: Machine,
+    folds: bool = False,
+    rounds: int = PUSHES,
+) -> Joined:
+    """Strands of lines in steps as of `even_points`, moved apart and off the border."""
+    section, width, least = layer.plane.polygon, machine.fibre_width, _least(layer, machine)
+    lines = evened(lines, section, width, rounds)
+    lines = keep_off_border(lines, section, _END * width)
+    lines = trim_to_clearance(even_points(lines, width), _TRIM * width, _PIECE * width)
+    lines = _long_chains(lines, width, least, folds)
+    joined = join(lines, corners(lines, width, least) if folds else [])
+    return _printable(joined, section, machine, least, folds)
 
 
 def _printable(

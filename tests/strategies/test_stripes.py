@@ -13,6 +13,7 @@ from ccfem.paths.folds import folds_in
 from ccfem.paths.planning import plan
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
+from ccfem.strategies.stripes import Stripes
 
 MACHINE = Machine()
 
@@ -48,6 +49,26 @@ def test_a_pulled_plate_is_filled_with_straight_rows():
     assert paths.lengths.min() > 78.0
     assert least_distance(paths) > 0.85
     assert folds_in(paths, MACHINE).counts.sum() == 0
+
+
+def test_strands_taken_over_move_to_where_another_layer_has_room():
+    """A plate that widens by 1 % a mm of height: down, strands give way, and up, none is lost."""
+    mesh = box_mesh((60.0, 20.0, 4.0), (15, 5, 2))
+    wider = 1.0 + 0.01 * mesh.points[:, 2:]
+    mesh = replace(mesh, points=np.hstack([mesh.points[:, :2] * wider, mesh.points[:, 2:]]))
+    stress, layers = given(mesh, pull(), ("x_min", "x_max")), Planar(count=2).cut(mesh)
+    stripes = Stripes()
+    paths = plan(stripes, layers, stress, MACHINE)
+    for source, layer in (layers, layers[::-1]):
+        strands = paths.on_layer(source.index)
+        taken = stripes.taken_over(strands, source, layer, MACHINE)
+        assert (taken.layer == layer.index).all()
+        lines = [shapely.LineString(layer.plane.project(path)) for path in taken]
+        room = shapely.buffer(layer.plane.polygon, -0.39 * MACHINE.fibre_width)
+        assert shapely.covers(room, lines).all()
+        assert taken.lengths.sum() == pytest.approx(strands.lengths.sum(), rel=0.02)
+        assert least_distance(taken) > 0.85
+        assert folds_in(taken, MACHINE).counts.sum() == 0
 
 
 def test_less_fibre_is_laid_where_the_tension_is():

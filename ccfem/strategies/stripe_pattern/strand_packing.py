@@ -32,7 +32,7 @@ _TANGENT, _ASIDE = np.cos(np.radians(35.0)), np.cos(np.radians(40.0))
 """Cosines of the largest angle between the strands at such a gap, and between strand and gap."""
 _HEAD = 1.5
 """Length, in widths, over which the direction at an end is measured."""
-_PUSHES, _SEARCH = 48, 6
+PUSHES, _SEARCH = 48, 6
 """Rounds of pushes, and of those for which neighbours are searched once."""
 _NEAR = 1.3
 """Distance, in widths, up to which they are."""
@@ -138,7 +138,7 @@ def _frames(
 
 
 def evened(
-    lines: Sequence[FloatArray], section: Region, width: float, rounds: int = _PUSHES
+    lines: Sequence[FloatArray], section: Region, width: float, rounds: int = PUSHES
 ) -> list[FloatArray]:
     """Push lines apart that are nearer than a width, and off the border by half of it.
 

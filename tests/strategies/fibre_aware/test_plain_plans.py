@@ -1,5 +1,7 @@
 """Rows, contours and isocurves that cost little: planned once for layers that are alike."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -11,6 +13,7 @@ from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.fem.materials import isotropic
 from ccfem.machine.machine import Machine
 from ccfem.slicing.slicers.planar import Planar
+from ccfem.strategies.fibre_aware import plain_plans as module
 from ccfem.strategies.fibre_aware.plain_plans import _longer_side, plain_plans
 
 MACHINE = Machine(minimum_length=15.0)
@@ -35,6 +38,26 @@ def test_layers_that_are_alike_get_the_same_paths():
         assert len(first)
         for layer in layers[1:]:
             np.testing.assert_allclose(in_plane(paths, layer), first, atol=1e-9)
+
+
+def test_on_large_parts_three_layers_of_about_one_section_share_stripes(monkeypatch):
+    mesh = box_mesh((60.0, 12.0, 4.0), (15, 3, 4))
+    wider = 1.0 + 0.002 * mesh.points[:, 2:]
+    mesh = replace(mesh, points=np.hstack([mesh.points[:, :2] * wider, mesh.points[:, 2:]]))
+    pulled = {"pull": (Force("x_max", (300.0, 0.0, 0.0)),)}
+    problem = Problem(mesh, isotropic(3500.0, 0.3), (Support("x_min"),), pulled, order=1)
+    cases, layers = WeightedCases.of(solve(problem)), Planar(count=4).cut(mesh)
+    for_each = plain_plans(cases, layers, MACHINE, curves=False)[-1]
+    monkeypatch.setattr(module, "_LARGE", 0)
+    shared = plain_plans(cases, layers, MACHINE, curves=False)[-1]
+    # Two runs of two layers: the upper one of each is planned as without sharing.
+    for k, layer in enumerate(layers):
+        size = shared.on_layer(layer.index).lengths.sum()
+        assert size == pytest.approx(for_each.on_layer(layer.index).lengths.sum(), rel=0.05)
+        if k % 2:
+            np.testing.assert_allclose(
+                in_plane(shared, layer), in_plane(for_each, layer), atol=1e-6
+            )
 
 
 def test_where_a_beam_bends_across_its_layers_only_stretched_ones_get_rows_along_it():
