@@ -28,7 +28,7 @@ import ccfem
 # elements keep this short.
 
 # %%
-case = ccfem.read("loop", element_size=4.0)
+case = ccfem.read("loop", element_size=5.0)
 print(case.title)
 print(len(case.problem.mesh.cells), "tetrahedra, patches", ", ".join(case.problem.mesh.patches))
 

@@ -53,7 +53,7 @@ assert abs(2.0 * full.strain_energy - 9.13) < 0.05
 # %%
 def prepared(optimised):
     """Case, stress of the part, and its one layer."""
-    case = create_case("bridge", optimised=optimised)
+    case = create_case("bridge", optimised=optimised, element_size=3.0)
     field = solve(case.problem)["down"]
     (layer,) = Planar(count=1).cut(case.problem.mesh)
     return replace(case.machine, minimum_length=0.0), field, layer

@@ -82,7 +82,7 @@ def test_with_all_load_cases_every_one_is_as_stiff():
     problem = Problem(mesh, isotropic(3500.0, 0.3), (Support("x_min"),), loads, order=1)
     machine = Machine(minimum_length=10.0)
     case = Case("beam", "", problem, slicing=Planar(count=2), machine=machine)
-    strategy = create("stream_function", {"evaluations": 2, "phases": 1})
+    strategy = create("stream_function", {"evaluations": 2, "phases": 1, "inset": 0.6})
     planned = compare(case, {"stream": strategy}, layers=2, load_case="all", stiffness="1.3")
     (run,) = planned.runs
     assert run.strategy.objective == "least"

@@ -39,9 +39,9 @@ from ccfem.strategies.stream_function import StreamFunction
 SIZE = (60.0, 24.0, 4.0)
 
 
-def strip(force=1000.0):
+def strip(force=1000.0, size=SIZE, cells=(16, 7, 2)):
     """A strip along x that is free to contract: uniform stress."""
-    mesh = box_mesh(SIZE, (16, 7, 2))
+    mesh = box_mesh(size, cells)
     supports = (Support("x_min", "x"), Support("y_min", "y"), Support("z_min", "z"))
     problem = Problem(
         mesh,
@@ -614,7 +614,8 @@ def test_results_are_the_same_for_any_number_of_processors(monkeypatch):
     results = []
     for count in ("1", "2"):
         monkeypatch.setenv("CCFEM_THREADS", count)
-        result = compare(strip(), strategies, layers=2, fibre_per_layer=250.0, print_plans=True)
+        case = strip(size=(40.0, 12.0, 4.0), cells=(8, 3, 1))
+        result = compare(case, strategies, layers=2, fibre_per_layer=120.0, print_plans=True)
         for run in result.runs:
             assert run.tested.bracket.tension.unreinforced.mesh is result.stress.mesh
             assert not run.toolpaths.points.flags.writeable

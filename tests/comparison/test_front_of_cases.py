@@ -25,7 +25,7 @@ from ccfem.strategies.fibre_aware.upper_bound import UpperBound, upper_bound
 from ccfem.strategies.pruned import Pruned
 from ccfem.strategies.stream_function import StreamFunction
 
-STREAM = StreamFunction(evaluations=2, phases=1)
+STREAM = StreamFunction(evaluations=2, phases=1, inset=0.6)
 
 
 @pytest.fixture(scope="module")

@@ -31,7 +31,7 @@ def case_of(loads=None, **options):
 @pytest.fixture(scope="module")
 def compared():
     case = case_of(weights={"pull": 1.0, "side": 0.5})
-    strategies = {"stream": StreamFunction(evaluations=3, phases=1), "zigzag": Zigzag()}
+    strategies = {"stream": StreamFunction(evaluations=3, phases=1, inset=0.6), "zigzag": Zigzag()}
     return compare(case, strategies, fibre_per_layer=500.0, load_case="all")
 
 

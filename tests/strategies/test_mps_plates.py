@@ -69,7 +69,7 @@ def test_plates_are_filled_along_the_stress(plate, laid):
     assert used == pytest.approx(1.0 + laid.overlap - laid.gaps, abs=1e-4)
 
 
-@pytest.mark.parametrize("plate", ["II", "III"], indirect=True)
+@pytest.mark.parametrize("plate", ["III"], indirect=True)
 def test_rounding_changes_next_to_nothing(plate, laid):
     """Noise of 1e-9 mm and another origin: short strands at junctions may differ, no more."""
     other = Laid(plate[1], shift=SHIFT, noise=1e-9)

@@ -25,6 +25,7 @@ from ccfem.strategies import create
 DISC = shapely.Point(0, 0).buffer(9.0, quad_segs=32) & shapely.box(-8.9, -9, 8.9, 9)
 """With short flats to hold and pull it at."""
 MACHINE = Machine(fibre_width=0.9, minimum_radius=1.5, minimum_length=5.0)
+WIDE = replace(MACHINE, fibre_width=1.8, minimum_radius=3.0)
 
 
 @pytest.fixture(scope="module")
@@ -195,10 +196,9 @@ def test_wide_members_are_not_laid_over_each_other(plate_with_hole):
 @pytest.mark.parametrize("longest", [6.0, 1000.0])
 def test_no_link_lies_inside_for_longer_than_is_allowed(plate_with_hole, longest):
     layer, stress = plate_with_hole
-    machine = replace(MACHINE, fibre_width=1.8, minimum_radius=3.0)
     # Strands that end in the joints are linked there, or not at all.
     strategy = create("svt", {"longest_inside": longest, "crossings": False})
-    paths = strategy(layer, stress, machine)
+    paths = strategy(layer, stress, WIDE)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], paths.link]).astype(int)))
     plane = paths.points[:, :2]
     links = [plane[a : b + 1] for a, b in zip(edges[::2], edges[1::2], strict=True)]
@@ -217,7 +217,7 @@ def test_no_link_lies_over_voids_where_none_may(plate_with_hole):
     hole = shapely.Polygon(layer.plane.polygon.interiors[0]).buffer(-1e-3)
     over = []
     for parameters in ({}, {"longest_over_void": 0.0}):
-        paths = create("svt", parameters)(layer, stress, MACHINE)
+        paths = create("svt", parameters)(layer, stress, WIDE)
         start = np.flatnonzero(paths.link)
         steps = np.stack([paths.points[start, :2], paths.points[start + 1, :2]], axis=1)
         over.append(shapely.length(shapely.intersection(shapely.linestrings(steps), hole)).sum())

@@ -156,7 +156,10 @@ def test_the_judge_weighs_what_each_test_alone_says(strong_plate):
 
 @pytest.mark.parametrize(
     ("strategy", "weight"),
-    [(StreamFunction(evaluations=2, phases=1, overfill=1.3), 0.6), (Pruned(of="zigzag"), 0.25)],
+    [
+        (StreamFunction(evaluations=2, phases=1, overfill=1.3, inset=0.6), 0.6),
+        (Pruned(of="zigzag"), 0.25),
+    ],
 )
 def test_planning_for_strength_is_worth_no_less_than_for_stiffness(strong_bends, strategy, weight):
     cases, layers = strong_bends[0], strong_bends[1][1:2]  # one layer shows it as well

@@ -39,7 +39,7 @@ def test_too_much_is_refused_with_the_most_that_there_is(pulled_bar):
 
 
 SMALL = Machine(minimum_length=6.0)
-STREAM = StreamFunction(evaluations=6, phases=1)
+STREAM = StreamFunction(evaluations=6, phases=1, inset=0.6)
 
 
 def test_every_load_case_reaches_the_ratio_with_no_less_fibre_than_any_paths_take(two_pulls):

@@ -80,7 +80,7 @@ def test_one_case_is_planned_as_ever(two_bends):
     cases, layers = two_bends
     field = cases.fields[0]
     one = WeightedCases.of({"tip": field}, {"tip": 7.0})
-    for each in (StreamFunction(evaluations=2, phases=1), Pruned(of="zigzag")):
+    for each in (StreamFunction(evaluations=2, phases=1, inset=0.6), Pruned(of="zigzag")):
         before = plan_to_length(each, layers, field, MACHINE, 500.0)
         after = plan_cases(each, layers, one, MACHINE, 500.0)
         np.testing.assert_array_equal(after.toolpaths.points, before.toolpaths.points)
@@ -199,7 +199,7 @@ def vars_of(field):
 def test_stream_function_plans_for_a_force_and_a_support_that_moves(pulled_and_moved):
     # The part is alike along x and along y, and so is what loads it: so are the gains.
     cases, layers = pulled_and_moved
-    strategy = StreamFunction(evaluations=8)
+    strategy = StreamFunction(evaluations=8, phases=2, inset=0.6)
     planned = plan_cases(strategy, layers, cases, MACHINE, wanted=200.0)
     ratios = virtual_tests(planned.toolpaths, cases).ratios
     x, y = along_x(planned.toolpaths)
@@ -213,7 +213,7 @@ def test_with_fewer_layers_than_cases_those_of_most_weight_get_a_field(two_bends
     cases, layers = two_bends
     material = replace(cases.fields[0].problem.material, tensile_strength=50.0)
     strong = WeightedCases.of(solve(replace(cases.fields[0].problem, material=material)))
-    strategy = StreamFunction(evaluations=4, phases=1, strength=strength)
+    strategy = StreamFunction(evaluations=4, phases=1, inset=0.6, strength=strength)
     planned = plan_cases(strategy, layers[:1], strong, MACHINE, 400.0)
     assert 380.0 < planned.length_per_layer <= 400.0
     assert set(planned.toolpaths.layer) == {layers[0].index}

@@ -205,7 +205,7 @@ def test_shares_of_strength_outside_zero_to_one_are_refused(strategy):
 
 def test_a_plan_for_strength_keeps_its_length_and_says_what_it_overfilled(strong_beam):
     stress, layers = strong_beam
-    strategy = StreamFunction(strength=0.5, evaluations=2, phases=1)
+    strategy = StreamFunction(strength=0.5, evaluations=2, phases=1, inset=0.6)
     told, planner = strategy.to_lengths(stress, layers, SHORT, (200.0,))[0]
     assert told.strength == 0.5
     assert told.overfill >= 1.1
