@@ -9,6 +9,7 @@ from forked_children import ForkedChildren
 
 from ccfem.body.isolated import process
 from ccfem.body.mesh import TetMesh
+from ccfem.cases.bodies import BODIES
 
 CUBE = np.array(
     [[0, 1, 3, 7], [0, 1, 7, 5], [0, 5, 7, 4], [0, 3, 2, 7], [0, 6, 4, 7], [0, 2, 6, 7]]
@@ -129,6 +130,13 @@ def forked_children():
 def started_children(monkeypatch):
     """Start each child of `ccfem.body.isolated` from nothing, as outside of tests."""
     monkeypatch.setattr(process, "subprocess", subprocess)
+
+
+@pytest.fixture
+def coarse_bar(monkeypatch):
+    """Give the case `bar` 2.5 times longer cells: examples of pages run on it as they stand."""
+    make, _ = BODIES["bar"]
+    monkeypatch.setitem(BODIES, "bar", (make, 4.0))
 
 
 @pytest.fixture(scope="module")

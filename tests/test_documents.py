@@ -38,6 +38,7 @@ def test_the_two_commands_are_there():
     assert '    pip install -e ".[test]" && pytest\n' in README
 
 
+@pytest.mark.usefixtures("coarse_bar")
 def test_python_of_the_readme_runs(capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     for block in blocks(README, "python"):
@@ -51,6 +52,7 @@ def test_the_readme_is_short():
     assert len(README.split()) <= 900
 
 
+@pytest.mark.usefixtures("coarse_bar")
 def test_the_flow_is_drawn_as_it_is(capsys):
     """Every word of the drawing is a name of the engine, and its code runs."""
     page = (ROOT / "docs/concepts/flow.md").read_text()
@@ -233,6 +235,7 @@ def test_adding_a_strategy_works_as_told(copy):
     assert re.search(r"\d+ passed", run("-m", *command.split()))
 
 
+@pytest.mark.usefixtures("coarse_bar")
 def test_a_slicer_of_a_notebook_works_as_printed(capsys):
     """What the page defines is compared as it stands there, without a file in the package."""
     module = types.ModuleType("notebook")

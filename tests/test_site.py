@@ -41,6 +41,7 @@ def test_every_command_of_a_page_exists(page):
             group.commands[name].make_context(name, rest, resilient_parsing=False)
 
 
+@pytest.mark.usefixtures("coarse_bar")
 @pytest.mark.parametrize(
     "page", [page for page in PAGES if fenced(page, "python")], ids=lambda page: page.stem
 )

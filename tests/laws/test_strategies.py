@@ -31,6 +31,9 @@ ALL = NAMES + VARIANTS
 QUICK = {"stream_function": {"evaluations": 2, "phases": 1}}
 """Parameters that none of the laws depends on, of strategies that are slow with their defaults."""
 
+ALONE = {"pruned": {"base": {"cap": 60.0}}, "stream_function": {"inset": 0.6}}
+"""Parameters with which no plain plans are tested, and perhaps taken, beside their own."""
+
 SLOW = {
     "mps": 1.5, "pruned": 2.0, "stream_function": 2.0, "streamline": 1.7, "stripes": 1.7, "svt": 1.3
 }  # fmt: skip
@@ -47,13 +50,17 @@ def made(name, **parameters):
 def with_amount(name, which):
     """Strategy of a name that lays most, or least."""
     amount = named()[name].amount
-    return made(name, **{amount.parameter: getattr(amount, which)})
+    return made(name, **ALONE.get(name, {}), **{amount.parameter: getattr(amount, which)})
 
 
 def strategy_of(label):
     """Strategy of a name, or of a name and one of its variants."""
     name, _, variant = label.partition("-")
-    return made(name, **(named()[name].variants[variant] if variant else {}))
+    if not variant:
+        return made(name)
+    parameters = named()[name].variants[variant]
+    alone = {} if "of" in parameters else ALONE.get(name, {})
+    return made(name, **(alone | parameters))
 
 
 def machine_of(strategy):

@@ -65,7 +65,7 @@ def test_the_objective_least_serves_the_case_that_gains_least():
     layers = Planar(count=4).cut(cases.mesh)
     ratios = {}
     for objective in ("worst", "least"):
-        strategy = create("pruned", {"objective": objective})
+        strategy = create("pruned", {"objective": objective, "base": {"cap": 60.0}})
         paths = plan_cases(strategy, layers, cases, case.machine, 1500.0).toolpaths
         ratios[objective] = virtual_tests(paths, cases).ratios
     assert ratios["worst"].max() > 1.4 * ratios["worst"].min()
