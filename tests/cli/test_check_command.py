@@ -85,12 +85,13 @@ def test_bad_words_are_one_line(ccfem, tmp_path, arguments, message):
 
 
 ARMS = "[20, 0], [40, 0], [40, 15], [60, 15], [60, 20], [0, 20], [0, 15], [20, 15]"
-TEE = 'build = "y"\n' + PART.replace("[0, 0], [60, 0], [60, 20], [0, 20]", ARMS)
+TEE = 'build = "y"\nlayers = 3\n' + PART.replace("[0, 0], [60, 0], [60, 20], [0, 20]", ARMS)
+FEW = f"layers = 3\n{PART}"
 LAID_IN_AIR = "% of the matrix would be laid in air: "
 SAME = {
-    "sound": (PART, (), 0, ""),
-    "bed": (PART, ("gcode.bed=[50,50,50]",), 3, "the part needs 59.2 x 19.2 x 6 mm"),
-    "cover": (PART, ("process.cover=2",), 3, "fibre layer do not hold it; at least 2 mm do"),
+    "sound": (FEW, (), 0, ""),
+    "bed": (FEW, ("gcode.bed=[50,50,50]",), 3, "the part needs 59.2 x 19.2 x 6 mm"),
+    "cover": (FEW, ("process.cover=2",), 3, "fibre layer do not hold it; at least 2 mm do"),
     "overhang": (TEE, (), 3, LAID_IN_AIR),
     "layers": (PART, ("fibre_height=0.5",), 2, "layers must lie at least 0.5 mm apart"),
 }

@@ -39,7 +39,7 @@ from ccfem.strategies.stream_function import StreamFunction
 SIZE = (60.0, 24.0, 4.0)
 
 
-def strip(force=1000.0, size=SIZE, cells=(16, 7, 2)):
+def strip(force=1000.0, size=SIZE, cells=(12, 5, 2)):
     """A strip along x that is free to contract: uniform stress."""
     mesh = box_mesh(size, cells)
     supports = (Support("x_min", "x"), Support("y_min", "y"), Support("z_min", "z"))
@@ -334,7 +334,7 @@ def test_all_runs_share_one_factorisation(monkeypatch):
 
     monkeypatch.setattr(System, "factorise", counted)
     strategies = {
-        "designed": create("stream_function", {"evaluations": 3}),
+        "designed": create("stream_function", {"evaluations": 2, "phases": 1, "inset": 0.6}),
         "pruned": create("pruned", {"of": "zigzag"}),
         "zigzag": create("zigzag"),
         "rings": create("concentric"),

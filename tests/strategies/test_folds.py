@@ -38,7 +38,7 @@ def test_planners_do_not_lose_to_straight_rows(name, cantilever):
         Toolpaths.from_plane([np.array([(0.0, y), (98.0, y)]) for y in heights], layer)
         for layer in layers
     )
-    given = {"evaluations": 5} if name == "stream_function" else {}
+    given = {"evaluations": 5, "phases": 1} if name == "stream_function" else {}
     paths = plan_to_length(create(name, given), layers, stress, MACHINE, ROWS).toolpaths
     assert rows.lengths.sum() == pytest.approx(2 * ROWS)
     assert paths.lengths.sum() <= 2 * ROWS * (1.0 + 1e-9)

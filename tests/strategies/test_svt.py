@@ -21,11 +21,30 @@ from ccfem.paths.planning import plan
 from ccfem.slicing.layers.layer import stress_on
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create
+from ccfem.strategies.svt import Svt
 
 DISC = shapely.Point(0, 0).buffer(9.0, quad_segs=32) & shapely.box(-8.9, -9, 8.9, 9)
 """With short flats to hold and pull it at."""
 MACHINE = Machine(fibre_width=0.9, minimum_radius=1.5, minimum_length=5.0)
 WIDE = replace(MACHINE, fibre_width=1.8, minimum_radius=3.0)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def groups_once():
+    """Find the main paths of a layer once for all strategies that differ in their links alone."""
+    groups, known = Svt.groups, {}
+    links = {name: getattr(Svt, name) for name in ("links", "longest_inside", "longest_over_void")}
+
+    def once(strategy, piece, stress, machine):
+        alike = replace(strategy, **links, minimum_length=strategy._shortest(machine))
+        key = alike, piece.wkb, machine, id(stress)
+        if key not in known:
+            known[key] = stress, groups(strategy, piece, stress, machine)
+        return [[line.copy() for line in group] for group in known[key][1]]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Svt, "groups", once)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -217,7 +236,7 @@ def test_no_link_lies_over_voids_where_none_may(plate_with_hole):
     hole = shapely.Polygon(layer.plane.polygon.interiors[0]).buffer(-1e-3)
     over = []
     for parameters in ({}, {"longest_over_void": 0.0}):
-        paths = create("svt", parameters)(layer, stress, WIDE)
+        paths = create("svt", parameters)(layer, stress, MACHINE)
         start = np.flatnonzero(paths.link)
         steps = np.stack([paths.points[start, :2], paths.points[start + 1, :2]], axis=1)
         over.append(shapely.length(shapely.intersection(shapely.linestrings(steps), hole)).sum())

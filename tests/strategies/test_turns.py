@@ -24,11 +24,8 @@ from ccfem.strategies import create, named
 MACHINE = Machine()
 WITH_TURNS = sorted(name for name, kind in named().items() if hasattr(kind, "turns"))
 NEEDS_JOINTS = {"winding"}
-TESTED = {"pruned": {}, "stream_function": {"evaluations": 3, "phases": 1, "inset": 0.6}}
-"""Strategies that choose by virtual tests which bends stay, up to 1 %, with quick parameters.
-
-With that inset designs are not tested beside plain plans, which might be taken instead.
-"""
+TESTED = {"pruned": {}, "stream_function": {"evaluations": 3, "phases": 1}}
+"""Strategies that choose by virtual tests which bends stay, up to 1 %, with quick parameters."""
 SLOW = {"mps", "pruned", "stream_function", "stripes", "svt"}
 """Strategies that lay fibre 1.8 mm wide here: there are fewer strands to plan, which turn alike."""
 MOVES = {

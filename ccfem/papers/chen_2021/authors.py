@@ -43,6 +43,7 @@ def solved_loop() -> tuple[StressField, tuple[Layer, ...], Machine]:
     return stress, layers, case.machine
 
 
+@cache
 def published_paths(name: str) -> Toolpaths:
     """Read the published paths of the Loop, "ours" or "zigzag", all 20 layers."""
     _, layers, _ = solved_loop()

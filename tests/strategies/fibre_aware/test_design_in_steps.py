@@ -65,7 +65,7 @@ def test_usual_amounts_are_designed_in_one_step(lever):
 
 
 def test_designs_for_several_lengths_share_their_first_step(lever, monkeypatch):
-    stress, layers = lever
+    (stress, layers), machine = lever, Machine(fibre_width=1.6)  # fewer strands than of 1 mm
     strategy, steps = StreamFunction(evaluations=2, phases=1, inset=0.6), []
 
     def counted(*about):
@@ -73,15 +73,15 @@ def test_designs_for_several_lengths_share_their_first_step(lever, monkeypatch):
         return first_step(*about)
 
     monkeypatch.setattr(stream_function, "first_step", counted)
-    full = full_length(layers, MACHINE)
+    full = full_length(layers, machine)
     lengths = [0.6 * full, 0.8 * full, 0.8 * full]
-    together = strategy.to_lengths(stress, layers, MACHINE, lengths)
+    together = strategy.to_lengths(stress, layers, machine, lengths)
     assert len(steps) == 1
-    ((_, alone),) = strategy.to_lengths(stress, layers, MACHINE, lengths[:1])
+    ((_, alone),) = strategy.to_lengths(stress, layers, machine, lengths[:1])
     (_, first), (_, most), (_, again) = together
     for layer in layers:
         view = stress_on(layer, stress)
-        paths = [planner(layer, view, MACHINE) for planner in (alone, first, most, again)]
+        paths = [planner(layer, view, machine) for planner in (alone, first, most, again)]
         np.testing.assert_array_equal(paths[0].points, paths[1].points)
         assert not np.array_equal(paths[1].points, paths[2].points)  # from there on by itself
         np.testing.assert_array_equal(paths[2].points, paths[3].points)

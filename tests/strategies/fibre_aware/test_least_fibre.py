@@ -21,7 +21,7 @@ MACHINE = Machine(minimum_length=20.0)
 def test_a_bar_takes_the_fibre_that_parallel_bars_say(pulled_bar):
     """Straight fibre of length L in all adds 4 L / V to a stiffness of 1."""
     stress, layers = pulled_bar
-    found = least_fibre(create("eqs", {}), layers, stress, MACHINE, 1.5)
+    found = least_fibre(create("eqs", {}), layers[1:3], stress, MACHINE, 1.5)
     assert 1.5 <= found.ratio <= 1.51
     exact = (found.ratio - 1.0) * 60.0 * 20.0 * 4.0 / 4.0
     assert found.planned.toolpaths.lengths.sum() == pytest.approx(exact, rel=0.03)

@@ -12,6 +12,7 @@ from ccfem.fem.elasticity.statics import solve
 from ccfem.fem.elasticity.stress_field import WeightedCases
 from ccfem.fem.materials import isotropic
 from ccfem.machine.machine import Machine
+from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies.fibre_aware import plain_plans as module
 from ccfem.strategies.fibre_aware.plain_plans import _longer_side, plain_plans
@@ -60,6 +61,14 @@ def test_on_large_parts_three_layers_of_about_one_section_share_stripes(monkeypa
             )
 
 
+@pytest.fixture
+def rows_alone(monkeypatch):
+    """No stripes, which take longest, where only rows are looked at."""
+    module = "ccfem.strategies.fibre_aware.plain_plans"
+    monkeypatch.setattr(f"{module}.plan", lambda *_: Toolpaths.empty())
+
+
+@pytest.mark.usefixtures("rows_alone")
 def test_where_a_beam_bends_across_its_layers_only_stretched_ones_get_rows_along_it():
     cases, layers = beam((0.0, 0.0, -20.0))
     along_tension = plain_plans(cases, layers, MACHINE, curves=False)[0]
@@ -69,6 +78,7 @@ def test_where_a_beam_bends_across_its_layers_only_stretched_ones_get_rows_along
     assert min(lengths[2:]) > 0.8 * 12 * 60.0
 
 
+@pytest.mark.usefixtures("rows_alone")
 def test_each_layer_is_planned_for_its_own_load_case():
     cases, layers = beam((300.0, 0.0, 0.0), (0.0, 300.0, 0.0))
     paths = plain_plans(cases, layers, MACHINE, curves=False)[0]
