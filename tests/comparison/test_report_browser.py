@@ -75,7 +75,7 @@ def shades(page, selector: str) -> int:
     from PIL import Image
 
     image = Image.open(io.BytesIO(page.locator(selector).first.screenshot(timeout=60_000)))
-    return len(np.unique(np.asarray(image.convert("RGB")).reshape(-1, 3), axis=0))
+    return len(image.convert("RGB").getcolors(image.width * image.height))
 
 
 def test_nothing_goes_wrong_and_nothing_is_fetched(page, report):
@@ -210,17 +210,28 @@ def test_paper_shows_the_views(page):
         page.emulate_media(media="screen")
 
 
+FITTED = """(() => {
+  const view = document.getElementById("part-view"), drawn = view._fullLayout;
+  const off = [drawn.width - view.offsetWidth, drawn.height - view.offsetHeight];
+  return Math.max(...off.map(Math.abs)) < 1;
+})()"""
+"""Whether the scene of the part is as large as the page has room for."""
+
+
 @pytest.mark.parametrize("size", [(390, 844), (1200, 500), (800, 1200)])
 def test_the_part_lies_in_its_view_whatever_its_shape(page, size):
     """No pixel of the part or its loads touches the border of the view."""
     from PIL import Image
 
     page.set_viewport_size({"width": size[0], "height": size[1]})
-    page.wait_for_timeout(1500)
+    page.wait_for_function(FITTED, timeout=60_000)
     view = page.locator("#part-view")
     view.scroll_into_view_if_needed()
-    page.wait_for_timeout(500)
-    image = Image.open(io.BytesIO(view.screenshot(timeout=60_000))).convert("L")
+    before, shown = b"", view.screenshot(timeout=60_000)
+    while shown != before:  # it is drawn a moment after it has its size
+        page.wait_for_timeout(150)
+        before, shown = shown, view.screenshot(timeout=60_000)
+    image = Image.open(io.BytesIO(shown)).convert("L")
     dark = np.asarray(image)[4:-4, 4:-4] < 240
     rows, columns = np.flatnonzero(dark.any(axis=1)), np.flatnonzero(dark.any(axis=0))
     assert rows[0] > 0

@@ -67,14 +67,14 @@ def test_values_go_there_and_back(stranger, capfd):
     ("name", "kind", "message"),
     [
         ("crash", ChildError, r"the library crashed \(SIGSEGV\)"),
-        ("hang", ChildError, "more than 2 s"),
+        ("hang", ChildError, "more than 1 s"),
         ("flood", ChildError, "too much memory"),
         ("refuse", InputError, "no such thing: name another"),
         ("fail", ChildError, r"^'a\\nb'$"),
     ],
 )
 def test_ends_of_children(stranger, name, kind, message, capfd):
-    seconds = 2.0 if name == "hang" else 60.0
+    seconds = 1.0 if name == "hang" else 60.0
     with pytest.raises(kind, match=message):
         in_own_process(f"stranger:{name}", seconds=seconds, memory=2e9)
     assert capfd.readouterr() == ("", "")
