@@ -23,7 +23,7 @@ from ccfem.slicing.slicers.planar import Planar
 
 @pytest.fixture(scope="module")
 def plate():
-    return run_plate("l_shape", list(PATTERNS), element_size=5.0)
+    return run_plate("l_shape", list(PATTERNS), element_size=4.0)
 
 
 def test_lpp_is_one_path_that_fills_the_part(plate):

@@ -105,7 +105,7 @@ def test_stiffer_than_isocurves_of_the_same_length(bent_beam):
 @pytest.mark.usefixtures("designs_alone")
 def test_strands_keep_their_width_and_the_layer(bent_beam):
     stress, layers = bent_beam
-    paths = plan(StreamFunction(coverage=0.5, evaluations=8), layers, stress, MACHINE)
+    paths = plan(StreamFunction(coverage=0.5, evaluations=8, phases=2), layers, stress, MACHINE)
     total = evaluate(paths, layers, stress, MACHINE).total
     # Nearer are only ends that meet the boundary at a small angle.
     assert total["spacing_5"] > 1.0
@@ -118,7 +118,7 @@ def test_strands_keep_their_width_and_the_layer(bent_beam):
 def test_plain_plans_keep_to_the_layer_and_off_each_other(bent_beam):
     """The best plan here is one of stripes, whose strands may lie closer than a design's."""
     stress, layers = bent_beam
-    paths = plan(StreamFunction(coverage=0.5, evaluations=1), layers, stress, MACHINE)
+    paths = plan(StreamFunction(coverage=0.5, evaluations=1, phases=1), layers, stress, MACHINE)
     total = evaluate(paths, layers, stress, MACHINE).total
     assert total["on_fibre"] < 0.5 * MACHINE.limits.on_fibre
     assert total["outside_length"] == 0.0
@@ -141,7 +141,7 @@ def test_fibre_lies_where_bending_across_the_layers_stretches(bent_plate):
 @pytest.mark.usefixtures("designs_alone")
 def test_one_layer_by_itself_gets_its_share(pulled_bar):
     stress, layers = pulled_bar
-    strategy = StreamFunction(coverage=0.4, evaluations=5)
+    strategy = StreamFunction(coverage=0.4, evaluations=5, phases=2)
     alone = plan(strategy, layers[1:2], stress, MACHINE)
     assert set(alone.layer) == {1}
     assert 0.95 * 0.4 < coverage_of(alone, layers[1:2]) <= 0.4 * (1.0 + 1e-9)
@@ -178,7 +178,7 @@ def test_impossible_parameters_are_refused(name, value):
 def test_strands_keep_off_the_boundary(bent_beam):
     stress, layers = bent_beam
     for inset in (0.45, 1.0):
-        strategy = StreamFunction(evaluations=3, inset=inset, link_limit=0.0)
+        strategy = StreamFunction(evaluations=3, phases=2, inset=inset, link_limit=0.0)
         paths = plan(strategy, layers, stress, MACHINE)
         across = np.array([80.0, 30.0])
         edge = np.minimum(paths.points[:, :2], across - paths.points[:, :2]).min()

@@ -26,6 +26,8 @@ WITH_TURNS = sorted(name for name, kind in named().items() if hasattr(kind, "tur
 NEEDS_JOINTS = {"winding"}
 TESTED = {"pruned": {}, "stream_function": {"evaluations": 3, "phases": 1}}
 """Strategies that choose by virtual tests which bends stay, up to 1 %, with quick parameters."""
+ALONE = {"pruned": {"base": {"cap": 60.0}}, "stream_function": {"inset": 0.6}}
+"""Parameters with which these test no plain plans, and perhaps take one, beside their own."""
 SLOW = {"mps", "pruned", "stream_function", "stripes", "svt"}
 """Strategies that lay fibre 1.8 mm wide here: there are fewer strands to plan, which turn alike."""
 MOVES = {
@@ -75,7 +77,8 @@ def machine_of(name):
 @cache
 def planned(name, shape, move, turns="cut"):
     """Paths of a strategy, quick where it is slow, on the layer of a part."""
-    strategy = create(name, {"turns": turns, **TESTED.get(name, {})})
+    more = {} if shape is gear else ALONE.get(name, {})
+    strategy = create(name, {"turns": turns, **TESTED.get(name, {}), **more})
     stress, layers = part(shape, move)
     return plan(strategy, layers, stress, machine_of(name))
 

@@ -21,6 +21,8 @@ from ccfem.strategies.stream_function import StreamFunction
 from ccfem.strategies.zigzag import Zigzag
 
 MACHINE = Machine(minimum_length=6.0)
+STREAM = StreamFunction(evaluations=5, phases=1, inset=0.6)
+"""With no plain plans beside its designs, at this inset."""
 
 
 def crossed(layers):
@@ -93,7 +95,7 @@ def planned(two_bends):
     """Plans of 500 mm a layer for both cases."""
     cases, layers = two_bends
     strategies = {
-        "stream": StreamFunction(evaluations=5, phases=1),
+        "stream": STREAM,
         "isocurve": Isocurve(),
         "pruned": Pruned(of="zigzag"),
         "zigzag": Zigzag(),
@@ -119,8 +121,7 @@ def test_planned_together_the_worst_case_is_better_than_planned_for_one(planned,
     for name, one in planned.items():
         worst[name] = virtual_tests(one.toolpaths, cases).ratios
     for field in cases.fields:
-        strategy = StreamFunction(evaluations=5, phases=1)
-        alone = plan_to_length(strategy, layers, field, MACHINE, 500.0)
+        alone = plan_to_length(STREAM, layers, field, MACHINE, 500.0)
         best.append(virtual_tests(alone.toolpaths, cases).ratios)
     single = np.diag(best)
     together = (worst["stream"] / single).min()
