@@ -42,7 +42,7 @@ TERMS: dict[str, tuple[str, ...]] = {
     "judge untested": ("triangles", "room", "some_room"),
     "bound": ("unknowns", "triangles"),
     "write": ("run", "room"),
-    "write a print": ("run", "volume"),
+    "write a print": ("run", "volume", "room"),
     "report": ("run", "unknowns", "triangles"),
     "memory of compare": ("run", "solved", "triangles", "room"),
     "memory of plan": ("run", "solved", "triangles", "room"),
