@@ -22,7 +22,9 @@ from ccfem.cases.part_editing import valued
 from ccfem.comparison.plot.symbols import (
     arrow_outside,
     bed_under,
+    borders,
     box_edges,
+    face_meshes,
     heat_waves,
     pressing,
     swung,
@@ -32,13 +34,11 @@ from ccfem.workbench.bench import Bench, Said
 from ccfem.workbench.compare_tab import CompareTab
 from ccfem.workbench.drawing import (
     MATT,
-    borders,
     boxes,
     draw_arrows,
     draw_label,
     draw_lines,
     draw_mesh,
-    face_meshes,
     snapped,
     stretched,
     upward,

@@ -9,7 +9,7 @@ from ccfem.body.mesh.face_places import BodyFaces
 from ccfem.body.mesh.face_rules import numbered_faces
 from ccfem.body.mesh.smooth_faces import smooth_faces
 from ccfem.body.meshing import extrude
-from ccfem.workbench.drawing import borders, face_meshes
+from ccfem.comparison.plot.symbols import borders, face_meshes
 
 
 @pytest.fixture(scope="module")
