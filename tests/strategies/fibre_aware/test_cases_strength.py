@@ -30,6 +30,8 @@ from .test_stream_design import problem_of
 from .test_strength import near_of, work_of
 
 SHORT = Machine(minimum_length=6.0)
+WIDE = Machine(fibre_width=2.0, minimum_length=6.0)
+"""Where fibre is wide there are fewer strands to plan."""
 
 
 def of_strong_material(cases):
@@ -164,13 +166,13 @@ def test_the_judge_weighs_what_each_test_alone_says(strong_plate):
 def test_planning_for_strength_is_worth_no_less_than_for_stiffness(strong_bends, strategy, weight):
     cases, layers = strong_bends[0], strong_bends[1][1:2]  # one layer shows it as well
     parts, worth = specimens(cases), []
-    bounds = measures(WORST, cases, layers, 250.0 * len(layers), SHORT)
+    bounds = measures(WORST, cases, layers, 250.0 * len(layers), WIDE)
     goal = Goal(parts, cases.weights, bounds)
     for strength, moves in ((0.0, 0), (weight, 0), (weight, 1)):
         planned = replace(strategy, strength=strength, moves=moves)
-        ((told, planner),) = planned.for_cases(cases, layers, SHORT, (250.0,))
+        ((told, planner),) = planned.for_cases(cases, layers, WIDE, (250.0,))
         assert told.strength == strength
-        tested = virtual_tests(planner.toolpaths, parts, machine=SHORT)
+        tested = virtual_tests(planner.toolpaths, parts, machine=WIDE)
         merit, factor = goal.merit(tested.ratios), cases_failure(tested, layers=layers).factor
         worth.append((1.0 - weight) * np.log(merit) + weight * np.log(factor))
     assert worth[1] >= worth[0] - 1e-5
