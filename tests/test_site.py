@@ -4,6 +4,7 @@ import importlib
 import re
 import shlex
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ import typer
 
 from ccfem import strategies
 from ccfem.cases import named_cases
+from ccfem.cases.designed import PLATES
 from ccfem.cases.part_file import read_part
 from ccfem.cases.part_keys import Part
 from ccfem.cases.part_loads import LOADS, SUPPORTS
@@ -47,6 +49,7 @@ def test_every_command_of_a_page_exists(page):
 )
 def test_python_of_a_page_runs(page, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(PLATES, "cantilever", replace(PLATES["cantilever"], pixel=2.0))  # coarse
     space = {}
     for block in fenced(page, "python"):
         exec(compile(block, str(page), "exec"), space)
