@@ -37,7 +37,7 @@ _CLOSE_TO_TENSION = Stripes(smooth=4.0, border=5.0)
 _LARGE = 50_000
 """Cells above which layers of about the same section share stripes: they take longest."""
 
-_SHARED, _SAME = 3, 0.5
+_SHARED, _SAME = 2, 0.5
 """Layers that share stripes, and distance of their borders in strand widths. On the Shell of Chen
 et al. 2021 the plan is then .1 % softer."""
 
@@ -149,7 +149,7 @@ class SharedStripes:
     def of(
         cls, layers: Sequence[Layer], group: Sequence[int], stress: StressField, machine: Machine
     ) -> "SharedStripes":
-        """Plan stripes on the middle one of up to three layers of about the same section.
+        """Plan stripes on every second layer of about the same section.
 
         Parameters
         ----------
@@ -180,8 +180,8 @@ def plain_plans(
 ) -> list[Toolpaths]:
     """Plan straight rows, contours, stripes and isocurves, each with more fibre than is kept.
 
-    Layers of one section under alike stress are planned once, and on large parts up to three flat
-    layers of about the same section share stripes. On curved layers rows and contours follow the
+    Layers of one section under alike stress are planned once, and on large parts two flat layers
+    of about the same section share stripes. On curved layers rows and contours follow the
     tension nowhere, and are left out.
 
     Parameters

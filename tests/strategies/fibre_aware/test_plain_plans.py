@@ -41,7 +41,7 @@ def test_layers_that_are_alike_get_the_same_paths():
             np.testing.assert_allclose(in_plane(paths, layer), first, atol=1e-9)
 
 
-def test_on_large_parts_three_layers_of_about_one_section_share_stripes(monkeypatch):
+def test_on_large_parts_two_layers_of_about_one_section_share_stripes(monkeypatch):
     mesh = box_mesh((60.0, 12.0, 4.0), (15, 3, 4))
     wider = 1.0 + 0.002 * mesh.points[:, 2:]
     mesh = replace(mesh, points=np.hstack([mesh.points[:, :2] * wider, mesh.points[:, 2:]]))
