@@ -325,7 +325,7 @@ def main() -> None:
     within = show(rows, samples)
     if asked.write:
         text = [f'"{stage}" = {values}' for stage, values in fitted(samples).items()]
-        text += [f"pace = {usual_pace()}", "[within]"]
+        text += [f"pace = {usual_pace():.4f}", "[within]"]
         text += [f"{command} = {values}" for command, values in within.items()]
         text += ["[most]"]
         for command in within:

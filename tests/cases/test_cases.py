@@ -56,7 +56,7 @@ PART_FILES = sorted(path for path in data_folder().glob("*.toml") if path.stem !
 
 
 def test_names():
-    """All are those of part files and of optimised plates, each of which has tests of its own."""
+    """All are those of part files and of optimised plates."""
     assert named_cases().keys() >= {file.stem for file in PART_FILES} | PLATES.keys()
     assert shipped_cases().keys() == {file.stem for file in PART_FILES} | PLATES.keys()
     with pytest.raises(

@@ -334,7 +334,7 @@ def test_all_runs_share_one_factorisation(monkeypatch):
 
     monkeypatch.setattr(System, "factorise", counted)
     strategies = {
-        "designed": create("stream_function", {"evaluations": 2, "phases": 1, "inset": 0.6}),
+        "designed": create("stream_function", {"evaluations": 2, "phases": 1}),
         "pruned": create("pruned", {"of": "zigzag"}),
         "zigzag": create("zigzag"),
         "rings": create("concentric"),

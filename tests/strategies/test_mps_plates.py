@@ -69,6 +69,7 @@ def test_plates_are_filled_along_the_stress(plate, laid):
     assert used == pytest.approx(1.0 + laid.overlap - laid.gaps, abs=1e-4)
 
 
+# One plate: it takes a second plan, and the others are planned by the same functions.
 @pytest.mark.parametrize("plate", ["III"], indirect=True)
 def test_rounding_changes_next_to_nothing(plate, laid):
     """Noise of 1e-9 mm and another origin: short strands at junctions may differ, no more."""

@@ -44,7 +44,7 @@ def groups_once():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Svt, "groups", once)
-        yield
+        yield groups
 
 
 @pytest.fixture(scope="module")
@@ -97,6 +97,16 @@ def test_bridge_is_one_path_with_its_links_outside(bridge, bridge_path):
 def test_links_outside_are_never_left_out(bridge, bridge_path):
     strict = create("svt", {"longest_inside": 0.0})(*bridge)
     np.testing.assert_array_equal(strict.points, bridge_path.points)
+
+
+def test_main_paths_do_not_depend_on_links(bridge, groups_once):
+    """What `groups_once` relies on."""
+    layer, stress, machine = bridge
+    about = layer.plane.polygon, stress, machine
+    by_default = groups_once(create("svt"), *about)
+    options = {"links": "none", "longest_inside": 3.0, "longest_over_void": 4.0}
+    for group, same in zip(by_default, groups_once(create("svt", options), *about), strict=True):
+        np.testing.assert_equal(group, same)
 
 
 def test_bridge_has_arch_tie_and_four_diagonals(bridge):

@@ -288,7 +288,7 @@ def equilibrium(
         too, by an estimate: the stiffness is then accurate to its square.
     prepare : bool, default False
         On large meshes of linear cells, solves far from their goal then get a preconditioner that
-        knows the fibre. They take a third of the iterations, and set it up in the time of twenty.
+        knows the fibre. They are fewer, and it is set up in the time of some twenty.
 
     Raises
     ------

@@ -82,7 +82,7 @@ def test_one_case_is_planned_as_ever(two_bends):
     cases, layers = two_bends
     field = cases.fields[0]
     one = WeightedCases.of({"tip": field}, {"tip": 7.0})
-    for each in (replace(STREAM, evaluations=2), Pruned(of="zigzag")):
+    for each in (StreamFunction(evaluations=2, phases=1), Pruned(of="zigzag")):
         before = plan_to_length(each, layers, field, MACHINE, 500.0)
         after = plan_cases(each, layers, one, MACHINE, 500.0)
         np.testing.assert_array_equal(after.toolpaths.points, before.toolpaths.points)
