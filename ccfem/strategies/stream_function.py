@@ -235,7 +235,8 @@ class StreamFunction(ByCoverage):
         """Design for this coverage, and cut by tests of all cases to lengths, mm per layer.
 
         With `whole`, plans that lay the length go before stiffer ones that do not. Returned with
-        the plans is the length, mm in all, of the longest paths that are drawn of the design.
+        the plans is the length, mm in all, that plain plans, or a design with the most fibre that
+        is asked for again, could lay.
         """
         cases, layers, machine = common.cases, common.layers, common.machine
         check_moves(self.moves, layers)
@@ -279,7 +280,9 @@ class StreamFunction(ByCoverage):
             enough = [paths for paths in offered if float(paths.lengths.sum()) >= _WHOLE * length]
             offered = enough if whole and enough else offered
             plans.append(prune_and_move(offered, layers, goal, length, machine, strand, how, last))
-        return plans, max(float(paths.lengths.sum()) for some in tried for paths in some)
+        drawn = max(float(paths.lengths.sum()) for some in tried for paths in some)
+        plain = max((float(paths.lengths.sum()) for paths in common.plain), default=0.0)
+        return plans, max(_AT_MOST * drawn, plain)
 
     def extraction(
         self,
@@ -492,11 +495,11 @@ def designed_to_lengths(
     cut : callable
         Designs for the coverage of a strategy and cuts the paths to each of the lengths, given
         whether plans that lay a length go before stiffer ones that do not. Returns the plans, and
-        the length, mm in all, that the design itself draws.
+        the length, mm in all, that it could lay at most when it is asked again.
     again : bool, default True
         Whether to design for more fibre where the paths are too short, and to take the longer ones.
-        Not where other plans are so much longer that the design, which draws about in proportion to
-        its fibre, could not be.
+        Not where the plans are the longest already: a design draws about in proportion to its
+        fibre.
 
     Returns
     -------
@@ -510,11 +513,11 @@ def designed_to_lengths(
     def designed(near: Sequence[float]) -> list[tuple[Designed, LayerPlanner]]:
         longest = max(near)
         asked = replace(strategy, coverage=longest / full)
-        plans, drawn = cut(asked, near, False)
+        plans, reach = cut(asked, near, False)
         longest_plan = max(float(paths.lengths.sum()) for paths in plans) / len(layers)
         # At the largest coverage the stiffest plan counts, however much of that it lays.
         short_of = longest < most and 0.0 < longest_plan < _ENOUGH * longest
-        in_reach = longest_plan * len(layers) < _AT_MOST * drawn
+        in_reach = longest_plan * len(layers) < reach
         if again and short_of and in_reach and strategy.overfill * asked.coverage < DENSEST:
             overfill = min(_MORE * longest / longest_plan, _AT_MOST) * strategy.overfill
             more = replace(asked, overfill=overfill)

@@ -185,8 +185,7 @@ def test_verdicts_of_the_cases_are_true(compared):
 
 @pytest.mark.parametrize("compared", ["bar"], indirect=True)
 def test_verdicts_of_made_up_tables_are_true(compared):
-    """Stiffnesses of three runs, without and with compression, far and near, each set of three pairs in
-    one order of many."""
+    """Stiffnesses of three runs, without and with compression, far and near, in mixed orders."""
     runs = [run for run in compared.runs if run.tested is not None][:3]
     assert len(runs) == 3
     runs = [replace(run, why_not="") for run in runs]

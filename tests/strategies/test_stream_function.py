@@ -14,6 +14,7 @@ from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.machine import Machine
 from ccfem.paths.planning import plan
 from ccfem.slicing.slicers.planar import Planar
+from ccfem.strategies.fibre_aware import smeared
 from ccfem.strategies.fibre_aware.prune import prune
 from ccfem.strategies.fibre_aware.upper_bound import upper_bound
 from ccfem.strategies.isocurve import Isocurve
@@ -60,7 +61,11 @@ def designs_alone(monkeypatch):
 
 
 @pytest.mark.usefixtures("designs_alone")
-def test_uniform_tension_gets_straight_fibre_and_the_stiffness_of_parallel_bars(pulled_bar):
+@pytest.mark.parametrize("factorised", [25_000, 0])
+def test_uniform_tension_gets_straight_fibre_and_the_stiffness_of_parallel_bars(
+    pulled_bar, factorised, monkeypatch
+):
+    monkeypatch.setattr(smeared, "_DIRECT_UNKNOWNS", factorised)  # others by multigrid
     stress, layers = pulled_bar
     strategy = StreamFunction(coverage=0.4, overfill=1.0, evaluations=10, phases=2, inset=0.0)
     paths = plan(strategy, layers, stress, MACHINE)

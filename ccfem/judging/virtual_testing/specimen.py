@@ -103,7 +103,7 @@ class Specimen:
             Of a similar matrix under the same supports: the preconditioner.
         """
         made = replace(self, matrix=matrix)
-        reduced = self.held.reduce(matrix)
+        reduced = self.solver.matrix if matrix is self.matrix else self.held.reduce(matrix)
         made.__dict__["held"] = self.held
         made.__dict__["solver"] = replace(solver, matrix=reduced, exact=False)
         return made

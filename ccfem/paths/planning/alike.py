@@ -53,6 +53,12 @@ def equal_sections(one: Layer, other: Layer, distance: float = EQUAL) -> bool:
     if shapely.equals_exact(*sections, tolerance=0.5 * distance):  # corner by corner
         return True
     borders = shapely.boundary(sections)
+    # What bounds and areas rule out needs no look at the corners.
+    farthest = float(np.abs(np.subtract(*shapely.bounds(sections))).max())
+    if farthest >= distance:
+        return False
+    if abs(np.subtract(*shapely.area(sections))) > 4.0 * distance * shapely.length(borders).sum():
+        return False
     return float(shapely.hausdorff_distance(*borders)) < distance
 
 

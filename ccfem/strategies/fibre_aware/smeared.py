@@ -242,7 +242,12 @@ class SmearedPart:
         specimen = self.specimen
         if specimen.solver.backend != "amg":
             return self
-        added = self.axes.stiffness_in_space(fibre(strain))
+        along = fibre(strain)
+        if along.ndim == 2:  # upper triangles
+            rows, columns = UPPER
+            packed, along = along, np.empty((len(along), 3, 3))
+            along[:, rows, columns] = along[:, columns, rows] = packed
+        added = self.axes.stiffness_in_space(along)
         return replace(self, specimen=specimen.for_fibre(added))
 
     def solve(

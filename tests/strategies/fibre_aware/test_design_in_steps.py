@@ -88,24 +88,24 @@ def test_designs_for_several_lengths_share_their_first_step(lever, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("coverage", "drawn", "designs"),
+    ("coverage", "reach", "designs"),
     [
-        (0.6, 50.0, [False, True]),
-        (0.6, 26.0, [False, True]),
-        # Twice of it is less than the 50 mm that another plan lays.
-        (0.6, 24.0, [False]),
+        (0.6, 100.0, [False, True]),
+        (0.6, 52.0, [False, True]),
+        # Less than the 50 mm that are laid.
+        (0.6, 48.0, [False]),
         # More than that would lay strands side by side, and soften the part.
-        (0.9, 50.0, [False]),
+        (0.9, 100.0, [False]),
     ],
 )
-def test_what_a_longer_design_could_reach_is_designed_for_again(lever, coverage, drawn, designs):
+def test_what_a_longer_design_could_reach_is_designed_for_again(lever, coverage, reach, designs):
     _, layers = lever
     short = Toolpaths.from_plane([np.array([[0.0, 0.0], [50.0, 0.0]])], layers[0])
     asked = []
 
     def cut(strategy, lengths, whole):
         asked.append(whole)
-        return len(lengths) * [short], drawn
+        return len(lengths) * [short], reach
 
     length = coverage * full_length(layers, MACHINE)
     stream_function.designed_to_lengths(StreamFunction(), layers, MACHINE, [length], cut)
