@@ -56,6 +56,7 @@ GONE = {
     for old, new in _NAMES.items()
     if old.endswith("!")
 } | {
+    "cli.fitting": "use ccfem.cli.commands.calibrate, which does what its fit_material did",
     "papers.layer_traction": (
         "use ccfem.judging.virtual_testing.failure_laws.interlayer.layer_traction, which returns "
         "the averaged stress too: opening, sliding, tensor"

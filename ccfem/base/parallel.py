@@ -41,7 +41,10 @@ FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 
 
 def processors() -> int:
-    """Processors that the program may use: CCFEM_THREADS, by default all that the system grants."""
+    """Processors that the program may use: CCFEM_THREADS, by default all that the system grants.
+
+    CCFEM_THREADS is a whole number from 1 on.
+    """
     wanted = os.environ.get("CCFEM_THREADS", "")
     if not wanted:
         return _granted()

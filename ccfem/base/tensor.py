@@ -100,7 +100,10 @@ def von_mises(stress: FloatArray) -> FloatArray:
 
 
 def in_plane(stress: FloatArray, frame: FloatArray) -> FloatArray:
-    """Components s11, s22, s12 of stress (..., 3, 3) in the plane of two rows of a frame."""
+    """Components s11, s22, s12, MPa, (..., 3), of stress (..., 3, 3), MPa, in a plane.
+
+    Its unit vectors are the first two rows of a frame (2 or 3, 3).
+    """
     e1, e2 = frame[0], frame[1]
     first, second = stress @ e1, stress @ e2
     return np.stack([first @ e1, second @ e2, first @ e2], axis=-1)

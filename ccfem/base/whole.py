@@ -72,7 +72,7 @@ def check_writable(path: str | os.PathLike[str]) -> Path:
 
 
 def existing_file(path: str | os.PathLike[str], what: str) -> Path:
-    """Return `path` when it is a file that can be read."""
+    """Return `path` when it is a file that can be read; else an error begins with `what` it is."""
     path = Path(path)
     if not str(path).isprintable():  # a path of Windows whose \\t and \\n were read as escapes
         raise InputError(
@@ -89,7 +89,10 @@ def existing_file(path: str | os.PathLike[str], what: str) -> Path:
 
 
 def text_of(path: str | os.PathLike[str], what: str) -> str:
-    """Text of a file in UTF-8, with or without a byte order mark."""
+    """Text of a file in UTF-8, with or without a byte order mark.
+
+    Where it cannot be read, or is in another encoding, an error begins with `what` it is.
+    """
     path = existing_file(path, what)
     try:
         data = path.read_bytes()

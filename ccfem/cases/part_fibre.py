@@ -107,7 +107,10 @@ def patches_of_fibre(places: fibre_places.FibrePlaces | None) -> tuple[str, ...]
 
 
 def fibre_table(places: fibre_places.FibrePlaces | None) -> dict[str, Any]:
-    """Table [fibre] that reads as some places; empty without any."""
+    """Table [fibre] that reads as some places; empty without any.
+
+    The inside of a surface, whose file is not known, is an error.
+    """
     if places is None:
         return {}
     keys = {name: key for key, name in _KEYS.items()}

@@ -32,6 +32,11 @@ def part_text(case: Case, mesh: str, comment: str = "") -> str:
         Name of the file that its mesh, with the patches, is written to.
     comment : str
         Lines at its head.
+
+    Raises
+    ------
+    InputError
+        For what a part file cannot say.
     """
     problem = case.problem
     if problem.regions or problem.axes is not None or problem.density is not None:

@@ -232,7 +232,7 @@ class Comparison:
 
     @property
     def layers(self) -> tuple[Layer, ...]:
-        """Layers of the part."""
+        """Layers of the part; an error where several slicings are compared."""
         if len(self.stacks) > 1:
             raise InputError(
                 f"a comparison over slicings has layers for each: {', '.join(self.stacks)}; take "

@@ -23,7 +23,7 @@ from ccfem.slicing.layers import Layer
 from ccfem.strategies.fibre_aware.upper_bound import UpperBound
 
 RESIDUAL = 1e-6
-"""Largest relative one of the tests: the error of the stiffness is of its square."""
+"""Largest relative residual of the tests: the error of the stiffness is of its square."""
 
 ENERGY = 1e-3
 """Error in energy norm of those on quadratic cells, far below what cells leave by themselves: the

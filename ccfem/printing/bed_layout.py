@@ -35,7 +35,7 @@ class BedLayout:
         Middle of the part on the bed, of all copies together where there are several; by default
         that of the bed, as far as there is room for what is printed beside them.
     copies : tuple of 1 or 2 ints
-        How many, or how many along X and along Y.
+        How many, or how many along X and along Y: 1 to 1000 in all.
     """
 
     spin: float = 0.0

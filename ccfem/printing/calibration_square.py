@@ -75,7 +75,13 @@ class CalibrationSquare:
 
 
 def calibration_square(machine: Machine) -> CalibrationSquare:
-    """Plan the square for a machine."""
+    """Plan the square for a machine.
+
+    Raises
+    ------
+    InputError
+        Where it does not fit on the bed, or the machine cannot print it.
+    """
     machine = replace(machine, process=replace(machine.process, cover=0.0))
     length = machine.shortest_strand + _LONGER
     side, high = length + 2.0 * ALONG, _BASE + machine.strand_height

@@ -24,7 +24,7 @@ class Course:
     pauses : tuple of str
         Layers before which the print halts, as ``12``, counted from 0 as ``;LAYER:`` counts them;
         or heights, as ``3.4mm``: it halts when what lies up to there is printed.
-    from_layer : int
+    from_layer : int >= 0
         Layer with which the file begins; what lies below is printed already.
     """
 

@@ -49,6 +49,11 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
     Layer by layer: tool changes with their lifts and temperatures, first filament on a block beside
     the part and on a bar, the skirt, lines of matrix, strands with their cuts, pauses. Of a plan
     whose file begins above the lowest layer, the rest of what is laid, at its place.
+
+    Raises
+    ------
+    InputError
+        Where a nozzle would leave the bed.
     """
     recorder, paths = Recorder(machine), plan.paths
     sites, lowest = _sites(plan, machine), plan.lowest

@@ -212,6 +212,11 @@ class StreamFunction(ByCoverage):
         unless plans that cost little lay more than twice as much as they do.
         Much shorter lengths get a design of their own: a design cut far below its length would end
         strands where they carry load.
+
+        Raises
+        ------
+        InputError
+            As `for_part`, where no layer has a tensile direction in any case.
         """
         least = 1.0 if len(cases) == 1 else _CASES_OVERFILL
         common = _Common(self, cases, tuple(layers), machine)

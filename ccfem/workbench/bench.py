@@ -110,7 +110,7 @@ class Bench:
         return [path.relative_to(self.folder).as_posix() for path in bodies[:_LISTED]]
 
     def open(self, what: str | os.PathLike[str]) -> None:
-        """Open a body, a part file, or a case by name."""
+        """Open a body, a part file or a case by name; on an error what was on the bench stays."""
         name = os.fspath(what)
         if not Path(name).suffix and not {"/", "\\"} & set(name):
             check_known("case", name, named_cases(), "or name a file")
@@ -181,7 +181,10 @@ class Bench:
     # Editing.
 
     def edit(self, change: Change | str, field: str = "") -> None:
-        """Change the part file, or put a text in its place, and save it in ``results``."""
+        """Change the part file and save it in ``results``; on an error nothing is changed.
+
+        A text takes the place of the part file.
+        """
         text = change if isinstance(change, str) else edited(self.text, change)
         self._show(self.history.after(text, field))
 

@@ -34,7 +34,7 @@ class Row:
     label: str
     default: Any  # what is so where it does not stand there; its type is that of the field
     options: tuple[str, ...] = ()  # what can be chosen
-    # Of a number.
+    # step and least value of a number
     step: float = 1.0
     least: float | None = 0.0
     hint: str = ""

@@ -54,7 +54,7 @@ def read_strand_files(path: str | Path) -> list[list[FloatArray]]:
 
 
 def check_near(points: FloatArray, name: str) -> None:
-    """Raise on points (n, 3) of paths that no printer reaches."""
+    """Raise on points (n, 3), mm, that no printer reaches; the error begins with their `name`."""
     farthest = float(np.abs(points).max())
     if farthest > _FARTHEST:
         raise InputError(

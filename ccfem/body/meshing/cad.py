@@ -67,6 +67,11 @@ def read_cad(
         Of the triangles; 0 for a thirtieth of the part.
     joined : {"glued", "separate"}, default "glued"
         Whether solids that touch become one, or keep faces of their own there.
+
+    Raises
+    ------
+    InputError
+        When the file is missing or holds no solid, or Gmsh is not installed.
     """
     made = _made("cad_surface", path, size, scale, joined)
     names = tuple(str(name) for name in made["names"])

@@ -275,7 +275,8 @@ def _about_chords(mesh: TetMesh) -> str:
 def check_effect(problem: Problem, case: str, held: Held, forces: FloatArray, size: float) -> None:
     """Refuse a load case, or a combination, under which nothing moves.
 
-    The forces (n, 3), N, are added up from forces whose sizes are `size` together.
+    The forces (n, 3), N, are added up from forces whose sizes are `size` together. The error names
+    the cause: cases of a combination that cancel, or loads on held nodes alone.
     """
     if held.value.any():
         return

@@ -356,6 +356,11 @@ class StressField(Shown):
         -------
         (k, 3, 3) array, MPa
             Interpolated linearly between the corner nodes of the cell that holds each point.
+
+        Raises
+        ------
+        InputError
+            When a point lies further outside.
         """
         cell, weights = located(self.mesh, points, tolerance)
         return np.einsum("qk,qkij->qij", weights, self.nodal[self.mesh.corners[cell]])
@@ -372,7 +377,10 @@ class StressField(Shown):
         return read_only(strain_from_voigt(to_voigt(engineering)))
 
     def probe(self, points: FloatArray, tolerance: float = 1e-3) -> Probe:
-        """Displacement, recovered strain and stress at points (k, 3), mm; tolerance as in `at`."""
+        """Displacement, recovered strain and stress at points (k, 3), mm.
+
+        Tolerance, and error where a point lies further outside, as in `at`.
+        """
         points = np.asarray(points, dtype=np.float64)
         mesh = self.mesh
         cell, weights = located(mesh, points, tolerance)

@@ -186,6 +186,11 @@ def part_mesh(
     TetMesh
         The piece that joins all loads and supports: cut where the density, averaged at the nodes,
         passes the threshold; small enclosed voids filled; smoothed.
+
+    Raises
+    ------
+    InputError
+        When no piece joins them.
     """
     problem = design.full
     assert isinstance(problem, Problem)
@@ -382,6 +387,11 @@ def part_shape(
     shapely Polygon or Surface, mm
         Of a plate on a raster its outline, of tetrahedra a closed surface: of the piece that joins
         all loads and supports, smoothed, within the domain.
+
+    Raises
+    ------
+    InputError
+        When no piece joins them, or a domain is given for tetrahedra.
     """
     if isinstance(design.full, PlaneProblem):
         return plate_outline(design, volume_fraction, threshold, domain)

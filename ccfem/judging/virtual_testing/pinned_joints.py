@@ -66,7 +66,7 @@ class PinnedJoint:
     centre: FloatArray  # (3,), mm: on the axis, in the middle of the wall
     # (3,), N: of the pin on the part, across the axis, under the load of the test
     force: FloatArray
-    # mm: of the hole; length of its loaded wall along the axis
+    # mm: diameter of the hole; thickness: length of its loaded wall along the axis
     diameter: float
     thickness: float
     # mm^2: of the material beside the hole across the force, and of both planes of shear-out

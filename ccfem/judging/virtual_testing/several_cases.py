@@ -87,6 +87,13 @@ def virtual_tests(
         As in `virtual_test`.
     known : sequence of (n, 3) arrays, mm, optional
         For each case a displacement near its solution, to start from.
+
+    Raises
+    ------
+    InputError
+        As `virtual_test`.
+    SolveError
+        When a solve misses its tolerance.
     """
     specimens_of_cases = specimens(parts) if isinstance(parts, WeightedCases) else tuple(parts)
     if isinstance(fibres, Toolpaths):

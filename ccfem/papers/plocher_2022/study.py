@@ -75,7 +75,7 @@ class PatternStudy:
     maps: tuple[plane_study.FibreMap, ...]
     laid: Mapping[str, plane_study.LaidPlate]  # by "C", "S", "mixed"
     values: Mapping[str, float]  # by index
-    raster: tuple[RasterPlan, ...] = ()  # A layer each; none of a pattern of polylines
+    raster: tuple[RasterPlan, ...] = ()  # a layer each; none of a pattern of polylines
 
 
 @dataclass(frozen=True)

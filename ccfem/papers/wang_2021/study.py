@@ -68,19 +68,17 @@ class PatternStudy:
     toolpaths: Toolpaths
     paths: PlanePaths
     total: Mapping[str, float]  # by index: from `evaluate`
-    # by reading: matching rates at 5, 10, ..., 90 degrees; "strands" is "path" without links
+    # (18,) by reading: matching rates at 5, 10, ..., 90 degrees; "strands" is "path" without links
     rates: Mapping[str, FloatArray]
-    # (s, 2), mm, and (s,) array, 1/mm: resampled in steps of half a millimetre; outside the part
-    # too
-    places: FloatArray
-    curvature: FloatArray
+    places: FloatArray  # (s, 2), mm: in steps of half a millimetre; outside the part too
+    curvature: FloatArray  # (s,), 1/mm: at these places
     curvature_in_part: FloatArray  # (s,), 1/mm
     # (v,), 1/mm: at the vertices as planned
     native: FloatArray
     native_in_part: FloatArray
-    # by "tension" and "bonded": of the part with its fibre over that without, in the virtual test,
-    # with strands so stiff that all patterns have the same volume of fibre in the part; empty for
-    # full plates
+    # by "tension" and "bonded": stiffness of the part with its fibre over that without, in the
+    # virtual test, with strands so stiff that all patterns have the same volume of fibre in the
+    # part; empty for full plates
     stiffness: Mapping[str, float]
     seconds: float  # of planning
 

@@ -53,7 +53,10 @@ class GivenPaths:
         return self.toolpaths.on_layer(layer.index)
 
     def heights(self, direction: FloatArray) -> FloatArray:
-        """Heights, mm, of the layers that the paths lie on, upwards along a unit vector (3,)."""
+        """Heights, mm, of the layers that the paths lie on, upwards along a unit vector (3,).
+
+        A path that is not flat across it is an error.
+        """
         return np.unique(self._levels(np.asarray(direction, dtype=np.float64)).round(3))
 
     def are_flat(self, direction: FloatArray) -> bool:
@@ -88,6 +91,11 @@ class GivenPaths:
         """Return these paths, each with the number of the layer that it lies on.
 
         Where one is curved, the points are moved onto the layer that is nearest to their path.
+
+        Raises
+        ------
+        InputError
+            When a path lies farther from every layer than half the layer's height.
         """
         if curved_layers(layers):
             return self._on_curved(layers)

@@ -83,7 +83,13 @@ TYPES = {
 
 
 def write_gcode(path: str | Path, plan: PrintPlan, machine: Machine, title: str = "") -> None:
-    """Write the G-code of a part, whole or not at all, with a title at the head of the file."""
+    """Write the G-code of a part, whole or not at all, with a title at the head of the file.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be written, or a nozzle would leave the bed.
+    """
     pieces = gcode_pieces(part_moves(plan, machine), plan, machine, title)
     with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
         file.writelines(pieces)

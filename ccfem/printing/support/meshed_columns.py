@@ -94,12 +94,12 @@ def support_columns(
     ----------
     build : sequence of 3 floats, default z
         Build direction.
-    angle : float, degrees, default 0
+    angle : float in [0, 90), degrees, default 0
         Faces that lean over by more than this, from upright, need support: with 0 all that look
         down, as for layers that continue below the part; flat layers carry about 45 themselves.
-    lift : float, mm, default 0
+    lift : float >= 0, mm, default 0
         Height of the lowest point of the part above the bed.
-    pitch : float, mm, default 0.25
+    pitch : float > 0, mm, default 0.25
         Distance of the columns.
     """
     check_number("angle", angle, at_least=0.0, below=90.0, unit="degrees")

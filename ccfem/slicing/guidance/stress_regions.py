@@ -85,6 +85,11 @@ def stress_regions(
         Largest number of regions that are kept, largest first; none has less than 10 cells.
     smoothing : int, default 200
         Passes in which each direction is averaged with those of its neighbours in the region.
+
+    Raises
+    ------
+    InputError
+        When no region is found.
     """
     values, axes = np.linalg.eigh(stress)
     largest, volume = values[:, 2], mesh.volumes

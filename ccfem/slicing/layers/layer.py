@@ -217,7 +217,7 @@ class Layer(Shown):
 
     @cached_property
     def plane(self) -> "FlatLayer":
-        """The layer seen in its plane."""
+        """The layer seen in its plane; an error where it is curved."""
         if self.flat is None:
             raise InputError(
                 f"layer {self.index} is curved and lies in no plane: choose a planar slicing, or "

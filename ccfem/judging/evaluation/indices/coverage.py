@@ -93,7 +93,7 @@ _SHIFT = (0.381966, 0.276393)
 class CoverageSamples:
     """Samples of equal area inside the section, and whole areas of a layer."""
 
-    tension: FloatArray  # (s,), MPa: s1+
+    tension: FloatArray  # (s,), MPa: S1+
     covered: BoolArray  # (s,)
     laid: FloatArray  # (1,), mm^2: length of the fibre times its width
     # (1,), mm^2: of the section, and of its places that are too narrow for a strand

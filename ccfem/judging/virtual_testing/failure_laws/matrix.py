@@ -25,6 +25,11 @@ def matrix_peak(stress: StressField) -> tuple[float, FloatArray]:
     centroid is closer than 3 mm to a patch with a load or a support are left out, though they count
     in the averages of others. A whole flat face that slides in its plane, as a plane of symmetry
     does, is no such patch: no stress peaks there.
+
+    Raises
+    ------
+    InputError
+        When all cells are left out.
     """
     judged, average, centroid = averaged_mises(stress.problem, stress.case, stress.stress)
     if not len(judged):
