@@ -22,7 +22,7 @@ from ccfem.base.folder import Folder
 from ccfem.base.result_folder import whole_folder
 from ccfem.base.whole import whole_file
 from ccfem.comparison import files as files_of_comparisons
-from ccfem.comparison.files import RESULT_FILES
+from ccfem.comparison.files import BED_FILES, RESULT_FILES
 
 NAMES = ("report.html", "paths.vtp", "notes.txt", "*_waypoints.txt", "[abc]")
 """Files that ccfem writes, in these tests."""
@@ -401,7 +401,7 @@ def test_all_files_that_comparisons_write_are_known():
     names = [name for name in names if name != "07"]
     assert len(names) >= 6
     for name in names:
-        assert any(fnmatchcase(name, pattern) for pattern in RESULT_FILES), name
+        assert any(fnmatchcase(name, pattern) for pattern in (*RESULT_FILES, *BED_FILES)), name
     assert not any(fnmatchcase("thesis.docx", pattern) for pattern in RESULT_FILES)
 
 
