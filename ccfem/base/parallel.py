@@ -60,11 +60,10 @@ def _granted() -> int:
 
 
 def one_blas_thread(function: FunctionT) -> FunctionT:
-    """Make a function compute with one thread of BLAS, as all that shares out its work here.
+    """Make a function, and all that it calls, compute with one thread of BLAS.
 
-    Threads of BLAS cost more than they save on matrices of the size that occurs, and their number
-    would change the last digits, by which paths can differ. Where none was set, all calls of the
-    function and all that they call are equal to the bit on one processor and on many.
+    Their number changes the last digits, and with them paths. On matrices of the size that occurs
+    they cost more than they save.
     """
     return cast(FunctionT, threadpool_limits.wrap(limits=1, user_api="blas")(function))
 
