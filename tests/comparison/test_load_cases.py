@@ -25,14 +25,14 @@ def case_of(loads=None, **options):
     given = {"pull": (Force("x_max", (300.0, 0.0, 0.0)),), "side": (Force("x_max", (0, 40.0, 0)),)}
     problem = Problem(mesh, printed_pla(), (Support("x_min"),), loads or given, order=1)
     machine = Machine(minimum_length=15.0)
-    return Case("small", "Small", problem, slicing=Planar(count=4), machine=machine, **options)
+    return Case("small", "Small", problem, slicing=Planar(count=2), machine=machine, **options)
 
 
 @pytest.fixture(scope="module")
 def compared():
     case = case_of(weights={"pull": 1.0, "side": 0.5})
     strategies = {"stream": StreamFunction(evaluations=3, phases=1, inset=0.6), "zigzag": Zigzag()}
-    return compare(case, strategies, fibre_per_layer=500.0, load_case="all")
+    return compare(case, strategies, fibre_per_layer=400.0, load_case="all")
 
 
 def test_every_run_is_tested_under_every_case(compared):

@@ -163,11 +163,11 @@ def test_guides_are_streamlines():
     c, s = np.cos(np.radians(30.0)), np.sin(np.radians(30.0))
     lines, _ = plan(
         Mps(minimum_length=0.0),
-        shapely.box(0, 0, 120, 80),
+        shapely.box(0, 0, 80, 50),
         lambda p: [c * c, s * s, c * s] + 0 * p[:, :1],
     )
     inner = [x for x in lines if not np.array_equal(x[0], x[-1])]
-    assert len(inner) > 60
+    assert len(inner) > 40
     for line in inner:
         steps = np.diff(line, axis=0)
         np.testing.assert_allclose(steps @ [-s, c], 0.0, atol=0.02)
@@ -343,7 +343,7 @@ def loop():
     """A machine with wide fibre, the stress on the loop, and one layer."""
     case = create_case("loop", element_size=8.0)
     stress = solve(case.problem)["pull"]
-    machine = replace(case.machine, fibre_width=1.6)  # fewer strands than of 1 mm
+    machine = replace(case.machine, fibre_width=2.4)  # fewer strands than of 1 mm
     return machine, stress, Planar(count=1).cut(case.problem.mesh, case.build)
 
 

@@ -20,7 +20,7 @@ from ccfem.strategies.fibre_aware.upper_bound import upper_bound
 from ccfem.strategies.isocurve import Isocurve
 from ccfem.strategies.stream_function import StreamFunction
 
-MACHINE = Machine(minimum_length=20.0)
+MACHINE = Machine(fibre_width=1.5, minimum_length=20.0)
 PLA = isotropic(3500.0, 0.35)
 
 

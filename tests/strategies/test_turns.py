@@ -21,15 +21,14 @@ from ccfem.paths.planning.infill import with_turns
 from ccfem.slicing.slicers.planar import Planar
 from ccfem.strategies import create, named
 
-MACHINE = Machine()
+MACHINE = Machine(fibre_width=1.8)
+"""Where fibre is wide there are fewer strands to plan, which turn alike."""
 WITH_TURNS = sorted(name for name, kind in named().items() if hasattr(kind, "turns"))
 NEEDS_JOINTS = {"winding"}
 TESTED = {"pruned": {}, "stream_function": {"evaluations": 3, "phases": 1}}
 """Strategies that choose by virtual tests which bends stay, up to 1 %, with quick parameters."""
 ALONE = {"pruned": {"base": {"cap": 60.0}}, "stream_function": {"inset": 0.6}}
 """Parameters with which these test no plain plans, and perhaps take one, beside their own."""
-SLOW = {"mps", "pruned", "stream_function", "stripes", "svt"}
-"""Strategies that lay fibre 1.8 mm wide here: there are fewer strands to plan, which turn alike."""
 MOVES = {
     "plain": np.eye(3),
     "turned": np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]]),
@@ -70,17 +69,13 @@ def part(shape, move):
     return solve(problem)["pull"], Planar(count=1).cut(mesh)
 
 
-def machine_of(name):
-    return Machine(fibre_width=1.8) if name in SLOW else MACHINE
-
-
 @cache
 def planned(name, shape, move, turns="cut"):
     """Paths of a strategy, quick where it is slow, on the layer of a part."""
     more = {} if shape is gear else ALONE.get(name, {})
     strategy = create(name, {"turns": turns, **TESTED.get(name, {}), **more})
     stress, layers = part(shape, move)
-    return plan(strategy, layers, stress, machine_of(name))
+    return plan(strategy, layers, stress, MACHINE)
 
 
 @pytest.mark.parametrize("name", [name for name in WITH_TURNS if name not in TESTED])
@@ -88,8 +83,8 @@ def test_by_default_strands_go_round_all_turns(name):
     kind = named()[name]
     assert {field.name: field.default for field in fields(kind)}["turns"] == "tight"
     line = np.array([(0.0, 0.0), (60.0, 0.0), (60.0, 1.0), (0.0, 1.0)])
-    assert with_turns(create(name), [line], MACHINE).lines[0] is line
-    pieces = with_turns(create(name, {"turns": "cut"}), [line], MACHINE).lines
+    assert with_turns(create(name), [line], Machine()).lines[0] is line
+    pieces = with_turns(create(name, {"turns": "cut"}), [line], Machine()).lines
     assert [line_length(piece) for piece in pieces] == pytest.approx([60.0, 60.0])
 
 
@@ -99,20 +94,20 @@ def test_where_turns_are_cut_nothing_bends_too_tightly(name, shape, move):
     (stress, layers), paths = part(shape, move), planned(name, shape, move)
     if len(paths):
         assert paths.lengths.min() >= MACHINE.minimum_length - 1e-6
-        assert evaluate(paths, layers, stress, machine_of(name)).total["curvature_ok"] >= 0.99
+        assert evaluate(paths, layers, stress, MACHINE).total["curvature_ok"] >= 0.99
 
 
 @pytest.mark.parametrize("name", sorted(TESTED))
 def test_bends_worth_most_stay_and_hardly_any_stiffness_goes(name):
-    (stress, layers), machine = part(gear, "plain"), machine_of(name)
+    stress, layers = part(gear, "plain")
     tight, cut = (planned(name, gear, "plain", turns) for turns in ("tight", "cut"))
     shares = [
-        1.0 - evaluate(paths, layers, stress, machine).total["curvature_ok"]
+        1.0 - evaluate(paths, layers, stress, MACHINE).total["curvature_ok"]
         for paths in (tight, cut)
     ]
     assert shares[0] > 0.0  # folds, which were most of the tight bends, are not planned
     assert 0.0 <= shares[1] <= 0.01
-    ratios = [virtual_test(paths, stress, span=(), machine=machine).ratio for paths in (tight, cut)]
+    ratios = [virtual_test(paths, stress, span=(), machine=MACHINE).ratio for paths in (tight, cut)]
     assert ratios[1] - 1.0 > 0.8 * (ratios[0] - 1.0)
 
 

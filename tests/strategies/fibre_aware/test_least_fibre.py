@@ -38,7 +38,7 @@ def test_too_much_is_refused_with_the_most_that_there_is(pulled_bar):
         least_fibre(create("eqs", {}), layers, stress, MACHINE, 0.9)
 
 
-SMALL = Machine(minimum_length=6.0)
+SMALL = Machine(fibre_width=1.4, minimum_length=6.0)
 STREAM = StreamFunction(evaluations=6, phases=1, inset=0.6)
 
 

@@ -20,7 +20,8 @@ from ccfem.strategies.pruned import Pruned
 from ccfem.strategies.stream_function import StreamFunction
 from ccfem.strategies.zigzag import Zigzag
 
-MACHINE = Machine(minimum_length=6.0)
+MACHINE = Machine(fibre_width=2.0, minimum_length=6.0)
+"""Where fibre is wide there are fewer strands to plan."""
 STREAM = StreamFunction(evaluations=5, phases=1, inset=0.6)
 """With no plain plans beside its designs, at this inset."""
 
@@ -83,8 +84,8 @@ def test_one_case_is_planned_as_ever(two_bends):
     field = cases.fields[0]
     one = WeightedCases.of({"tip": field}, {"tip": 7.0})
     for each in (StreamFunction(evaluations=2, phases=1), Pruned(of="zigzag")):
-        before = plan_to_length(each, layers, field, MACHINE, 500.0)
-        after = plan_cases(each, layers, one, MACHINE, 500.0)
+        before = plan_to_length(each, layers, field, MACHINE, 350.0)
+        after = plan_cases(each, layers, one, MACHINE, 350.0)
         np.testing.assert_array_equal(after.toolpaths.points, before.toolpaths.points)
         np.testing.assert_array_equal(after.toolpaths.offsets, before.toolpaths.offsets)
         assert after.strategy == before.strategy
@@ -92,7 +93,7 @@ def test_one_case_is_planned_as_ever(two_bends):
 
 @pytest.fixture(scope="module")
 def planned(two_bends):
-    """Plans of 500 mm a layer for both cases."""
+    """Plans of 350 mm a layer for both cases."""
     cases, layers = two_bends
     strategies = {
         "stream": STREAM,
@@ -101,15 +102,15 @@ def planned(two_bends):
         "zigzag": Zigzag(),
     }
     return {
-        name: plan_cases(one, layers, cases, MACHINE, 500.0) for name, one in strategies.items()
+        name: plan_cases(one, layers, cases, MACHINE, 350.0) for name, one in strategies.items()
     }
 
 
 def test_plans_keep_to_the_length(planned, two_bends):
     _, layers = two_bends
     for one in planned.values():
-        assert one.length_per_layer <= 500.0 * (1.0 + 1e-9)
-        assert one.length_per_layer > 0.95 * 500.0
+        assert one.length_per_layer <= 350.0 * (1.0 + 1e-9)
+        assert one.length_per_layer > 0.95 * 350.0
         assert set(one.toolpaths.layer) == {layer.index for layer in layers}
         assert one.toolpaths.lengths.min() >= MACHINE.minimum_length * (1.0 - 1e-9)
 
@@ -121,7 +122,7 @@ def test_planned_together_the_worst_case_is_better_than_planned_for_one(planned,
     for name, one in planned.items():
         worst[name] = virtual_tests(one.toolpaths, cases).ratios
     for field in cases.fields:
-        alone = plan_to_length(STREAM, layers, field, MACHINE, 500.0)
+        alone = plan_to_length(STREAM, layers, field, MACHINE, 350.0)
         best.append(virtual_tests(alone.toolpaths, cases).ratios)
     single = np.diag(best)
     together = (worst["stream"] / single).min()
@@ -142,7 +143,7 @@ def test_the_design_goes_on_with_the_cases_counted_as_tests_count_them(two_bends
 
     monkeypatch.setattr("ccfem.strategies.stream_function.design", spy)
     with pytest.raises(DesignedError) as planned:
-        plan_cases(StreamFunction(evaluations=10, inset=0.6), layers, cases, MACHINE, 500.0)
+        plan_cases(StreamFunction(evaluations=10, inset=0.6), layers, cases, MACHINE, 350.0)
     problem, begun, found = planned.value.args
     begun_shares, shares = (one.ratio / problem.bounds for one in (begun, found.objective))
     assert shares.min() > begun_shares.min()
@@ -165,7 +166,7 @@ def test_layers_by_case_are_those_planned_for_the_case(two_bends):
 
 def test_strategies_that_ignore_the_stress_stay_as_they_are(planned, two_bends):
     cases, layers = two_bends
-    alone = plan_to_length(Zigzag(), layers, cases.fields[1], MACHINE, 500.0)
+    alone = plan_to_length(Zigzag(), layers, cases.fields[1], MACHINE, 350.0)
     np.testing.assert_array_equal(planned["zigzag"].toolpaths.points, alone.toolpaths.points)
 
 
@@ -215,8 +216,8 @@ def test_with_fewer_layers_than_cases_those_of_most_weight_get_a_field(two_bends
     material = replace(cases.fields[0].problem.material, tensile_strength=50.0)
     strong = WeightedCases.of(solve(replace(cases.fields[0].problem, material=material)))
     strategy = StreamFunction(evaluations=4, phases=1, inset=0.6, strength=strength)
-    planned = plan_cases(strategy, layers[:1], strong, MACHINE, 400.0)
-    assert 380.0 < planned.length_per_layer <= 400.0
+    planned = plan_cases(strategy, layers[:1], strong, MACHINE, 300.0)
+    assert 285.0 < planned.length_per_layer <= 300.0
     assert set(planned.toolpaths.layer) == {layers[0].index}
 
 

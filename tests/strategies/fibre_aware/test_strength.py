@@ -224,8 +224,8 @@ def test_planning_for_strength_is_worth_no_less_than_for_stiffness(strong_beam, 
     worth = []
     for strength, moves in ((0.0, 0), (weight, 0), (weight, 1)):
         planned = replace(strategy, strength=strength, moves=moves)
-        ((_, planner),) = planned.to_lengths(stress, layers, SHORT, (150.0,))
-        tested = virtual_test(planner.toolpaths, stress, span=(), machine=SHORT)
+        ((_, planner),) = planned.to_lengths(stress, layers, WIDE, (150.0,))
+        tested = virtual_test(planner.toolpaths, stress, span=(), machine=WIDE)
         load = first_failure(tested, layers=layers).load
         worth.append((1.0 - weight) * np.log(tested.ratio) + weight * np.log(load))
     assert worth[1] >= worth[0] - 1e-6
