@@ -128,7 +128,7 @@ def test_the_command_makes_the_stored_outline_again():
 def test_another_share_is_optimised_anew(monkeypatch):
     """Of a design that is not at its end yet, too, as much is cut as was asked for."""
     plate = replace(PLATES["m_shape"], volume_fraction=0.4)
-    monkeypatch.setattr(DesignPlate, "design", partialmethod(DesignPlate.design, 20))
+    monkeypatch.setattr(DesignPlate, "design", partialmethod(DesignPlate.design, 8))
     assert plate.part.area == pytest.approx(0.4 * plate.domain.area, rel=0.005)
 
 

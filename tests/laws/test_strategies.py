@@ -35,7 +35,8 @@ ALONE = {"pruned": {"base": {"cap": 60.0}}, "stream_function": {"inset": 0.6}}
 """Parameters with which no plain plans are tested, and perhaps taken, beside their own."""
 
 SLOW = {
-    "mps": 1.5, "pruned": 2.0, "stream_function": 2.0, "streamline": 1.7, "stripes": 1.7, "svt": 1.3
+    "mat": 1.5, "mps": 1.6, "pruned": 3.0, "stream_function": 3.0, "streamline": 2.0,
+    "stripes": 2.5, "svt": 1.8,
 }  # fmt: skip
 """Width, mm, of the fibre of slow strategies: where it is wide there are fewer strands to plan."""
 
@@ -73,7 +74,7 @@ def plate_with_hole():
 
     The origin lies in it, to the left of the hole: what is turned about it turns onto itself.
     """
-    around, across = 60, 10
+    around, across = 48, 8
     box = box_mesh((1.0, 1.0, 4.0), (around, across, 2))
     share, depth, z = box.points.T
     angle = 2.0 * np.pi * share

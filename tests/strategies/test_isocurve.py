@@ -315,10 +315,10 @@ def test_figures_on_the_authors_loop() -> None:
 
     case = authors_loop()
     field = next(iter(solve(case.problem).values()))
-    layers = Planar(count=12).cut(field.mesh, case.build)[1::3]
+    layers = Planar(count=12).cut(field.mesh, case.build)[1::5]
     paths: Toolpaths = plan(Isocurve(), layers, field, MACHINE)
     total = evaluate(paths, layers, field, MACHINE).total
-    assert total["fibre_length"] <= 34658.0 * 4.0 / 12.0
+    assert total["fibre_length"] <= 34658.0 * 3.0 / 12.0
     assert total["aligned_10"] >= 0.93
     assert total["aligned_stress_10"] >= 0.95
     assert total["coverage_top_20"] >= 0.72
@@ -330,7 +330,7 @@ def test_figures_on_the_authors_loop() -> None:
     assert why_not(total, case.machine) == ()
     assert sharpest_strand(paths) <= 90.0
     linked = plan(
-        Isocurve(smooth=False, link_limit=7.0, inset=0.0, folds=True), layers[:2], field, MACHINE
+        Isocurve(smooth=False, link_limit=7.0, inset=0.0, folds=True), layers[:1], field, MACHINE
     )
     assert np.bincount(linked.layer).max() <= 16
 
