@@ -74,16 +74,19 @@ COMPILE_NOTHING = {
 }  # fmt: skip
 """Files whose tests call nothing that numba compiles."""
 
+HALF_WAY = {"test_documents", "test_notebooks", "test_site", "test_workbench_browser"}
+"""Files of long tests: at the end one process would wait for the other that runs them."""
+
 
 def pytest_collection_modifyitems(items):
-    """Begin with the report in a browser, beside what compiles nothing; workbench half way.
+    """Begin with the report in a browser, beside what compiles nothing; long files half way.
 
     Two processes that begin with the same commands would compile the same at one time, both.
     Slow tests are left out, unless they are asked for.
     """
     half = {item.path: k < len(items) / 2 for k, item in reversed([*enumerate(items)])}
-    first = {"test_report_browser": 0, "test_workbench_browser": 3}
-    first |= dict.fromkeys(COMPILE_NOTHING, 1)
+    first = {"test_report_browser": 0} | dict.fromkeys(COMPILE_NOTHING, 1)
+    first |= dict.fromkeys(HALF_WAY, 3)
     items.sort(key=lambda item: first.get(item.path.stem, 2 if half[item.path] else 4))
     if not os.environ.get("CCFEM_SLOW"):
         for item in items:
