@@ -61,7 +61,7 @@ def part(shape, move):
     x0, y0, x1, y1 = outline.bounds
     left = Box((x0 - 1.0, y0 - 1.0, -1.0), (x0 + 4.0, y1 + 1.0, 3.0))
     right = Box((x1 - 4.0, y0 - 1.0, -1.0), (x1 + 1.0, y1 + 1.0, 3.0))
-    mesh = patches_from_rules(extrude(outline, 2.0, 3.0), {"left": left, "right": right})
+    mesh = patches_from_rules(extrude(outline, 2.0, 5.0), {"left": left, "right": right})
     cells = mesh.cells[:, [1, 0, 2, 3]] if np.linalg.det(a) < 0.0 else mesh.cells
     mesh = replace(mesh, points=mesh.points @ a.T, cells=cells)
     pull = (Force("right", tuple(a @ np.array([300.0, -60.0, 0.0]))),)
