@@ -137,7 +137,7 @@ def test_bridge_is_covered_without_sharp_turns(bridge, bridge_path):
     ("name", "inside"), [("suspension", 20.0), ("l_shape", 5.0)], ids=["suspension", "l_shape"]
 )
 def test_frames_of_the_paper_are_one_path_of_strands_side_by_side(name, inside, monkeypatch):
-    case = create_case(name)
+    case = create_case(name, element_size=3.0)
     stress = solve(case.problem)["down"]
     layers = Planar(count=1).cut(case.problem.mesh, case.build)
     strategy, made = create("svt"), []
