@@ -35,13 +35,8 @@ def part():
     loads = {"pull": (Force("x_max", (200.0, 0.0, 0.0)),), "side": (Force("x_max", (0, 40.0, 0)),)}
     material = replace(printed_pla(), tensile_strength=40.0)
     problem = Problem(mesh, material, (Support("x_min"),), loads, order=1)
-    case = Case(
-        "small",
-        "",
-        problem,
-        slicing=Planar(count=2),
-        machine=Machine(fibre_width=1.5, minimum_length=10.0),
-    )
+    machine = Machine(fibre_width=1.5, minimum_length=10.0)
+    case = Case("small", "", problem, slicing=Planar(count=2), machine=machine)
     return case, WeightedCases.of(solve(problem), {"pull": 1.0, "side": 2.0})
 
 
