@@ -46,6 +46,8 @@ _SAMPLES = 40
 """Samples of the tangent in a window."""
 _BATCH = 2_000_000
 """Samples that are looked at together: about 300 MB."""
+_LAGS = 8
+"""Numbers of samples ahead that are looked at together, where memory allows."""
 _FINEST = 0.02
 """Least distance of the samples, mm: with radii below .8 mm fewer of them lie in a window."""
 _SMOOTH = 2
@@ -270,14 +272,17 @@ def _fold_stretches(
     most = np.where(closed[line], most, np.minimum(most, samples[line] - 1 - number))
     limit = np.cos(ANGLE + _SLACK)
     pending = np.flatnonzero(_may_fold(tangent, first[line], number, samples[line], most))
-    for lag in range(1, int(most.max(initial=0)) + 1):
-        pending = pending[most[pending] >= lag]
-        after = (number[pending] + lag) % samples[line[pending]]
-        other = np.asarray(first[line[pending]] + after, dtype=np.int64)
-        here, there = tangent.take(pending, axis=0), tangent.take(other, axis=0)
-        turned = np.einsum("ij,ij->i", here, there) < limit
-        ahead[pending[turned]] = lag
-        pending = pending[~turned]
+    least = 1
+    while len(pending):
+        lag = np.arange(least, least + (_LAGS if _LAGS * len(pending) < _BATCH else 1))
+        after = (number[pending, None] + lag) % samples[line[pending], None]
+        there = tangent.take(first[line[pending], None] + after, axis=0)
+        turned = np.einsum("ij,ikj->ik", tangent.take(pending, axis=0), there) < limit
+        turned &= lag <= most[pending, None]
+        turns = turned.any(axis=1)
+        ahead[pending[turns]] = lag[turned[turns].argmax(axis=1)]
+        least += len(lag)
+        pending = pending[~turns & (most[pending] >= least)]
     reach = ahead * step[line]
     # Shortest stretches: those that hold no other, which would start at the next sample.
     following = ahead[first[line] + (number + 1) % np.maximum(samples[line], 1)]

@@ -9,7 +9,7 @@ import shapely
 from ccfem.base.arrays import BoolArray, FloatArray, IntArray
 from ccfem.base.compiled import compiled
 from ccfem.geometry.polylines import along_line, is_closed, line_length, pack, points_along, runs
-from ccfem.geometry.shapes import Region, open_lines
+from ccfem.geometry.shapes import Region, open_lines, strings
 from ccfem.paths.linking.joining import Joined, Joint, join, link_ends
 from ccfem.paths.linking.possible_links import ring_arc
 
@@ -34,15 +34,15 @@ def keep_off_border(lines: Sequence[FloatArray], section: Region, inset: float) 
     """
     if inset == 0.0:
         return list(lines)
-    room = shapely.buffer(section, -inset)
+    return parts_inside(lines, shapely.buffer(section, -inset))
+
+
+def parts_inside(lines: Sequence[FloatArray], room: Region) -> list[FloatArray]:
+    """Parts (n_i, 2) of lines inside a region; those that it covers are kept as they are."""
     shapely.prepare(room)
-    kept = []
-    for line in lines:
-        string = shapely.linestrings(line)
-        if shapely.covers(room, string):
-            kept.append(line)
-            continue
-        kept += open_lines(shapely.intersection(string, room))
+    paths, kept = strings(lines), list[FloatArray]()
+    for line, path, whole in zip(lines, paths, shapely.covers(room, paths), strict=True):
+        kept += [line] if whole else open_lines(shapely.intersection(path, room))
     return kept
 
 

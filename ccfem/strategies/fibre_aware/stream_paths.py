@@ -23,6 +23,7 @@ from ccfem.paths.linking.finishing import (
     keep_off_border,
     linked_paths,
     long_enough,
+    parts_inside,
     trim_to_clearance,
 )
 from ccfem.paths.linking.joining import Joined
@@ -460,9 +461,11 @@ def lines_to_slide_in(
         Parts at least 0.8 times the distance off the border. Ends that run onto the border are cut
         at the full distance, since sideways slides do not move them inwards.
     """
-    slid_in = []
+    if inset == 0.0:
+        return list(lines)
+    slid_in, room = [], shapely.buffer(section, -inset)
     for line in keep_off_border(lines, section, _DEPTH * inset):
-        kept = keep_off_border([line], section, inset)
+        kept = parts_inside([line], room)
         cut = len(kept) == 1 and line_length(line) - line_length(kept[0]) < inset
         slid_in.append(kept[0] if cut else line)
     return slid_in
@@ -533,16 +536,24 @@ def _ends_cut(paths: Toolpaths, layer: Layer, inset: float, machine: Machine) ->
     """Paths without ends that are too near the border, where the rest is long enough."""
     border = shapely.boundary(layer.plane.polygon)
     shapely.prepare(border)
-    places = shapely.points(paths.points @ layer.plane.frame[:2].T)
-    missing = inset - shapely.distance(places, border)
+    plane = paths.points @ layer.plane.frame[:2].T
+
+    def missing(some: slice | IntArray) -> FloatArray:
+        return np.asarray(inset - shapely.distance(shapely.points(plane[some]), border))
+
+    ends = np.stack([paths.offsets[:-1], paths.offsets[1:] - 1], axis=1)
+    near = (missing(ends.ravel()).reshape(-1, 2) > 0.0).any(axis=1) & ~paths.closed
+    if not near.any():
+        return paths
     left = paths.lengths - np.minimum(paths.lengths, machine.shortest_strand)
     cut = []
     for k, (first, end) in enumerate(pairwise(paths.offsets)):
-        points, link, short = paths.points[first:end], paths.link[first:end], missing[first:end]
-        for _ in range(2):  # one end, then the other
+        points, link = paths.points[first:end], paths.link[first:end]
+        short = missing(slice(first, end)) if near[k] else np.zeros(len(points))
+        for _ in range(2 * int(near[k])):  # one end, then the other
             points, link, short = points[::-1], np.roll(link[::-1], -1), short[::-1]
             number = int(np.argmax(short <= 0.0))
-            if number == 0 or paths.closed[k]:
+            if number == 0:
                 continue
             share = short[number] / (short[number] - short[number - 1])
             place = points[number] + share * (points[number - 1] - points[number])
