@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from ccfem.base.arrays import FloatArray, IntArray
 from ccfem.base.compiled import compiled
 from ccfem.geometry.dubins import WORDS, shortest_curve, word_sizes
-from ccfem.geometry.polylines import along_line, is_closed, pack, points_along
+from ccfem.geometry.polylines import along_line, is_closed, pack, points_along, sizes
 from ccfem.geometry.shapes import Region, Shapes, strings
 from ccfem.paths.folds import MARGIN, folds
 
@@ -25,6 +25,12 @@ neighbouring strands that closes on itself could no longer join the next strand.
 
 _WINDOWS = 1.2
 """Length of the strands beside a link that is looked at for folds, in radii."""
+
+_OUTWARD = 1.0
+"""Length, mm, over which the direction of an end is measured."""
+
+_POINTS = 32
+"""Points of the beginnings of lines that are looked at first."""
 
 _ON_BORDER = 1e-6
 """Distance, mm, by which rounding may move points off a border."""
@@ -75,7 +81,7 @@ def possible_links(
         return []
     ends = np.array([2 * k + side for k in opened for side in (0, 1)])
     points = np.array([lines[end // 2][-(end % 2)] for end in ends])
-    outward = np.array([_outward(lines[end // 2], end % 2) for end in ends])
+    outward = _outward(_heads(lines, ends, _OUTWARD))
     links = _straight_links(points, outward, ends, limit, turn_cost)
     if along_boundary:
         links += _boundary_links(
@@ -188,9 +194,9 @@ def _boundary_links(
     """Links along the boundary, `inset` inside it, between neighbouring ends on it."""
     links: list[Link] = []
     starts = shapely.points(points)
-    heads = strings(
-        [_head(lines[e // 2] if e % 2 == 0 else lines[e // 2][::-1], limit) for e in ends]
-    )
+    head = _heads(lines, ends, limit)
+    inside = np.arange(head.along.shape[1]) <= head.last(limit)[:, None]
+    heads = shapely.linestrings(head.points[inside], indices=np.nonzero(inside)[0])
     for ring in shapely.get_rings(shapely.buffer(section, -inset)):
         near = np.flatnonzero(shapely.dwithin(ring, starts, 1.5 * inset))
         meeting, met = _first_meetings(heads[near], starts[near], ring)
@@ -247,8 +253,57 @@ def ring_arc(ring: shapely.LinearRing, start: float, length: float) -> FloatArra
 
 def _head(line: FloatArray, reach: float) -> FloatArray:
     """Return the first `reach` mm of a line, or at least its first piece."""
-    distance = np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))
-    return line[: int(np.searchsorted(distance, reach)) + 2]
+    return line[: int(np.searchsorted(along_line(line)[1:], reach)) + 2]
+
+
+class _Heads(NamedTuple):
+    """Beginnings of lines, each from one of its ends: the last points of short ones repeat.
+
+    Attributes
+    ----------
+    points : (e, h, 2) array, mm
+    along : (e, h) array, mm
+        Arc length from the end.
+    count : (e,) int array
+        Points of each line.
+    """
+
+    points: FloatArray
+    along: FloatArray
+    count: IntArray
+
+    def last(self, reach: float) -> IntArray:
+        """Last point (e,) of the first `reach` mm, or at least of the first piece."""
+        before = (self.along[:, 1:] < reach).sum(axis=1)
+        return np.minimum(before + 1, self.count - 1)
+
+    def at(self, positions: FloatArray) -> FloatArray:
+        """Points (e, k, 2) at arc lengths (k,), or the last ones, as of `numpy.interp`."""
+        wanted = np.minimum(positions, self.along[:, -1:])
+        piece = (self.along[:, None] <= wanted[..., None]).sum(axis=2) - 1
+        row, piece = np.arange(len(piece))[:, None], np.minimum(piece, self.along.shape[1] - 2)
+        begin, end = self.along[row, piece], self.along[row, piece + 1]
+        first, second = self.points[row, piece], self.points[row, piece + 1]
+        slope = (second - first) / np.where(end > begin, end - begin, 1.0)[..., None]
+        inner = slope * (wanted - begin)[..., None] + first
+        return np.where((wanted < end)[..., None], inner, second)
+
+
+def _heads(lines: Sequence[FloatArray], ends: IntArray, reach: float) -> _Heads:
+    """Beginnings of lines up to a reach, mm, from ends as of `Link`."""
+    points, offsets = pack(lines)
+    line, back = ends // 2, ends % 2
+    count = np.diff(offsets)[line]
+    start, sense = np.where(back, offsets[line + 1] - 1, offsets[line]), 1 - 2 * back
+    most = _POINTS
+    while True:
+        number = np.minimum(np.arange(most), count[:, None] - 1)
+        head = points[start[:, None] + sense[:, None] * number]
+        steps = sizes((head[:, 1:] - head[:, :-1]).reshape(-1, 2)).reshape(len(head), -1)
+        along = np.concatenate([np.zeros((len(head), 1)), np.cumsum(steps, axis=1)], axis=1)
+        if ((along[:, -1] >= reach) | (count <= most)).all():
+            return _Heads(head, along, count)
+        most *= 2
 
 
 def _angles(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -257,11 +312,10 @@ def _angles(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.asarray(np.abs(np.arctan2(cross, (a * b).sum(axis=1))))
 
 
-def _outward(line: FloatArray, side: int) -> FloatArray:
-    """Return the unit vector along which a line leaves its first or last (side 1) point."""
-    head = _head(line if side == 0 else line[::-1], 1.0)
-    step = head[0] - head[-1]
-    return step / max(float(np.linalg.norm(step)), 1e-12)
+def _outward(heads: _Heads) -> FloatArray:
+    """Return the unit vectors (e, 2) along which lines leave their ends."""
+    step = heads.points[:, 0] - heads.points[np.arange(len(heads.count)), heads.last(_OUTWARD)]
+    return np.array([one / max(float(np.linalg.norm(one)), 1e-12) for one in step])
 
 
 # Links that a machine's fibre can follow: of a least radius, and in line with the strands.
@@ -305,9 +359,9 @@ def smooth_links(
     if len(ends) < 2:
         return []
     cuts = _CUTS * width
-    poses = np.array([_poses(lines[end // 2], int(end % 2), cuts, width) for end in ends])
+    poses = _poses(_heads(lines, ends, cuts[-1] + 2.0 * _HEADING * width), cuts, width)
     pairs = cKDTree(poses[:, 0, :2]).query_pairs(limit, output_type="ndarray")
-    room = np.array([along_line(lines[end // 2])[-1] for end in ends])
+    room = np.array([along_line(line)[-1] for line in lines])[ends // 2]
     cheapest = _best(poses, pairs, cuts, room, radius, limit + cuts[-1])
     links = []
     for (a, b), (cost, turn, one, other) in zip(pairs, cheapest, strict=True):
@@ -321,21 +375,16 @@ def smooth_links(
     return links
 
 
-def _poses(line: FloatArray, side: int, cuts: FloatArray, width: float) -> FloatArray:
-    """Poses (c, 3) at places before an end of a line, heading out of the line."""
-    head = line if side == 0 else line[::-1]
-    along = along_line(head)
-    here = points_along(head, along, np.minimum(cuts, along[-1]))
-    back = points_along(head, along, np.minimum(cuts + _HEADING * width, along[-1]))
-    way = here - back
+def _poses(heads: _Heads, cuts: FloatArray, width: float) -> FloatArray:
+    """Poses (e, c, 3) at places before ends of lines, heading out of the lines."""
     # The heading of a chord is that in its middle: on a bend the end turns further by half of it.
-    far = points_along(head, along, np.minimum(cuts + 2.0 * _HEADING * width, along[-1]))
-    before = back - far
+    here, back, far = (heads.at(cuts + k * _HEADING * width) for k in (0.0, 1.0, 2.0))
+    way, before = here - back, back - far
     bend = np.arctan2(
-        before[:, 0] * way[:, 1] - before[:, 1] * way[:, 0], (before * way).sum(axis=1)
+        before[..., 0] * way[..., 1] - before[..., 1] * way[..., 0], (before * way).sum(axis=2)
     )
-    heading = np.arctan2(way[:, 1], way[:, 0]) + 0.5 * np.clip(bend, -0.3, 0.3)
-    return np.column_stack([here, heading])
+    heading = np.arctan2(way[..., 1], way[..., 0]) + 0.5 * np.clip(bend, -0.3, 0.3)
+    return np.concatenate([here, heading[..., None]], axis=2)
 
 
 @compiled
