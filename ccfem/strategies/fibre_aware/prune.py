@@ -192,11 +192,13 @@ def profiles(toolpaths: Toolpaths, strands: Strands, value: FloatArray) -> list[
         step = float(total[k]) / count
         span = slice(bounds[k], bounds[k + 1])
         done = np.cumsum(work[span])
-        along = np.concatenate([[0.0], np.stack([begin[span], end[span]], axis=1).ravel()])
-        below = np.concatenate([[0.0], np.stack([done - work[span], done], axis=1).ravel()])
-        mean = np.diff(np.interp(step * np.arange(count + 1), along, below)) / step
+        along, below = np.zeros((2, 2 * len(done) + 1))
+        along[1::2], along[2::2] = begin[span], end[span]
+        below[1::2], below[2::2] = done - work[span], done
+        reached = np.interp(step * np.arange(count + 1), along, below)
+        mean = (reached[1:] - reached[:-1]) / step
         turn = _least_valuable(mean) if toolpaths.closed[k] else 0
-        result.append(Profile(k, np.roll(mean, -turn), step, turn * step))
+        result.append(Profile(k, np.roll(mean, -turn) if turn else mean, step, turn * step))
     return _tilted(result)
 
 

@@ -110,19 +110,18 @@ class StrandLines:
 
         Fixed points are held.
         """
-        first = self._differences((-1.0, 1.0))
-        second = self._differences((1.0, -2.0, 1.0))
-        diagonal = sp.diags_array(1.0 + _HELD * self.fixed)
-        return (diagonal + _STRETCH * (first.T @ first) + _BEND * (second.T @ second)).tocsc()
-
-    def _differences(self, weights: tuple[float, ...]) -> sp.csr_array:
-        """Matrix (n, P) of differences between neighbouring points of a path."""
-        width = len(weights)
-        first = np.flatnonzero(self.path[width - 1 :] == self.path[: 1 - width])
-        rows = np.repeat(np.arange(len(first)), width)
-        columns = (first[:, None] + np.arange(width)).ravel()
-        entries = np.tile(weights, len(first))
-        return sp.csr_array((entries, (rows, columns)), shape=(len(first), len(self.path)))
+        # By diagonals: of both points of every step, and of all three of every pair of steps.
+        one, two = (self.path[k:] == self.path[:-k] for k in (1, 2))
+        diagonal = 1.0 + _HELD * self.fixed
+        diagonal[:-1] += _STRETCH * one
+        diagonal[1:] += _STRETCH * one
+        for k, weight in enumerate((1.0, 4.0, 1.0)):
+            diagonal[k : len(two) + k] += _BEND * weight * two
+        beside = -_STRETCH * one
+        beside[:-1] -= 2.0 * _BEND * two
+        beside[1:] -= 2.0 * _BEND * two
+        bands = [diagonal, beside, beside, _BEND * two, _BEND * two][: 2 * len(diagonal) - 1]
+        return sp.diags_array(bands, offsets=[0, 1, -1, 2, -2][: len(bands)], format="csc")
 
     def points(self, slide: FloatArray) -> FloatArray:
         """Points (P, 2), mm, in the plane, after slides (P,), mm."""

@@ -186,9 +186,9 @@ def spacing(
             owner.append(np.full(len(step), layer.index))
     border, normals = np.concatenate(pieces), np.concatenate(inward)
     tree = cKDTree(_lifted(border.mean(axis=1), np.concatenate(owner)))
-    _, near = tree.query(_lifted(lines.start, lines.layer), k=_NEAREST)
     depth = np.full(len(lines.path), inset)
     if not come_in:
+        _, near = tree.query(_lifted(lines.start, lines.layer), k=_NEAREST)
         depth = np.minimum(_from_border(lines.start, near, border, normals)[0], inset)
     return Spacing(lines, width, depth, border, normals, tree, lines.roughness, radius)
 

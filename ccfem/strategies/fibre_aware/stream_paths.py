@@ -494,10 +494,13 @@ def slid_in(
     width = machine.fibre_width
     if not len(paths):
         return paths
-    for _ in range(_ROUNDS):
-        lines = strand_lines(paths, (layer,), machine, hold=False)
-        off = _INNER * inset * width
-        apart = spacing(lines, (layer,), _APART * width, off, come_in=True, radius=radius)
+    off = _INNER * inset * width
+    lines = strand_lines(paths, (layer,), machine, hold=False)
+    apart = spacing(lines, (layer,), _APART * width, off, come_in=True, radius=radius)
+    for after in range(_ROUNDS):
+        if after:
+            lines = strand_lines(paths, (layer,), machine, hold=False)
+            apart = apart.for_lines(lines, off)
         paths = lines.slid(apart.spread(np.zeros(len(lines.path))))
     return _ends_cut(_back_inside(paths, layer), layer, inset * width, machine)
 
@@ -522,10 +525,10 @@ def slid_out(
 def _back_inside(paths: Toolpaths, layer: Layer) -> Toolpaths:
     """Paths with points that neighbours have pushed over the border moved back onto it."""
     section, frame = layer.plane.polygon, layer.plane.frame[:2]
-    places = shapely.points(paths.points @ frame.T)
+    places = paths.points @ frame.T
     shapely.prepare(section)
-    out = np.flatnonzero(~shapely.covers(section, places))
-    ways = shapely.shortest_line(places[out], shapely.boundary(section))
+    out = np.flatnonzero(~shapely.intersects_xy(section, places))
+    ways = shapely.shortest_line(shapely.points(places[out]), shapely.boundary(section))
     steps = np.diff(shapely.get_coordinates(ways).reshape(-1, 2, 2), axis=1)[:, 0]
     points = paths.points.copy()
     points[out] += steps @ frame

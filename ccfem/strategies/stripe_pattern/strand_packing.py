@@ -282,9 +282,7 @@ def stepped_over(
         touched: set[int] = set()
         tree = shapely.STRtree(strings(lines))
         new: list[FloatArray] = []
-        for k, other, parts in _steps_over(lines, width, least):
-            if k in touched or other in touched:
-                continue
+        for k, other, parts in _steps_over(lines, width, least, touched):
             before, curve, after, *rests = parts
             string = shapely.linestrings(curve)
             near = tree.query(string, predicate="dwithin", distance=0.4 * width).tolist()
@@ -300,9 +298,12 @@ def stepped_over(
 
 
 def _steps_over(
-    lines: list[FloatArray], width: float, least: float
+    lines: list[FloatArray], width: float, least: float, touched: set[int]
 ) -> Iterator[tuple[int, int, list[FloatArray]]]:
-    """Pairs of lines, best first, and what they become: three parts of one line, and two rests."""
+    """Pairs of lines, best first, and what they become: three parts of one line, and two rests.
+
+    Lines that have been touched by then are left alone.
+    """
     if not lines:
         return
     points, offsets = pack(lines)
@@ -338,6 +339,8 @@ def _steps_over(
     for k in np.lexsort((np.arange(len(gain)), -gain)).tolist():
         if gain[k] <= _LEAST_GAIN * width:
             return
+        if not touched.isdisjoint((int(one[k]), int(other[k]))):
+            continue
         line, track = lines[one[k]], lines[other[k]]
         track = track if cosine[k] > 0.0 else track[::-1]
         leave, meet = int(i[k]) - reach, int(j[k]) + reach
