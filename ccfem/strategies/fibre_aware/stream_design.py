@@ -332,8 +332,9 @@ class StreamModel:
         size = np.sqrt(gx * gx + gy * gy + _SMALLEST**2)
         along = np.stack([gy * gy, gx * gx, -gx * gy], axis=1)
         strength = self.axial_stiffness * self.capacity / size**3
-        rows, columns = UPPER
-        upper = (strength[:, None] * along).take(rows, axis=1) * along.take(columns, axis=1)
+        upper, scaled = np.empty((len(along), 6)), strength[:, None] * along
+        for k, (row, column) in enumerate(zip(*UPPER, strict=True)):
+            np.multiply(scaled[:, row], along[:, column], out=upper[:, k])
         return SmearedFibre(gx, gy, size, along, upper)
 
     def pull(self, smeared: SmearedFibre, solution: SmearedSolution) -> Pull:
@@ -450,7 +451,8 @@ class StreamProblem:
 
     def stiffness(self, smeared: Sequence[SmearedFibre], strain: FloatArray) -> FloatArray:
         """Stiffness (m, 6), MPa, of the fibre of all fields at strains (m, 3)."""
-        stiffness = self.shares[0] * smeared[0].stiffness(strain)
+        stiffness = smeared[0].stiffness(strain)
+        stiffness *= self.shares[0]
         for share, fibre in zip(self.shares[1:], smeared[1:], strict=True):
             stiffness += share * fibre.stiffness(strain)
         return stiffness
