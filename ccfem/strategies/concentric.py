@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -10,6 +11,7 @@ from ccfem.base.arrays import FloatArray
 from ccfem.base.checks import check_fields
 from ccfem.base.errors import InputError
 from ccfem.geometry.offsets import join_rings, offset_rings
+from ccfem.geometry.shapes import Region
 from ccfem.geometry.shells import concentric
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.infill import Infill, Turns
@@ -19,6 +21,9 @@ from ccfem.slicing.layers.layer import Layer, LayerStress
 
 _CLOSEST = 0.6
 """Least distance between filled rings, in spacings [Plocher et al. 2022]."""
+
+_KNOWN = 8
+"""Sections whose rings are kept for other layers, and for other amounts of what they enclose."""
 
 
 @dataclass(frozen=True)
@@ -87,13 +92,27 @@ class Concentric(Infill):
         width, spacing = machine.fibre_width, self.spacing * machine.fibre_width
         if self.filled:
             return concentric(layer.plane.polygon, spacing, _CLOSEST, 0.5 * width, self.rings)
-        levels = offset_rings(layer.plane.polygon, 0.5 * width, spacing, width, self.rings)
-        if not self.joined or not levels:
-            return [ring for level in levels for ring in level]
-        first = layer.plane.points[layer.loops[0][:2]].mean(axis=0)
-        start = first if self.start is None else np.asarray(self.start, dtype=np.float64)
-        return join_rings(levels, start, spacing, width)
+        start: tuple[float, ...] | None = None
+        if self.joined:
+            first = layer.plane.points[layer.loops[0][:2]].mean(axis=0)
+            start = tuple(first.tolist()) if self.start is None else self.start
+        return list(_rings(layer.plane.polygon, spacing, width, self.rings, start))
 
     def regions(self, image: Bitmap, layer: Layer, stress: LayerStress) -> Regions:
         """Rings of pixels."""
         return concentric_regions(image.mask, rings=self.rings)
+
+
+@lru_cache(maxsize=_KNOWN)
+def _rings(
+    section: Region,
+    spacing: float,
+    width: float,
+    count: int | None,
+    start: tuple[float, ...] | None,
+) -> tuple[FloatArray, ...]:
+    """Rings in a section, joined where they have a start: many layers have the same section."""
+    levels = offset_rings(section, 0.5 * width, spacing, width, count)
+    if start is None or not levels:
+        return tuple(ring for level in levels for ring in level)
+    return tuple(join_rings(levels, np.asarray(start, dtype=np.float64), spacing, width))

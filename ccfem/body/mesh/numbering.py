@@ -78,22 +78,38 @@ def nested_dissection(points: FloatArray, start: IntArray, neighbour: IntArray) 
     the same degree.
     """
     order = np.empty(len(points), dtype=np.int64)
-    first_half = np.zeros(len(points), dtype=bool)
-    left = [(np.arange(len(points)), 0)]
-    while left:
-        nodes, begin = left.pop()
-        end = begin + len(nodes)
-        if len(nodes) <= _PIECE:
-            order[begin:end] = nodes
-            continue
-        axis = np.ptp(points[nodes], axis=0).argmax()
-        nodes = nodes[np.argsort(points[nodes, axis], kind="stable")]
-        low, high = np.split(nodes, [len(nodes) // 2])
-        first_half[low] = True
-        of, nth = repeated(start[high + 1] - start[high])
-        across = first_half[neighbour[start[high][of] + nth]]
-        parting = np.bincount(of, across, len(high)) > 0
-        first_half[low] = False
-        order[end - int(parting.sum()) : end] = high[parting]
-        left += [(low, begin), (high[~parting], begin + len(low))]
+    # All pieces of one size after the other: their nodes, and where they and their numbers begin.
+    nodes = np.arange(len(points))
+    first, begin = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
+    piece_of, in_first = np.full(len(points), -1), np.zeros(len(points), dtype=bool)
+    while len(nodes):
+        size = np.diff(first, append=len(nodes))
+        piece, nth = repeated(size)
+        small = size[piece] <= _PIECE
+        order[(begin[piece] + nth)[small]] = nodes[small]
+        nodes, begin = nodes[~small], begin[size > _PIECE]
+        size = size[size > _PIECE]
+        if not len(nodes):
+            break
+        piece, nth = repeated(size)
+        place, first = points[nodes], np.cumsum(size) - size
+        box = np.maximum.reduceat(place, first) - np.minimum.reduceat(place, first)
+        along = place[np.arange(len(nodes)), box.argmax(axis=1)[piece]]
+        nodes = nodes[np.lexsort((along, piece))]
+        half = nth < (size // 2)[piece]
+        piece_of[:] = -1
+        piece_of[nodes], in_first[nodes] = piece, half
+        high = nodes[~half]
+        of, number = repeated(start[high + 1] - start[high])
+        other = neighbour[start[high][of] + number]
+        across = in_first[other] & (piece_of[other] == piece[~half][of])
+        parting = np.zeros(len(nodes), dtype=bool)
+        parting[~half] = np.bincount(of, across, len(high)) > 0
+        # What parts the halves of a piece takes its last numbers.
+        count = np.bincount(piece[parting], minlength=len(size))
+        of, number = repeated(count)
+        order[(begin + size - count)[of] + number] = nodes[parting]
+        parts = np.stack([size // 2, size - size // 2 - count], axis=1)
+        begin = np.stack([begin, begin + size // 2], axis=1).ravel()
+        nodes, first = nodes[~parting], np.cumsum(parts) - parts.ravel()
     return order
