@@ -247,17 +247,16 @@ def _from_border(
 ) -> tuple[FloatArray, FloatArray]:
     """Signed depth (n,) of points in the section, and unit vectors (n, 2) that lead farther in."""
     # The nearest of the pieces (n, k) near each point.
-    begin = border[near, 0]
-    (ex, ey), (rx, ry) = (
-        np.moveaxis(vector, 2, 0) for vector in (border[near, 1] - begin, points[:, None] - begin)
-    )
+    pieces = np.concatenate([border[:, 0].T, (border[:, 1] - border[:, 0]).T])
+    x, y, ex, ey = pieces.take(near, axis=1)
+    rx, ry = points[:, :1] - x, points[:, 1:] - y
     s = np.minimum(np.maximum((rx * ex + ry * ey) / (ex * ex + ey * ey), 0.0), 1.0)
     hx, hy = rx - s * ex, ry - s * ey
     square = hx * hx + hy * hy
-    row, nearest = np.arange(len(points)), square.argmin(axis=1)
-    s, hx, hy, square = (one[row, nearest] for one in (s, hx, hy, square))
+    at = np.arange(len(points)) * near.shape[1] + square.argmin(axis=1)
+    s, hx, hy, square = (one.take(at) for one in (s, hx, hy, square))
     side = np.where(s == 0.0, 0, np.where(s == 1.0, 2, 1))
-    nx, ny = inward[near[row, nearest], side].T
+    nx, ny = inward.reshape(-1, 2).take(3 * near.take(at) + side, axis=0).T
     distance = np.sqrt(square)
     # Points on the border have no depth, and take the vector of their piece.
     on = distance < 1e-9
