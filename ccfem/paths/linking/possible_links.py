@@ -264,18 +264,18 @@ class _Heads(NamedTuple):
     points : (e, h, 2) array, mm
     along : (e, h) array, mm
         Arc length from the end.
-    count : (e,) int array
+    number : (e,) int array
         Points of each line.
     """
 
     points: FloatArray
     along: FloatArray
-    count: IntArray
+    number: IntArray
 
     def last(self, reach: float) -> IntArray:
         """Last point (e,) of the first `reach` mm, or at least of the first piece."""
         before = (self.along[:, 1:] < reach).sum(axis=1)
-        return np.minimum(before + 1, self.count - 1)
+        return np.minimum(before + 1, self.number - 1)
 
     def at(self, positions: FloatArray) -> FloatArray:
         """Points (e, k, 2) at arc lengths (k,), or the last ones, as of `numpy.interp`."""
@@ -314,7 +314,7 @@ def _angles(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def _outward(heads: _Heads) -> FloatArray:
     """Return the unit vectors (e, 2) along which lines leave their ends."""
-    step = heads.points[:, 0] - heads.points[np.arange(len(heads.count)), heads.last(_OUTWARD)]
+    step = heads.points[:, 0] - heads.points[np.arange(len(heads.number)), heads.last(_OUTWARD)]
     return np.array([one / max(float(np.linalg.norm(one)), 1e-12) for one in step])
 
 
