@@ -262,6 +262,7 @@ def test_equal_values_keep_their_order_on_every_processor():
 CLOCKS = {
     "ccfem.cli.run",
     "ccfem.comparison.effort",
+    "ccfem.comparison.expected",
     "ccfem.comparison.files",
     "ccfem.comparison.stages",
     "ccfem.fem.elasticity.statics",

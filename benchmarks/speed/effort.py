@@ -19,15 +19,19 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from scipy.optimize import nnls
 
 from benchmarks.speed.size import plate
 from ccfem.base.arrays import FloatArray
+from ccfem.base.progress import silent
 from ccfem.cases.case import Case
 from ccfem.cases.reading import read
 from ccfem.comparison.effort import (
@@ -37,10 +41,13 @@ from ccfem.comparison.effort import (
     Coefficients,
     Counts,
     counts,
+    judging_stages,
     pace,
+    planning_stage,
     stage_effort,
     stages,
 )
+from ccfem.comparison.expected import START, Schedule
 from ccfem.comparison.request import STRATEGIES
 from ccfem.slicing.slicers.planar import Planar
 
@@ -118,22 +125,30 @@ def part(said: str, folder: Path) -> tuple[list[str], Case]:
 
 
 class _Steps(logging.Handler):
-    """Takes the CPU time at which each step of progress begins."""
+    """Takes the CPU time at which each step of progress begins, and the share of time before it."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.begun: list[tuple[float, str]] = []
+        self.begun: list[tuple[float, float, str]] = []
 
     def emit(self, record: logging.LogRecord) -> None:
         """Take a step."""
         assert isinstance(record.args, tuple)
-        self.begun.append((time.process_time(), str(record.args[-1])))
+        _, percent, what = record.args
+        assert isinstance(percent, float)
+        self.begun.append((time.process_time(), 0.01 * percent, str(what)))
 
 
 def watched(words: list[str], file: Path) -> None:
-    """Run a command in this process, and write what its stages took to a file."""
+    """Run a command in this process, and write what its stages took to a file.
+
+    The time left is told by the CPU time, so that other load does not count.
+    """
+    time.perf_counter = time.process_time
+    from ccfem.cli import run
     from ccfem.cli.main import main as command
 
+    run._STARTED = 0.0  # imports for the measurement are those of any run
     steps, logger = _Steps(), logging.getLogger("ccfem")
     logger.setLevel(logging.INFO)
     logger.addHandler(steps)
@@ -146,13 +161,27 @@ def watched(words: list[str], file: Path) -> None:
             raise
     seconds: dict[str, float] = {}
     # The measurement itself, and imports for it, take a tenth of a second.
-    begun = [(0.0, ""), *steps.begun, (time.process_time(), "")]
-    for (start, what), (stop, _) in itertools.pairwise(begun):
+    begun = [(0.0, 0.0, ""), *steps.begun, (time.process_time(), 1.0, "")]
+    for (start, _, what), (stop, *_) in itertools.pairwise(begun):
         stage = next((name for first, name in _STAGES.items() if what.startswith(first)), "start")
         stage = f"plan {what.split()[1]}" if stage == "plan" else stage
         seconds[stage] = seconds.get(stage, 0.0) + stop - start
     used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-    file.write_text(json.dumps({"seconds": seconds, "memory": used, "pace": quick}))
+    taken = {"seconds": seconds, "memory": used, "pace": quick, "steps": begun}
+    file.write_text(json.dumps(taken))
+
+
+def watch(words: list[str], folder: Path) -> dict[str, Any]:
+    """Run a command in a process of its own, on one processor, and return what `watched` writes."""
+    taken = folder / "taken.json"
+    line = [str(taken), *words, "--out", str(folder / "out")]
+    child = [sys.executable, "-m", "benchmarks.speed.effort", "--watched", *line]
+    environment = {**os.environ, "CCFEM_THREADS": "1"}
+    done = subprocess.run(child, capture_output=True, text=True, env=environment, check=False)
+    if not taken.exists():
+        raise SystemExit(done.stderr)
+    result: dict[str, Any] = json.loads(taken.read_text())
+    return result
 
 
 def measure(said: str, command: str) -> dict[str, str]:
@@ -160,16 +189,9 @@ def measure(said: str, command: str) -> dict[str, str]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         words, case = part(said, folder)
-        taken = folder / "taken.json"
         verb, *options = COMMANDS[command]
-        line = [verb, *words, *options, "--out", str(folder / "out")]
-        child = [sys.executable, "-m", "benchmarks.speed.effort", "--watched", str(taken), *line]
-        environment = {**os.environ, "CCFEM_THREADS": "1"}
-        done = subprocess.run(child, capture_output=True, text=True, env=environment, check=False)
-        if not taken.exists():
-            raise SystemExit(done.stderr)
+        result = watch([verb, *words, *options], folder)
         (known,) = counts(case, case.known_layers())
-        result = json.loads(taken.read_text())
     row = {"part": said, "command": command, "cells": str(len(case.problem.mesh.cells))}
     row |= {name: f"{value:.6g}" for name, value in vars(known).items() if name != "run"}
     row |= {"GB": f"{result['memory']:.3f}", "pace": f"{result['pace']:.4f}"}
@@ -307,6 +329,55 @@ def show(rows: list[dict[str, str]], samples: Samples) -> dict[str, list[float]]
     return within
 
 
+def expected(row: dict[str, str], coefficients: Coefficients) -> dict[str, float]:
+    """Seconds that are expected of each stage in a line."""
+    command, known = row["command"], known_of(row)
+    prints, tested = command != "compare", command != "untested"
+    planned = PLANNED[command]
+    of = {"write": ["write a print" if prints else "write"]}
+    of |= {f"plan {name}": [planning_stage(name)] for name in planned}
+    of |= {"judge": judging_stages(prints, tested) * len(planned)}
+    return {
+        stage: sum(stage_effort(one, known, coefficients) for one in of.get(stage, [stage]))
+        for stage in seconds_of(row)
+    }
+
+
+def replay(row: dict[str, str], coefficients: Coefficients) -> Iterator[tuple[str, float, float]]:
+    """Yield each later stage in a line, the seconds left that are told as it begins, and the true.
+
+    At the pace that it was measured at, from the first tenth on, while some seconds are left.
+    """
+    slower = float(row["pace"]) / usual_pace()
+    taken = {stage: slower * spent for stage, spent in seconds_of(row).items()}
+    whole = sum(taken.values())
+    with patch("time.perf_counter") as clock:
+        clock.return_value = now = 0.0
+        schedule = Schedule(silent, steps=expected(row, coefficients), passed={START: 0.0})
+        for stage, spent in taken.items():
+            clock.return_value = now
+            schedule(stage)
+            if now >= 0.1 * whole and whole - now > WORTH:
+                yield stage, schedule.left(), whole - now
+            now += spent
+
+
+WORTH = 2.0
+"""Seconds left from which it counts how true they are told."""
+
+
+def show_left(rows: list[dict[str, str]], samples: Samples) -> None:
+    """Print where the fits to the other parts tell times left that are off by more than 1.5."""
+    off = []
+    for row in rows:
+        for stage, told, true in replay(row, fitted(samples, row["part"])):
+            off.append(np.exp(np.abs(np.log(told / true))))
+            if off[-1] > 1.5:
+                print(f"{row['part']} {row['command']}, {stage}: {told:.1f} of {true:.1f} s left")
+    within = sum(factor <= 1.5 for factor in off)
+    print(f"time left: {within} of {len(off)} within a factor of 1.5, all within {max(off):.2f}")
+
+
 def main() -> None:
     """Measure what is missing, if wanted, and print the fit."""
     if sys.argv[1:2] == ["--watched"]:
@@ -323,6 +394,7 @@ def main() -> None:
     rows = lines()
     samples = samples_of(rows)
     within = show(rows, samples)
+    show_left(rows, samples)
     if asked.write:
         text = [f'"{stage}" = {values}' for stage, values in fitted(samples).items()]
         text += [f"pace = {usual_pace():.4f}", "[within]"]

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ccfem.base.errors import InputError
-from ccfem.base.progress import Progress, progress_bar
+from ccfem.base.progress import progress_bar
 
 if TYPE_CHECKING:
     from ccfem.cases.case import Case
@@ -81,7 +81,7 @@ def run(
     from ccfem.cli.first_run import compiling_beside
     from ccfem.cli.screen import print_comparison
     from ccfem.comparison.engine import answer
-    from ccfem.comparison.expected import shares_before_writing
+    from ccfem.comparison.expected import START, Schedule
     from ccfem.comparison.files import RESULT_FILES, write_results
 
     imported, text = time.perf_counter(), _text_of(name)  # it may change while this runs
@@ -94,11 +94,11 @@ def run(
         on_cluster(scheduler),
         progress_bar(lines=True) as progress,
     ):
-        results, report = shares_before_writing(request)
-        comparison = answer(request, _part(progress, 0.0, results))
+        schedule = Schedule(progress, command=True, passed={START: elapsed()})
+        comparison = answer(request, schedule)
         _check(comparison)
-        command, rest = shlex.join(["ccfem", *sys.argv[1:]]), _rest(progress, results, report)
-        about = (command, seconds, rest, output.pictures, text, output.drawings)
+        command = shlex.join(["ccfem", *sys.argv[1:]])
+        about = (command, seconds, schedule, output.pictures, text, output.drawings)
         write_results(comparison, folder, *about, cell=output.cell)
     print_comparison(comparison, where, elapsed(), output.details)
     return comparison
@@ -161,23 +161,3 @@ def _check(comparison: "Comparison") -> None:
     for run in comparison.runs:
         if run.unprinted and comparison.request.print_plans:
             raise InputError(run.unprinted)
-
-
-def _rest(progress: Progress, results: float, report: float) -> Progress:
-    """Progress of `write_results`, which begins at `results`, and its report at `report`."""
-    from ccfem.comparison.files import BEFORE_REPORT
-
-    before, after = _part(progress, results, report), _part(progress, report, 1.0)
-
-    def tell(what: str, share: float) -> None:
-        if share < BEFORE_REPORT:
-            before(what, share / BEFORE_REPORT)
-        else:
-            after(what, (share - BEFORE_REPORT) / (1.0 - BEFORE_REPORT))
-
-    return tell
-
-
-def _part(progress: Progress, first: float, last: float) -> Progress:
-    """Progress of a piece of work that takes the bar from `first` to `last`."""
-    return lambda what, share: progress(what, first + (last - first) * share)

@@ -129,11 +129,6 @@ def stage_effort(stage: str, known: Counts, coefficients: Coefficients | None = 
     return float(np.dot([getattr(known, term) for term in TERMS[stage]], given[stage]))
 
 
-def cutting_effort(known: Counts) -> float:
-    """CPU seconds of cutting the layers: what of the start grows with their triangles."""
-    return known.triangles * float(measured()["start"][TERMS["start"].index("triangles")])
-
-
 def planning_stage(strategy: str) -> str:
     """Stage of planning by a strategy; those that are not measured take about as `isocurve`."""
     return _PLANNED.get(strategy, "plan")

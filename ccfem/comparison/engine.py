@@ -17,14 +17,14 @@ import numpy as np
 
 from ccfem.base.checks import member_name, refuse_keywords
 from ccfem.base.errors import InputError, SolveError
-from ccfem.base.parallel import beside, one_blas_thread, processors
+from ccfem.base.parallel import beside, has_room_beside, one_blas_thread, processors
 from ccfem.base.progress import Progress, silent
 from ccfem.cases.case import Case
 from ccfem.cases.load_cases import weighted_cases
 from ccfem.comparison.bounds import bounded, bounds_of
 from ccfem.comparison.curve import Curve, along_curve, one_length_suits
 from ccfem.comparison.effort import LONGEST_CURVE, Counts, curve_steps
-from ccfem.comparison.expected import Schedule, before_planning, expected_steps
+from ccfem.comparison.expected import Schedule, expected_steps, steps_before_solving
 from ccfem.comparison.plan_to_stiffness import plan_to_stiffness
 from ccfem.comparison.request import (
     DEFAULT_STRAND,
@@ -43,7 +43,6 @@ from ccfem.comparison.runs import Run
 from ccfem.comparison.stages import (
     Ahead,
     Part,
-    Tell,
     Tests,
     all_planned,
     judged,
@@ -179,6 +178,8 @@ def solved(
     case, strand, backend = request.case, request.strand, request.backend
     check_slicings(request)
     foreign = request.stress
+    if isinstance(progress, Schedule):
+        progress.expect(steps_before_solving(request, progress.command))
     with timed(seconds, "solve"):
         problem = case.printed_problem(request.only_slicer)
         given = None if foreign is None else _stress_on(foreign, problem)
@@ -258,7 +259,8 @@ def answer(
     """
     seconds: dict[str, float] = {}
     processors()  # a wrong number is refused here, not as the failure of a strategy
-    basis = solved(request, seconds, progress) if known is None else known
+    tell = progress if isinstance(progress, Schedule) else Schedule(progress)
+    basis = solved(request, seconds, tell) if known is None else known
     refused: dict[str, str] = {}
     if parts is None:
         with timed(seconds, "slice"):
@@ -266,9 +268,7 @@ def answer(
     known_of = {
         name: Counts.of(part.stress.mesh, part.layers, part.machine) for name, part in parts.items()
     }
-    steps = expected_steps(request, known_of, len(basis.cases))
-    before = before_planning(next(iter(known_of.values()))) if known is None else 0.0
-    tell = Schedule(progress, steps, before)
+    tell.expect(expected_steps(request, known_of, len(basis.cases), tell.command))
     early = _Early(request, basis)
     parts, runs, wanted = _planned(request, basis, parts, tell, early)
     # One that is left alone has all processors for its layers.
@@ -318,7 +318,7 @@ class _Early:
         """What takes a planned run as far as its virtual test."""
         return partial(judged, prints=self.request.print_plans, tests=self.basis.tests)
 
-    def on(self, part: Part, wanted: Wanted, tell: Tell) -> Ahead:
+    def on(self, part: Part, wanted: Wanted, tell: Schedule) -> Ahead:
         """Judge runs on a part in another process, and bound what any of their length reach."""
 
         @contextmanager
@@ -330,14 +330,19 @@ class _Early:
                 known = {} if wanted is None else bounds_of(*about, lambda _: None, spent)
                 return done, known, spent
 
+            names = [f"judging {run.name}" for run in runs]
+
             def outcome(late: Sequence[Run]) -> Sequence[Run]:
                 parts = {run.slicing: part for run in late}
                 judged_late = side_by_side("judging {}", self.judged, late, parts, tell)
+                tell(names[0])  # in all, where there was no room for it before
                 done, bounds, spent = result()
                 self.bounds.update(bounds)
                 self.seconds.update(spent)
                 return [*done, *judged_late]
 
+            if has_room_beside():
+                tell.beside([*names, "bounding"])
             with beside(work, shared=[runs, part, self.basis]) as result:
                 yield outcome
 
@@ -349,7 +354,7 @@ def _broken(
     basis: Solved,
     parts: Mapping[str, Part],
     runs: list[Run],
-    tell: Tell,
+    tell: Schedule,
     seconds: dict[str, float],
 ) -> tuple[list[Run], BreakingLoad | None]:
     """Break every run, and the part without fibre."""
@@ -449,7 +454,7 @@ _Plans = tuple[Mapping[str, Part], list[Run], Wanted]
 
 
 def _planned(
-    request: Request, basis: Solved, parts: Mapping[str, Part], tell: Tell, early: _Early
+    request: Request, basis: Solved, parts: Mapping[str, Part], tell: Schedule, early: _Early
 ) -> _Plans:
     """Plan every strategy on every slicing to the amount that is asked for.
 
@@ -477,7 +482,7 @@ def _to_the_shortest(
     request: Request,
     unplanned: Mapping[str, Sequence[Run]],
     parts: Mapping[str, Part],
-    tell: Tell,
+    tell: Schedule,
     early: _Early,
 ) -> tuple[list[Run], Wanted]:
     """Plan all runs to the shortest natural length of any; with them that length."""
@@ -505,7 +510,7 @@ def _spread(
     unplanned: Mapping[str, Sequence[Run]],
     parts: Mapping[str, Part],
     points: int,
-    tell: Tell,
+    tell: Schedule,
     early: _Early,
 ) -> list[Run]:
     """Plan every strategy on every slicing to several lengths, the largest filling most layers.

@@ -1,13 +1,15 @@
-"""Progress of a run, in shares of the time that its steps are expected to take."""
+"""Progress of a run, by the time that its steps are expected to take."""
 
-from collections.abc import Mapping
+import math
+import time
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from ccfem.base.progress import Progress
 from ccfem.comparison.effort import (
     FILLED,
     Counts,
-    cutting_effort,
+    counts,
     judging_stages,
     planning_stage,
     stage_effort,
@@ -17,45 +19,96 @@ from ccfem.comparison.request import Request, Spread
 _BREAKING = 10.0
 """Time of a breaking load over that of judging: a guess, so that the bar moves on."""
 
-_UNKNOWN = (0.9, 0.98)
-"""Shares of a run that are behind when its results and its report are written, where its layers are
-not known."""
+_SURE = 0.3
+"""Seconds that are added to the time of a step and to the expected one, before their ratio counts:
+short steps say little of the pace."""
+
+_PRIOR = 1.0
+"""Weight of the machine that was measured in the pace, beside the root of the expected seconds of
+each step. Our choice, by `python -m benchmarks.speed.effort`."""
+
+START = "start"
+WRITING = ("writing results", "writing the report")
 
 
 @dataclass
 class Schedule:
-    """Tells progress what is done next, and the share of all expected time that is behind it."""
+    """Tells progress what is done next, and the share of the time of the whole run that has passed.
+
+    The time to come is what is expected of the steps to come, at the pace of those that are done:
+    the mean of the logarithms of how much longer than expected they took. One step that is badly
+    predicted thus changes little for the others.
+    """
 
     progress: Progress
-    # by words, s: first words of each step that is expected, and its time. What else is done counts
-    # nothing.
-    steps: dict[str, float]
-    behind: float  # s: expected time of what is done already
-    begun: set[str] = field(default_factory=set)  # steps of which the first words were said
+    command: bool = False  # the run also starts the program, and writes files
+    # s, by the first words of a step: the time expected in all, and that which passed so far in
+    # those that were begun. What else is done counts nothing.
+    steps: dict[str, float] = field(default_factory=dict)
+    passed: dict[str, float] = field(default_factory=dict)
+    _aside: set[str] = field(default_factory=set)  # steps that are done beside others
 
-    def __call__(self, what: str) -> None:
+    def __post_init__(self) -> None:
+        self._began = self._last = time.perf_counter()
+        self._step = next(iter(self.passed), "")
+
+    def __call__(self, what: str, _: float = 0.0) -> None:
         """Say what is done next: what was said before is done."""
-        done = self.behind + sum(self.steps[step] for step in self.begun)
-        whole = self.behind + sum(self.steps.values())
-        self.progress(what, done / whole if whole else 0.0)
-        self.begun |= {step for step in self.steps if f"{what} ".startswith(f"{step} ")}
+        now = time.perf_counter()
+        self.passed[self._step] = self.passed.get(self._step, 0.0) + now - self._last
+        begun = (step for step in self.steps if f"{what} ".startswith(f"{step} "))
+        self._last, self._step = now, max(begun, key=len, default="")
+        self.passed.setdefault(self._step, 0.0)
+        spent = now - self._began
+        whole = spent + self.left()
+        self.progress(what, spent / whole if whole else 0.0)
+
+    def left(self) -> float:
+        """Seconds that are left."""
+        weights = logarithms = 0.0
+        for step, spent in self.passed.items():
+            if step != self._step and (expected := self.steps.get(step)):
+                weight = math.sqrt(expected)
+                weights += weight
+                logarithms += weight * math.log((spent + _SURE) / (expected + _SURE))
+        pace = math.exp(logarithms / (weights + _PRIOR))
+        begun = {*self.passed, *self._aside}
+        to_come = sum(spent for step, spent in self.steps.items() if step not in begun)
+        now = 0.0 if self._step in self._aside else self.steps.get(self._step, 0.0)
+        return pace * to_come + max(pace * now - self.passed.get(self._step, 0.0), 0.0)
 
     def expect(self, steps: Mapping[str, float]) -> None:
-        """Add steps that turned out to be needed."""
+        """Set the time that is expected of steps, also of those that turned out to be needed."""
         self.steps |= steps
 
+    def beside(self, steps: Iterable[str]) -> None:
+        """Take steps for done beside all others before the writing; these end no earlier."""
+        self._aside |= {*steps} & {*self.steps}
+        here = [step for step in self.steps if step not in {*self.passed, *self._aside, *WRITING}]
+        if here:
+            longer = sum(map(self.steps.__getitem__, self._aside))
+            longer -= sum(map(self.steps.__getitem__, here))
+            self.steps[here[-1]] += max(longer, 0.0)
 
-def expected_steps(request: Request, known: Mapping[str, Counts], cases: int) -> dict[str, float]:
-    """First words and seconds of the steps between solving and writing.
+
+def expected_steps(
+    request: Request, known: Mapping[str, Counts], cases: int, command: bool = False
+) -> dict[str, float]:
+    """First words and seconds of the steps of a run.
 
     Parameters
     ----------
+    known : mapping of slicing to Counts
     cases : int
         Load cases that are planned for.
+    command : bool, default False
+        With the start of the program, and the writing of files.
     """
     steps: dict[str, float] = {}
-    plans = cases * (request.amount.points if isinstance(request.amount, Spread) else 1)
+    spread = request.amount.points if isinstance(request.amount, Spread) else 0
+    plans = cases * (spread or 1)
     for slicing, part in known.items():
+        steps["solving"] = stage_effort("solve", part)
         tested = request.strand is not None and FILLED * part.room <= request.longest_test
         judging = sum(
             stage_effort(stage, part) for stage in judging_stages(request.print_plans, tested)
@@ -66,25 +119,25 @@ def expected_steps(request: Request, known: Mapping[str, Counts], cases: int) ->
             steps[f"judging {run}"] = plans * judging
             if request.breaking_load:
                 steps[f"breaking {run}"] = _BREAKING * judging
-        if request.bound and tested and not slicing:
-            steps["bounding"] = plans * stage_effort("bound", part)
+        if request.bound and tested and (spread or not slicing):
+            bounding = plans * stage_effort("bound", part)
+            steps["bounding"] = max(bounding, steps.get("bounding", 0.0))
+        if command:
+            steps[START] = stage_effort("start", part)
+            written = "write a print" if request.print_plans else "write"
+            for step, stage in zip(WRITING, (written, "report"), strict=True):
+                steps[step] = steps.get(step, 0.0) + stage_effort(stage, part)
     return steps
 
 
-def before_planning(part: Counts) -> float:
-    """Seconds of cutting and solving a part."""
-    return cutting_effort(part) + stage_effort("solve", part)
-
-
-def shares_before_writing(request: Request) -> tuple[float, float]:
-    """Shares of a run that are behind when its results, and when its report, are written."""
-    layers = () if request.named else request.case.known_layers(request.only_slicer)
+def steps_before_solving(request: Request, command: bool) -> dict[str, float]:
+    """Expect the steps of a run, where its layers are known before the part is solved."""
+    case, layers = request.case, ()
+    if not request.named:
+        layers = case.known_layers(request.only_slicer)
     if not layers:
-        return _UNKNOWN
-    part = Counts.of(request.case.problem.mesh, layers, request.case.machine)
-    steps = expected_steps(request, {"": part}, 1)
-    written = "write a print" if request.print_plans else "write"
-    results = before_planning(part) + sum(steps.values())
-    report = results + stage_effort(written, part)
-    whole = report + stage_effort("report", part)
-    return results / whole, report / whole
+        return {}
+    known = Counts.of(case.problem.mesh, layers, case.machine)
+    if case.problem.order == 2:
+        known = counts(case, layers)[0]
+    return expected_steps(request, {"": known}, 1, command)

@@ -13,6 +13,7 @@ from ccfem.base.progress import Progress, silent
 from ccfem.cases.case import Case
 from ccfem.comparison.bounds import presses
 from ccfem.comparison.engine import Solved, answer, solved
+from ccfem.comparison.expected import Schedule
 from ccfem.comparison.front_cases import PointCases
 from ccfem.comparison.front_points import FibreFront, FrontPoint
 from ccfem.comparison.plan_to_stiffness import counts_to_try
@@ -115,7 +116,8 @@ def front_of(
     request = replace(request, case=alone, curve=False)
     if counts is not None:
         request = replace(request, slicings=_slicings(counts), amount=spread)
-    basis = solved(request) if known is None else known
+    tell = Schedule(progress)
+    basis = solved(request, progress=tell) if known is None else known
     if len(basis.cases) > 1 and presses(basis.cases):
         raise InputError(
             "a front over several load cases measures each by its bound, and supports that only "
@@ -125,7 +127,7 @@ def front_of(
         counts = counts_to_try(request.case, basis.planned_on)
     slicings = _slicings(counts)
     request = replace(request, strategies=kinds, slicings=slicings, amount=spread)
-    return _front(name, answer(request, progress, replace(basis, limits_only=True)))
+    return _front(name, answer(request, tell, replace(basis, limits_only=True)))
 
 
 def _slicings(counts: Sequence[int]) -> dict[str, Slicing]:

@@ -1,6 +1,7 @@
 """What commands are expected to take, and the progress that is told by it."""
 
 import math
+import time
 import tomllib
 from dataclasses import replace
 
@@ -9,6 +10,7 @@ import shapely
 import shapely.affinity
 
 from benchmarks.speed import effort as benchmark
+from ccfem.base.progress import silent
 from ccfem.body.mesh import box_mesh
 from ccfem.cases.case import Case
 from ccfem.comparison.effort import (
@@ -17,11 +19,15 @@ from ccfem.comparison.effort import (
     about_effort,
     counts,
     curve_steps,
-    cutting_effort,
     stage_effort,
     stages,
 )
-from ccfem.comparison.expected import Schedule, expected_steps, shares_before_writing
+from ccfem.comparison.expected import (
+    WRITING,
+    Schedule,
+    expected_steps,
+    steps_before_solving,
+)
 from ccfem.comparison.request import Request, Spread
 from ccfem.fem.elasticity import Force, Problem, Support
 from ccfem.fem.materials import isotropic
@@ -78,19 +84,70 @@ def test_coefficients_are_those_of_the_measurement():
         assert sum(one <= math.log(1.5) for one in off) >= near
 
 
-def test_progress_is_the_share_of_the_time_that_is_behind():
-    """1 s is solved, 2 and 3 s are planned, 4 s judged: what was said before is done."""
-    told = []
-    steps = {"planning a": 2.0, "planning ab": 3.0, "judging a": 4.0}
-    tell = Schedule(lambda what, share: told.append((what, share)), steps, 1.0)
-    for what in ("planning ab to 5 mm", "planning a", "planning a to 5 mm", "judging a"):
+@pytest.fixture
+def clock(monkeypatch):
+    """Seconds that the clock shows, as the only item of a list."""
+    now = [0.0]
+    monkeypatch.setattr(time, "perf_counter", lambda: now[0])
+    return now
+
+
+def test_the_share_that_is_told_gives_the_time_that_is_left(clock):
+    """Steps of 1, 2, 3 and 4 s take as long as expected: each line tells what is then left."""
+    left = []
+    steps = {"solving": 1.0, "planning a": 2.0, "planning ab": 3.0, "judging a": 4.0}
+    tell = Schedule(lambda _, share: left.append(clock[0] * (1.0 / share - 1.0)), steps=steps)
+    tell.progress, show = lambda _, share: None, tell.progress
+    tell("solving a part")
+    tell.progress = show
+    # A step that is said again goes on.
+    for now, what in ((1.0, "planning a"), (2.5, "planning a to 5 mm"), (3.0, "planning ab")):
+        clock[0] = now
         tell(what)
-    assert [share for _, share in told] == pytest.approx([0.1, 0.4, 0.6, 0.6])
+    clock[0] = 6.0
+    tell("judging a")
+    assert left == pytest.approx([9.0, 7.5, 7.0, 4.0])
     # A curve that turns out to be needed: 2 x 2 and 5 x (2 + 4) s more.
+    clock[0] = 10.0
     tell.expect(curve_steps(steps, ["a"]))
     tell("planning the least and the most of a")
+    clock[0] = 14.0
     tell("planning a along the curve")
-    assert [share for _, share in told[4:]] == pytest.approx([10.0 / 44.0, 14.0 / 44.0])
+    assert left[4:] == pytest.approx([34.0, 30.0])
+
+
+def test_the_time_left_follows_the_pace_of_what_is_done(clock):
+    """All takes three times as long: once much of it is done, so much is told, up to the prior."""
+    left = []
+    steps = {f"planning {k}": 100.0 for k in range(20)}
+    tell = Schedule(silent, steps=steps)
+    for what in steps:
+        tell(what)
+        left.append(tell.left())
+        clock[0] += 300.0
+    true = [300.0 * (20 - k) for k in range(20)]
+    assert left[0] == pytest.approx(true[0] / 3.0)
+    ratios = [told / right for told, right in zip(left, true, strict=True)]
+    assert ratios == sorted(ratios)
+    assert 0.98 < ratios[-1] < 1.0
+
+
+def test_one_short_step_that_is_badly_expected_changes_little(clock):
+    """A step of 5 ms takes 10 times as long, and one of 100 s as long as expected: 100 s left."""
+    tell = Schedule(silent, steps={"solving": 0.005, "planning a": 100.0, "planning b": 100.0})
+    for now, what in ((0.0, "solving"), (0.05, "planning a"), (100.05, "planning b")):
+        clock[0] = now
+        tell(what)
+    assert tell.left() == pytest.approx(100.0, rel=0.01)
+
+
+def test_what_is_done_beside_ends_before_the_writing(clock):
+    """6 s are judged and bounded beside 2 s of planning and 1 s of judging: 6 s, and 3 of files."""
+    steps = {"planning b": 2.0, "judging a": 4.0, "judging b": 1.0, "bounding": 2.0}
+    tell = Schedule(silent, steps=steps | dict.fromkeys(WRITING, 1.5))
+    tell.beside(["judging a", "bounding"])
+    tell("planning b")
+    assert tell.left() == pytest.approx(9.0)
 
 
 def test_every_length_of_a_front_is_a_plan():
@@ -98,20 +155,31 @@ def test_every_length_of_a_front_is_a_plan():
     known = {"": counts(request.case, request.case.known_layers())[0]}
     one = expected_steps(request, known, 1)
     front = expected_steps(replace(request, amount=Spread(4)), known, 1)
-    assert front == pytest.approx({step: 4.0 * spent for step, spent in one.items()})
+    once = one.pop("solving")
+    four = {step: 4.0 * spent for step, spent in one.items()}
+    assert front == pytest.approx(four | {"solving": once})
 
 
-def test_what_is_left_when_the_report_begins_is_the_report():
+def test_a_command_is_expected_to_take_the_time_of_its_stages():
     request = Request.of("bar", ["isocurve"])
-    results, report = shares_before_writing(request)
     known = counts(request.case, request.case.known_layers())[0]
-    write, draw = (stage_effort(stage, known) for stage in ("write", "report"))
-    assert (report - results) / (1.0 - results) == pytest.approx(write / (write + draw))
-    whole = draw / (1.0 - report)
-    every = cutting_effort(known) + sum(
-        stage_effort(stage, known) for stage in stages(["isocurve"], False)[1:]
-    )
-    assert whole == pytest.approx(every)
+    every = sum(stage_effort(stage, known) for stage in stages(["isocurve"], False))
+    assert sum(steps_before_solving(request, True).values()) == pytest.approx(every)
+    within = every - sum(stage_effort(stage, known) for stage in ("start", "write", "report"))
+    assert sum(steps_before_solving(request, False).values()) == pytest.approx(within)
+
+
+def test_a_replay_of_what_was_measured_tells_the_time_left():
+    """By the fit to all; the benchmark tells it by fits to the other parts."""
+    rows = benchmark.lines()
+    coefficients = tomllib.loads(COEFFICIENTS.read_text())
+    factors = [
+        max(told / true, true / told)
+        for row in rows
+        for _, told, true in benchmark.replay(row, coefficients)
+    ]
+    assert len(factors) > 100
+    assert sum(factor <= 1.5 for factor in factors) > 0.9 * len(factors)
 
 
 def test_layers_that_cut_the_same_cells_count_once_in_regions_too():
