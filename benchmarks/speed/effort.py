@@ -20,7 +20,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -192,8 +192,9 @@ def measure(said: str, command: str) -> dict[str, str]:
         verb, *options = COMMANDS[command]
         result = watch([verb, *words, *options], folder)
         (known,) = counts(case, case.known_layers())
-    row = {"part": said, "command": command, "cells": str(len(case.problem.mesh.cells))}
-    row |= {name: f"{value:.6g}" for name, value in vars(known).items() if name != "run"}
+    row = {"part": said, "command": command, "cells": f"{known.cells:.0f}"}
+    row |= {name: f"{value:.6g}" for name, value in vars(known).items() if name not in row}
+    del row["run"]
     row |= {"GB": f"{result['memory']:.3f}", "pace": f"{result['pace']:.4f}"}
     spent = result["seconds"].items()
     row["seconds"] = " ".join(f"{stage.replace(' ', ':')}={taken:.2f}" for stage, taken in spent)
@@ -234,8 +235,7 @@ Samples = dict[str, list[tuple[str, Counts, float]]]
 
 def known_of(row: dict[str, str]) -> Counts:
     """Read the counts in a line."""
-    named = ("unknowns", "solved", "triangles", "room", "volume", "some_room")
-    return Counts(*(float(row[name]) for name in named))
+    return Counts(**{one.name: float(row.get(one.name, one.default)) for one in fields(Counts)})
 
 
 @cache
@@ -260,6 +260,7 @@ def samples_of(rows: list[dict[str, str]]) -> Samples:
         samples[f"memory of {row['command']}"].append((said, known, float(row["GB"])))
         if row["command"] == "compare":
             taken["plan"] = taken.pop("plan isocurve")
+            taken["plan stream_function to a length"] = taken.pop("plan stream_function")
             judged[said] = taken["judge"] = taken["judge"] / len(STRATEGIES)
             taken["plan zigzag"] = 0.5 * (taken["plan zigzag"] + taken.pop("plan contour_zigzag"))
         elif row["command"] == "untested":
@@ -335,7 +336,7 @@ def expected(row: dict[str, str], coefficients: Coefficients) -> dict[str, float
     prints, tested = command != "compare", command != "untested"
     planned = PLANNED[command]
     of = {"write": ["write a print" if prints else "write"]}
-    of |= {f"plan {name}": [planning_stage(name)] for name in planned}
+    of |= {f"plan {name}": [planning_stage(name, prints)] for name in planned}
     of |= {"judge": judging_stages(prints, tested) * len(planned)}
     return {
         stage: sum(stage_effort(one, known, coefficients) for one in of.get(stage, [stage]))

@@ -48,9 +48,12 @@ def _seconds_left(spent: float, share: float) -> float | None:
 
 
 def _in_words(left: float | None) -> str:
-    if left is None or left < 0.0:
-        return ""
-    return f"about {left:.0f} s left" if left < 120.0 else f"about {left / 60.0:.0f} min left"
+    return "" if left is None or left < 0.0 else f"{about(left)} left"
+
+
+def about(seconds: float) -> str:
+    """Say a time in words, as "about 90 s" and "about 15 min"."""
+    return f"about {seconds:.0f} s" if seconds < 120.0 else f"about {seconds / 60.0:.0f} min"
 
 
 @contextmanager

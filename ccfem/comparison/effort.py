@@ -35,18 +35,19 @@ TERMS: dict[str, tuple[str, ...]] = {
     "start": ("run", "unknowns", "triangles"),
     "solve": ("solved", "triangles"),
     "plan stream_function": ("unknowns", "room"),
+    "plan stream_function to a length": ("unknowns", "room"),
     "plan zigzag": ("triangles", "room"),
     "plan": ("triangles", "some_room"),
     "judge": ("solved", "triangles", "room"),
-    "print": ("triangles", "volume"),
-    "judge untested": ("triangles", "room", "some_room"),
-    "bound": ("unknowns", "triangles"),
+    "print": ("run", "plastic", "volume"),
+    "judge untested": ("triangles", "volume", "some_room"),
+    "bound": ("bulk", "triangles"),
     "write": ("run", "room"),
     "write a print": ("run", "volume", "room"),
-    "report": ("run", "unknowns", "triangles"),
+    "report": ("run", "near", "triangles", "room"),
     "memory of compare": ("run", "solved", "triangles", "room"),
     "memory of plan": ("run", "solved", "triangles", "room"),
-    "memory of untested": ("run", "solved", "room", "some_room"),
+    "memory of untested": ("run", "solved", "streamed"),
 }
 """What each stage grows with: attributes of `Counts`."""
 
@@ -75,7 +76,24 @@ class Counts:
     # mm: `room` of the layers that are planned: of more than 60, about four of those that cut the
     # same cells in equal sections, since their stress is alike (`alike_layers`)
     some_room: float
+    cells: float
+    plastic: float  # layers of matrix in which the layers with fibre are printed, one each at least
     run: float = 1.0
+
+    @property
+    def bulk(self) -> float:
+        """Cells times those at each unknown: a few in thin walls, many within thick ones."""
+        return self.cells**2 / self.unknowns
+
+    @property
+    def near(self) -> float:
+        """Cells times those in a row through a ball of one size, over which stress is averaged."""
+        return float(self.cells * np.cbrt(self.cells / self.volume))
+
+    @property
+    def streamed(self) -> float:
+        """Root of the room: layers are written one after the other, and few are held at once."""
+        return float(np.sqrt(self.room))
 
     @classmethod
     def of(cls, mesh: TetMesh, layers: Sequence[Layer], machine: Machine) -> "Counts":
@@ -85,7 +103,10 @@ class Counts:
         room = float(sum(layer.areas.sum() for layer in layers)) / machine.fibre_width
         solved = 3.0 * len(mesh.points)
         some = room * _planned_layers(mesh, layers) / max(len(layers), 1)
-        return cls(unknowns, solved, triangles, room, float(mesh.volumes.sum()), some)
+        volume, cells = float(mesh.volumes.sum()), float(len(mesh.cells))
+        high = machine.highest_matrix(0.0)
+        plastic = float(sum(max(layer.thickness / high, 1.0) for layer in layers))
+        return cls(unknowns, solved, triangles, room, volume, some, cells, plastic)
 
 
 _OF_EQUAL = 4
@@ -129,9 +150,17 @@ def stage_effort(stage: str, known: Counts, coefficients: Coefficients | None = 
     return float(np.dot([getattr(known, term) for term in TERMS[stage]], given[stage]))
 
 
-def planning_stage(strategy: str) -> str:
-    """Stage of planning by a strategy; those that are not measured take about as `isocurve`."""
-    return _PLANNED.get(strategy, "plan")
+def planning_stage(strategy: str, natural: bool) -> str:
+    """Stage of planning by a strategy; those that are not measured take about as `isocurve`.
+
+    Parameters
+    ----------
+    natural : bool
+        To the amount of its own; `stream_function` may design again for another.
+    """
+    stage = _PLANNED.get(strategy, "plan")
+    again = strategy == "stream_function" and not natural
+    return f"{stage} to a length" if again else stage
 
 
 def judging_stages(prints: bool, tested: bool) -> list[str]:
@@ -141,7 +170,7 @@ def judging_stages(prints: bool, tested: bool) -> list[str]:
 
 def stages(strategies: Sequence[str], prints: bool, tested: bool = True) -> list[str]:
     """Stages of `ccfem compare`, or of `ccfem plan --gcode` where it prints."""
-    planned = [planning_stage(strategy) for strategy in strategies]
+    planned = [planning_stage(strategy, natural=prints) for strategy in strategies]
     judged = judging_stages(prints, tested) * len(strategies)
     written = "write a print" if prints else "write"
     return ["start", "solve", *planned, *judged, *["bound"] * tested, written, "report"]
@@ -149,6 +178,10 @@ def stages(strategies: Sequence[str], prints: bool, tested: bool = True) -> list
 
 _POINTS = 5
 """Lengths on a curve, at most."""
+
+_DESIGNED = 2.5
+"""Times of planning `stream_function` once that these take: they share the first steps of their
+designs, and its least and most are known without a plan. Measured on `bar`: 2.2."""
 
 LONGEST_CURVE = 300.0
 """Processor seconds, on the machine of `effort.toml`, above which a curve has to be asked for. Our
@@ -160,8 +193,11 @@ def curve_steps(steps: Mapping[str, float], strategies: Iterable[str]) -> dict[s
     curve: dict[str, float] = {}
     for name in strategies:
         planning, judging = steps[f"planning {name}"], steps[f"judging {name}"]
-        curve[f"planning the least and the most of {name}"] = 2.0 * planning
-        curve[f"planning {name} along the curve"] = _POINTS * (planning + judging)
+        designed = name == "stream_function"
+        if not designed:
+            curve[f"planning the least and the most of {name}"] = 2.0 * planning
+        plans = _DESIGNED if designed else _POINTS
+        curve[f"planning {name} along the curve"] = plans * planning + _POINTS * judging
     return curve
 
 
@@ -231,7 +267,10 @@ def about_effort(case: Case, layers: Sequence[Layer]) -> tuple[str, ...]:
 
 def _curve_effort(known: Counts) -> float:
     """CPU seconds of a curve of the default strategies, where one length does not suit all."""
-    steps = {f"planning {name}": stage_effort(planning_stage(name), known) for name in STRATEGIES}
+    steps = {
+        f"planning {name}": stage_effort(planning_stage(name, natural=False), known)
+        for name in STRATEGIES
+    }
     judging = {f"judging {name}": stage_effort("judge", known) for name in STRATEGIES}
     return sum(curve_steps(steps | judging, STRATEGIES).values())
 

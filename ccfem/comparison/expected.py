@@ -5,7 +5,7 @@ import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from ccfem.base.progress import Progress
+from ccfem.base.progress import Progress, about
 from ccfem.comparison.effort import (
     FILLED,
     Counts,
@@ -14,7 +14,7 @@ from ccfem.comparison.effort import (
     planning_stage,
     stage_effort,
 )
-from ccfem.comparison.request import Request, Spread
+from ccfem.comparison.request import Natural, Request, Spread
 
 _BREAKING = 10.0
 """Time of a breaking load over that of judging: a guess, so that the bar moves on."""
@@ -26,6 +26,9 @@ short steps say little of the pace."""
 _PRIOR = 1.0
 """Weight of the machine that was measured in the pace, beside the root of the expected seconds of
 each step. Our choice, by `python -m benchmarks.speed.effort`."""
+
+_LONG = 60.0
+"""Seconds from which a run says at its start what it will take. Our choice."""
 
 START = "start"
 WRITING = ("writing results", "writing the report")
@@ -50,7 +53,7 @@ class Schedule:
 
     def __post_init__(self) -> None:
         self._began = self._last = time.perf_counter()
-        self._step = next(iter(self.passed), "")
+        self._step, self._told = next(iter(self.passed), ""), False
 
     def __call__(self, what: str, _: float = 0.0) -> None:
         """Say what is done next: what was said before is done."""
@@ -59,9 +62,11 @@ class Schedule:
         begun = (step for step in self.steps if f"{what} ".startswith(f"{step} "))
         self._last, self._step = now, max(begun, key=len, default="")
         self.passed.setdefault(self._step, 0.0)
-        spent = now - self._began
-        whole = spent + self.left()
-        self.progress(what, spent / whole if whole else 0.0)
+        spent, left = now - self._began, self.left()
+        if left > _LONG and not self._told:
+            what = f"{what} ({about(left)} in all)"
+        self._told = True
+        self.progress(what, spent / (spent + left) if left else min(spent, 1.0))
 
     def left(self) -> float:
         """Seconds that are left."""
@@ -115,7 +120,8 @@ def expected_steps(
         )
         for name in request.strategies:
             run = request.on_slicing(name, slicing)
-            steps[f"planning {run}"] = plans * stage_effort(planning_stage(name), part)
+            stage = planning_stage(name, isinstance(request.amount, Natural))
+            steps[f"planning {run}"] = plans * stage_effort(stage, part)
             steps[f"judging {run}"] = plans * judging
             if request.breaking_load:
                 steps[f"breaking {run}"] = _BREAKING * judging

@@ -10,6 +10,7 @@ import shapely
 import shapely.affinity
 
 from benchmarks.speed import effort as benchmark
+from ccfem.base.errors import InputError
 from ccfem.base.progress import silent
 from ccfem.body.mesh import box_mesh
 from ccfem.cases.case import Case
@@ -22,6 +23,7 @@ from ccfem.comparison.effort import (
     stage_effort,
     stages,
 )
+from ccfem.comparison.engine import answer
 from ccfem.comparison.expected import (
     WRITING,
     Schedule,
@@ -158,6 +160,23 @@ def test_every_length_of_a_front_is_a_plan():
     once = one.pop("solving")
     four = {step: 4.0 * spent for step, spent in one.items()}
     assert front == pytest.approx(four | {"solving": once})
+
+
+@pytest.mark.parametrize(("seconds", "said"), [(30.0, ""), (90.0, " (about 90 s in all)")])
+def test_a_long_run_says_what_it_will_take_before_it_is_solved(clock, seconds, said):
+    """The program started in the 2 s that are expected, so that the pace is as expected too."""
+    lines = []
+    steps = {"start": 2.0, "solving": 10.0, "planning a": seconds - 10.0}
+    tell = Schedule(lambda what, _: lines.append(what), steps=steps, passed={"start": 2.0})
+    tell("solving a part")
+    tell("planning a")
+    assert lines == [f"solving a part{said}", "planning a"]
+
+
+def test_layers_that_a_strand_does_not_fit_are_refused_before_they_are_cut(monkeypatch):
+    monkeypatch.setattr(Planar, "cut", lambda *_: pytest.fail("cut"))
+    with pytest.raises(InputError, match="layers must lie at least"):
+        answer(Request.of("loop", ["isocurve"], 5000), Schedule(silent, command=True))
 
 
 def test_a_command_is_expected_to_take_the_time_of_its_stages():
