@@ -39,7 +39,7 @@ def one_length_suits(runs: Sequence[Run], wanted: Wanted) -> bool:
     return not any(
         off_length(run, wanted) and not isinstance(run.strategy, GivenPaths)
         for run in runs
-        if run.evaluation is not None
+        if not run.failure
     )
 
 

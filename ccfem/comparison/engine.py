@@ -271,6 +271,7 @@ def answer(
     tell.expect(expected_steps(request, known_of, len(basis.cases), tell.command))
     early = _Early(request, basis)
     parts, runs, wanted = _planned(request, basis, parts, tell, early)
+    tell.expect(_steps_of_curve(request, basis, runs, wanted, tell) or {})
     # One that is left alone has all processors for its layers.
     left = [run for run in runs if run.evaluation is None]
     done = iter(side_by_side("judging {}", early.judged, left, parts, tell))
@@ -278,7 +279,9 @@ def answer(
     bare = None
     if request.breaking_load:
         runs, bare = _broken(request, basis, parts, runs, tell, seconds)
-    curve = _curve(request, basis, parts, runs, wanted, tell, seconds)
+    curve = None
+    if _steps_of_curve(request, basis, runs, wanted, tell) is not None:
+        curve = _curve(request, basis, parts[""], runs, wanted, tell, seconds)
     about = (request, basis.cases, basis.tests, parts, runs, wanted)
     seconds |= early.seconds
     bounds = bounds_of(*about, tell, seconds, early.bounds)
@@ -561,29 +564,32 @@ def _per_layer(amount: Any, parts: Mapping[str, Part]) -> dict[str, float | None
     return dict.fromkeys(parts, length)
 
 
-def _curve(
-    request: Request,
-    basis: Solved,
-    parts: Mapping[str, Part],
-    runs: Sequence[Run],
-    wanted: Wanted,
-    tell: Schedule,
-    seconds: dict[str, float],
-) -> Curve | None:
-    """Compare at several lengths where that is asked for, or where one length suits not all.
+def _steps_of_curve(
+    request: Request, basis: Solved, runs: Sequence[Run], wanted: Wanted, tell: Schedule
+) -> dict[str, float] | None:
+    """Expect a curve where it is asked for, or where one length suits not all; else None.
 
     On large parts only where it is asked for.
     """
-    tests = basis.tests
-    if request.named or tests is None or request.curve is False or len(basis.cases) > 1:
+    if request.named or basis.tests is None or request.curve is False or len(basis.cases) > 1:
         return None
     planned = [name for name, s in request.strategies.items() if not isinstance(s, GivenPaths)]
     steps = curve_steps(tell.steps, planned)
     long = sum(steps.values()) > LONGEST_CURVE
-    if request.curve is None and (long or one_length_suits(runs, wanted)):
-        return None
-    part, held = parts[""], None if isinstance(wanted, InAll) else wanted
-    tell.expect(steps)
+    return None if request.curve is None and (long or one_length_suits(runs, wanted)) else steps
+
+
+def _curve(
+    request: Request,
+    basis: Solved,
+    part: Part,
+    runs: Sequence[Run],
+    wanted: Wanted,
+    tell: Schedule,
+    seconds: dict[str, float],
+) -> Curve:
+    """Compare at several lengths."""
+    tests, held = basis.tests, None if isinstance(wanted, InAll) else wanted
     with timed(seconds, "curve"):
         unchanged = [
             replace(run, strategy=before.strategy)

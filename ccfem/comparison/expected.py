@@ -53,7 +53,7 @@ class Schedule:
 
     def __post_init__(self) -> None:
         self._began = self._last = time.perf_counter()
-        self._step, self._told = next(iter(self.passed), ""), False
+        self._step, self._told, self._wait = next(iter(self.passed), ""), False, 0.0
 
     def __call__(self, what: str, _: float = 0.0) -> None:
         """Say what is done next: what was said before is done."""
@@ -66,7 +66,7 @@ class Schedule:
         if left > _LONG and not self._told:
             what = f"{what} ({about(left)} in all)"
         self._told = True
-        self.progress(what, spent / (spent + left) if left else min(spent, 1.0))
+        self.progress(what, spent / (spent + left) if spent + left else 0.0)
 
     def left(self) -> float:
         """Seconds that are left."""
@@ -79,6 +79,7 @@ class Schedule:
         pace = math.exp(logarithms / (weights + _PRIOR))
         begun = {*self.passed, *self._aside}
         to_come = sum(spent for step, spent in self.steps.items() if step not in begun)
+        to_come += 0.0 if {*self.passed} & {*self._aside, *WRITING} else self._wait
         now = 0.0 if self._step in self._aside else self.steps.get(self._step, 0.0)
         return pace * to_come + max(pace * now - self.passed.get(self._step, 0.0), 0.0)
 
@@ -90,10 +91,8 @@ class Schedule:
         """Take steps for done beside all others before the writing; these end no earlier."""
         self._aside |= {*steps} & {*self.steps}
         here = [step for step in self.steps if step not in {*self.passed, *self._aside, *WRITING}]
-        if here:
-            longer = sum(map(self.steps.__getitem__, self._aside))
-            longer -= sum(map(self.steps.__getitem__, here))
-            self.steps[here[-1]] += max(longer, 0.0)
+        longer = sum(self.steps[step] for step in self._aside)
+        self._wait = max(longer - sum(self.steps[step] for step in here), 0.0)
 
 
 def expected_steps(
