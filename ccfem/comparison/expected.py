@@ -12,6 +12,7 @@ from ccfem.comparison.effort import (
     counts,
     judging_stages,
     planning_stage,
+    plans_to_lengths,
     stage_effort,
 )
 from ccfem.comparison.request import Natural, Request, Spread
@@ -109,8 +110,8 @@ def expected_steps(
         With the start of the program, and the writing of files.
     """
     steps: dict[str, float] = {}
-    spread = request.amount.points if isinstance(request.amount, Spread) else 0
-    plans = cases * (spread or 1)
+    lengths = request.amount.points if isinstance(request.amount, Spread) else 1
+    plans = cases * lengths
     for slicing, part in known.items():
         steps["solving"] = stage_effort("solve", part)
         tested = request.strand is not None and FILLED * part.room <= request.longest_test
@@ -120,11 +121,12 @@ def expected_steps(
         for name in request.strategies:
             run = request.on_slicing(name, slicing)
             stage = planning_stage(name, isinstance(request.amount, Natural))
-            steps[f"planning {run}"] = plans * stage_effort(stage, part)
+            planning = plans_to_lengths(name, lengths) * stage_effort(stage, part)
+            steps[f"planning {run}"] = cases * planning
             steps[f"judging {run}"] = plans * judging
             if request.breaking_load:
                 steps[f"breaking {run}"] = _BREAKING * judging
-        if request.bound and tested and (spread or not slicing):
+        if request.bound and tested and (lengths > 1 or not slicing):
             bounding = plans * stage_effort("bound", part)
             steps["bounding"] = max(bounding, steps.get("bounding", 0.0))
         if command:

@@ -153,13 +153,13 @@ def test_what_is_done_beside_ends_before_the_writing(clock):
 
 
 def test_every_length_of_a_front_is_a_plan():
-    request = Request.of("bar", ["stream_function"])
+    """Designs share half of their time."""
+    request = Request.of("bar", ["stream_function", "zigzag"])
     known = {"": counts(request.case, request.case.known_layers())[0]}
     one = expected_steps(request, known, 1)
     front = expected_steps(replace(request, amount=Spread(4)), known, 1)
-    once = one.pop("solving")
-    four = {step: 4.0 * spent for step, spent in one.items()}
-    assert front == pytest.approx(four | {"solving": once})
+    times = dict.fromkeys(one, 4.0) | {"solving": 1.0, "planning stream_function": 2.0}
+    assert front == pytest.approx({step: times[step] * spent for step, spent in one.items()})
 
 
 @pytest.mark.parametrize(("seconds", "said"), [(30.0, ""), (90.0, " (about 90 s in all)")])
