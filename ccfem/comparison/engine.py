@@ -590,6 +590,7 @@ def _curve(
 ) -> Curve:
     """Compare at several lengths."""
     tests, held = basis.tests, None if isinstance(wanted, InAll) else wanted
+    assert tests is not None
     with timed(seconds, "curve"):
         unchanged = [
             replace(run, strategy=before.strategy)

@@ -139,9 +139,8 @@ def expected_steps(
 
 def steps_before_solving(request: Request, command: bool) -> dict[str, float]:
     """Expect the steps of a run, where its layers are known before the part is solved."""
-    case, layers = request.case, ()
-    if not request.named:
-        layers = case.known_layers(request.only_slicer)
+    case = request.case
+    layers = () if request.named else case.known_layers(request.only_slicer)
     if not layers:
         return {}
     known = Counts.of(case.problem.mesh, layers, case.machine)
