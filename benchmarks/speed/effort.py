@@ -235,7 +235,7 @@ Samples = dict[str, list[tuple[str, Counts, float]]]
 
 def known_of(row: dict[str, str]) -> Counts:
     """Read the counts in a line."""
-    return Counts(**{one.name: float(row.get(one.name, one.default)) for one in fields(Counts)})
+    return Counts(**{one.name: float(row[one.name]) for one in fields(Counts) if one.name in row})
 
 
 @cache
