@@ -15,6 +15,7 @@ from ccfem.comparison.runs import Run, Tested
 from ccfem.comparison.tested_cases import ENERGY, RESIDUAL, in_all_cases
 from ccfem.fem.elasticity.stress_field import PartStress, StressField, WeightedCases
 from ccfem.judging.evaluation import evaluate
+from ccfem.judging.evaluation.evaluation import layer_indices
 from ccfem.judging.evaluation.strand_rules import StrandVerdict, strand_verdict, why_not
 from ccfem.judging.virtual_testing.anchorage import Anchorage
 from ccfem.judging.virtual_testing.failure_laws.matrix import matrix_peak
@@ -116,6 +117,18 @@ class Part:
         if self.every_layer or len(self.layers) <= MOST_LAYERS or self.several_cases:
             return None
         return alike_layers(self.layers, self.stress)
+
+    @cached_property
+    def layer_indices(self) -> list[dict[str, float]]:
+        """Indices that its layers have whatever the paths are."""
+        return layer_indices(*self.evaluated_on)
+
+    @property
+    def evaluated_on(self) -> tuple[Any, ...]:
+        """What `evaluate` takes beside the paths."""
+        most = 1 if self.limits_only else None if self.every_layer else MOST_LAYERS
+        about = (self.layers, self.stress, self.machine, self.strand, self.build, most)
+        return (*about, self.cases.heaviest.problem.filled)
 
     def tests(self, run: Run) -> bool:
         """Whether a run is tested virtually."""
@@ -402,9 +415,7 @@ def evaluated(run: Run, part: Part) -> Run:
         return replace(run, failure=why)
 
     def work() -> Run:
-        most = 1 if part.limits_only else None if part.every_layer else MOST_LAYERS
-        about = (part.layers, part.stress, part.machine, part.strand, part.build, most)
-        evaluation = evaluate(run.toolpaths, *about, part.cases.heaviest.problem.filled)
+        evaluation = evaluate(run.toolpaths, *part.evaluated_on, part.layer_indices)
         # Who planned given paths is not known, but where their file says so.
         by_design = bool(pattern_that_folds(run.strategy, run.name))
         what = (run.toolpaths, part.layers, part.machine, by_design)

@@ -132,6 +132,7 @@ def evaluate(
     build: Sequence[float] | None = None,
     most: int | None = None,
     filled: float = 1.0,
+    of_layers: Sequence[Mapping[str, float]] | None = None,
 ) -> Evaluation:
     """Evaluate the fibre paths of a part.
 
@@ -157,6 +158,8 @@ def evaluate(
         of a machine bound, are always of all layers. Default: all layers.
     filled : float, default 1
         Share of the part's volume that is filled (`Problem.filled`), for the mass of the matrix.
+    of_layers : sequence of mappings, optional
+        What `layer_indices` returns for the same part; by default taken here.
 
     Raises
     ------
@@ -172,13 +175,35 @@ def evaluate(
     whole = _spread_over(len(layers), most)
     material = _material(layers, stress, machine, strand or Strand())
     basis = layer_paths.Basis(machine, material, filled=filled)
+    if of_layers is None:
+        of_layers = layer_indices(layers, stress, machine, strand, build, most, filled)
     rows, along_fibre = _rows(toolpaths, layers, stress, basis, build, whole)
+    rows = [row | of_layer for row, of_layer in zip(rows, of_layers, strict=True)]
     nan = float("nan")
     return Evaluation(
         np.array([layer.index for layer in layers]),
         {column.name: np.array([row.get(column.name, nan) for row in rows]) for column in COLUMNS},
         tuple(along_fibre),
     )
+
+
+def layer_indices(
+    layers: Sequence[Layer],
+    stress: PartStress,
+    machine: Machine,
+    strand: Strand | None = None,
+    build: Sequence[float] | None = None,
+    most: int | None = None,
+    filled: float = 1.0,
+) -> list[dict[str, float]]:
+    """Take the indices that are the same for all paths: of each layer, then of all together.
+
+    The parameters are those of `evaluate`.
+    """
+    material = _material(layers, stress, machine, strand or Strand())
+    about = (layer_paths.Basis(machine, material, filled=filled), build)
+    whole = _spread_over(len(layers), most)
+    return _rows(Toolpaths.empty(), layers, stress, *about, whole, by_layer=True)[0]
 
 
 def _rows(
@@ -188,17 +213,24 @@ def _rows(
     basis: layer_paths.Basis,
     build: Sequence[float] | None,
     whole: BoolArray,
+    by_layer: bool = False,
 ) -> tuple[list[dict[str, float]], list[FibreSamples]]:
-    """Take the indices of each layer and of all, and the samples of layers where `whole` is set."""
+    """Take the indices of each layer and of all, and the samples of layers where `whole` is set.
+
+    They are those that depend on the paths, or else, with `by_layer`, all others.
+    """
     machine, fibre = basis.machine, toolpaths.of_kind(FIBRE).layer
     late = fibre[fibre < np.maximum.accumulate(fibre)]
     stack, upright = layer_paths.printed(layers, build), _upright(layers, build)
     area = np.array([float(layer.areas.sum()) for layer in layers])
     sampled = 1.0 if whole.all() else float(area[whole].sum() / area.sum())
 
-    below = list(
-        in_processes(lambda k: _below(k, layers, stress.mesh, machine), layers, shared=[layers])
-    )
+    below: list[Region | None] = [None] * len(layers)
+    if not by_layer:
+        beneath = in_processes(
+            lambda k: _below(k, layers, stress.mesh, machine), layers, shared=[layers]
+        )
+        below = list(beneath)
     behind = [int(np.count_nonzero(late == layer.index)) for layer in layers]
     more = [
         (round(layer.thickness, SAME_DECIMALS), count, under and corners_only(under))
@@ -209,7 +241,7 @@ def _rows(
     rows: list[dict[str, float]] = [{} for _ in layers]
     total: dict[str, float] = {}
     along_fibre: list[FibreSamples] = []
-    for kinds in _passes(len(layers)):
+    for kinds in _passes(len(layers), by_layer):
         origin = _origins(kinds, source, whole)
 
         def measured(
@@ -276,12 +308,16 @@ _TOGETHER = 60
 """Layers up to which all samples are taken at once."""
 
 
-def _passes(layers: int) -> list[dict[str, ModuleType]]:
-    """Return the indices that take samples, in passes over the layers.
+def _passes(layers: int, by_layer: bool) -> list[dict[str, ModuleType]]:
+    """Return the indices that take samples, by the layer alone or not, in passes over the layers.
 
     Of many layers those with large samples (`LARGE`) have passes of their own.
     """
-    kinds = {name: kind for name, kind in indices.named().items() if hasattr(kind, "sample")}
+    kinds = {
+        name: kind
+        for name, kind in indices.named().items()
+        if hasattr(kind, "sample") and getattr(kind, "BY_LAYER", False) == by_layer
+    }
     if layers <= _TOGETHER:
         return [kinds]
     large = [{name: kind} for name, kind in kinds.items() if getattr(kind, "LARGE", False)]

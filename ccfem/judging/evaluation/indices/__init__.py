@@ -10,6 +10,8 @@ A module has
   limit of a machine bounds them; default false;
 * ``BY_PATHS``, true where the samples follow from the paths in the plane of a flat layer, its
   section and what is below it: layers that repeat another have those of that one; default false;
+* ``BY_LAYER``, true where the samples follow from the layer and the stress on it alone: all paths
+  on the same layers have the same; default false;
 * ``LARGE``, true where the samples of a layer take megabytes: those of many layers are then taken
   alone; default false;
 * ``PLACE``, a number that says where its columns stand in tables; default behind all others.

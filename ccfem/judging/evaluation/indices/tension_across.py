@@ -14,6 +14,9 @@ from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, Laye
 PLACE = 150
 """Of these columns in tables: the smaller, the farther to the left."""
 
+BY_LAYER = True
+"""Whatever the paths are."""
+
 LARGE = True
 """Its samples take megabytes a layer."""
 

@@ -10,6 +10,9 @@ from ccfem.judging.evaluation.layer_paths import Basis, Column, LayerPaths, Laye
 PLACE = 145
 """Of these columns in tables: the smaller, the farther to the left."""
 
+BY_LAYER = True
+"""Whatever the paths are."""
+
 
 COLUMNS = (
     Column("thickness_5", "mm", "5th percentile by area of the layers' thickness.", "> 0"),
