@@ -112,7 +112,8 @@ def beads(
     # Direction of each part in the plane of its layer.
     normal = _layer_normals(points, normals, offsets, middle, line)
     chord = nodes[start + 1] - nodes[start]
-    direction, straight, often = _chords(chord, length, line, first, seen_only(closed))
+    direction, straight, often = np.empty_like(chord), np.empty(len(line)), np.empty(len(line))
+    _chords(chord, length, line, first, seen_only(closed), direction, straight, often)
     direction = direction - np.einsum("ij,ij->i", direction, normal)[:, None] * normal
     direction /= np.maximum(np.linalg.norm(direction, axis=1), 1e-300)[:, None]
     if not shared:
@@ -158,11 +159,16 @@ def _layer_normals(
 
 @compiled
 def _chords(
-    chord: FloatArray, length: FloatArray, line: IntArray, first: IntArray, closed: BoolArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:  # pragma: no cover
-    """Direction (s, 3), share of the length that goes ahead (s,), and passes of the chord (s,)."""
-    direction = np.empty((len(line), 3))
-    straight, often = np.empty(len(line)), np.empty(len(line))
+    chord: FloatArray,
+    length: FloatArray,
+    line: IntArray,
+    first: IntArray,
+    closed: BoolArray,
+    direction: FloatArray,
+    straight: FloatArray,
+    often: FloatArray,
+) -> None:  # pragma: no cover
+    """Write directions (s, 3), shares of the length that go ahead, and passes of the chord (s,)."""
     for k in range(len(line)):
         low, high = first[line[k]], first[line[k] + 1]
         ring = closed[line[k]] and high - low > 2 * _AHEAD
@@ -191,7 +197,6 @@ def _chords(
         direction[k, 0], direction[k, 1], direction[k, 2] = x, y, z
         straight[k] = min(max(size / max(whole, 1e-300), 1e-3), 1.0)
         often[k] = 1e3 if lost else min(max(passed / max(size, 1e-300), 1.0), 1e3)
-    return direction, straight, often
 
 
 # How bands of strands overlap, across each of their parts.

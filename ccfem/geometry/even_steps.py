@@ -55,7 +55,8 @@ def even_steps(
     # A polyline ends at its last point, whichever points near it are merged.
     long = np.diff(ends) > 1
     merged[ends[1:][long] - 1] = points[offsets[1:][long] - 1]
-    keep = _needed(np.ascontiguousarray(merged), ends, held, tolerance)
+    keep, stack = held.copy(), np.empty((len(merged) + 1, 2), dtype=np.int64)
+    _keep_needed(np.ascontiguousarray(merged), ends, tolerance, keep, stack)
     chosen, kept = merged[keep], np.concatenate([[0], np.cumsum(keep)])[ends]
     stepped, parts, segment = subdivide(chosen, kept, step)
     source = last[keep]
@@ -67,10 +68,10 @@ def even_steps(
 
 
 @compiled
-def _needed(points: FloatArray, offsets: IntArray, fixed: BoolArray, tolerance: float) -> BoolArray:
-    """Mask (P,) of the points that Douglas and Peucker keep, the fixed ones among them."""
-    keep = fixed.copy()
-    stack = np.empty((len(points) + 1, 2), np.int64)
+def _keep_needed(
+    points: FloatArray, offsets: IntArray, tolerance: float, keep: BoolArray, stack: IntArray
+) -> None:
+    """Set `keep` (P,) for the points that Douglas and Peucker keep beside those set already."""
     for k in range(len(offsets) - 1):
         first, end = offsets[k], offsets[k + 1] - 1
         if end < first:
@@ -106,4 +107,3 @@ def _needed(points: FloatArray, offsets: IntArray, fixed: BoolArray, tolerance: 
                 stack[count, 0], stack[count, 1] = a, farthest
                 stack[count + 1, 0], stack[count + 1, 1] = farthest, b
                 count += 2
-    return keep

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray, IntArray, repeated
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, repeated
 from ccfem.base.compiled import compiled
 from ccfem.geometry.facets import unique_edges
 from ccfem.geometry.locate import Buckets, bucket
@@ -83,7 +83,9 @@ def isocontours(
     edge, nth = repeated(np.diff(start))
     level, (before, after) = low[edge] + nth, scaled[ends[edge]].T
     weights = (level - before) / (after - before)
-    line, offsets = chained(_links(of_triangle, low, high, start))
+    link = np.full((start[-1], 2), -1)
+    _link(of_triangle, low, high, start, link)
+    line, offsets = chained(link)
     order = np.argsort(level[line[offsets[:-1]]], kind="stable")
     sizes = np.diff(offsets)[order]
     nth, number = repeated(sizes)
@@ -101,9 +103,10 @@ def triangle_edges(triangles: IntArray) -> tuple[IntArray, IntArray]:
 
 
 @compiled
-def _links(of_triangle: IntArray, low: IntArray, high: IntArray, start: IntArray) -> IntArray:
-    """Crossings before and after each crossing on its curve, as of `chained`."""
-    link = np.full((start[-1], 2), -1)
+def _link(
+    of_triangle: IntArray, low: IntArray, high: IntArray, start: IntArray, link: IntArray
+) -> None:
+    """Write the crossings before and after each crossing on its curve, as of `chained`."""
     # A level that crosses a triangle crosses two of its sides: link these two crossings.
     for t in range(len(of_triangle)):
         bottom = min(low[of_triangle[t, 0]], low[of_triangle[t, 1]], low[of_triangle[t, 2]])
@@ -119,10 +122,8 @@ def _links(of_triangle: IntArray, low: IntArray, high: IntArray, start: IntArray
                     else:
                         link[first, 1 if link[first, 0] >= 0 else 0] = k
                         link[k, 1 if link[k, 0] >= 0 else 0] = first
-    return link
 
 
-@compiled
 def chained(link: IntArray) -> tuple[IntArray, IntArray]:
     """Curves through things that are linked to at most two others.
 
@@ -140,11 +141,15 @@ def chained(link: IntArray) -> tuple[IntArray, IntArray]:
         As in CSR.
     """
     count = len(link)
-    line = np.empty(2 * count, np.int64)
-    offsets = np.zeros(count + 1, np.int64)
-    used = np.zeros(count, np.bool_)
-    chains = 0
-    size = 0
+    line, offsets = np.empty(2 * count, dtype=np.int64), np.zeros(count + 1, dtype=np.int64)
+    chains = _follow(link, np.zeros(count, dtype=bool), line, offsets)
+    return line[: offsets[chains]], offsets[: chains + 1]
+
+
+@compiled
+def _follow(link: IntArray, used: BoolArray, line: IntArray, offsets: IntArray) -> int:
+    """Write the curves of `chained`; returns their number."""
+    count, chains, size = len(link), 0, 0
     # Follow the links, first from the things with one link, which are ends; the rest are rings.
     for closed in range(2):
         for seed in range(count):
@@ -164,7 +169,7 @@ def chained(link: IntArray) -> tuple[IntArray, IntArray]:
                 size += 1
             chains += 1
             offsets[chains] = size
-    return line[:size], offsets[: chains + 1]
+    return chains
 
 
 def least_distance(curves: Isocontours, reach: float, enough: float) -> float:

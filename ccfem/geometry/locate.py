@@ -64,36 +64,30 @@ def bucket(low: FloatArray, high: FloatArray, cell: float | None = None) -> Buck
     last = np.zeros((len(low), 3), dtype=np.int64)
     first[:, :dimension] = np.floor((low - origin) / cell)
     last[:, :dimension] = np.floor((high - origin) / cell)
-    starts, items = _boxes_by_cell(first, np.minimum(last, shape - 1), shape)
+    last = np.minimum(last, shape - 1)
+    # Boxes are counted, then written: this moves the place in every cell to its end.
+    place = np.zeros(np.prod(shape), dtype=np.int64)
+    _visit_cells(first, last, shape, place, np.zeros(0, dtype=np.int64))
+    starts = np.concatenate([[0], np.cumsum(place)])
+    items = np.empty(starts[-1], dtype=np.int64)
+    _visit_cells(first, last, shape, starts[:-1].copy(), items)
     return Buckets(origin, cell, shape, starts, items)
 
 
 @compiled
-def _boxes_by_cell(first: IntArray, last: IntArray, shape: IntArray) -> tuple[IntArray, IntArray]:
-    """Items of each grid cell: boxes of cells from `first` to `last`, counted, then written."""
-    starts = np.zeros(shape[0] * shape[1] * shape[2] + 1, np.int64)
-    items = np.empty(0, np.int64)
-    for writing in range(2):
-        if writing:
-            total = 0
-            for c in range(len(starts)):
-                size = starts[c]
-                starts[c] = total
-                total += size
-            items = np.empty(total, np.int64)
-        for box in range(len(first)):
-            for i in range(first[box, 0], last[box, 0] + 1):
-                for j in range(first[box, 1], last[box, 1] + 1):
-                    for k in range(first[box, 2], last[box, 2] + 1):
-                        c = (i * shape[1] + j) * shape[2] + k
-                        if writing:
-                            items[starts[c]] = box
-                        starts[c] += 1
-    # Writing has moved the start of every cell to that of the next one.
-    for c in range(len(starts) - 1, 0, -1):
-        starts[c] = starts[c - 1]
-    starts[0] = 0
-    return starts, items
+def _visit_cells(
+    first: IntArray, last: IntArray, shape: IntArray, place: IntArray, items: IntArray
+) -> None:
+    """Raise the place in each cell for every box from cell `first` to `last`, and write the box."""
+    writing = len(items) > 0
+    for box in range(len(first)):
+        for i in range(first[box, 0], last[box, 0] + 1):
+            for j in range(first[box, 1], last[box, 1] + 1):
+                for k in range(first[box, 2], last[box, 2] + 1):
+                    c = (i * shape[1] + j) * shape[2] + k
+                    if writing:
+                        items[place[c]] = box
+                    place[c] += 1
 
 
 @dataclass(frozen=True)

@@ -251,13 +251,17 @@ def orient(
     if confidence is not None:
         alike = np.minimum(confidence[pairs[:, 0]], confidence[pairs[:, 1]]) * alike
     order = np.argsort(1.0 - alike, kind="stable")
-    return direction * _signs(len(direction), pairs[order], product[order] < 0.0)[:, None]
+    count = len(direction)
+    sign, parent, parity = np.ones(count), np.arange(count), np.zeros(count, dtype=bool)
+    _set_signs(pairs[order], product[order] < 0.0, parent, parity, sign)
+    return direction * sign[:, None]
 
 
 @compiled
-def _signs(count: int, pairs: IntArray, opposite: BoolArray) -> FloatArray:
-    parent = np.arange(count)
-    parity = np.zeros(count, np.bool_)  # relative to the parent
+def _set_signs(
+    pairs: IntArray, opposite: BoolArray, parent: IntArray, parity: BoolArray, sign: FloatArray
+) -> None:
+    """Turn signs; the parity of an element is relative to its parent, first itself."""
     root_of_pair = np.empty(2, np.int64)
     odd = np.empty(2, np.bool_)
     for e in range(len(pairs)):
@@ -279,8 +283,7 @@ def _signs(count: int, pairs: IntArray, opposite: BoolArray) -> FloatArray:
                 a, b = b, a
             parent[b] = a
             parity[b] = odd[0] ^ odd[1] ^ opposite[e]
-    sign = np.ones(count)
-    for start in range(count):
+    for start in range(len(sign)):
         element = start
         turned = False
         while parent[element] != element:
@@ -288,4 +291,3 @@ def _signs(count: int, pairs: IntArray, opposite: BoolArray) -> FloatArray:
             element = parent[element]
         if turned:
             sign[start] = -1.0
-    return sign

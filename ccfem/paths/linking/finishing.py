@@ -226,7 +226,8 @@ def trim_to_clearance(
     keep = np.ones(len(points), dtype=bool)
     head, following = np.full(int(shape.prod()), -1), np.empty(len(points), dtype=np.int64)
     grid = _Grid(low, shape, float(clearance), head, following)
-    _drop_near(points, offsets, grid, float(least_length), keep)
+    along, line_of_point = np.zeros(len(points)), np.zeros(len(points), dtype=np.int64)
+    _drop_near(points, offsets, grid, float(least_length), keep, along, line_of_point)
     masks = np.split(keep, offsets[1:-1])
     kept: list[FloatArray] = []
     for line, mask in zip(ordered, masks, strict=True):
@@ -256,13 +257,19 @@ class _Grid(NamedTuple):
 
 @compiled
 def _drop_near(
-    points: FloatArray, offsets: IntArray, grid: _Grid, least_length: float, keep: BoolArray
+    points: FloatArray,
+    offsets: IntArray,
+    grid: _Grid,
+    least_length: float,
+    keep: BoolArray,
+    along: FloatArray,
+    line: IntArray,
 ) -> None:
-    """Clear `keep` (p,) for points that are too near to others."""
+    """Clear `keep` (p,) for points that are too near to others.
+
+    Writes the arc length `along` (p,) at each point, and the `line` (p,) that it is of.
+    """
     low, shape, clearance, head, following = grid
-    count = len(points)
-    along = np.zeros(count)
-    line = np.zeros(count, np.int64)
     for k in range(len(offsets) - 1):
         first, last = offsets[k], offsets[k + 1]
         for p in range(first, last):

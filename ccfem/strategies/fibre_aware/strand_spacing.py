@@ -108,7 +108,11 @@ class Spacing:
         _, near = self.tree.query(_lifted(points, lines.layer), k=_NEAREST)
         for _ in range(rounds):
             points = lines.start + slide[:, None] * lines.normals
-            column, value, missing = _too_near(points, lines.normals, pairs, self.width)
+            column, value = np.empty((len(pairs), 3), dtype=np.int64), np.empty((len(pairs), 3))
+            missing = np.empty(len(pairs))
+            rows = (column, value, missing)
+            used = _too_near(points, lines.normals, pairs, self.width, *rows)
+            column, value, missing = column[:used], value[:used], missing[:used]
             off, wanted = _outside(
                 points, near, self.border, self.inward, self.inset, lines.normals
             )
@@ -212,34 +216,34 @@ def _solve(matrix: Any, right: FloatArray) -> FloatArray:
 
 @compiled
 def _too_near(
-    points: FloatArray, normals: FloatArray, pairs: IntArray, least: float
-) -> tuple[IntArray, FloatArray, FloatArray]:  # pragma: no cover
-    """Pairs that are too near: their points, how slides part them, and how much is missing."""
+    points: FloatArray,
+    normals: FloatArray,
+    pairs: IntArray,
+    least: float,
+    column: IntArray,
+    value: FloatArray,
+    missing: FloatArray,
+) -> int:  # pragma: no cover
+    """Write of pairs that are too near: points, how slides part them, what is missing; how many."""
     count = 0
-    for write in range(2):
-        if write:
-            column, value = np.zeros((count, 3), np.int64), np.zeros((count, 3))
-            missing = np.zeros(count)
-            count = 0
-        for k in range(len(pairs)):
-            p, q = pairs[k, 0], pairs[k, 1]
-            ex, ey = points[q + 1, 0] - points[q, 0], points[q + 1, 1] - points[q, 1]
-            rx, ry = points[p, 0] - points[q, 0], points[p, 1] - points[q, 1]
-            square = ex * ex + ey * ey
-            s = min(max((rx * ex + ry * ey) / square, 0.0), 1.0) if square > 0.0 else 0.0
-            gx, gy = rx - s * ex, ry - s * ey
-            distance = np.sqrt(gx * gx + gy * gy)
-            if distance >= least or distance < 1e-9:
-                continue
-            if write:
-                gx, gy = gx / distance, gy / distance
-                column[count, 0], column[count, 1], column[count, 2] = p, q, q + 1
-                value[count, 0] = gx * normals[p, 0] + gy * normals[p, 1]
-                value[count, 1] = -(1.0 - s) * (gx * normals[q, 0] + gy * normals[q, 1])
-                value[count, 2] = -s * (gx * normals[q + 1, 0] + gy * normals[q + 1, 1])
-                missing[count] = least - distance
-            count += 1
-    return column, value, missing
+    for k in range(len(pairs)):
+        p, q = pairs[k, 0], pairs[k, 1]
+        ex, ey = points[q + 1, 0] - points[q, 0], points[q + 1, 1] - points[q, 1]
+        rx, ry = points[p, 0] - points[q, 0], points[p, 1] - points[q, 1]
+        square = ex * ex + ey * ey
+        s = min(max((rx * ex + ry * ey) / square, 0.0), 1.0) if square > 0.0 else 0.0
+        gx, gy = rx - s * ex, ry - s * ey
+        distance = np.sqrt(gx * gx + gy * gy)
+        if distance >= least or distance < 1e-9:
+            continue
+        gx, gy = gx / distance, gy / distance
+        column[count, 0], column[count, 1], column[count, 2] = p, q, q + 1
+        value[count, 0] = gx * normals[p, 0] + gy * normals[p, 1]
+        value[count, 1] = -(1.0 - s) * (gx * normals[q, 0] + gy * normals[q, 1])
+        value[count, 2] = -s * (gx * normals[q + 1, 0] + gy * normals[q + 1, 1])
+        missing[count] = least - distance
+        count += 1
+    return count
 
 
 def _from_border(
