@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ccfem.base.arrays import FloatArray, IntArray, repeated
+from ccfem.base.arrays import BoolArray, FloatArray, IntArray, repeated
 from ccfem.base.compiled import compiled
 
 
@@ -28,17 +28,21 @@ def reverse_cuthill_mckee(start: IntArray, neighbour: IntArray) -> IntArray:
     """
     degree = np.diff(start)
     first = np.argsort(degree, kind="stable")
-    order: IntArray = _breadth_first(start, neighbour, degree, first)
+    order = np.empty(len(first), dtype=np.int64)
+    _breadth_first(start, neighbour, degree, first, order, np.zeros(len(first), dtype=bool))
     return order[::-1]
 
 
 @compiled
 def _breadth_first(
-    start: IntArray, neighbour: IntArray, degree: IntArray, first: IntArray
-) -> IntArray:
-    """Nodes in layers of neighbours; those that each node adds by rising degree."""
-    order = np.empty(len(first), np.int64)
-    seen = np.zeros(len(first), np.bool_)
+    start: IntArray,
+    neighbour: IntArray,
+    degree: IntArray,
+    first: IntArray,
+    order: IntArray,
+    seen: BoolArray,
+) -> None:
+    """Order nodes in layers of neighbours; those that each node adds by rising degree."""
     count = done = 0
     for seed in first:
         if seen[seed]:
@@ -61,7 +65,6 @@ def _breadth_first(
                     k -= 1
                 order[k] = other
                 count += 1
-    return order
 
 
 _PIECE = 20

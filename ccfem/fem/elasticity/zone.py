@@ -136,7 +136,8 @@ def ball_averages(
     turn = np.argsort(boxes.number[judged], kind="stable")
     centres, sums = points[judged[turn]], np.zeros_like(result)
     if parts == 1:
-        _average(boxes, values, centres, boxes.number[judged[turn]], sums)
+        inside = np.empty(len(boxes.points), dtype=np.int64)
+        _average(boxes, values, centres, boxes.number[judged[turn]], sums, inside)
     else:
         columns = np.column_stack([boxes.weights, boxes.weights[:, None] * values])
         until = np.concatenate([np.zeros((1, columns.shape[1])), np.cumsum(columns, axis=0)])
@@ -222,9 +223,14 @@ def _points_in_ball(
 
 @compiled
 def _average(
-    boxes: _Boxes, values: FloatArray, centres: FloatArray, box: IntArray, result: FloatArray
+    boxes: _Boxes,
+    values: FloatArray,
+    centres: FloatArray,
+    box: IntArray,
+    result: FloatArray,
+    inside: IntArray,
 ) -> None:  # pragma: no cover
-    weights, inside = boxes.weights, np.empty(len(boxes.points), np.int64)
+    weights = boxes.weights
     for k in range(len(centres)):
         weight = 0.0
         for q in range(_points_in_ball(boxes, centres[k], box[k], inside)):

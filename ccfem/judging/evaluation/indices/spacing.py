@@ -85,7 +85,9 @@ def sample_spacing(paths: PlanePaths, width: float) -> SpacingSamples:
     grid = bucket(ends.min(axis=1), ends.max(axis=1), width)
     period = np.where(paths.closed, paths.lengths, np.inf)
     strands = _Pieces(grid, ends, along[start], along[start + 1], owner, period)
-    return SpacingSamples(_nearest(strands, points, line, position, reach), length)
+    distance = np.empty(len(points))
+    _nearest(strands, points, line, position, reach, distance)
+    return SpacingSamples(distance, length)
 
 
 class _Pieces(NamedTuple):
@@ -106,16 +108,20 @@ class _Pieces(NamedTuple):
 
 @compiled
 def _nearest(
-    pieces: _Pieces, points: FloatArray, line: IntArray, position: FloatArray, reach: float
-) -> FloatArray:
-    """Distance (s,) from each sample to the nearest piece, at most `reach`.
+    pieces: _Pieces,
+    points: FloatArray,
+    line: IntArray,
+    position: FloatArray,
+    reach: float,
+    distance: FloatArray,
+) -> None:
+    """Write the `distance` (s,) from each sample to the nearest piece, at most `reach`.
 
     `points` (s, 2), `line` and `position` (s,) are the places of the samples, their paths and the
     arc lengths there. Pieces of their own paths count from `reach` of arc on.
     """
     grid, ends, along, along_end, owner, period = pieces
     origin, cell, shape, starts, items = grid
-    distance = np.empty(len(points))
     for q in range(len(points)):
         x, y = points[q, 0], points[q, 1]
         ci, cj = int(np.floor((x - origin[0]) / cell)), int(np.floor((y - origin[1]) / cell))
@@ -144,7 +150,6 @@ def _nearest(
                         best = min(best, ex * ex + ey * ey)
             ring += 1
         distance[q] = np.sqrt(best)
-    return distance
 
 
 @compiled
