@@ -110,8 +110,8 @@ class Spacing:
             points = lines.start + slide[:, None] * lines.normals
             column, value = np.empty((len(pairs), 3), dtype=np.int64), np.empty((len(pairs), 3))
             missing = np.empty(len(pairs))
-            rows = (column, value, missing)
-            used = _too_near(points, lines.normals, pairs, self.width, *rows)
+            about = (points, lines.normals, pairs, self.width)
+            used = _too_near(*about, column, value, missing)
             column, value, missing = column[:used], value[:used], missing[:used]
             off, wanted = _outside(
                 points, near, self.border, self.inward, self.inset, lines.normals

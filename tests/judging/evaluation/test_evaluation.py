@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from ccfem.base.errors import InputError
 from ccfem.body.mesh import TetMesh
 from ccfem.body.mesh.box import box_mesh
-from ccfem.judging.evaluation import COLUMNS, evaluate, evaluation
+from ccfem.judging.evaluation import COLUMNS, evaluate, evaluation, indices
 from ccfem.judging.evaluation.indices import room
 from ccfem.judging.virtual_testing import Strand
 from ccfem.machine import Machine
@@ -95,11 +95,26 @@ def test_indices_in_passes_over_many_layers_are_those_taken_at_once(part, monkey
     about = (both, part.layers, part.stress, MACHINE, None, None, 1)
     at_once = evaluate(*about)
     monkeypatch.setattr(evaluation, "_TOGETHER", 1)
-    assert len(evaluation._passes(2)) > 1
+    assert len(evaluation._passes(2, by_layer=False)) > 1
     in_passes = evaluate(*about)
     for name in NAMES:
         np.testing.assert_array_equal(in_passes.values[name], at_once.values[name])
     assert len(in_passes.samples) == 1
+
+
+def test_indices_of_the_layers_themselves_are_those_taken_with_the_paths(part, monkeypatch):
+    about = (part.layers, part.stress, MACHINE)
+    alone = evaluation.layer_indices(*about)
+    given = evaluate(paths_of(part), *about, of_layers=alone)
+    of_layers = [kind for kind in indices.named().values() if getattr(kind, "BY_LAYER", False)]
+    names = {column.name for kind in of_layers for column in kind.COLUMNS}
+    assert set(alone[-1]) == names
+    assert "across_best" in names
+    for kind in of_layers:
+        monkeypatch.setattr(kind, "BY_LAYER", False)
+    with_paths = evaluate(paths_of(part), *about)
+    for name in NAMES:
+        np.testing.assert_array_equal(given.values[name], with_paths.values[name])
 
 
 def test_table_has_a_row_a_layer_and_the_total(part):
