@@ -121,14 +121,20 @@ class Part:
     @cached_property
     def layer_indices(self) -> list[dict[str, float]]:
         """Indices that its layers have whatever the paths are."""
-        return layer_indices(*self.evaluated_on)
+        return layer_indices(**self.evaluated_on)
 
     @property
-    def evaluated_on(self) -> tuple[Any, ...]:
+    def evaluated_on(self) -> dict[str, Any]:
         """What `evaluate` takes beside the paths."""
-        most = 1 if self.limits_only else None if self.every_layer else MOST_LAYERS
-        about = (self.layers, self.stress, self.machine, self.strand, self.build, most)
-        return (*about, self.cases.heaviest.problem.filled)
+        return {
+            "layers": self.layers,
+            "stress": self.stress,
+            "machine": self.machine,
+            "strand": self.strand,
+            "build": self.build,
+            "most": 1 if self.limits_only else None if self.every_layer else MOST_LAYERS,
+            "filled": self.cases.heaviest.problem.filled,
+        }
 
     def tests(self, run: Run) -> bool:
         """Whether a run is tested virtually."""
@@ -415,7 +421,7 @@ def evaluated(run: Run, part: Part) -> Run:
         return replace(run, failure=why)
 
     def work() -> Run:
-        evaluation = evaluate(run.toolpaths, *part.evaluated_on, part.layer_indices)
+        evaluation = evaluate(run.toolpaths, **part.evaluated_on, of_layers=part.layer_indices)
         # Who planned given paths is not known, but where their file says so.
         by_design = bool(pattern_that_folds(run.strategy, run.name))
         what = (run.toolpaths, part.layers, part.machine, by_design)

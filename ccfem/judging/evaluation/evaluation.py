@@ -178,7 +178,7 @@ def evaluate(
     if of_layers is None:
         of_layers = layer_indices(layers, stress, machine, strand, build, most, filled)
     rows, along_fibre = _rows(toolpaths, layers, stress, basis, build, whole)
-    rows = [row | of_layer for row, of_layer in zip(rows, of_layers, strict=True)]
+    rows = [{**row, **more} for row, more in zip(rows, of_layers, strict=True)]
     nan = float("nan")
     return Evaluation(
         np.array([layer.index for layer in layers]),
