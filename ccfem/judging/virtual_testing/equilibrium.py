@@ -358,6 +358,19 @@ def equilibrium(
     )
 
 
+def knowing_fibre(specimen: Specimen, strands: Strands, axial_stiffness: float) -> Specimen:
+    """Return the part with a preconditioner that knows the fibre that it stretches without any.
+
+    Parameters
+    ----------
+    axial_stiffness : float, N
+        EA of one strand.
+    """
+    pieces = bars(strands, specimen.system.problem.mesh)
+    carried = _state(pieces, specimen.unreinforced.displacement, PARTIAL)[1]
+    return _knowing_fibre(specimen, strands, axial_stiffness * carried * strands.share)
+
+
 def _knowing_fibre(specimen: Specimen, strands: Strands, stiffness: FloatArray) -> Specimen:
     """Return the part with a preconditioner of it with fibre of a stiffness EA (s,), N."""
     volumes = specimen.system.problem.mesh.volumes

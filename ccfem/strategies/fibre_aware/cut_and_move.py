@@ -28,6 +28,7 @@ from ccfem.paths.planning.layer_plans import plan_layers
 from ccfem.paths.planning.strategy import WholePart
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
 from ccfem.slicing.layers.layer import Layer
+from ccfem.strategies.fibre_aware.heights import LARGE_CELLS
 from ccfem.strategies.fibre_aware.judges import (
     Goal,
     Judge,
@@ -53,8 +54,9 @@ _FOR_BOTH = (False, True)
 _MUCH = 1.12
 """Fibre of a plan over the length wanted from which the last of its cuts is a large step."""
 
-_ROUGH, _EXACT = 1e-4, 1e-6
-"""Relative residuals of the tests, and of the last one of moved paths, which gain little."""
+_ROUGH, _LARGE_ROUGH, _EXACT = 1e-4, 1e-3, 1e-6
+"""Relative residuals of the tests, of those for the stiffness of parts that are not factorised, and
+of the last one of moved paths, which gain little."""
 
 
 class _Cut(Protocol):
@@ -66,8 +68,8 @@ class _Cut(Protocol):
         """Cut, given the weight of the strength, the number of tests and the others."""
 
 
-_Exchange = Callable[[Toolpaths, Toolpaths, Judged], Toolpaths]
-"""Makes a plan better, given what it was cut from and its test."""
+_Exchange = Callable[[Toolpaths, Toolpaths, Judged], tuple[Toolpaths, Judged]]
+"""Makes a plan better, given what it was cut from and its test; returns it with its own."""
 
 
 @dataclass(frozen=True)
@@ -109,11 +111,14 @@ def prune_and_move(
 
     Each candidate is cut, and the best one is moved: the stiffest, or with strength the one of
     highest value. Before that the stiffest takes over stretches of the others (`exchanged`), if it
-    was cut from much more fibre; for several load cases that gains next to nothing. With strength
+    was cut from much more fibre; for several load cases that gains next to nothing. On large parts
+    the second does so too, and the better one is taken. With strength
     it is moved once for the stiffness and once for both, and a test chooses. `last` is the goal on
     the cells of the last test, by which moved paths are taken or not.
     """
     goal = Goal.of(part)
+    for paths in [paths for paths in candidates if len(paths)][:1]:
+        goal = goal.knowing(paths, strand)
 
     def cut(
         toolpaths: Toolpaths, share: float, tests: int, least: Judged | None = None
@@ -126,15 +131,17 @@ def prune_and_move(
         both = (aim, layers, machine, strand, how.strength)
         return tuple(strength_judge(*both, for_both, tolerance) for for_both in _FOR_BOTH)
 
-    judges = judges_of(goal, _ROUGH)
+    roughly = goal.prepared and not how.strength and not how.moves
+    judges = judges_of(goal, _LARGE_ROUGH if roughly else _ROUGH)
 
-    def exchange(kept: Toolpaths, source: Toolpaths, tested: Judged) -> Toolpaths:
+    def exchange(kept: Toolpaths, source: Toolpaths, tested: Judged) -> tuple[Toolpaths, Judged]:
         if len(goal.parts) > 1 or fibre_length(source) < _MUCH * length:
-            return kept
+            return kept, tested
         cut_again = partial(cut, share=0.0)
         return exchanged(kept, candidates, goal.mesh, machine, judges[0], cut_again, tested)
 
-    kept = best_cut(candidates, cut, judges[0], how.strength, how.rounds, exchange)
+    bases = _LARGE_BASES if len(goal.mesh.cells) > LARGE_CELLS else 1
+    kept = best_cut(candidates, cut, judges[0], how.strength, how.rounds, exchange, bases)
     if not how.moves:
         return kept
     radius, offered = kept_radius(machine, how.tight), [kept]
@@ -163,6 +170,7 @@ def best_cut(
     strength: float,
     rounds: int,
     exchange: _Exchange | None = None,
+    bases: int = 1,
 ) -> Toolpaths:
     """Cut candidates, and return the result of highest value.
 
@@ -179,13 +187,15 @@ def best_cut(
     rounds : int
         Tests of each cut.
     exchange : callable, optional
-        Makes the stiffest result of several better still, where strength does not count.
+        Makes the stiffest results of several better still, where strength does not count.
+    bases : int, default 1
+        Number of results that it is tried on.
     """
     filled = [paths for paths in candidates if len(paths)]
     if not filled:
         return candidates[0]
     if not strength:
-        return _stiffest_cut(filled, cut, judge, rounds, exchange)
+        return _stiffest_cut(filled, cut, judge, rounds, exchange, bases)
     paths, shares = zip(
         *(
             (paths, share * strength)
@@ -203,6 +213,7 @@ def _stiffest_cut(
     judge: Judge,
     rounds: int,
     exchange: _Exchange | None,
+    bases: int,
 ) -> Toolpaths:
     """Cut candidates for the stiffness, the first in any case, and return the stiffest result.
 
@@ -218,17 +229,25 @@ def _stiffest_cut(
         return kept, judge(kept) if len(kept) else None
 
     tried = [(first, least), *in_processes(contender, candidates[1:], shared=[candidates])]
-    best = int(np.argmax([-np.inf if tested is None else tested.value for _, tested in tried]))
-    kept, tested = tried[best]
-    assert tested is not None
-    return kept if exchange is None else exchange(kept, candidates[best], tested)
+    whole = [(k, kept, tested) for k, (kept, tested) in enumerate(tried) if tested is not None]
+    best = sorted(whole, key=lambda one: -one[2].value)[:bases]
+    if exchange is None:
+        return best[0][1]
+    number, kept, judged = zip(*best, strict=True)
+    sources = [candidates[k] for k in number]
+    better = in_processes(exchange, kept, sources, judged, shared=[candidates])
+    return max(better, key=lambda one: one[1].value)[0]
 
 
 # Stretches of other plans in the room between strands, in exchange for what carries less.
 
 
-_TIMES = 3
-"""Exchanges at most."""
+_TIMES, _LARGE_TIMES = 3, 4
+"""Exchanges at most; the second on large parts, where fewer plans take part."""
+
+_LARGE_BASES = 2
+"""Plans that take over stretches on large parts, where one more costs less than other plans: on the
+Shell of Chen et al. 2021 the second best one becomes the best. Elsewhere only the stiffest does."""
 
 _GAIN = 1e-3
 """Share by which an exchange has to be better: less may be rounding, which turns with the part."""
@@ -258,7 +277,7 @@ def exchanged(
     judge: Judge,
     cut: Callable[..., Toolpaths],
     tested: Judged | None = None,
-) -> Toolpaths:
+) -> tuple[Toolpaths, Judged]:
     """Add stretches of other plans to a plan where there is room, and cut all to the length again.
 
     Parameters
@@ -274,13 +293,13 @@ def exchanged(
 
     Returns
     -------
-    Toolpaths
-        The given ones where nothing as long is stiffer by more than a thousandth.
+    Toolpaths, Judged
+        The given ones where nothing as long is stiffer by more than a thousandth; and their test.
     """
     least = machine.shortest_strand
     length, known = fibre_length(paths), judge(paths) if tested is None else tested
     pieces = [(plan, *_pieces(plan, mesh)) for plan in plans if len(plan)]
-    for _ in range(_TIMES):
+    for _ in range(_LARGE_TIMES if len(mesh.cells) > LARGE_CELLS else _TIMES):
         price, taken = _price(paths, known, mesh), _Taken(machine.fibre_width, [paths])
         for plan, strands, pieces_of in pieces:
             along = profiles(plan, strands, _worth(known, pieces_of))
@@ -289,14 +308,14 @@ def exchanged(
             if len(fresh):
                 taken.add(fresh.of_kind(FIBRE))
         if len(taken.plans) == 1:
-            return paths
+            break
         other = cut(Toolpaths.concatenate(taken.plans), tests=_TESTS)
         fresh_test = judge(other, known.displacements)
         better = fresh_test.value > (1.0 + _GAIN) * known.value
         if not better or fibre_length(other) < (1.0 - 0.5 * TOLERANCE) * length:
-            return paths
+            break
         paths, known = other, fresh_test
-    return paths
+    return paths, known
 
 
 def _pieces(paths: Toolpaths, mesh: TetMesh) -> tuple[Strands, Bars]:

@@ -199,6 +199,10 @@ _ALIKE = 0.8
 
 _MOST_GROUPS = 6
 
+LARGE_CELLS = 50_000
+"""Cells above which plans on flat layers for one load case are made in fewer ways: they take
+longest, and what is left out is made up for by one more exchange of stretches."""
+
 
 def nearest_layer(part: SmearedPart, layers: Sequence[Layer]) -> IntArray:
     """Position in `layers` of the one nearest to each cell, (m,); of flat ones in height."""

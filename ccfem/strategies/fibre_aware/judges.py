@@ -1,7 +1,7 @@
 """Tests of paths under one or several load cases: their value, and the worth of their fibre."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol
 
@@ -13,8 +13,14 @@ from ccfem.base.parallel import in_processes
 from ccfem.body.mesh import TetMesh
 from ccfem.fem.elasticity import StressField
 from ccfem.judging.virtual_testing import Specimen, Strand, Strands, cut_strands
-from ccfem.judging.virtual_testing.equilibrium import Equilibrium, bars, equilibrium
+from ccfem.judging.virtual_testing.equilibrium import (
+    Equilibrium,
+    bars,
+    equilibrium,
+    knowing_fibre,
+)
 from ccfem.judging.virtual_testing.several_cases import cases_failure, virtual_tests
+from ccfem.judging.virtual_testing.strands import whole_strands
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
@@ -44,12 +50,15 @@ class Goal:
         (`ccfem.strategies.fibre_aware.upper_bound.measures`); of one case any number.
     objective : {"worst", "sum", "least"}
         What counts: the case that is farthest below what it is measured by, or the weighted mean.
+    prepared : bool, default False
+        Whether the parts have preconditioners that know fibre; tests then make none of their own.
     """
 
     parts: tuple[Specimen, ...]
     weights: FloatArray
     bounds: FloatArray
     objective: str = WORST
+    prepared: bool = False
 
     __repr__ = in_brief
 
@@ -64,6 +73,18 @@ class Goal:
             return part
         specimen = Specimen.of(part) if isinstance(part, StressField) else part
         return cls((specimen,), np.ones(1), np.ones(1))
+
+    def knowing(self, toolpaths: Toolpaths, strand: Strand) -> "Goal":
+        """Return the goal with parts prepared for tests of paths that are like some.
+
+        Parts that are factorised stay as they are.
+        """
+        if self.parts[0].solver.backend != "amg":
+            return self
+        strands = whole_strands(toolpaths, self.mesh)
+        axial = strand.stiffness(self.parts[0].modulus)
+        parts = tuple(knowing_fibre(part, strands, axial) for part in self.parts)
+        return replace(self, parts=parts, prepared=True)
 
     @property
     def mesh(self) -> TetMesh:
@@ -136,7 +157,7 @@ def equilibria(
     for k, part in enumerate(goal.parts):
         near = () if known is None else (known[k],)
         with_fibre = equilibrium(
-            part, strands, axial, known=near, tolerance=tolerance, prepare=True
+            part, strands, axial, known=near, tolerance=tolerance, prepare=not goal.prepared
         )
         stiffness = part.stiffness(with_fibre.displacement, 0.5 * with_fibre.work)
         bare = part.unreinforced

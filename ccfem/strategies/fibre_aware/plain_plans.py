@@ -21,6 +21,7 @@ from ccfem.slicing.layers.layer import Layer, LayerStress, curved_layers
 from ccfem.strategies import create
 from ccfem.strategies.concentric import Concentric
 from ccfem.strategies.fibre_aware.heights import (
+    LARGE_CELLS,
     grouped_by_stress,
     layers_by_case,
     layers_of_one_kind,
@@ -33,9 +34,6 @@ _CAP = 60.0
 
 _CLOSE_TO_TENSION = Stripes(smooth=4.0, border=5.0)
 """Stripes that are cut down follow the tension more closely than those that cover a layer."""
-
-_LARGE = 50_000
-"""Cells above which layers of about the same section share stripes: they take longest."""
 
 _SHARED, _SAME = 2, 0.5
 """Layers that share stripes, and distance of their borders in strand widths. On the Shell of Chen
@@ -181,8 +179,8 @@ def plain_plans(
     """Plan straight rows, contours, stripes and isocurves, each with more fibre than is kept.
 
     Layers of one section under alike stress are planned once, and on large parts two flat layers
-    of about the same section share stripes. On curved layers rows and contours follow the
-    tension nowhere, and are left out.
+    of about the same section share stripes. There contours and isocurves are left out for one load
+    case. On curved layers rows and contours follow the tension nowhere, and are left out.
 
     Parameters
     ----------
@@ -218,10 +216,12 @@ def plain_plans(
         return in_all(lambda some, field: plan_layers(planner, some, some, field, machine))
 
     plans = []
+    large = len(cases.mesh.cells) > LARGE_CELLS and not curved_layers(layers)
+    few = large and len(cases) == 1
     if not curved_layers(layers):
-        rings = Concentric().for_part(field, layers, machine)
-        plans += [by(StraightRows("tension")), by(StraightRows("section")), by(rings)]
-    large = len(cases.mesh.cells) > _LARGE and not curved_layers(layers)
+        plans += [by(StraightRows("tension")), by(StraightRows("section"))]
+        if not few:
+            plans.append(by(Concentric().for_part(field, layers, machine)))
     group_of = {layer.index: int(k) for layer, k in zip(layers, group, strict=True)}
 
     def striped(some: Sequence[Layer], field: StressField) -> Toolpaths:
@@ -232,7 +232,7 @@ def plain_plans(
         return plan_layers(shared, some, some, field, machine)
 
     plans.append(in_all(striped))
-    if curves:
+    if curves and not few:
         isocurve = create("isocurve", {"cap": _CAP})
         plans.append(in_all(lambda some, field: plan(isocurve, some, field, machine)))
     return plans

@@ -24,8 +24,9 @@ from ccfem.strategies.fibre_aware.path_profile import Profile
 from ccfem.strategies.fibre_aware.shortening import shorten_bent, tight_share
 from ccfem.strategies.fibre_aware.strength_value import Worth, layer_normal, raised
 
-_TOLERANCE = 1e-5
-"""Relative residual of the tests, and so the error of the strain that says what fibre is worth."""
+_TOLERANCE, _LARGE_TOLERANCE = 1e-5, 1e-3
+"""Relative residual of the tests, and so the error of the strain that says what fibre is worth; the
+second on parts that are not factorised, for the stiffness alone."""
 
 _FASTEST = 0.5
 """Share of the excess that a round removes at least where there is one load case."""
@@ -117,11 +118,12 @@ def prune(
     if length_now <= length and (tight >= 1.0 or tight_share(toolpaths, machine) <= tight):
         return toolpaths
     known = None
+    tolerance = _LARGE_TOLERANCE if goal.prepared and not strength else _TOLERANCE
     worth = Worth.of(goal.parts, strand, strength) if strength else None
     for k in range(rounds):
         if k or strands is None:
             strands = whole_strands(toolpaths, goal.mesh)
-        tested = equilibria(goal, strands, strand, known, _TOLERANCE)
+        tested = equilibria(goal, strands, strand, known, tolerance)
         known, counts = tested.displacements, goal.counts(tested.ratios)
         if beaten(strands, known):
             return Toolpaths.empty()

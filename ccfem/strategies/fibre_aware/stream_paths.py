@@ -31,7 +31,7 @@ from ccfem.paths.planning.alike import on_layer
 from ccfem.paths.planning.unfolding import unfolded, unfolded_paths
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.layers.layer import Layer
-from ccfem.strategies.fibre_aware.heights import layers_of_one_kind, middle
+from ccfem.strategies.fibre_aware.heights import LARGE_CELLS, layers_of_one_kind, middle
 from ccfem.strategies.fibre_aware.hole_wraps import LEVELS, led_round_holes
 from ccfem.strategies.fibre_aware.path_profile import Profile, least_price
 from ccfem.strategies.fibre_aware.prune import profiles
@@ -99,6 +99,12 @@ class Extraction:
     radius: float = 0.0
     charts: Mapping[int, Chart] = field(default_factory=dict)
 
+    @property
+    def few(self) -> bool:
+        """Whether the part is so large that only one position of the levels is tested."""
+        flat = not self.charts and not self.radius
+        return flat and len(self.strains_of) == 1 and len(self.mesh.cells) > LARGE_CELLS
+
     def candidates(
         self, layers: Sequence[Layer], group: IntArray, lengths: Sequence[float]
     ) -> list[list[Toolpaths]]:
@@ -107,7 +113,7 @@ class Extraction:
         The strains of the design say only roughly which positions are worth most. Others are given
         too if they are worth hardly less, and so are whole numbers, which were drawn to the border.
         The best position is given once more with the links that are worth most, if these paths are
-        worth more.
+        worth more. Where there are few ways (`few`) that position is the only one.
 
         Parameters
         ----------
@@ -130,6 +136,10 @@ class Extraction:
         tried = [[drawings.rough(k, phase) for phase in range(self.phases)] for k in stand_ins]
         prices = [self._price(tried, counts, length) for length in lengths]
         shifts = [self.best_phases(tried, counts, price) for price in prices]
+        if self.few:
+            best = [(some[0], 0.0) for some in shifts]
+            drawn = drawings.planned(set(best))
+            return [[drawn[way]] for way in best]
         whole = len(alike) * (0,)  # drawn to the border: they may only lack links worth most
         linked = [dict.fromkeys((some[0], whole)) for some in shifts]
         pairs = {

@@ -34,7 +34,9 @@ def exchange(beam, paths, *plans):
     def cut(toolpaths, tests):
         return prune(toolpaths, stress, length, MACHINE, rounds=tests)
 
-    return exchanged(paths, plans, stress.mesh, MACHINE, judge, cut)
+    kept, tested = exchanged(paths, plans, stress.mesh, MACHINE, judge, cut)
+    assert tested.value == pytest.approx(judge(kept).value, rel=1e-6)
+    return kept
 
 
 def stretch(paths):
@@ -71,7 +73,7 @@ def test_nothing_is_taken_that_gains_nothing(bent_beam, plan, link):
 
 def test_only_plans_that_were_much_too_long_are_exchanged(bent_beam, monkeypatch):
     stress, layers = bent_beam
-    monkeypatch.setattr(cut_and_move, "exchanged", lambda *_: Toolpaths.empty())
+    monkeypatch.setattr(cut_and_move, "exchanged", lambda *about: (Toolpaths.empty(), about[-1]))
     half, row = rows(layers, (0.5,)), float(rows(layers, (0.5,)).lengths.sum())
     planned = partial(cut_and_move.prune_and_move, layers=layers, part=Goal.of(stress))
     about = {"machine": MACHINE, "strand": Strand(), "how": cut_and_move.Cutting(1)}

@@ -9,7 +9,7 @@ from ccfem.base.errors import InputError
 from ccfem.body.mesh import box_mesh
 from ccfem.fem.elasticity import Force, Problem, Support, solve
 from ccfem.fem.materials import isotropic
-from ccfem.judging.virtual_testing import Strand
+from ccfem.judging.virtual_testing import Specimen, Strand
 from ccfem.judging.virtual_testing.stiffness_test import virtual_test
 from ccfem.judging.virtual_testing.strands import cut_strands
 from ccfem.machine import Machine
@@ -242,6 +242,23 @@ def beam(moved):
     return solve(problem, tolerance=1e-10)["tip"], Planar(count=2).cut(mesh)
 
 
+def test_tests_of_a_prepared_part_find_the_same(rng):
+    """Prepared for all paths, of which half are tested; held against a factorised part."""
+    stress, layers = beam(moved=False)
+    paths = plan(Isocurve(cap=60.0), layers, stress, SHORT)
+    chosen = cut_strands(paths.select(rng.random(len(paths)) < 0.5), stress.mesh)
+    direct, iterative = (Goal.of(Specimen.of(stress, name)) for name in ("superlu", "amg"))
+    prepared = iterative.knowing(paths, Strand())
+    assert direct.knowing(paths, Strand()) is direct
+    assert prepared.prepared
+    assert not iterative.prepared
+    exact, near = (equilibria(goal, chosen, tolerance=1e-5) for goal in (direct, prepared))
+    assert near.ratios[0] == pytest.approx(exact.ratios[0], rel=1e-6)
+    np.testing.assert_allclose(
+        near.displacements[0], exact.displacements[0], atol=1e-4 * exact.displacements[0].max()
+    )
+
+
 @pytest.mark.parametrize("moved", [False, True])
 def test_no_choice_of_strands_is_stiffer_than_the_energy_allows(moved, rng):
     stress, layers = beam(moved)
@@ -273,7 +290,7 @@ def test_what_cannot_be_stiffer_than_other_paths_is_given_up(bent_beam, monkeypa
     np.testing.assert_array_equal(
         prune(curves, goal, length, SHORT, least=judge(soft)).points, stiff.points
     )
-    monkeypatch.setattr(cut_and_move, "exchanged", lambda paths, *_: paths)
+    monkeypatch.setattr(cut_and_move, "exchanged", lambda paths, *about: (paths, about[-1]))
     for candidates in ([curves, rows], [rows, curves]):
         about = (candidates, layers, goal, length, SHORT, Strand(), cut_and_move.Cutting(2))
         kept = cut_and_move.prune_and_move(*about)

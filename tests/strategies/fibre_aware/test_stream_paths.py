@@ -1,5 +1,7 @@
 """Levels of a field, and what of a part lies away from its border, against what is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -68,6 +70,11 @@ def test_links_by_worth_are_tried_at_whole_numbers_too(two_pulls, monkeypatch):
     monkeypatch.setattr(Extraction, "_gain", gain)
     ((_, *_, best),) = extraction.candidates(layers, np.zeros(1, dtype=int), [100.0])
     assert placed(extraction, best, layers[0]) == (0.0, 1.0)
+    # On a large part only the levels that are worth most by themselves are drawn.
+    monkeypatch.setattr("ccfem.strategies.fibre_aware.stream_paths.LARGE_CELLS", 0)
+    large = replace(extraction, strains_of=((1.0, np.zeros((0, 3))),))
+    ((paths,),) = large.candidates(layers, np.zeros(1, dtype=int), [100.0])
+    assert placed(large, paths, layers[0]) == (0.2, 0.0)
 
 
 def test_layers_of_one_section_are_drawn_once_for_each_field(two_pulls, monkeypatch):
