@@ -90,6 +90,10 @@ class StreamFunction(ByCoverage):
     it takes over stretches of the others where there is room and it becomes stiffer. The load is
     that of the stress given to the strategy. Fibre is taken to carry tension only.
 
+    On more than 50,000 cells, flat layers under one load case are planned in fewer ways: contours
+    and `isocurve` are left out, one position of the levels is tested, and both of the two best
+    plans take over stretches.
+
     On curved layers the field is one of space, of which each layer has the values along its
     surface: neighbouring layers get about the same strands. Rows and contours are left out there.
 
@@ -105,6 +109,7 @@ class StreamFunction(ByCoverage):
     evaluations : int, default 80
         Evaluations of the stiffness in the design. If the coverage is above 0.45, 0.6 times as many
         follow for one load case (`ccfem.strategies.fibre_aware.stream_design.designed_in_steps`).
+        On large parts (below) half of them are made.
     groups : int, default 0
         Number of fields over the height of the part; 0 for one field, or for at most six where the
         stress differs over the height. Curved layers have one, which changes over the height.

@@ -599,8 +599,8 @@ def design(problem: StreamProblem, start: FloatArray, evaluations: int = 50) -> 
     """Improve fields by `ccfem.strategies.fibre_aware.field_descent.designed_fields`.
 
     The unknowns are scaled with the curvature of all cases. The levels of each field are drawn to
-    the borders that any case stretches along it. On more than 50,000 cells, one load case gets half
-    of the evaluations.
+    the borders that any case stretches along it. On flat layers and more than 50,000 cells, one
+    load case gets half of the evaluations.
 
     Parameters
     ----------
@@ -614,7 +614,9 @@ def design(problem: StreamProblem, start: FloatArray, evaluations: int = 50) -> 
     StreamDesign
         The best of all evaluations.
     """
-    if len(problem.parts) == 1 and len(problem.model.part.mesh.cells) > LARGE_CELLS:
+    part = problem.model.part
+    large = len(part.mesh.cells) > LARGE_CELLS and not part.axes.curved
+    if large and len(problem.parts) == 1:
         evaluations = int(np.ceil(_LARGE_SHARE * evaluations))
     field, objective, ratios = designed_fields(problem, start, evaluations)
     return StreamDesign(field.reshape(len(problem.shares), -1), objective, ratios)
