@@ -116,9 +116,8 @@ def prune_and_move(
     it is moved once for the stiffness and once for both, and a test chooses. `last` is the goal on
     the cells of the last test, by which moved paths are taken or not.
     """
-    goal = Goal.of(part)
-    for paths in [paths for paths in candidates if len(paths)][:1]:
-        goal = goal.knowing(paths, strand)
+    filled = [paths for paths in candidates if len(paths)]
+    goal = Goal.of(part).knowing(filled[0], strand) if filled else Goal.of(part)
 
     def cut(
         toolpaths: Toolpaths, share: float, tests: int, least: Judged | None = None
