@@ -5,13 +5,15 @@ gather the contributions of earlier rows to row i, and to scatter those of row i
 as much memory as a sweep over whole rows.
 """
 
-from typing import Any
+from abc import ABC, abstractmethod
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
 
-from ccfem.base.arrays import Float32Array, FloatArray, Int32Array
+from ccfem.base.arrays import Float32Array, FloatArray, Int32Array, IntArray
 from ccfem.base.compiled import compiled
+from ccfem.base.parallel import in_threads
 
 _CONTRACT = {"contract"}
 """Products and sums may be fused."""
@@ -104,7 +106,30 @@ def _six(
                     y[q] -= m[p, q] * u[p]
 
 
-class GaussSeidel:
+class _Sweeps(ABC):
+    """Sweeps forward and backward round a coarse correction, over nodes of d components."""
+
+    size: int
+
+    def forward(self, rhs: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Sweep forward from zero: the approximation (d n,) and the residual (d n,) it leaves."""
+        x, residual = rhs.copy(), np.zeros_like(rhs)
+        self._run(self._by_node(residual), self._by_node(x), False)
+        return x, residual
+
+    def backward(self, rhs: FloatArray, x: FloatArray) -> FloatArray:
+        """Sweep backward over the approximation x (d n,), in place, and return it."""
+        self._run(self._by_node(rhs.copy()), self._by_node(x), True)
+        return x
+
+    def _by_node(self, values: FloatArray) -> FloatArray:
+        return values.reshape(-1, self.size)
+
+    @abstractmethod
+    def _run(self, rest: FloatArray, x: FloatArray, backward: bool) -> None: ...
+
+
+class GaussSeidel(_Sweeps):
     """Symmetric block Gauss-Seidel round a coarse correction.
 
     Parameters
@@ -134,24 +159,154 @@ class GaussSeidel:
             else np.linalg.inv(diagonal)
         )
         self._arguments: tuple[Any, ...] = (start, column, low, self.inverse)
-        self._sweep = _three if low.shape[1] == 3 else _six
-
-    def forward(self, rhs: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Sweep forward from zero: the approximation (d n,) and the residual (d n,) it leaves."""
-        x, residual = rhs.copy(), np.zeros_like(rhs)
-        self._run(residual, x, False)
-        return x, residual
-
-    def backward(self, rhs: FloatArray, x: FloatArray) -> FloatArray:
-        """Sweep backward over the approximation x (d n,), in place, and return it."""
-        self._run(rhs.copy(), x, True)
-        return x
+        self.size = low.shape[1]
+        self._sweep = _three if self.size == 3 else _six
 
     def jacobi(self, rhs: FloatArray) -> FloatArray:
         """Product (d n,) with the inverse of the diagonal blocks."""
-        shape = self.inverse.shape[:2]
-        return np.einsum("npq,nq->np", self.inverse, rhs.reshape(shape)).reshape(-1)
+        return np.einsum("npq,nq->np", self.inverse, self._by_node(rhs)).reshape(-1)
 
     def _run(self, rest: FloatArray, x: FloatArray, backward: bool) -> None:
-        shape = self.inverse.shape[:2]
-        self._sweep(*self._arguments, rest.reshape(shape), x.reshape(shape), backward)
+        self._sweep(*self._arguments, rest, x, backward)
+
+
+# Sweeps over clusters of nodes.
+#
+# Nodes of a short edge, or of a flat cell, hold each other so firmly that a sweep over one node at
+# a time barely moves them. They are solved for together. Clusters of two halves of a part that do
+# not meet are swept side by side, before those that part them.
+
+
+class _Stored(NamedTuple):
+    """What a sweep over clusters reads: nodes, cluster by cluster, and what precedes them."""
+
+    node: Int32Array  # (n,): in the order of the sweep
+    bounds: Int32Array  # (k + 1,): first node of each cluster
+    start: Int32Array  # (n + 1,): first block of each node with one of an earlier cluster
+    column: Int32Array  # (b,): that node
+    low: Float32Array  # (b, 3, 3)
+    place: Int32Array  # (k,): first entry of the inverse of each cluster
+    inverse: FloatArray  # inverses of the stiffness of the clusters, one after the other
+
+
+@compiled(fastmath=_CONTRACT)
+def _sweep_clusters(
+    stored: _Stored, first: int, last: int, rest: FloatArray, x: FloatArray, backward: bool
+) -> None:
+    """Sweep over the clusters from `first` to before `last`, otherwise as `_three`."""
+    node, bounds, start, column, low, place, inverse = stored
+    f = np.empty(3 * (np.diff(bounds).max()))
+    for cluster in range(first, last):
+        k = first + last - 1 - cluster if backward else cluster
+        begin, end = bounds[k], bounds[k + 1]
+        for p in range(begin, end):
+            i = node[p]
+            g = rest[i] if backward else x[i]
+            a, b, c = g[0], g[1], g[2]
+            for s in range(start[p], start[p + 1]):
+                m, y = low[s], x[column[s]]
+                u, v, w = y[0], y[1], y[2]
+                a -= m[0, 0] * u + m[0, 1] * v + m[0, 2] * w
+                b -= m[1, 0] * u + m[1, 1] * v + m[1, 2] * w
+                c -= m[2, 0] * u + m[2, 1] * v + m[2, 2] * w
+            q = 3 * (p - begin)
+            f[q], f[q + 1], f[q + 2] = a, b, c
+        size, at = 3 * (end - begin), place[k]
+        for p in range(begin, end):
+            i = node[p]
+            u, v, w = 0.0, 0.0, 0.0
+            for q in range(size):
+                u += inverse[at + q] * f[q]
+                v += inverse[at + size + q] * f[q]
+                w += inverse[at + 2 * size + q] * f[q]
+            at += 3 * size
+            x[i, 0], x[i, 1], x[i, 2] = u, v, w
+            for s in range(start[p], start[p + 1]):
+                m, y = low[s], rest[column[s]]
+                y[0] -= m[0, 0] * u + m[1, 0] * v + m[2, 0] * w
+                y[1] -= m[0, 1] * u + m[1, 1] * v + m[2, 1] * w
+                y[2] -= m[0, 2] * u + m[1, 2] * v + m[2, 2] * w
+
+
+_MANY_NODES = 20_000
+"""Nodes from which on both halves are swept at once: fewer take no longer than to begin that."""
+
+
+class ClusterSweeps(_Sweeps):
+    """Block Gauss-Seidel over clusters of nodes, in single precision off their diagonal.
+
+    Parameters
+    ----------
+    matrix : bsr_array (3n, 3n) with 3x3 blocks
+        Symmetric positive definite.
+    of_node : (n,) int array
+        Cluster of each node; -1 for a node by itself.
+    along : (n,) array, optional
+        Where nodes are along an axis: clusters on either side of the median, as far as they do not
+        meet, are swept side by side. Default: one after the other.
+    """
+
+    size = 3
+
+    def __init__(
+        self, matrix: sp.bsr_array, of_node: IntArray, along: FloatArray | None = None
+    ) -> None:
+        row, column, n = rows_of(matrix), matrix.indices, len(of_node)
+        # A cluster is known by its first node.
+        leader, several = np.arange(n), of_node >= 0
+        _, first, cluster = np.unique(of_node[several], return_index=True, return_inverse=True)
+        leader[several] = leader[several][first][cluster]
+        # Clusters of the first half, of the second, and those of it that meet the first.
+        part = np.zeros(n, dtype=np.int8)
+        if along is not None:
+            part[(along > np.median(along))[leader]] = 1
+            part[np.isin(leader, leader[row[part[row] > part[column]]])] = 2
+        node = np.lexsort((leader, part))
+        begins = np.diff(leader[node], prepend=-1) != 0
+        bounds = np.append(np.flatnonzero(begins), n)
+        cluster, place = np.empty(n, dtype=np.int32), np.empty(n, dtype=np.int32)
+        cluster[node], place[node] = np.cumsum(begins) - 1, np.arange(n)
+        self._spans = np.searchsorted(part[node[bounds[:-1]]], np.arange(4)).tolist()
+        # Blocks with nodes of earlier clusters, in the order of the sweep.
+        before = np.flatnonzero(cluster[column] < cluster[row])
+        before = before[np.argsort(place[row[before]], kind="stable")]
+        start = np.append(0, np.cumsum(np.bincount(place[row[before]], minlength=n)))
+        low = matrix.data.astype(np.float32)[before]
+        within = cluster[column] == cluster[row]
+        nodes = (place[row[within]], place[column[within]])
+        inverse = _inverses(*nodes, matrix.data[within], bounds)
+        integers = (node, bounds, start, column[before], inverse[0])
+        node, bounds, start, column, begin = (some.astype(np.int32) for some in integers)
+        self._stored = _Stored(node, bounds, start, column, low, begin, inverse[1])
+
+    def _run(self, rest: FloatArray, x: FloatArray, backward: bool) -> None:
+        def sweep(first: int, last: int) -> None:
+            _sweep_clusters(self._stored, first, last, rest, x, backward)
+
+        begin, middle, meeting, end = self._spans
+        if backward:
+            sweep(meeting, end)
+        # These do not meet, so that neither needs nor changes what the other does.
+        most = 2 if len(x) >= _MANY_NODES else 1
+        in_threads(sweep, [begin, middle], [middle, meeting], most=most)
+        if not backward:
+            sweep(meeting, end)
+
+
+def _inverses(
+    row: Int32Array, column: Int32Array, blocks: FloatArray, bounds: IntArray
+) -> tuple[IntArray, FloatArray]:
+    """First entry of the inverse of each cluster, and the entries, from blocks within clusters."""
+    size = 3 * np.diff(bounds)
+    begin = np.append(0, np.cumsum(size * size))
+    result = np.zeros(begin[-1])
+    cluster = np.searchsorted(bounds, row, side="right") - 1
+    width = size[cluster]
+    at = begin[cluster] + 3 * ((row - bounds[cluster]) * width + column - bounds[cluster])
+    result[at[:, None, None] + np.arange(3)[:, None] * width[:, None, None] + np.arange(3)] = blocks
+    # All clusters of one size at once.
+    for one in np.unique(size):
+        entries = begin[:-1][size == one, None] + np.arange(one * one)
+        dense = result[entries].reshape(-1, one, one)
+        result[entries] = np.linalg.inv(dense).reshape(entries.shape)
+    return begin, result

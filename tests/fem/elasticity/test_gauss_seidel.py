@@ -3,8 +3,9 @@ import pytest
 import scipy.sparse as sp
 from hypothesis import example, given, settings, strategies as st
 
+from ccfem.fem.elasticity import gauss_seidel
 from ccfem.fem.elasticity.conjugate_gradient import conjugate_gradient
-from ccfem.fem.elasticity.gauss_seidel import GaussSeidel
+from ccfem.fem.elasticity.gauss_seidel import ClusterSweeps, GaussSeidel
 
 
 def random_matrix(nodes, seed):
@@ -47,6 +48,40 @@ def test_sweeps_are_triangular_solves(nodes, seed):
         np.testing.assert_allclose(residual, rhs - dense @ x, atol=1e-12)
         expected = start + np.linalg.solve(upper, rhs - dense @ start)
         np.testing.assert_allclose(smoother.backward(rhs, start.copy()), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("along", [None, np.arange(8) % 3])
+def test_sweeps_over_clusters_are_triangular_solves_in_their_order(along, monkeypatch):
+    """Two halves that do not meet, swept by two threads or one, then what parts them."""
+    matrix, dense = random_matrix(8, 5)
+    of_node = np.array([1, 0, -1, 1, 1, -1, 0, -1])
+    if along is not None:
+        # Nodes 2 and 5, and the two clusters, meet across the median at nodes 7 and 2 only.
+        half = np.kron(along > 1, [1, 1, 1])
+        dense = np.where(half[:, None] == half, dense, 0.0)
+        dense[6:9, 15:18] = dense[15:18, 6:9] = 0.25 * np.eye(3)
+        matrix = sp.bsr_array(dense, blocksize=(3, 3))
+    first = np.array([0, 1, 2, 0, 0, 5, 1, 7])
+    order = np.unique(first, return_inverse=True)[1]
+    if along is not None:
+        part = (along > 1)[first]
+        part = np.where(np.isin(first, first[[5]]) & part, 2, part)
+        order = np.unique(10 * part + order, return_inverse=True)[1]
+    rank = np.repeat(order, 3)
+    upper = np.where(rank[:, None] <= rank, dense, 0.0)
+    rhs, start = np.random.default_rng(6).normal(size=(2, 24))
+    monkeypatch.setattr(gauss_seidel, "_MANY_NODES", 0)
+    sweeps = []
+    for threads in "12":
+        monkeypatch.setenv("CCFEM_THREADS", threads)
+        smoother = ClusterSweeps(matrix, of_node, along)
+        sweeps.append((*smoother.forward(rhs), smoother.backward(rhs, start.copy())))
+    np.testing.assert_array_equal(*sweeps)
+    x, residual, backward = sweeps[0]
+    np.testing.assert_allclose(x, np.linalg.solve(upper.T, rhs), atol=1e-6)
+    np.testing.assert_allclose(residual, rhs - dense @ x, atol=1e-6)
+    expected = start + np.linalg.solve(upper, rhs - dense @ start)
+    np.testing.assert_allclose(backward, expected, atol=1e-6)
 
 
 def test_motions_that_no_aggregate_has_stay_zero():
