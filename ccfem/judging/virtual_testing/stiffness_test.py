@@ -16,6 +16,7 @@ from ccfem.judging.virtual_testing.equilibrium import (
     TENSION,
     Equilibrium,
     equilibrium,
+    knowing_pressed_fibre,
 )
 from ccfem.judging.virtual_testing.specimen import Specimen
 from ccfem.judging.virtual_testing.strand import RHO_SPAN, Strand
@@ -223,6 +224,8 @@ def virtual_bracket(
 ) -> Bracket:
     """Test in every mode of `virtual_test`, with one factorisation; parameters as there."""
     specimen, strands = _prepared(fibres, part, machine)
+    axial = (Strand() if strand is None else strand).stiffness(specimen.modulus)
+    specimen = knowing_pressed_fibre(specimen, strands, axial)
     tests: list[VirtualTest] = []
     known = [specimen.unreinforced.displacement]
     for mode in IN_COMPRESSION:  # each starts from those before
