@@ -231,8 +231,8 @@ def has_room_beside() -> bool:
 def _left() -> int:
     """Processors for work of this process: what is done beside it gives way, or takes one each."""
     if processors() >= _granted():
-        return processors()
-    return processors() - _undone()
+        return max(processors() // _siblings, 1)
+    return max((processors() - _undone()) // _siblings, 1)
 
 
 def _undone() -> int:
@@ -305,6 +305,9 @@ class _Forks:
                 process.kill()
                 process.join()
 
+
+_siblings = 1
+"""Processes that share the processors with this one, itself included."""
 
 _besides: list[_Forks] = []
 """What is being done beside this process."""
@@ -411,6 +414,8 @@ def _serve(
 
     An outcome is a result and an error, pickled; it is empty where it cannot be.
     """
+    global _siblings
+    _siblings = max(len(inherited) // 2, 1)
     _ELSEWHERE.set(None)  # its connection is that of the parent
     # The parent says that it was stopped.
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):

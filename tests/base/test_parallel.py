@@ -231,3 +231,12 @@ def test_threads_of_blas_are_off_within_and_back_after():
     with threadpool_limits(2, user_api="blas"):
         assert one_blas_thread(threads)() == {1}
         assert threads() == {2}
+
+
+def test_processes_share_the_processors_that_their_threads_use(monkeypatch):
+    monkeypatch.setenv("CCFEM_THREADS", "4")
+    left = parallel._left
+    assert list(in_processes(lambda _: left(), range(2))) == [2, 2]
+    assert list(in_processes(lambda _: left(), range(4))) == [1, 1, 1, 1]
+    with beside(left) as alone:
+        assert alone() == 4
