@@ -275,9 +275,11 @@ class ClusterSweeps(_Sweeps):
         within = cluster[column] == cluster[row]
         nodes = (place[row[within]], place[column[within]])
         inverse = _inverses(*nodes, matrix.data[within], bounds)
-        integers = (node, bounds, start, column[before], inverse[0])
-        node, bounds, start, column, begin = (some.astype(np.int32) for some in integers)
-        self._stored = _Stored(node, bounds, start, column, low, begin, inverse[1])
+        order = [some.astype(np.int32) for some in (node, bounds, start, column[before])]
+        begin, entries = inverse
+        self._stored = _Stored(
+            order[0], order[1], order[2], order[3], low, begin.astype(np.int32), entries
+        )
 
     def _run(self, rest: FloatArray, x: FloatArray, backward: bool) -> None:
         def sweep(first: int, last: int) -> None:

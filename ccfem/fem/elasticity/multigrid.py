@@ -640,8 +640,20 @@ def two_level(matrix: sp.bsr_array, points: FloatArray, parents: IntArray | Coar
     below = smoothed_aggregation(coarse, coarse_points, thorough=True)
     of_node, _ = _grouped(*_strong(matrix, _FIRM))
     finest = ClusterSweeps(matrix, of_node, along)
-    prolong = prolong.tocsr()
-    return _cycle(finest, prolong, prolong.T.tocsr(), below)
+    if parents is rough:
+        return _cycle(finest, prolong.tocsr(), prolong.T.tocsr(), below)
+    shape = len(points), len(coarse_points)
+    weights = sp.csr_array((prolong.data[:, 0, 0], prolong.indices, prolong.indptr), shape)
+    return _cycle(finest, _Weights(weights), _Weights(weights.T.tocsr()), below)
+
+
+class _Weights(NamedTuple):
+    """Weights of nodes, the same for their three components; ``@`` applies them to those."""
+
+    values: sp.csr_array
+
+    def __matmul__(self, x: FloatArray) -> FloatArray:
+        return np.asarray(self.values @ x.reshape(-1, 3)).reshape(-1)
 
 
 def _from_corners(parents: IntArray) -> Coarse:
