@@ -195,7 +195,10 @@ def _sweep_clusters(
 ) -> None:
     """Sweep over the clusters from `first` to before `last`, otherwise as `_three`."""
     node, bounds, start, column, low, place, inverse = stored
-    f = np.empty(3 * (np.diff(bounds).max()))
+    most = 0
+    for k in range(first, last):
+        most = max(most, bounds[k + 1] - bounds[k])
+    f = np.empty(3 * most)
     for cluster in range(first, last):
         k = first + last - 1 - cluster if backward else cluster
         begin, end = bounds[k], bounds[k + 1]
