@@ -88,7 +88,6 @@ LARGE = (
     "plate 400 300 8",
     "plate 400 300 16",
     "plate 400 300 72",
-    "plate 400 300 240",
     "plate 100 75 600 4.36",
 )
 """What is planned without a virtual test."""
@@ -125,7 +124,7 @@ def part(said: str, folder: Path) -> tuple[list[str], Case]:
 
 
 class _Steps(logging.Handler):
-    """Takes the CPU time at which each step of progress begins, and the share of time before it."""
+    """Takes the CPU time of each step's begin, and what is said to be left then."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -134,9 +133,11 @@ class _Steps(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Take a step."""
         assert isinstance(record.args, tuple)
-        _, percent, what = record.args
+        spent, percent, what = record.args
+        assert isinstance(spent, float)
         assert isinstance(percent, float)
-        self.begun.append((time.process_time(), 0.01 * percent, str(what)))
+        left = spent * (100.0 / max(percent, 1e-7) - 1.0)
+        self.begun.append((time.process_time(), left, str(what)))
 
 
 def watched(words: list[str], file: Path) -> None:
@@ -161,7 +162,7 @@ def watched(words: list[str], file: Path) -> None:
             raise
     seconds: dict[str, float] = {}
     # The measurement itself, and imports for it, take a tenth of a second.
-    begun = [(0.0, 0.0, ""), *steps.begun, (time.process_time(), 1.0, "")]
+    begun = [(0.0, 0.0, ""), *steps.begun, (time.process_time(), 0.0, "")]
     for (start, _, what), (stop, *_) in itertools.pairwise(begun):
         stage = next((name for first, name in _STAGES.items() if what.startswith(first)), "start")
         stage = f"plan {what.split()[1]}" if stage == "plan" else stage
@@ -371,10 +372,10 @@ def show_left(rows: list[dict[str, str]], samples: Samples) -> None:
     """Print where the fits to the other parts tell times left that are off by more than 1.5."""
     off = []
     for row in rows:
-        for stage, told, true in replay(row, fitted(samples, row["part"])):
-            off.append(np.exp(np.abs(np.log(told / true))))
+        for stage, left, true in replay(row, fitted(samples, row["part"])):
+            off.append(np.exp(np.abs(np.log(left / true))))
             if off[-1] > 1.5:
-                print(f"{row['part']} {row['command']}, {stage}: {told:.1f} of {true:.1f} s left")
+                print(f"{row['part']} {row['command']}, {stage}: {left:.1f} of {true:.1f} s left")
     within = sum(factor <= 1.5 for factor in off)
     print(f"time left: {within} of {len(off)} within a factor of 1.5, all within {max(off):.2f}")
 

@@ -40,11 +40,11 @@ def show(words: list[str], folder: Path) -> None:
     print(f"ccfem {' '.join(words)}: {end:.0f} s, {first:.1f} of them before the first line")
     print(f"{'after':>7} {'told':>7} {'true':>7} {'ratio':>6}")
     largest = 1.0
-    for at, share, what in steps:
-        left, told = end - at, (at - first) * (1.0 / max(share, 1e-9) - 1.0)
+    for at, expected, what in steps:
+        left = end - at
         if at > 0.1 * end and left > WORTH:
-            largest = max(largest, math.exp(abs(math.log(told / left))))
-        print(f"{at:7.1f} {told:7.1f} {left:7.1f} {told / left:6.2f}  {what}")
+            largest = max(largest, math.exp(abs(math.log(expected / left))))
+        print(f"{at:7.1f} {expected:7.1f} {left:7.1f} {expected / left:6.2f}  {what}")
     print(f"largest factor after a tenth, with {WORTH:g} s left or more: {largest:.2f}\n")
 
 

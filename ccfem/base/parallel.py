@@ -217,9 +217,13 @@ time of what it gives way to, and also of other people's work: less would hold i
 
 
 def _with_low_priority(work: Callable[[], Result]) -> Result:
+    global _siblings
     # Not where work whose result cannot be sent is done again by the user's own process.
-    if processors() >= _granted() and multiprocessing.current_process().daemon:
-        os.nice(_LOW)
+    if multiprocessing.current_process().daemon:
+        if processors() >= _granted():
+            os.nice(_LOW)
+        else:  # it counts as one processor
+            _siblings = processors()
     return work()
 
 

@@ -338,14 +338,15 @@ class _Early:
             def outcome(late: Sequence[Run]) -> Sequence[Run]:
                 parts = {run.slicing: part for run in late}
                 judged_late = side_by_side("judging {}", self.judged, late, parts, tell)
-                tell(names[0])  # in all, where there was no room for it before
+                for name in dict.fromkeys(names):  # in all, where there was no room before
+                    tell(name)
                 done, bounds, spent = result()
                 self.bounds.update(bounds)
                 self.seconds.update(spent)
                 return [*done, *judged_late]
 
             if has_room_beside():
-                tell.beside([*names, "bounding"])
+                tell.beside([*names, *["bounding"] * (wanted is not None)])
             with beside(work, shared=[runs, part, self.basis]) as result:
                 yield outcome
 

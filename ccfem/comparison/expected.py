@@ -54,7 +54,7 @@ class Schedule:
 
     def __post_init__(self) -> None:
         self._began = self._last = time.perf_counter()
-        self._step, self._told, self._wait = next(iter(self.passed), ""), False, 0.0
+        self._step, self._begun, self._wait = next(iter(self.passed), ""), False, 0.0
 
     def __call__(self, what: str, _: float = 0.0) -> None:
         """Say what is done next: what was said before is done."""
@@ -64,16 +64,18 @@ class Schedule:
         self._last, self._step = now, max(begun, key=len, default="")
         self.passed.setdefault(self._step, 0.0)
         spent, left = now - self._began, self.left()
-        if left > _LONG and not self._told:
-            what = f"{what} ({about(left)} in all)"
-        self._told = True
+        if left > _LONG and not self._begun:
+            what = f"{what} ({about(spent + left)} in all)"
+        self._begun = True
         self.progress(what, spent / (spent + left) if spent + left else 0.0)
 
     def left(self) -> float:
         """Seconds that are left."""
         weights = logarithms = 0.0
         for step, spent in self.passed.items():
-            if step != self._step and (expected := self.steps.get(step)):
+            # What was waited for of a step that is done beside others says nothing of the pace.
+            alone = step not in {self._step, *self._aside}
+            if alone and (expected := self.steps.get(step)):
                 weight = math.sqrt(expected)
                 weights += weight
                 logarithms += weight * math.log((spent + _SURE) / (expected + _SURE))

@@ -94,9 +94,12 @@ class Concentric(Infill):
             return concentric(layer.plane.polygon, spacing, _CLOSEST, 0.5 * width, self.rings)
         start: tuple[float, ...] | None = None
         if self.joined:
-            first = layer.plane.points[layer.loops[0][:2]].mean(axis=0)
-            start = tuple(first.tolist()) if self.start is None else self.start
-        return list(_rings(layer.plane.polygon, spacing, width, self.rings, start))
+            place = self.start
+            if place is None:
+                place = layer.plane.points[layer.loops[0][:2]].mean(axis=0)
+            start = tuple(np.asarray(place, dtype=np.float64).tolist())
+        rings = _rings(layer.plane.polygon, spacing, width, self.rings, start)
+        return [ring.copy() for ring in rings]
 
     def regions(self, image: Bitmap, layer: Layer, stress: LayerStress) -> Regions:
         """Rings of pixels."""

@@ -109,7 +109,6 @@ class StreamFunction(ByCoverage):
     evaluations : int, default 80
         Evaluations of the stiffness in the design. If the coverage is above 0.45, 0.6 times as many
         follow for one load case (`ccfem.strategies.fibre_aware.stream_design.designed_in_steps`).
-        On large parts (above) three fifths of them are made.
     groups : int, default 0
         Number of fields over the height of the part; 0 for one field, or for at most six where the
         stress differs over the height. Curved layers have one, which changes over the height.

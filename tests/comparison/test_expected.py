@@ -162,15 +162,15 @@ def test_every_length_of_a_front_is_a_plan():
     assert front == pytest.approx({step: times[step] * spent for step, spent in one.items()})
 
 
-@pytest.mark.parametrize(("seconds", "said"), [(30.0, ""), (90.0, " (about 90 s in all)")])
-def test_a_long_run_says_what_it_will_take_before_it_is_solved(clock, seconds, said):
+@pytest.mark.parametrize(("seconds", "words"), [(30.0, ""), (90.0, " (about 90 s in all)")])
+def test_a_long_run_says_what_it_will_take_before_it_is_solved(clock, seconds, words):
     """The program started in the 2 s that are expected, so that the pace is as expected too."""
     lines = []
     steps = {"start": 2.0, "solving": 10.0, "planning a": seconds - 10.0}
     tell = Schedule(lambda what, _: lines.append(what), steps=steps, passed={"start": 2.0})
     tell("solving a part")
     tell("planning a")
-    assert lines == [f"solving a part{said}", "planning a"]
+    assert lines == [f"solving a part{words}", "planning a"]
 
 
 def test_layers_that_a_strand_does_not_fit_are_refused_before_they_are_cut(monkeypatch):
@@ -193,9 +193,9 @@ def test_a_replay_of_what_was_measured_tells_the_time_left():
     rows = benchmark.lines()
     coefficients = tomllib.loads(COEFFICIENTS.read_text())
     factors = [
-        max(told / true, true / told)
+        max(left / true, true / left)
         for row in rows
-        for _, told, true in benchmark.replay(row, coefficients)
+        for _, left, true in benchmark.replay(row, coefficients)
     ]
     assert len(factors) > 100
     assert sum(factor <= 1.5 for factor in factors) > 0.9 * len(factors)

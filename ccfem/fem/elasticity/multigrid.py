@@ -519,7 +519,7 @@ _ENERGY = ("energy", {"krylov": "cg", "maxiter": 4, "degree": 1})
 
 _FIRM = 0.55
 """Size of a block above which nodes of quadratic cells are solved for together. On the Shell .45 to
-.85 take 44 to 64 iterations, single nodes 76 (measured)."""
+.85 take 44 to 64 iterations, single nodes more than 70 (measured)."""
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from ccfem.paths.planning.equal_fibre import TOLERANCE
 from ccfem.paths.planning.layer_plans import plan_layers
 from ccfem.paths.planning.strategy import WholePart
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
-from ccfem.slicing.layers.layer import Layer
+from ccfem.slicing.layers.layer import Layer, curved_layers
 from ccfem.strategies.fibre_aware.heights import LARGE_CELLS
 from ccfem.strategies.fibre_aware.judges import (
     Goal,
@@ -112,12 +112,14 @@ def prune_and_move(
     Each candidate is cut, and the best one is moved: the stiffest, or with strength the one of
     highest value. Before that the stiffest takes over stretches of the others (`exchanged`), if it
     was cut from much more fibre; for several load cases that gains next to nothing. On large parts
-    the second does so too, and the better one is taken. With strength
-    it is moved once for the stiffness and once for both, and a test chooses. `last` is the goal on
-    the cells of the last test, by which moved paths are taken or not.
+    with flat layers the second does so too, and the better one is taken. With strength it is moved
+    once for the stiffness and once for both, and a test chooses. `last` is the goal on the cells of
+    the last test, by which moved paths are taken or not.
     """
     filled = [paths for paths in candidates if len(paths)]
-    goal = Goal.of(part).knowing(filled[0], strand) if filled else Goal.of(part)
+    goal = Goal.of(part)
+    if filled and not how.strength and not how.moves:
+        goal = goal.knowing(filled[0], strand)
 
     def cut(
         toolpaths: Toolpaths, share: float, tests: int, least: Judged | None = None
@@ -130,16 +132,17 @@ def prune_and_move(
         both = (aim, layers, machine, strand, how.strength)
         return tuple(strength_judge(*both, for_both, tolerance) for for_both in _FOR_BOTH)
 
-    roughly = goal.prepared and not how.strength and not how.moves
-    judges = judges_of(goal, _LARGE_ROUGH if roughly else _ROUGH)
+    judges = judges_of(goal, _LARGE_ROUGH if goal.prepared else _ROUGH)
 
     def exchange(kept: Toolpaths, source: Toolpaths, tested: Judged) -> tuple[Toolpaths, Judged]:
         if len(goal.parts) > 1 or fibre_length(source) < _MUCH * length:
             return kept, tested
         cut_again = partial(cut, share=0.0)
-        return exchanged(kept, candidates, goal.mesh, machine, judges[0], cut_again, tested)
+        mesh = goal.mesh
+        return exchanged(kept, candidates, mesh, machine, judges[0], cut_again, tested, times)
 
-    bases = _LARGE_BASES if len(goal.mesh.cells) > LARGE_CELLS else 1
+    large = len(goal.mesh.cells) > LARGE_CELLS and not curved_layers(layers)
+    times, bases = (_LARGE_TIMES, _LARGE_BASES) if large else (_TIMES, 1)
     kept = best_cut(candidates, cut, judges[0], how.strength, how.rounds, exchange, bases)
     if not how.moves:
         return kept
@@ -276,6 +279,7 @@ def exchanged(
     judge: Judge,
     cut: Callable[..., Toolpaths],
     tested: Judged | None = None,
+    times: int = _TIMES,
 ) -> tuple[Toolpaths, Judged]:
     """Add stretches of other plans to a plan where there is room, and cut all to the length again.
 
@@ -289,6 +293,8 @@ def exchanged(
         Cuts toolpaths to the length wanted, by a number of `tests`.
     tested : Judged, optional
         The test of the given paths, where it is known.
+    times : int, default 3
+        Exchanges at most.
 
     Returns
     -------
@@ -298,7 +304,7 @@ def exchanged(
     least = machine.shortest_strand
     length, known = fibre_length(paths), judge(paths) if tested is None else tested
     pieces = [(plan, *_pieces(plan, mesh)) for plan in plans if len(plan)]
-    for _ in range(_LARGE_TIMES if len(mesh.cells) > LARGE_CELLS else _TIMES):
+    for _ in range(times):
         price, taken = _price(paths, known, mesh), _Taken(machine.fibre_width, [paths])
         for plan, strands, pieces_of in pieces:
             along = profiles(plan, strands, _worth(known, pieces_of))

@@ -75,16 +75,15 @@ class Goal:
         return cls((specimen,), np.ones(1), np.ones(1))
 
     def knowing(self, toolpaths: Toolpaths, strand: Strand) -> "Goal":
-        """Return the goal with parts prepared for tests of paths that are like some.
+        """Return the goal of one load case with its part prepared for tests of paths like some.
 
-        Parts that are factorised stay as they are.
+        Several load cases, and parts that are factorised, stay as they are.
         """
-        if self.parts[0].solver.backend != "amg":
+        if len(self.parts) > 1 or self.parts[0].solver.backend != "amg":
             return self
         strands = whole_strands(toolpaths, self.mesh)
         axial = strand.stiffness(self.parts[0].modulus)
-        parts = tuple(knowing_fibre(part, strands, axial) for part in self.parts)
-        return replace(self, parts=parts, prepared=True)
+        return replace(self, parts=(knowing_fibre(self.parts[0], strands, axial),), prepared=True)
 
     @property
     def mesh(self) -> TetMesh:

@@ -118,7 +118,7 @@ def prune(
     if length_now <= length and (tight >= 1.0 or tight_share(toolpaths, machine) <= tight):
         return toolpaths
     known = None
-    tolerance = _LARGE_TOLERANCE if goal.prepared and not strength else _TOLERANCE
+    tolerance = _LARGE_TOLERANCE if goal.prepared else _TOLERANCE
     worth = Worth.of(goal.parts, strand, strength) if strength else None
     for k in range(rounds):
         if k or strands is None:

@@ -18,7 +18,6 @@ import scipy.sparse as sp
 from ccfem.base.arrays import FloatArray, IntArray, freeze
 from ccfem.strategies.fibre_aware.border_levels import BorderLevels
 from ccfem.strategies.fibre_aware.field_descent import designed_fields
-from ccfem.strategies.fibre_aware.heights import LARGE_CELLS
 from ccfem.strategies.fibre_aware.smeared import UPPER, SmearedPart, SmearedSolution
 from ccfem.strategies.fibre_aware.spline_grid import SplineGrid
 from ccfem.strategies.fibre_aware.upper_bound import LEAST, SUM, WORST
@@ -130,10 +129,6 @@ _FIRST = 0.5
 
 _THEN = 0.6
 """Evaluations of the second step, over those of the first."""
-
-_LARGE_SHARE = 0.6
-"""Share of the evaluations that a design of one load case gets on a large part: on the Shell of
-Chen et al. 2021 the rest gains .3 % in the fields, and nothing in the plan that is cut."""
 
 Pull: TypeAlias = tuple[FloatArray, FloatArray]
 """Derivatives (m,) by the two components of a field's gradient in the cells."""
@@ -599,8 +594,7 @@ def design(problem: StreamProblem, start: FloatArray, evaluations: int = 50) -> 
     """Improve fields by `ccfem.strategies.fibre_aware.field_descent.designed_fields`.
 
     The unknowns are scaled with the curvature of all cases. The levels of each field are drawn to
-    the borders that any case stretches along it. On flat layers and more than 50,000 cells, one
-    load case gets three fifths of the evaluations.
+    the borders that any case stretches along it.
 
     Parameters
     ----------
@@ -614,10 +608,6 @@ def design(problem: StreamProblem, start: FloatArray, evaluations: int = 50) -> 
     StreamDesign
         The best of all evaluations.
     """
-    part = problem.model.part
-    large = len(part.mesh.cells) > LARGE_CELLS and not part.axes.curved
-    if large and len(problem.parts) == 1:
-        evaluations = int(np.ceil(_LARGE_SHARE * evaluations))
     field, objective, ratios = designed_fields(problem, start, evaluations)
     return StreamDesign(field.reshape(len(problem.shares), -1), objective, ratios)
 

@@ -101,7 +101,7 @@ class Extraction:
 
     @property
     def few(self) -> bool:
-        """Whether the part is so large that only one position of the levels is tested."""
+        """Whether tests take so long that only the position that seems best is given, as it is."""
         flat = not self.charts and not self.radius
         return flat and len(self.strains_of) == 1 and len(self.mesh.cells) > LARGE_CELLS
 
@@ -113,7 +113,7 @@ class Extraction:
         The strains of the design say only roughly which positions are worth most. Others are given
         too if they are worth hardly less, and so are whole numbers, which were drawn to the border.
         The best position is given once more with the links that are worth most, if these paths are
-        worth more. Where there are few ways (`few`) that position is the only one.
+        worth more. On large flat parts under one load (`few`) that position is the only one.
 
         Parameters
         ----------

@@ -73,7 +73,7 @@ def test_nothing_is_taken_that_gains_nothing(bent_beam, plan, link):
 
 def test_only_plans_that_were_much_too_long_are_exchanged(bent_beam, monkeypatch):
     stress, layers = bent_beam
-    monkeypatch.setattr(cut_and_move, "exchanged", lambda *about: (Toolpaths.empty(), about[-1]))
+    monkeypatch.setattr(cut_and_move, "exchanged", lambda *about: (Toolpaths.empty(), about[-2]))
     half, row = rows(layers, (0.5,)), float(rows(layers, (0.5,)).lengths.sum())
     planned = partial(cut_and_move.prune_and_move, layers=layers, part=Goal.of(stress))
     about = {"machine": MACHINE, "strand": Strand(), "how": cut_and_move.Cutting(1)}

@@ -290,7 +290,7 @@ def test_what_cannot_be_stiffer_than_other_paths_is_given_up(bent_beam, monkeypa
     np.testing.assert_array_equal(
         prune(curves, goal, length, SHORT, least=judge(soft)).points, stiff.points
     )
-    monkeypatch.setattr(cut_and_move, "exchanged", lambda paths, *about: (paths, about[-1]))
+    monkeypatch.setattr(cut_and_move, "exchanged", lambda paths, *about: (paths, about[-2]))
     for candidates in ([curves, rows], [rows, curves]):
         about = (candidates, layers, goal, length, SHORT, Strand(), cut_and_move.Cutting(2))
         kept = cut_and_move.prune_and_move(*about)

@@ -60,13 +60,6 @@ def started(stress, layers, **options):
     return problem, start_fields(problem, (stress,), layers[:groups], cap=90.0)
 
 
-def test_a_large_part_gets_three_fifths_of_the_evaluations(bent_beam, monkeypatch):
-    problem, field = started(*bent_beam)
-    fewer = design(problem, field, evaluations=6)
-    monkeypatch.setattr("ccfem.strategies.fibre_aware.stream_design.LARGE_CELLS", 0)
-    np.testing.assert_array_equal(design(problem, field, evaluations=10).fields, fewer.fields)
-
-
 @pytest.mark.parametrize("groups", [1, 2])
 @pytest.mark.parametrize("scale", [0.6, 1.6])
 @pytest.mark.parametrize("radius", [0.0, 20.0])
