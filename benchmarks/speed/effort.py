@@ -71,6 +71,7 @@ PARTS = (
     "plate 60 40 12",
     "bridge",
     "open_hole element_size=1.5",
+    "loop element_size=2.1",
     "loop element_size=6",
     "bar order=2",
 )

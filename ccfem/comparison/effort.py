@@ -24,6 +24,8 @@ from ccfem.fem.elasticity.solve_cost import solve_costs
 from ccfem.machine.machine import Machine
 from ccfem.paths.planning.alike import BORDERS, equal_sections
 from ccfem.slicing.layers.layer import Layer, curved_layers
+from ccfem.strategies.fibre_aware.heights import LARGE_CELLS
+from ccfem.strategies.fibre_aware.smeared import DIRECT_UNKNOWNS
 
 COEFFICIENTS = Path(__file__).with_suffix(".toml")
 """What each term of each stage takes: CPU seconds, or gigabytes of memory."""
@@ -34,8 +36,8 @@ FILLED = 0.45
 TERMS: dict[str, tuple[str, ...]] = {
     "start": ("run", "unknowns", "triangles"),
     "solve": ("solved", "triangles"),
-    "plan stream_function": ("unknowns", "room"),
-    "plan stream_function to a length": ("unknowns", "room"),
+    "plan stream_function": ("factorised", "iterated", "room"),
+    "plan stream_function to a length": ("factorised", "iterated", "room"),
     "plan zigzag": ("triangles", "room"),
     "plan": ("triangles", "some_room"),
     "judge": ("solved", "triangles", "room"),
@@ -63,6 +65,10 @@ _PLANNED = {
 """Stages of planning by strategies."""
 
 
+_FEWER = 0.45
+"""Share of the time for each unknown that is left above `LARGE_CELLS` (measured)."""
+
+
 @dataclass(frozen=True)
 class Counts:
     """What the work on a part grows with."""
@@ -84,6 +90,17 @@ class Counts:
     def bulk(self) -> float:
         """Cells times those at each unknown: a few in thin walls, many within thick ones."""
         return self.cells**2 / self.unknowns
+
+    @property
+    def factorised(self) -> float:
+        """Unknowns of designs that solve with a factor."""
+        return self.unknowns if self.unknowns <= DIRECT_UNKNOWNS else 0.0
+
+    @property
+    def iterated(self) -> float:
+        """Unknowns of designs that iterate; large parts are planned in fewer ways."""
+        share = _FEWER if self.cells > LARGE_CELLS else 1.0
+        return share * (self.unknowns - self.factorised)
 
     @property
     def near(self) -> float:

@@ -65,7 +65,7 @@ def designs_alone(monkeypatch):
 def test_uniform_tension_gets_straight_fibre_and_the_stiffness_of_parallel_bars(
     pulled_bar, factorised, monkeypatch
 ):
-    monkeypatch.setattr(smeared, "_DIRECT_UNKNOWNS", factorised)  # others by multigrid
+    monkeypatch.setattr(smeared, "DIRECT_UNKNOWNS", factorised)  # others by multigrid
     stress, layers = pulled_bar
     strategy = StreamFunction(coverage=0.4, overfill=1.0, evaluations=10, phases=2, inset=0.0)
     paths = plan(strategy, layers, stress, MACHINE)

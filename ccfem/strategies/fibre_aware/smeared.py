@@ -30,7 +30,7 @@ _UPDATES = 40
 _PROGRESS = 1e-3
 """Factor by which one solve reduces the residual: the set of fibre in tension may then change."""
 
-_DIRECT_UNKNOWNS = 25_000
+DIRECT_UNKNOWNS = 25_000
 """Largest system that is factorised: solves are then as fast as with multigrid, and rotate with the
 part to the last digits."""
 
@@ -352,7 +352,7 @@ def smeared_cases(fields: Sequence[StressField], frame: FloatArray) -> tuple[Sme
 
 def _backend(stress: StressField) -> str:
     """Preconditioner by the size of the part."""
-    return "superlu" if 3 * len(stress.mesh.points) <= _DIRECT_UNKNOWNS else "amg"
+    return "superlu" if 3 * len(stress.mesh.points) <= DIRECT_UNKNOWNS else "amg"
 
 
 def _key(backend: str, frame: FloatArray) -> tuple[str, bytes]:
