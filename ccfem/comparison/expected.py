@@ -81,7 +81,7 @@ class Schedule:
                 logarithms += weight * math.log((spent + _SURE) / (expected + _SURE))
         pace = math.exp(logarithms / (weights + _PRIOR))
         begun = {*self.passed, *self._aside}
-        to_come = sum(spent for step, spent in self.steps.items() if step not in begun)
+        to_come = sum(expected for step, expected in self.steps.items() if step not in begun)
         to_come += 0.0 if {*self.passed} & {*self._aside, *WRITING} else self._wait
         now = 0.0 if self._step in self._aside else self.steps.get(self._step, 0.0)
         return pace * to_come + max(pace * now - self.passed.get(self._step, 0.0), 0.0)

@@ -91,8 +91,8 @@ class StreamFunction(ByCoverage):
     that of the stress given to the strategy. Fibre is taken to carry tension only.
 
     On more than 50,000 cells, flat layers under one load case are planned in fewer ways: contours
-    and `isocurve` are left out, one position of the levels is tested, and both of the two best
-    plans take over stretches.
+    and `isocurve` are left out, one position of the levels is tested (unless turns are cut), and
+    both of the two best plans take over stretches.
 
     On curved layers the field is one of space, of which each layer has the values along its
     surface: neighbouring layers get about the same strands. Rows and contours are left out there.

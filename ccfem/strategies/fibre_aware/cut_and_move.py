@@ -27,8 +27,8 @@ from ccfem.paths.planning.equal_fibre import TOLERANCE
 from ccfem.paths.planning.layer_plans import plan_layers
 from ccfem.paths.planning.strategy import WholePart
 from ccfem.paths.toolpaths import FIBRE, Toolpaths
-from ccfem.slicing.layers.layer import Layer, curved_layers
-from ccfem.strategies.fibre_aware.heights import LARGE_CELLS
+from ccfem.slicing.layers.layer import Layer
+from ccfem.strategies.fibre_aware.heights import is_large
 from ccfem.strategies.fibre_aware.judges import (
     Goal,
     Judge,
@@ -141,7 +141,7 @@ def prune_and_move(
         mesh = goal.mesh
         return exchanged(kept, candidates, mesh, machine, judges[0], cut_again, tested, times)
 
-    large = len(goal.mesh.cells) > LARGE_CELLS and not curved_layers(layers)
+    large = is_large(goal.mesh, layers)
     times, bases = (_LARGE_TIMES, _LARGE_BASES) if large else (_TIMES, 1)
     kept = best_cut(candidates, cut, judges[0], how.strength, how.rounds, exchange, bases)
     if not how.moves:

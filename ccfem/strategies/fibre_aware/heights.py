@@ -204,6 +204,11 @@ LARGE_CELLS = 50_000
 longest, and what is left out is made up for by one more exchange of stretches."""
 
 
+def is_large(mesh: TetMesh, layers: Sequence[Layer]) -> bool:
+    """Whether a part is one of more than `LARGE_CELLS` on flat layers."""
+    return len(mesh.cells) > LARGE_CELLS and not curved_layers(layers)
+
+
 def nearest_layer(part: SmearedPart, layers: Sequence[Layer]) -> IntArray:
     """Position in `layers` of the one nearest to each cell, (m,); of flat ones in height."""
     if curved_layers(layers):

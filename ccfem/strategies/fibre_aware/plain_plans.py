@@ -21,8 +21,8 @@ from ccfem.slicing.layers.layer import Layer, LayerStress, curved_layers
 from ccfem.strategies import create
 from ccfem.strategies.concentric import Concentric
 from ccfem.strategies.fibre_aware.heights import (
-    LARGE_CELLS,
     grouped_by_stress,
+    is_large,
     layers_by_case,
     layers_of_one_kind,
     middle,
@@ -216,7 +216,7 @@ def plain_plans(
         return in_all(lambda some, field: plan_layers(planner, some, some, field, machine))
 
     plans = []
-    large = len(cases.mesh.cells) > LARGE_CELLS and not curved_layers(layers)
+    large = is_large(cases.mesh, layers)
     few = large and len(cases) == 1
     if not curved_layers(layers):
         plans += [by(StraightRows("tension")), by(StraightRows("section"))]

@@ -14,7 +14,6 @@ from ccfem.fem.materials import isotropic
 from ccfem.machine.machine import Machine
 from ccfem.paths.toolpaths import Toolpaths
 from ccfem.slicing.slicers.planar import Planar
-from ccfem.strategies.fibre_aware import plain_plans as module
 from ccfem.strategies.fibre_aware.plain_plans import _longer_side, plain_plans
 
 MACHINE = Machine(minimum_length=15.0)
@@ -49,7 +48,7 @@ def test_on_large_parts_two_layers_of_about_one_section_share_stripes(monkeypatc
     problem = Problem(mesh, isotropic(3500.0, 0.3), (Support("x_min"),), pulled, order=1)
     cases, layers = WeightedCases.of(solve(problem)), Planar(count=4).cut(mesh)
     for_each = plain_plans(cases, layers, MACHINE, curves=False)[-1]
-    monkeypatch.setattr(module, "LARGE_CELLS", 0)
+    monkeypatch.setattr("ccfem.strategies.fibre_aware.heights.LARGE_CELLS", 0)
     *rows, shared = plain_plans(cases, layers, MACHINE)
     assert len(rows) == 2  # contours and isocurves take long
     # Two runs of two layers: the upper one of each is planned as without sharing.
